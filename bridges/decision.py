@@ -1,0 +1,99 @@
+"""What every decision core takes and gives: events in, a Decision out.
+
+A core is one pure function, `decide(memory, event, now, limits) -> Decision`. It has no I/O, no
+clock and no log. `now` is monotonic seconds. Each call derives the whole set of outputs and the
+whole report afresh, so a repeated, lost or reordered event cannot leave a relay where it should
+not be.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+from bridges.rmf.definitions import Message
+from bridges.rmf.topics import Topic
+
+S = TypeVar("S")
+M = TypeVar("M")
+O = TypeVar("O")  # noqa: E741
+R = TypeVar("R", bound="Report")
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing that is wrong, by a name that an engineer knows; `detail` says which and why."""
+
+    code: str
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.code}: {self.detail}" if self.detail else self.code
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled(Generic[S]):
+    """The driver has read every input once; the reading is as old as `now` when it is decided."""
+
+    sample: S
+
+
+@dataclass(frozen=True, slots=True)
+class IoFailed:
+    """A read or a write did not succeed: the outputs are unknown and the inputs not fresh."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class WriteFailed(IoFailed):
+    """The inputs were read, but not every output could be written. The next scan tries again."""
+
+
+@dataclass(frozen=True, slots=True)
+class RivalSeen:
+    """Somebody else publishes states under this device's name."""
+
+
+@dataclass(frozen=True, slots=True)
+class OperatorReset:
+    """`rmf-bridge reset`: latched faults may clear if their cause is gone."""
+
+
+class Report(Protocol):
+    """What RMF and the status file are told. Equal reports are the same news."""
+
+    @property
+    def read_at(self) -> float | None:
+        """Monotonic time of the reading that the report rests on; None before the first."""
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """Everything that is wrong now, most serious first."""
+
+    def news(self) -> Any:
+        """The part whose change is worth publishing at once: the report without its age."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decision(Generic[M, O, R]):
+    """The result of one scan.
+
+    `outputs`: the whole set, to be written as it is. `wake_at`: decide again by then at the latest
+    (monotonic seconds; `inf` when only an event can change anything). `refused`: why the event was
+    not obeyed, "" when it was. `publish`: messages beside the state, each to go out once.
+    """
+
+    memory: M
+    outputs: O
+    report: R
+    wake_at: float
+    refused: str = ""
+    publish: tuple[tuple[Topic[Any], Message], ...] = ()
+
+
+class RequestRefused(Exception):
+    """A message that is not obeyed. `kind` is a short fixed name to count and to log once by."""
+
+    def __init__(self, kind: str, detail: str) -> None:
+        super().__init__(f"{kind}: {detail}")
+        self.kind = kind
+        self.detail = detail

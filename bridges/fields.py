@@ -1,0 +1,53 @@
+"""What the sections of every device YAML are made of: numbers with units, names, common structs.
+
+`bridges/settings.py` reads a file into these; the kinds and drivers derive their own from them.
+A struct may have `problems() -> Iterable[tuple[tuple[str, ...], str]]`: what its fields cannot say
+one by one, as (path below the struct, text with the fix). It is asked when each field is there and
+of the right sort, even if a struct below has problems of its own.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+Seconds = Annotated[float, Meta(ge=0, le=86400, extra={"unit": "s"})]
+"""A duration that may be zero."""
+Period = Annotated[float, Meta(ge=0.01, le=60, extra={"unit": "s"})]
+"""A repetition period."""
+Name = Annotated[
+    str,
+    Meta(
+        min_length=1,
+        max_length=128,
+        pattern=r"^[^\x00-\x20\x7f-\x9f]([^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\x9f])?$(?!\n)",
+        extra={"pattern": "text without control characters, or spaces at its ends,"},
+    ),
+]
+"""A name that RMF uses: any text, quoted in YAML where YAML would read something else."""
+
+
+class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the daemon reaches Open-RMF.
+
+    `transport`: `ros2` (rclpy), `dds` (without ROS), or `auto`: rclpy where it imports, else dds.
+    `domain_id`: the DDS domain; ROS_DOMAIN_ID, or 0, when absent.
+    `network`: `localhost` keeps all traffic on the loopback interface.
+    `topics`: RMF's topic name -> the name that the site uses.
+    """
+
+    transport: Literal["auto", "ros2", "dds"] = "auto"
+    domain_id: Annotated[int, Meta(ge=0, le=232)] | None = None
+    network: Literal["subnet", "localhost"] = "subnet"
+    topics: dict[Name, Name] = msgspec.field(default_factory=dict)
+
+
+class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every lift, door and charger has, whatever its driver.
+
+    `bus`: the name of the bus that it stands on; not needed where the file has one.
+    `accept_unsafe`: signal -> why its unsafe wiring is accepted; `check` prints it.
+    """
+
+    bus: Name | None = None
+    accept_unsafe: dict[Name, Name] = msgspec.field(default_factory=dict)

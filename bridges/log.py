@@ -1,0 +1,43 @@
+"""Logs: one event, one line, `event key=value …`, with the priority that journald understands."""
+
+import logging
+import os
+import sys
+
+_PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
+
+
+def pairs(event: str, **values: object) -> str:
+    """One log line: values with spaces or quotes are quoted, so that a line stays one line."""
+    return " ".join([event, *(f"{key}={_quoted(str(value))}" for key, value in values.items())])
+
+
+def _quoted(text: str) -> str:
+    if text and text.isprintable() and not any(c in text for c in ' "='):
+        return text
+    return '"' + text.encode("unicode_escape").decode("ascii").replace('"', "'") + '"'
+
+
+class _Formatter(logging.Formatter):
+    """Under systemd `<6>text`, for its priority; on a terminal `12:34:56.789 INFO text`."""
+
+    def __init__(self, journal: bool) -> None:
+        super().__init__(
+            "%(message)s" if journal else "%(asctime)s.%(msecs)03d %(levelname)s %(message)s"
+        )
+        self.datefmt = "%H:%M:%S"
+        self._journal = journal
+
+    def format(self, record: logging.LogRecord) -> str:
+        text = super().format(record)
+        if not self._journal:
+            return text
+        prefix = f"<{_PRIORITY.get(record.levelname, 6)}>"
+        return "\n".join(prefix + line for line in text.splitlines())
+
+
+def start(level: str = "INFO") -> None:
+    """Send every log line to stderr."""
+    to_stderr = logging.StreamHandler(sys.stderr)
+    to_stderr.setFormatter(_Formatter(journal="JOURNAL_STREAM" in os.environ))
+    logging.basicConfig(level=level, handlers=[to_stderr], force=True)

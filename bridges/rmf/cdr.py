@@ -1,0 +1,210 @@
+"""Messages as bytes: plain CDR (XCDR1), the form in which ROS 2 puts them on the wire.
+
+Four bytes of header (`00 01 00 00` little endian, `00 00 00 00` big endian), then the fields in
+their order. A number is aligned to its own size, counted from the end of the header; a string is its
+length with the closing NUL as uint32, the UTF-8 bytes and the NUL; a sequence is its length as uint32
+and its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and what rmw_cyclonedds and rmw_fastrtps send.
+
+The steps for each type are made once, from the annotations in `definitions.py`. No type there holds
+anything wider than four bytes, so the header does not shift the alignment.
+"""
+
+import struct
+import typing
+from collections.abc import Callable
+from dataclasses import fields
+from functools import cache
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+Put = Callable[[bytearray, Any], None]
+Get = Callable[[bytes, int], tuple[Any, int]]
+
+LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+BIG_ENDIAN = b"\x00\x00\x00\x00"
+CODES = {"int32": "i", "uint32": "I"}
+PADDING = (b"", b"\0\0\0", b"\0\0", b"\0")
+
+
+class CdrError(ValueError):
+    """These bytes are not a message of this type, or this message cannot be put into bytes."""
+
+
+def encode(message_type: type, message: Any) -> bytes:
+    """The message as little endian CDR with its header.
+
+    What no string on the wire can hold (a NUL, half a surrogate pair) goes out as `?`: an odd text
+    from a device must not silence the state that carries it. Raises CdrError for a number out of
+    range, or a value of another type.
+    """
+    kind: Any = message_type
+    out = bytearray(LITTLE_ENDIAN)
+    try:
+        _put(kind)(out, message)
+    except (struct.error, TypeError, AttributeError, ValueError) as error:
+        raise CdrError(f"{message!r} cannot be sent as {kind.__name__}: {error}") from error
+    return bytes(out)
+
+
+def decode(message_type: type[T], sample: bytes) -> T:
+    """The message in a sample, of either byte order. Raises CdrError for anything else.
+
+    Up to three bytes may follow the last field: RTPS pads payloads to a multiple of four.
+    """
+    kind: Any = message_type
+    order = _ORDERS.get(sample[:2])
+    if order is None:
+        raise CdrError(f"not plain CDR: the sample begins with {sample[:4].hex(' ') or 'nothing'}")
+    try:
+        message, end = _get(kind, order)(sample, 4)
+    except (struct.error, IndexError) as error:
+        raise CdrError(f"cut short: {error}") from error
+    except UnicodeDecodeError as error:
+        raise CdrError(f"a string is not UTF-8: {error}") from error
+    if not 0 <= len(sample) - end <= 3:
+        raise CdrError(f"{len(sample)} bytes, where {kind.__name__} takes {end}")
+    return typing.cast(T, message)
+
+
+_ORDERS = {LITTLE_ENDIAN[:2]: "<", BIG_ENDIAN[:2]: ">"}
+
+
+def _members(kind: Any) -> list[tuple[str, Any]]:
+    return [(field.name, field.type) for field in fields(kind)]
+
+
+@cache
+def _put(kind: Any) -> Put:
+    """How a value of this type is appended."""
+    if typing.get_origin(kind) is typing.Annotated:
+        name = kind.__metadata__[0]
+        return _put_byte if name == "uint8" else _putting_number(CODES[name])
+    if kind is str:
+        return _put_text
+    if kind is bool:
+        return _put_bool
+    if typing.get_origin(kind) is tuple:
+        return _putting_sequence(_put(typing.get_args(kind)[0]))
+    return _putting_struct([(name, _put(member)) for name, member in _members(kind)])
+
+
+def _put_byte(out: bytearray, value: int) -> None:
+    out.append(value)
+
+
+def _put_bool(out: bytearray, value: bool) -> None:
+    if value is not True and value is not False:
+        raise CdrError(f"{value!r} is not a truth value")
+    out.append(value)
+
+
+def _putting_number(code: str) -> Put:
+    pack = struct.Struct("<" + code).pack
+
+    def put(out: bytearray, value: int) -> None:
+        out += PADDING[len(out) & 3]
+        out += pack(value)
+
+    return put
+
+
+_put_length = _putting_number("I")
+
+
+def _put_text(out: bytearray, value: str) -> None:
+    text = value.encode(errors="replace").replace(b"\0", b"?")
+    _put_length(out, len(text) + 1)
+    out += text
+    out.append(0)
+
+
+def _putting_sequence(put_element: Put) -> Put:
+    def put(out: bytearray, value: tuple[Any, ...]) -> None:
+        _put_length(out, len(value))
+        for element in value:
+            put_element(out, element)
+
+    return put
+
+
+def _putting_struct(members: list[tuple[str, Put]]) -> Put:
+    def put(out: bytearray, value: Any) -> None:
+        for name, put_member in members:
+            put_member(out, getattr(value, name))
+
+    return put
+
+
+@cache
+def _get(kind: Any, order: str) -> Get:
+    """How a value of this type is read at a position: the value, and where the next one begins."""
+    if typing.get_origin(kind) is typing.Annotated:
+        name = kind.__metadata__[0]
+        return _get_byte if name == "uint8" else _getting_number(order + CODES[name])
+    if kind is str:
+        return _getting_text(order)
+    if kind is bool:
+        return _get_bool
+    if typing.get_origin(kind) is tuple:
+        return _getting_sequence(_get(typing.get_args(kind)[0], order), order)
+    return _getting_struct(kind, [_get(member, order) for _, member in _members(kind)])
+
+
+def _get_byte(sample: bytes, at: int) -> tuple[int, int]:
+    return sample[at], at + 1
+
+
+def _get_bool(sample: bytes, at: int) -> tuple[bool, int]:
+    if sample[at] > 1:
+        raise CdrError(f"{sample[at]} is not a truth value")
+    return sample[at] == 1, at + 1
+
+
+def _getting_number(code: str) -> Get:
+    unpack = struct.Struct(code).unpack_from
+
+    def get(sample: bytes, at: int) -> tuple[int, int]:
+        at = (at + 3) & ~3
+        return unpack(sample, at)[0], at + 4
+
+    return get
+
+
+def _getting_text(order: str) -> Get:
+    get_length = _getting_number(order + "I")
+
+    def get(sample: bytes, at: int) -> tuple[str, int]:
+        length, at = get_length(sample, at)
+        end = at + length
+        if sample.find(0, at, end) != end - 1:
+            raise CdrError("a string does not end with its only NUL")
+        return sample[at : end - 1].decode(), end
+
+    return get
+
+
+def _getting_sequence(get_element: Get, order: str) -> Get:
+    get_length = _getting_number(order + "I")
+
+    def get(sample: bytes, at: int) -> tuple[tuple[Any, ...], int]:
+        length, at = get_length(sample, at)
+        if length > len(sample) - at:  # each element takes a byte at least
+            raise CdrError(f"a sequence of {length} in {len(sample)} bytes")
+        elements = []
+        for _ in range(length):
+            element, at = get_element(sample, at)
+            elements.append(element)
+        return tuple(elements), at
+
+    return get
+
+
+def _getting_struct(kind: type, members: list[Get]) -> Get:
+    def get(sample: bytes, at: int) -> tuple[Any, int]:
+        values = []
+        for get_member in members:
+            value, at = get_member(sample, at)
+            values.append(value)
+        return kind(*values), at
+
+    return get

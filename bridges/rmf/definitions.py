@@ -1,0 +1,239 @@
+"""RMF's messages, as the `.msg` files define them: fields in their order, types and constants.
+
+This is the only table of them. The transports make their own types from it (field by field,
+from the annotations), and the RIHS01 type hashes are computed from it.
+
+Source: rmf_internal_msgs 3d4df02 (4.1.0), builtin_interfaces and std_msgs of ROS 2 Jazzy.
+A `T[]` of ROS is a tuple here, so that a message is a value: hashable, comparable, immutable.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Annotated, Final
+
+uint8 = Annotated[int, "uint8"]
+uint32 = Annotated[int, "uint32"]
+int32 = Annotated[int, "int32"]
+
+
+@dataclass(frozen=True, slots=True)
+class Time:
+    """builtin_interfaces/Time: seconds and nanoseconds since the epoch; 0.0 means never."""
+
+    sec: int32 = 0
+    nanosec: uint32 = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Duration:
+    """builtin_interfaces/Duration: sec may be negative, nanosec is added to it."""
+
+    sec: int32 = 0
+    nanosec: uint32 = 0
+
+
+# --- rmf_lift_msgs -----------------------------------------------------------------------------
+
+
+class LiftRequestType(IntEnum):
+    """LiftRequest.request_type. Not LiftState's numbers: there HUMAN is 1 and AGV is 2."""
+
+    REQUEST_END_SESSION = 0
+    REQUEST_AGV_MODE = 1
+    REQUEST_HUMAN_MODE = 2
+
+
+class LiftRequestDoor(IntEnum):
+    """LiftRequest.door_state."""
+
+    DOOR_CLOSED = 0
+    DOOR_OPEN = 2
+
+
+class LiftDoor(IntEnum):
+    """LiftState.door_state."""
+
+    DOOR_CLOSED = 0
+    DOOR_MOVING = 1
+    DOOR_OPEN = 2
+
+
+class LiftMotion(IntEnum):
+    """LiftState.motion_state."""
+
+    MOTION_STOPPED = 0
+    MOTION_UP = 1
+    MOTION_DOWN = 2
+    MOTION_UNKNOWN = 3
+
+
+class LiftMode(IntEnum):
+    """LiftState.current_mode and available_modes."""
+
+    MODE_UNKNOWN = 0
+    MODE_HUMAN = 1
+    MODE_AGV = 2
+    MODE_FIRE = 3
+    MODE_OFFLINE = 4
+    MODE_EMERGENCY = 5
+
+
+@dataclass(frozen=True, slots=True)
+class LiftRequest:
+    lift_name: str = ""
+    request_time: Time = Time()
+    session_id: str = ""
+    request_type: uint8 = 0
+    destination_floor: str = ""
+    door_state: uint8 = 0
+
+
+@dataclass(frozen=True, slots=True)
+class LiftState:
+    lift_time: Time = Time()
+    lift_name: str = ""
+    available_floors: tuple[str, ...] = ()
+    current_floor: str = ""
+    destination_floor: str = ""
+    door_state: uint8 = 0
+    motion_state: uint8 = 0
+    available_modes: tuple[uint8, ...] = ()
+    current_mode: uint8 = 0
+    session_id: str = ""
+
+
+# --- rmf_door_msgs -----------------------------------------------------------------------------
+
+
+class DoorModeValue(IntEnum):
+    """DoorMode.value."""
+
+    MODE_CLOSED = 0
+    MODE_MOVING = 1
+    MODE_OPEN = 2
+    MODE_OFFLINE = 3
+    MODE_UNKNOWN = 4
+
+
+@dataclass(frozen=True, slots=True)
+class DoorMode:
+    value: uint32 = 0
+
+
+@dataclass(frozen=True, slots=True)
+class DoorRequest:
+    request_time: Time = Time()
+    requester_id: str = ""
+    door_name: str = ""
+    requested_mode: DoorMode = DoorMode()
+
+
+@dataclass(frozen=True, slots=True)
+class DoorState:
+    door_time: Time = Time()
+    door_name: str = ""
+    current_mode: DoorMode = DoorMode()
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    request_time: Time = Time()
+    requester_id: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DoorSessions:
+    door_name: str = ""
+    sessions: tuple[Session, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SupervisorHeartbeat:
+    all_sessions: tuple[DoorSessions, ...] = ()
+
+
+# --- rmf_charger_msgs --------------------------------------------------------------------------
+
+
+class ChargerStateValue(IntEnum):
+    """ChargerState.state. There is no 0: a default-constructed message is invalid."""
+
+    CHARGER_IDLE = 1
+    CHARGER_ASSIGNED = 2
+    CHARGER_CHARGING = 3
+    CHARGER_RELEASED = 4
+    CHARGER_ERROR = 200
+
+
+@dataclass(frozen=True, slots=True)
+class ChargerRequest:
+    charger_name: str = ""
+    fleet_name: str = ""
+    robot_name: str = ""
+    start_timeout: Duration = Duration()
+    request_id: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ChargerCancel:
+    charger_name: str = ""
+    request_id: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ChargerState:
+    charger_time: Time = Time()
+    state: uint32 = 0
+    charger_name: str = ""
+    error_message: str = ""
+    request_id: str = ""
+    robot_fleet: str = ""
+    robot_name: str = ""
+    time_to_fully_charged: Duration = Duration()
+
+
+# --- std_msgs, rmf_fleet_msgs ------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Bool:
+    data: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class EmergencySignal:
+    fleet_names: tuple[str, ...] = ()
+    is_emergency: bool = False
+
+
+Message = (
+    LiftRequest
+    | LiftState
+    | DoorRequest
+    | DoorState
+    | SupervisorHeartbeat
+    | ChargerRequest
+    | ChargerCancel
+    | ChargerState
+    | Bool
+    | EmergencySignal
+)
+
+PACKAGES: Final[dict[type, str]] = {
+    Time: "builtin_interfaces",
+    Duration: "builtin_interfaces",
+    LiftRequest: "rmf_lift_msgs",
+    LiftState: "rmf_lift_msgs",
+    DoorMode: "rmf_door_msgs",
+    DoorRequest: "rmf_door_msgs",
+    DoorState: "rmf_door_msgs",
+    Session: "rmf_door_msgs",
+    DoorSessions: "rmf_door_msgs",
+    SupervisorHeartbeat: "rmf_door_msgs",
+    ChargerRequest: "rmf_charger_msgs",
+    ChargerCancel: "rmf_charger_msgs",
+    ChargerState: "rmf_charger_msgs",
+    Bool: "std_msgs",
+    EmergencySignal: "rmf_fleet_msgs",
+}
+"""The ROS package that defines each type."""

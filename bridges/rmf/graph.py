@@ -1,0 +1,77 @@
+"""What makes our endpoints a named node on the ROS graph: the topic `ros_discovery_info`.
+
+DDS knows participants, readers and writers; nodes are ROS's own. Each ROS participant says on this
+topic, retained for late joiners, which node owns which of its readers and writers. Without it
+`ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
+Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publish them.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+from cyclonedds.idl import IdlStruct, annotations
+from cyclonedds.idl.types import array, bounded_str, sequence, uint8
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.topic import Topic
+
+PACKAGE: Final = "rmw_dds_common.msg.dds_."
+TYPE_HASH: Final = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"
+"""What Iron, Jazzy and later announce for ParticipantEntitiesInfo."""
+
+
+@annotations.final
+@dataclass
+class Gid(IdlStruct, typename=PACKAGE + "Gid_"):  # type: ignore[misc, call-arg]
+    data: array[uint8, 16]
+
+
+@annotations.final
+@dataclass
+class NodeEntitiesInfo(IdlStruct, typename=PACKAGE + "NodeEntitiesInfo_"):  # type: ignore[misc, call-arg]
+    node_namespace: bounded_str[256]
+    node_name: bounded_str[256]
+    reader_gid_seq: sequence[Gid]
+    writer_gid_seq: sequence[Gid]
+
+
+@annotations.final
+@dataclass
+class ParticipantEntitiesInfo(IdlStruct, typename=PACKAGE + "ParticipantEntitiesInfo_"):  # type: ignore[misc, call-arg]
+    gid: Gid
+    node_entities_info_seq: sequence[NodeEntitiesInfo]
+
+
+class NodeOnGraph:
+    """The one node of a participant, announced afresh whenever it has a new endpoint."""
+
+    def __init__(self, participant: Any, node_name: str) -> None:
+        self._node = NodeEntitiesInfo("/", node_name, [], [])
+        self._info = ParticipantEntitiesInfo(_gid(participant), [self._node])
+        self.topic = Topic(participant, "ros_discovery_info", ParticipantEntitiesInfo)
+        self.writer = DataWriter(participant, self.topic, qos=_qos())
+        self.writer.write(self._info)
+
+    def add_reader(self, reader: Any) -> None:
+        """Say that this reader is the node's."""
+        self._node.reader_gid_seq.append(_gid(reader))
+        self.writer.write(self._info)
+
+    def add_writer(self, writer: Any) -> None:
+        """Say that this writer is the node's."""
+        self._node.writer_gid_seq.append(_gid(writer))
+        self.writer.write(self._info)
+
+
+def _gid(entity: Any) -> Gid:
+    return Gid(list(entity.guid.bytes))
+
+
+def _qos() -> Any:
+    return Qos(
+        Policy.Reliability.Reliable(100_000_000),
+        Policy.Durability.TransientLocal,
+        Policy.History.KeepLast(1),
+        Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
+        Policy.Userdata(f"typehash={TYPE_HASH};".encode()),
+    )

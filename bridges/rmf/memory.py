@@ -1,0 +1,127 @@
+"""The `memory` transport: nodes of one process, for tests in virtual time. No thread, no clock.
+
+A message is delivered before `publish` returns, in the order in which the subscriptions were made.
+Who hears whom follows DDS: same name, same type, and a subscription that wants retained messages
+hears nobody who does not retain any.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from bridges.rmf import cdr
+from bridges.rmf.definitions import Message
+from bridges.rmf.topics import Topic
+from bridges.rmf.transport import TransportError
+
+M = TypeVar("M", bound=Message)
+
+
+class MemoryNetwork:
+    """What the nodes of one test have in common: their publishers and subscriptions."""
+
+    def __init__(self) -> None:
+        self.publishers: list[_Publisher[Any]] = []
+        self.subscriptions: list[_Subscription[Any]] = []
+
+
+class MemoryTransport:
+    """One node on a MemoryNetwork. Callbacks run on the thread that publishes."""
+
+    def __init__(self, network: MemoryNetwork, node_name: str) -> None:
+        self.name = node_name
+        self.dropped: dict[str, int] = {}
+        self._network = network
+        self._closed = False
+
+    def publisher(self, topic: Topic[M]) -> "_Publisher[M]":
+        """Declare a publisher with `topic.publish` QoS."""
+        self._require_open()
+        publisher = _Publisher(self, self._network, topic)
+        self._network.publishers.append(publisher)
+        return publisher
+
+    def subscribe(
+        self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
+    ) -> "_Subscription[M]":
+        """Declare a subscription with `topic.subscribe` QoS; what is retained comes at once."""
+        self._require_open()
+        subscription = _Subscription(self, self._network, topic, received, others_only)
+        self._network.subscriptions.append(subscription)
+        subscription.catch_up()
+        return subscription
+
+    def close(self) -> None:
+        """Leave the network, with all that was retained here."""
+        self._closed = True
+        network = self._network
+        network.publishers = [end for end in network.publishers if end.node is not self]
+        network.subscriptions = [end for end in network.subscriptions if end.node is not self]
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise TransportError(f"{self.name} has left the graph")
+
+
+class _Publisher(Generic[M]):
+    def __init__(self, node: MemoryTransport, network: MemoryNetwork, topic: Topic[M]) -> None:
+        self.node = node
+        self.topic = topic
+        self.retained: deque[M] = deque(maxlen=topic.publish.depth)
+        self._network = network
+
+    def publish(self, message: M) -> None:
+        """Deliver at once. Raises CdrError for what could not be sent by wire either."""
+        if self not in self._network.publishers:
+            raise TransportError(f"topic {self.topic.name}: the node has left the graph")
+        cdr.encode(self.topic.type, message)
+        if self.topic.publish.durability == "transient_local":
+            self.retained.append(message)
+        for subscription in self._network.subscriptions:
+            if subscription.hears(self):
+                subscription.received(message)
+
+    def matched(self) -> int:
+        """How many subscriptions are reached; 0 after close."""
+        open_here = self in self._network.publishers
+        return sum(open_here and end.hears(self) for end in self._network.subscriptions)
+
+
+class _Subscription(Generic[M]):
+    def __init__(
+        self,
+        node: MemoryTransport,
+        network: MemoryNetwork,
+        topic: Topic[M],
+        received: Callable[[M], None],
+        others_only: bool,
+    ) -> None:
+        self.node = node
+        self.received = received
+        self._network = network
+        self._topic = topic
+        self._others_only = others_only
+
+    def hears(self, publisher: _Publisher[Any]) -> bool:
+        """Whether DDS would match the two."""
+        theirs, ours = publisher.topic, self._topic
+        return (
+            (theirs.name, theirs.type) == (ours.name, ours.type)
+            and (ours.subscribe.durability, theirs.publish.durability)
+            != ("transient_local", "volatile")
+            and not (self._others_only and publisher.node is self.node)
+        )
+
+    def catch_up(self) -> None:
+        """Receive what each publisher has retained, the newest `depth` of each."""
+        if self._topic.subscribe.durability == "volatile":
+            return
+        for publisher in self._network.publishers:
+            if self.hears(publisher):
+                for message in list(publisher.retained)[-self._topic.subscribe.depth :]:
+                    self.received(message)
+
+    def matched(self) -> int:
+        """How many publishers are heard; 0 after close."""
+        open_here = self in self._network.subscriptions
+        return sum(open_here and self.hears(end) for end in self._network.publishers)

@@ -1,0 +1,67 @@
+"""The RIHS01 type hash (ROS REP-2016) of each message, computed from `definitions.py`.
+
+A ROS 2 node announces the hash of its message definition beside each endpoint, and warns about a
+peer that has none or another one. The hash is the SHA-256 of the type's description as JSON: its
+fields, and after them the descriptions of all types it is made of, sorted by name. It covers names
+and types of fields, not constants and not comments.
+Source: ros2/rosidl, rosidl_generator_type_description, and type_description_interfaces/FieldType.
+"""
+
+import hashlib
+import json
+import typing
+from dataclasses import fields
+from typing import Any
+
+from bridges.rmf.definitions import PACKAGES
+
+NESTED = 1
+TYPE_IDS = {"uint8": 3, "int32": 6, "uint32": 7, bool: 15, str: 17}
+UNBOUNDED_SEQUENCE = 144
+
+
+def type_hash(message_type: type) -> str:
+    """`RIHS01_` and 64 hexadecimal digits."""
+    referenced = sorted(_nested_in(message_type), key=_type_name)
+    description = {
+        "type_description": _description(message_type),
+        "referenced_type_descriptions": [_description(nested) for nested in referenced],
+    }
+    return "RIHS01_" + hashlib.sha256(json.dumps(description).encode()).hexdigest()
+
+
+def _type_name(message_type: type) -> str:
+    return f"{PACKAGES[message_type]}/msg/{message_type.__name__}"
+
+
+def _description(message_type: type) -> dict[str, Any]:
+    return {
+        "type_name": _type_name(message_type),
+        "fields": [
+            {"name": field.name, "type": _field_type(field.type)} for field in fields(message_type)
+        ],
+    }
+
+
+def _field_type(kind: Any) -> dict[str, Any]:
+    element = _element(kind)
+    nested = element in PACKAGES
+    sequence = typing.get_origin(kind) is tuple
+    return {
+        "type_id": (NESTED if nested else TYPE_IDS[element]) + sequence * UNBOUNDED_SEQUENCE,
+        "capacity": 0,
+        "string_capacity": 0,
+        "nested_type_name": _type_name(element) if nested else "",
+    }
+
+
+def _element(kind: Any) -> Any:
+    """What a sequence holds, or the type itself; a number by its ROS name."""
+    if typing.get_origin(kind) is tuple:
+        kind = typing.get_args(kind)[0]
+    return kind.__metadata__[0] if typing.get_origin(kind) is typing.Annotated else kind
+
+
+def _nested_in(message_type: type) -> set[type]:
+    direct = {_element(field.type) for field in fields(message_type)} & PACKAGES.keys()
+    return direct.union(*(_nested_in(nested) for nested in direct))

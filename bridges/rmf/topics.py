@@ -1,0 +1,59 @@
+"""Every topic that we publish or subscribe, with its type and QoS.
+
+The QoS is what RMF's own endpoints match (rmf_ros2 9dedd0f; agv/Node.cpp, lift_supervisor/Node.cpp,
+door_supervisor/Node.cpp). All endpoints are RELIABLE with KEEP_LAST history; what differs is the
+durability and the depth.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Generic, Literal, TypeVar
+
+from bridges.rmf import definitions as d
+
+M = TypeVar("M", bound=d.Message)
+
+
+@dataclass(frozen=True, slots=True)
+class Qos:
+    """RELIABLE, KEEP_LAST(depth), with this durability."""
+
+    durability: Literal["volatile", "transient_local"]
+    depth: int
+
+
+VOLATILE = Qos("volatile", 100)
+RETAINED = Qos("transient_local", 100)
+
+
+@dataclass(frozen=True, slots=True)
+class Topic(Generic[M]):
+    """A topic as ROS names it (no `rt/`), and the QoS of the end that we hold."""
+
+    name: str
+    type: type[M]
+    publish: Qos = VOLATILE
+    subscribe: Qos = VOLATILE
+
+    def named(self, name: str) -> "Topic[M]":
+        """The same topic under the name that a site has given it."""
+        return replace(self, name=name)
+
+
+LIFT_STATES = Topic("lift_states", d.LiftState)
+# Subscribed VOLATILE: TRANSIENT_LOCAL would replay up to 100 old requests at our restart.
+LIFT_REQUESTS = Topic("lift_requests", d.LiftRequest, publish=RETAINED, subscribe=VOLATILE)
+ADAPTER_LIFT_REQUESTS = Topic(
+    "adapter_lift_requests", d.LiftRequest, publish=RETAINED, subscribe=RETAINED
+)
+DOOR_STATES = Topic("door_states", d.DoorState)
+DOOR_REQUESTS = Topic("door_requests", d.DoorRequest)
+ADAPTER_DOOR_REQUESTS = Topic("adapter_door_requests", d.DoorRequest)
+DOOR_SUPERVISOR_HEARTBEAT = Topic("door_supervisor_heartbeat", d.SupervisorHeartbeat)
+CHARGER_STATES = Topic("charger_states", d.ChargerState)
+CHARGER_REQUESTS = Topic("charger_requests", d.ChargerRequest)
+CHARGER_CANCELS = Topic("charger_cancels", d.ChargerCancel)
+# A volatile publisher of these two never matches a fleet adapter (rmf_ros2#341).
+FIRE_ALARM_TRIGGER = Topic("fire_alarm_trigger", d.Bool, publish=RETAINED, subscribe=RETAINED)
+EMERGENCY_SIGNAL = Topic(
+    "emergency_signal", d.EmergencySignal, publish=RETAINED, subscribe=RETAINED
+)

@@ -1,0 +1,112 @@
+"""`definitions.py` against tables typed from the .msg files, which it must not be made from.
+
+Read in open-rmf/rmf_internal_msgs at 3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0), every line
+of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg and rmf_fleet_msgs/msg/EmergencySignal;
+Time, Duration and Bool from ROS 2 Jazzy's builtin_interfaces and std_msgs.
+"""
+
+import typing
+from dataclasses import fields
+from typing import Any
+
+import pytest
+
+from bridges.rmf import definitions as d
+
+CONSTANTS = {
+    d.LiftRequestType: {
+        "REQUEST_END_SESSION": 0,
+        "REQUEST_AGV_MODE": 1,
+        "REQUEST_HUMAN_MODE": 2,
+    },
+    d.LiftRequestDoor: {"DOOR_CLOSED": 0, "DOOR_OPEN": 2},
+    d.LiftDoor: {"DOOR_CLOSED": 0, "DOOR_MOVING": 1, "DOOR_OPEN": 2},
+    d.LiftMotion: {
+        "MOTION_STOPPED": 0,
+        "MOTION_UP": 1,
+        "MOTION_DOWN": 2,
+        "MOTION_UNKNOWN": 3,
+    },
+    d.LiftMode: {
+        "MODE_UNKNOWN": 0,
+        "MODE_HUMAN": 1,
+        "MODE_AGV": 2,
+        "MODE_FIRE": 3,
+        "MODE_OFFLINE": 4,
+        "MODE_EMERGENCY": 5,
+    },
+    d.DoorModeValue: {
+        "MODE_CLOSED": 0,
+        "MODE_MOVING": 1,
+        "MODE_OPEN": 2,
+        "MODE_OFFLINE": 3,
+        "MODE_UNKNOWN": 4,
+    },
+    d.ChargerStateValue: {
+        "CHARGER_IDLE": 1,
+        "CHARGER_ASSIGNED": 2,
+        "CHARGER_CHARGING": 3,
+        "CHARGER_RELEASED": 4,
+        "CHARGER_ERROR": 200,
+    },
+}
+
+FIELDS = {
+    "builtin_interfaces/Time": "int32 sec, uint32 nanosec",
+    "builtin_interfaces/Duration": "int32 sec, uint32 nanosec",
+    "rmf_lift_msgs/LiftRequest": (
+        "string lift_name, builtin_interfaces/Time request_time, string session_id,"
+        " uint8 request_type, string destination_floor, uint8 door_state"
+    ),
+    "rmf_lift_msgs/LiftState": (
+        "builtin_interfaces/Time lift_time, string lift_name, string[] available_floors,"
+        " string current_floor, string destination_floor, uint8 door_state, uint8 motion_state,"
+        " uint8[] available_modes, uint8 current_mode, string session_id"
+    ),
+    "rmf_door_msgs/DoorMode": "uint32 value",
+    "rmf_door_msgs/DoorRequest": (
+        "builtin_interfaces/Time request_time, string requester_id, string door_name,"
+        " rmf_door_msgs/DoorMode requested_mode"
+    ),
+    "rmf_door_msgs/DoorState": (
+        "builtin_interfaces/Time door_time, string door_name, rmf_door_msgs/DoorMode current_mode"
+    ),
+    "rmf_door_msgs/Session": "builtin_interfaces/Time request_time, string requester_id",
+    "rmf_door_msgs/DoorSessions": "string door_name, rmf_door_msgs/Session[] sessions",
+    "rmf_door_msgs/SupervisorHeartbeat": "rmf_door_msgs/DoorSessions[] all_sessions",
+    "rmf_charger_msgs/ChargerRequest": (
+        "string charger_name, string fleet_name, string robot_name,"
+        " builtin_interfaces/Duration start_timeout, string request_id"
+    ),
+    "rmf_charger_msgs/ChargerCancel": "string charger_name, string request_id",
+    "rmf_charger_msgs/ChargerState": (
+        "builtin_interfaces/Time charger_time, uint32 state, string charger_name,"
+        " string error_message, string request_id, string robot_fleet, string robot_name,"
+        " builtin_interfaces/Duration time_to_fully_charged"
+    ),
+    "std_msgs/Bool": "bool data",
+    "rmf_fleet_msgs/EmergencySignal": "string[] fleet_names, bool is_emergency",
+}
+
+
+@pytest.mark.parametrize("enum", CONSTANTS, ids=lambda enum: enum.__name__)
+def test_every_constant_has_the_number_of_the_msg_file(enum: Any) -> None:
+    assert {constant.name: constant.value for constant in enum} == CONSTANTS[enum]
+
+
+def test_every_message_has_the_fields_of_the_msg_file_in_their_order() -> None:
+    ours = {
+        _ros_name(kind): ", ".join(f"{_ros_name(f.type)} {f.name}" for f in fields(kind))
+        for kind in typing.cast("dict[Any, str]", d.PACKAGES)
+    }
+    assert ours == FIELDS
+
+
+def _ros_name(kind: Any) -> str:
+    if typing.get_origin(kind) is typing.Annotated:
+        return str(kind.__metadata__[0])
+    if typing.get_origin(kind) is tuple:
+        return _ros_name(typing.get_args(kind)[0]) + "[]"
+    if kind in (str, bool):
+        return {str: "string", bool: "bool"}[kind]
+    return f"{d.PACKAGES[kind]}/{kind.__name__}"

@@ -1,0 +1,40 @@
+from typing import Any
+
+import pytest
+
+from bridges.rmf import definitions as d
+from bridges.rmf.rihs01 import type_hash
+
+SEEN_ON_JAZZY = {
+    d.LiftRequest: "e8f1e0aa4d172703d0d7840c1876448c6c5d75ab58955faf7de7dddc17c096ac",
+    d.LiftState: "ce0553cd08eeeb321bdae554efdb6d2ebb2be9755df2e34895cbef55b51f4c06",
+    d.DoorRequest: "3145b5d97064f89b0a0db953b8167ddeeefbc2914c24a603c3bdc51f122f143e",
+    d.DoorState: "1cb9d98f19c66cbc1f9acb16faaa90c63a7b65021bd26c69958d96f0a0388bb2",
+    d.ChargerState: "13638f4a1149cb44d0e56c42f41e2ea752846d25010e16de13f2d1b05f4fe9f0",
+}
+"""What nodes of ROS 2 Jazzy announce, built from rmf_internal_msgs."""
+
+COMPUTED_BY_ROSBAGS = {
+    d.Time: "b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197",
+    d.Duration: "e8d009f659816f758b75334ee1a9ca5b5c0b859843261f14c7f937349599d93b",
+    d.Bool: "feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9",
+    d.DoorMode: "02c834bb83aa3ca1fbd8cf4f61a1d1ae4dc8227111bde3820dda580f8c2c6429",
+    d.Session: "276fee3ca5122cdca08d00b86e2f27009f5938bba19d90a65a1fcb99f4ec994d",
+    d.DoorSessions: "62e2203fd2335db5b1bf51a94e0cdbd4e08f85989635179d4f69d9d75963cdce",
+    d.SupervisorHeartbeat: "6537eeea544846a14c47bce940894d9c1887c179d698b9cc22855b219b3262b2",
+    d.ChargerRequest: "ead03937294b4a404f80dbd86974208c6ab8ab7f22f12501e90f43c3036fb870",
+    d.ChargerCancel: "b439d5d5f2dd726953fb24339764c26d2c1cd21f37f072ecdb4be3530270760b",
+    d.EmergencySignal: "2bcead0701ac71c292f12ba705ad9164b796b2660ae48cbf74204515fe5156e0",
+}
+"""From the .msg files at rmf_internal_msgs 3d4df02, by rosbags 0.11's `hash_rihs01`."""
+
+HASHES: dict[Any, str] = {**SEEN_ON_JAZZY, **COMPUTED_BY_ROSBAGS}
+
+
+def test_there_is_a_hash_to_compare_with_for_every_type() -> None:
+    assert HASHES.keys() == d.PACKAGES.keys()
+
+
+@pytest.mark.parametrize("message_type", HASHES, ids=lambda kind: kind.__name__)
+def test_the_hash_of_a_type_is_the_one_that_ros_computes(message_type: Any) -> None:
+    assert type_hash(message_type) == "RIHS01_" + HASHES[message_type]

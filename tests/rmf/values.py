@@ -1,0 +1,35 @@
+"""Hypothesis strategies for every message type, made from the annotations of `definitions.py`."""
+
+import typing
+from dataclasses import fields
+from typing import Any
+
+from hypothesis import settings
+from hypothesis import strategies as st
+
+from bridges.rmf import definitions as d
+
+WHOLE_NUMBERS = {
+    "uint8": st.integers(0, 2**8 - 1),
+    "uint32": st.integers(0, 2**32 - 1),
+    "int32": st.integers(-(2**31), 2**31 - 1),
+}
+TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20)
+
+repeatable = settings(derandomize=True, deadline=None, database=None, max_examples=40)
+"""The same values in every run."""
+
+MESSAGE_TYPES: tuple[Any, ...] = typing.get_args(d.Message)
+
+
+def values(kind: Any) -> st.SearchStrategy[Any]:
+    """Any value of a field's or a message's type."""
+    if typing.get_origin(kind) is typing.Annotated:
+        return WHOLE_NUMBERS[kind.__metadata__[0]]
+    if typing.get_origin(kind) is tuple:
+        return st.lists(values(typing.get_args(kind)[0]), max_size=6).map(tuple)
+    if kind is str:
+        return TEXTS
+    if kind is bool:
+        return st.booleans()
+    return st.builds(kind, *(values(field.type) for field in fields(kind)))
