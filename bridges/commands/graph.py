@@ -1,0 +1,110 @@
+"""What `watch` and `send` share: the options of the graph, listening to it, and leaving it cleanly."""
+
+import argparse
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from bridges.fields import Rmf
+from bridges.rmf.topics import Topic
+from bridges.rmf.transport import Transport
+
+SILENT_AFTER_S = 3.0
+"""States come at 1 Hz: three missed ones, or a reading three seconds old, deserve a mark."""
+
+
+def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options that say which graph: `--domain-id`, `--transport`, `--localhost`."""
+    parser.add_argument(
+        "--domain-id", type=_domain, metavar="N", help="DDS domain (default: ROS_DOMAIN_ID, else 0)"
+    )
+    parser.add_argument(
+        "--transport",
+        choices=("auto", "ros2", "dds"),
+        default="auto",
+        help="ros2 is rclpy, dds needs no ROS; auto takes rclpy where it imports (default)",
+    )
+    parser.add_argument(
+        "--localhost",
+        action="store_true",
+        help="stay on the loopback interface, where `run --simulate` is",
+    )
+
+
+def _domain(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or int(text) > 232:
+        raise argparse.ArgumentTypeError(f"{text!r} is no DDS domain: 0 to 232")
+    return int(text)
+
+
+def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
+    """Join the graph that the options name. Raises TransportError."""
+    from bridges.rmf.choose import open_transport
+
+    rmf = Rmf(
+        transport=args.transport,
+        domain_id=args.domain_id,
+        network="localhost" if args.localhost else "subnet",
+    )
+    return open_transport(rmf, node_name, localhost=args.localhost)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt.
+
+    Without that a killed command leaves a ghost of its node on the graph for over 10 s.
+    """
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, signal.default_int_handler) for number in signals}
+    try:
+        yield
+    finally:
+        for number, action in before.items():
+            signal.signal(number, action)
+
+
+def complain(command: str, text: object) -> None:
+    """One line to standard error, in the command's name."""
+    sys.stderr.write(f"rmf-bridge {command}: {text}\n")
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A message and when it arrived (monotonic s)."""
+
+    message: Any
+    at: float
+
+
+class Ears:
+    """Subscriptions whose messages wait in one inbox."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        *topics: Topic[Any],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._inbox: SimpleQueue[Heard] = SimpleQueue()
+        self._clock = clock
+        for topic in topics:
+            transport.subscribe(topic, self._received)
+
+    def _received(self, message: Any) -> None:
+        self._inbox.put(Heard(message, self._clock()))
+
+    def listen(self, timeout_s: float) -> list[Heard]:
+        """Everything that has arrived, in order; waits for the first, `timeout_s` at the most."""
+        heard = []
+        try:
+            heard.append(self._inbox.get(timeout=max(0.0, timeout_s)))
+            while True:
+                heard.append(self._inbox.get_nowait())
+        except Empty:
+            return heard

@@ -1,0 +1,258 @@
+"""`send` and `watch` around their pure parts: on the memory transport, and as processes on DDS."""
+
+import argparse
+import io
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import pytest
+
+from bridges.commands import send, watch
+from bridges.commands.effects import Wish
+from bridges.commands.wishes import Charge, ChargeCancel, DoorMove, LiftEnd, LiftRide
+from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.topics import Topic
+from bridges.rmf.transport import Transport
+from tests.rmf.domains import claim_domain
+from tests.waiting import wait_until
+
+M = TypeVar("M", bound=d.Message)
+ME = "fleet/robot"
+LIFT = d.LiftState(
+    lift_time=d.Time(1), lift_name="Lift1", available_floors=("L1", "L3"), current_floor="L1"
+)
+
+
+class Told(MemoryTransport):
+    """A node that is told a device's state as soon as it subscribes, and after each request."""
+
+    def __init__(self, device: "Device") -> None:
+        super().__init__(device.network, "command")
+        self._device = device
+
+    def subscribe(
+        self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
+    ) -> Any:
+        """As the device publishes at 1 Hz, a subscriber soon hears it."""
+        subscription = super().subscribe(topic, received, others_only=others_only)
+        self._device.tell()
+        return subscription
+
+
+class Device:
+    """A lift, door or charger on the memory transport that does as it is told, at once."""
+
+    def __init__(self, states: Topic[Any], requests: Topic[Any], state: Any) -> None:
+        self.network = MemoryNetwork()
+        self.state = state
+        self.requests: list[Any] = []
+        node = MemoryTransport(self.network, "device")
+        self._publisher = node.publisher(states)
+        node.subscribe(requests, self._obey)
+
+    def tell(self) -> None:
+        self._publisher.publish(self.state)
+
+    def _obey(self, request: Any) -> None:
+        self.requests.append(request)
+        self.state = obeyed(self.state, request)
+        self.tell()
+
+
+def obeyed(state: Any, request: Any) -> Any:
+    match request:
+        case d.LiftRequest(request_type=0):
+            return replace(state, session_id="")
+        case d.LiftRequest():
+            return replace(
+                state,
+                session_id=request.session_id,
+                current_floor=request.destination_floor,
+                door_state=2,
+            )
+        case d.DoorRequest():
+            return replace(state, current_mode=request.requested_mode)
+        case d.ChargerRequest():
+            return replace(state, state=2, request_id=request.request_id)
+        case _:
+            return replace(state, state=1, request_id="")
+
+
+HELD = replace(LIFT, session_id=ME)
+DOOR = d.DoorState(d.Time(1), "ward", d.DoorMode(0))
+CHARGER = d.ChargerState(d.Time(1), 1, "a")
+BUSY = replace(CHARGER, state=3, request_id="r1")
+
+
+@pytest.mark.parametrize(
+    ("states", "state", "wish"),
+    [
+        (topics.LIFT_STATES, LIFT, LiftRide("Lift1", "L3", ME, direct=True, granted_only=False)),
+        (topics.LIFT_STATES, HELD, LiftEnd("Lift1", "", direct=True)),
+        (topics.DOOR_STATES, DOOR, DoorMove("ward", True, ME, direct=True)),
+        (topics.CHARGER_STATES, CHARGER, Charge("a", "fleet", "robot", "r1", 30)),
+        (topics.CHARGER_STATES, BUSY, ChargeCancel("a", "r1")),
+    ],
+)
+def test_a_request_reaches_the_device_once_and_its_effect_ends_the_command(
+    states: Topic[Any], state: d.Message, wish: Wish
+) -> None:
+    device, out = Device(states, wish.topic, state), io.StringIO()
+    assert send.send(Told(device), wish, 10.0, out) == 0
+    assert [line.split()[2] for line in out.getvalue().splitlines()] == [
+        *("state", "request", "state", "done")
+    ]
+    assert len(device.requests) == 1
+
+
+def test_a_request_carries_the_time_at_which_it_was_sent() -> None:
+    device = Device(topics.DOOR_STATES, topics.DOOR_REQUESTS, DOOR)
+    assert send.send(Told(device), DoorMove("ward", True, ME, direct=True), 10, io.StringIO()) == 0
+    assert device.requests[0].request_time.sec > 1_700_000_000
+
+
+def test_the_reason_goes_to_standard_error_and_the_exit_code_is_1(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    device, out = Device(topics.LIFT_STATES, topics.LIFT_REQUESTS, LIFT), io.StringIO()
+    wish = LiftRide("Lift1", "L33", ME, direct=True, granted_only=False)
+    assert send.send(Told(device), wish, 10.0, out) == 1
+    assert capsys.readouterr().err == (
+        "rmf-bridge send: Lift1 serves L1, L3: no 'L33'; did you mean 'L3'?\n"
+    )
+    assert device.requests == []
+
+
+def test_once_prints_the_table_or_says_that_nothing_is_there(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    device, out = Device(topics.LIFT_STATES, topics.LIFT_REQUESTS, HELD), io.StringIO()
+    assert watch.show_once(watch.listen_on(Told(device)), 0.01, out) == 0
+    assert out.getvalue().splitlines()[1].split()[:6] == [
+        *("lift", "Lift1", "L1", "CLOSED", "UNKNOWN", ME)
+    ]
+    nobody = MemoryTransport(MemoryNetwork(), "alone")
+    assert watch.show_once(watch.listen_on(nobody), 0.01, out) == 1
+    assert "same domain" in capsys.readouterr().err
+
+
+# --- command lines -----------------------------------------------------------------------------
+
+
+def parsed(line: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    send.add_arguments(parser)
+    return parser.parse_args(line.split())
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "lift Lift1",
+        "lift Lift1 L3",
+        "lift Lift1 L3 --session x --end",
+        "lift Lift1 --end --granted-only",
+        "lift Lift1 L3 --session x --timeout -1",
+        "door ward",
+        "door ward shut",
+        "charger a",
+        "charger a --robot robot",
+        "charger a --robot /robot",
+        "charger a --robot fleet/robot --cancel r1",
+        "charger a --robot fleet/robot --direct",
+        "",
+    ],
+)
+def test_a_command_line_that_contradicts_itself_exits_2(line: str) -> None:
+    with pytest.raises(SystemExit) as left:
+        send.wish_of(parsed(line))
+    assert left.value.code == 2
+
+
+def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
+    first, second = (send.wish_of(parsed("charger a --robot f/r")) for _ in range(2))
+    assert isinstance(first, Charge)
+    assert isinstance(second, Charge)
+    ids = [wish.request_id for wish in (first, second)]
+    assert ids[0] != ids[1]
+    assert all(i.startswith("rmf_bridge_send-") for i in ids)
+
+
+# --- as processes ------------------------------------------------------------------------------
+
+
+@contextmanager
+def on_dds(domain: int) -> Iterator[Transport]:
+    from bridges.rmf.dds import DdsTransport
+
+    node = DdsTransport("device", domain, loopback=True)
+    try:
+        yield node
+    finally:
+        node.close()
+
+
+@contextmanager
+def command(line: str, domain: int) -> Iterator[subprocess.Popen[str]]:
+    words = [sys.executable, "-m", "bridges.cli", *line.split()]
+    words += ["--domain-id", str(domain), "--localhost", "--transport", "dds"]
+    process = subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic() -> None:
+    domain = claim_domain()
+    with on_dds(domain) as node:
+        states = node.publisher(topics.LIFT_STATES)
+        requests: list[d.LiftRequest] = []
+        node.subscribe(topics.ADAPTER_LIFT_REQUESTS, requests.append)
+        with command("send lift Lift1 L3 --session fleet/robot", domain) as process:
+            wait_until(lambda: states.matched() > 0, "send listens to lift_states")
+            states.publish(LIFT)
+            wait_until(lambda: requests, "the request arrives")
+            states.publish(obeyed(LIFT, requests[0]))
+            out, error = process.communicate(timeout=20)
+        assert (process.returncode, error) == (0, "")
+        assert "done" in out
+        assert replace(requests[0], request_time=d.Time()) == d.LiftRequest(
+            "Lift1", d.Time(), ME, 1, "L3", 2
+        )
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_watch_prints_changes_and_leaves_the_graph_at_once_when_told_to(
+    number: signal.Signals,
+) -> None:
+    domain = claim_domain()
+    with on_dds(domain) as node, command("watch", domain) as process:
+        states = node.publisher(topics.DOOR_STATES)
+        wait_until(lambda: states.matched() > 0, "watch listens to door_states")
+        states.publish(DOOR)
+        assert process.stdout is not None
+        assert process.stdout.readline().split()[1:4] == ["door", "ward", "CLOSED"]
+        process.send_signal(number)
+        assert process.wait(timeout=20) == 0
+        wait_until(lambda: states.matched() == 0, "watch has left the graph", patience_s=5)
+
+
+def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_door() -> None:
+    domain = claim_domain()
+    with on_dds(domain) as node, command("send door ward open --direct", domain) as process:
+        heard = node.subscribe(topics.DOOR_REQUESTS, lambda _: None)
+        wait_until(lambda: heard.matched() > 0, "send is there")
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=20) == 130
+        wait_until(lambda: heard.matched() == 0, "send has left the graph", patience_s=5)

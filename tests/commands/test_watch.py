@@ -1,0 +1,158 @@
+"""What `rmf-bridge watch` shows: rows from messages and a time, in virtual time."""
+
+import argparse
+from dataclasses import replace
+
+import pytest
+
+from bridges.commands import watch
+from bridges.commands.graph import Heard
+from bridges.commands.watch import Board, Row, change_line, changes, repaint, table
+from bridges.rmf import definitions as d
+from bridges.rmf.stamps import stamp
+
+WALL = 1_700_000_000.0
+LIFT = d.LiftState(
+    lift_time=stamp(WALL),
+    lift_name="Lift1",
+    current_floor="L1",
+    door_state=2,
+    current_mode=2,
+    session_id="fleet/robot",
+)
+DOOR = d.DoorState(stamp(WALL), "ward", d.DoorMode(0))
+CHARGER = d.ChargerState(stamp(WALL), 1, "a")
+
+
+def board(*messages: d.Message, at: float = 100.0) -> Board:
+    made = Board()
+    for message in messages:
+        made.take(Heard(message, at))
+    return made
+
+
+def test_there_is_one_row_for_each_device_lifts_first_then_by_name() -> None:
+    other = replace(LIFT, lift_name="A", session_id="")
+    rows = board(CHARGER, DOOR, LIFT, other, LIFT).rows(100.2, WALL + 0.2)
+    assert rows == [
+        Row("lift", "A", "L1 OPEN AGV", "-", "0.2 s", ""),
+        Row("lift", "Lift1", "L1 OPEN AGV", "fleet/robot", "0.2 s", ""),
+        Row("door", "ward", "CLOSED", "-", "0.2 s", ""),
+        Row("charger", "a", "IDLE", "-", "0.2 s", ""),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("age_s", "shown", "mark"),
+    [
+        (0.5, "0.5 s", ""),
+        (3.5, "3.5 s", "STALE"),
+        (119.0, "2 min", "STALE"),
+        (7200.0, "2 h", "STALE"),
+        (-10.0, "-10.0 s", "CLOCK AHEAD"),
+    ],
+)
+def test_the_age_is_that_of_the_reading_and_an_old_one_is_marked(
+    age_s: float, shown: str, mark: str
+) -> None:
+    message = replace(DOOR, door_time=stamp(WALL - age_s))
+    (row,) = board(message).rows(100.0, WALL)
+    assert (row.age, row.mark) == (shown, mark)
+
+
+def test_a_device_that_was_never_read_has_no_age_and_is_stale() -> None:
+    (row,) = board(replace(DOOR, door_time=d.Time())).rows(100.0, WALL)
+    assert (row.age, row.mark) == ("never", "STALE")
+
+
+def test_a_device_that_is_heard_no_more_is_marked_silent_and_not_stale() -> None:
+    (row,) = board(DOOR, at=100.0).rows(104.2, WALL + 4.2)
+    assert (row.age, row.mark) == ("4.2 s", "SILENT 4 s")
+
+
+def test_a_door_shows_who_the_supervisor_says_holds_it() -> None:
+    sessions = (d.Session(d.Time(), "fleet/a"), d.Session(d.Time(), "fleet/b"))
+    heartbeat = d.SupervisorHeartbeat((d.DoorSessions("ward", sessions),))
+    (row,) = board(DOOR, heartbeat).rows(100.0, WALL)
+    assert row.holder == "fleet/a fleet/b"
+    (row,) = board(DOOR, heartbeat, d.SupervisorHeartbeat()).rows(100.0, WALL)
+    assert row.holder == "-"
+
+
+def test_a_pipe_gets_a_line_for_a_change_and_none_for_an_age() -> None:
+    opened = replace(DOOR, current_mode=d.DoorMode(2))
+    first = board(DOOR, LIFT).rows(100.0, WALL)
+    older = board(DOOR, LIFT).rows(102.0, WALL + 2)
+    silent = board(DOOR, LIFT).rows(104.0, WALL + 4)
+    silent_longer = board(DOOR, LIFT).rows(114.0, WALL + 14)
+    moved = board(LIFT, opened).rows(100.0, WALL)
+    assert changes([], first) == first
+    assert changes(first, older) == []
+    assert [row.mark for row in changes(older, silent)] == ["SILENT 4 s", "SILENT 4 s"]
+    assert changes(silent, silent_longer) == []
+    assert [row.state for row in changes(first, moved)] == ["OPEN"]
+
+
+def test_a_change_line_can_be_grepped() -> None:
+    (row,) = board(LIFT).rows(100.0, WALL)
+    assert change_line(row, WALL).split()[1:] == [
+        *("lift", "Lift1", "L1", "OPEN", "AGV", "fleet/robot", "age", "0.0", "s")
+    ]
+
+
+def test_the_table_is_aligned_under_its_heading() -> None:
+    assert table(board(LIFT, DOOR).rows(100.0, WALL)) == [
+        "kind  name   state        session or request  age",
+        "lift  Lift1  L1 OPEN AGV  fleet/robot         0.0 s",
+        "door  ward   CLOSED       -                   0.0 s",
+    ]
+
+
+def test_an_empty_graph_is_called_that_and_its_line_goes_with_the_first_row() -> None:
+    assert repaint([], 0, columns=80, lines=24) == ("\r\x1b[Knothing heard yet\n\x1b[J", 1)
+    text, shown = repaint(board(DOOR).rows(100.0, WALL), 1, columns=80, lines=24)
+    assert text.startswith("\x1b[1A\r\x1b[Kkind")
+    assert shown == 2
+
+
+def test_a_repaint_goes_back_over_its_own_lines_and_wraps_none() -> None:
+    rows = board(LIFT, DOOR).rows(100.0, WALL)
+    text, shown = repaint(rows, 0, columns=20, lines=24)
+    assert shown == 3
+    assert text.startswith("\r\x1b[Kkind  name   state \n")
+    again, shown = repaint(rows, shown, columns=80, lines=24)
+    assert again.startswith("\x1b[3A\r")
+    assert shown == 3
+
+
+def test_a_repaint_that_does_not_fit_says_how_much_is_left_out() -> None:
+    doors = [replace(DOOR, door_name=f"door{n}") for n in range(10)]
+    text, shown = repaint(board(*doors).rows(100.0, WALL), 0, columns=80, lines=6)
+    assert shown == 5
+    assert "… and 7 more" in text
+    assert "door4" not in text
+
+
+def test_a_marked_row_is_red_on_a_terminal() -> None:
+    text, _ = repaint(board(LIFT, DOOR).rows(104.0, WALL), 0, columns=80, lines=24)
+    assert text.count("\x1b[31m") == 2
+
+
+@pytest.mark.parametrize(
+    ("line", "seconds"), [([], None), (["--once"], 3.0), (["--once", "0.5"], 0.5)]
+)
+def test_once_listens_for_three_seconds_unless_told_otherwise(
+    line: list[str], seconds: float | None
+) -> None:
+    parser = argparse.ArgumentParser()
+    watch.add_arguments(parser)
+    assert parser.parse_args(line).once == seconds
+
+
+@pytest.mark.parametrize("domain", ["-1", "233", "x", "1.5"])
+def test_a_domain_that_cannot_be_is_a_usage_error(domain: str) -> None:
+    parser = argparse.ArgumentParser()
+    watch.add_arguments(parser)
+    with pytest.raises(SystemExit) as left:
+        parser.parse_args(["--domain-id", domain])
+    assert left.value.code == 2

@@ -1,0 +1,74 @@
+"""Messages in words, as `watch`, `send` and the demo print them."""
+
+from bridges.rmf import definitions as d
+from bridges.rmf import stamps, words
+
+
+def test_a_lift_state_reads_as_floor_door_mode_and_where_it_goes() -> None:
+    state = d.LiftState(
+        lift_name="Lift1",
+        current_floor="L1",
+        destination_floor="L3",
+        door_state=d.LiftDoor.DOOR_CLOSED,
+        motion_state=d.LiftMotion.MOTION_UP,
+        current_mode=d.LiftMode.MODE_AGV,
+        session_id="fleet/robot",
+    )
+    assert words.condition(state) == "L1 CLOSED AGV going UP to L3"
+    assert words.holder(state) == "fleet/robot"
+    assert words.device(state) == "Lift1"
+
+
+def test_a_lift_between_floors_without_motion_lines_claims_neither_floor_nor_motion() -> None:
+    state = d.LiftState(motion_state=d.LiftMotion.MOTION_UNKNOWN, door_state=1)
+    assert words.condition(state) == "no-floor MOVING UNKNOWN"
+
+
+def test_a_number_that_rmf_does_not_define_is_shown_as_a_number() -> None:
+    assert words.condition(d.DoorState(current_mode=d.DoorMode(7))) == "7?"
+    assert words.condition(d.ChargerState(state=238)) == "238?"
+
+
+def test_a_name_from_the_network_cannot_move_the_cursor() -> None:
+    state = d.LiftState(current_floor="L1\x1b[2J\n", session_id="a\rb")
+    assert words.condition(state) == "L1\\x1b[2J\\n CLOSED UNKNOWN"
+    assert words.holder(state) == "a\\rb"
+
+
+def test_a_charger_says_its_error_its_robot_and_how_long_it_takes() -> None:
+    failed = d.ChargerState(state=200, error_message="over temperature")
+    charging = d.ChargerState(
+        state=3,
+        request_id="r1",
+        robot_fleet="fleet",
+        robot_name="robot",
+        time_to_fully_charged=d.Duration(720),
+    )
+    assert words.condition(failed) == "ERROR over temperature"
+    assert words.condition(charging) == "CHARGING full in 12 min"
+    assert words.holder(charging) == "r1 fleet/robot"
+
+
+def test_each_request_says_what_is_asked_and_by_whom() -> None:
+    asked: list[words.Requested] = [
+        d.LiftRequest("Lift1", d.Time(), "fleet/robot", 1, "L3", 2),
+        d.LiftRequest("Lift1", d.Time(), "fleet/robot", 0, "", 0),
+        d.DoorRequest(d.Time(), "door_supervisor", "ward", d.DoorMode(2)),
+        d.ChargerRequest("a", "fleet", "robot", d.Duration(30), "r1"),
+        d.ChargerCancel("a", "r1"),
+    ]
+    assert [words.request(message) for message in asked] == [
+        "AGV_MODE to L3 door OPEN for fleet/robot",
+        "END_SESSION of fleet/robot",
+        "OPEN for door_supervisor",
+        "charge fleet/robot as r1",
+        "cancel r1",
+    ]
+
+
+def test_seconds_and_stamps_convert_both_ways_and_never_is_zero() -> None:
+    assert stamps.stamp(1700000000.25) == d.Time(1700000000, 250000000)
+    assert stamps.in_seconds(d.Time(1700000000, 250000000)) == 1700000000.25
+    assert stamps.stamp(-1.0) == d.Time()
+    assert stamps.duration(1.5) == d.Duration(1, 500000000)
+    assert words.stamped_at(d.DoorState()) == 0
