@@ -1,0 +1,30 @@
+"""Chargers: RMF's ChargerRequest to a station, and the truth about it as ChargerState."""
+
+from collections.abc import Mapping
+
+from bridges.charger import core, messages
+from bridges.charger.settings import ChargerSettings, Limits
+from bridges.kind import Kind
+from bridges.rmf.topics import CHARGER_CANCELS, CHARGER_REQUESTS, CHARGER_STATES
+
+
+def limits(settings: ChargerSettings, debounce_s: Mapping[str, float]) -> Limits:
+    """The core's durations: a charger has no contacts to debounce."""
+    return settings.limits
+
+
+KIND = Kind(
+    name="charger",
+    devices_key="chargers",
+    states=CHARGER_STATES,
+    requests={
+        CHARGER_REQUESTS: messages.accept_request,
+        CHARGER_CANCELS: messages.accept_cancel,
+    },
+    device_name=messages.device_name,
+    limits=limits,
+    initial=core.initial,
+    decide=core.decide,
+    state_message=messages.state_message,
+    summary=messages.summary,
+)

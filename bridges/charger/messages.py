@@ -1,0 +1,109 @@
+"""ChargerRequest and ChargerCancel in, ChargerState out: is it well formed?"""
+
+from collections.abc import Mapping
+
+from bridges.charger.core import Cancelled, Requested
+from bridges.charger.report import ChargerReport
+from bridges.charger.settings import ChargerSettings
+from bridges.decision import RequestRefused
+from bridges.rmf.definitions import (
+    ChargerCancel,
+    ChargerRequest,
+    ChargerState,
+    ChargerStateValue,
+    Duration,
+    Time,
+)
+from bridges.rmf.stamps import duration, in_seconds
+
+LONGEST_NAME = 256
+LONGEST_TIMEOUT_S = 86400.0
+"""A day: whoever asks for more has mistaken the unit."""
+UNREQUESTED = "unrequested/"
+"""ChargerState wants a request id in every state but IDLE; what nobody asked for (an error of a free
+station, a robot that charges by itself) gets this, followed by the charger's name."""
+
+
+def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Requested:
+    """The event that a ChargerRequest is. Raises RequestRefused for what is not one.
+
+    A start_timeout of zero means the configured default.
+    """
+    _check("request_id", request.request_id)
+    _check("fleet_name", request.fleet_name)
+    _check("robot_name", request.robot_name)
+    if request.request_id.startswith(UNREQUESTED):
+        raise RequestRefused("reserved request_id", f"{UNREQUESTED}… is what we publish ourselves")
+    return Requested(
+        request.request_id,
+        request.fleet_name,
+        request.robot_name,
+        _start_timeout_s(request.start_timeout),
+    )
+
+
+def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled:
+    """The event that a ChargerCancel is. Raises RequestRefused for what is not one."""
+    _check("request_id", cancel.request_id)
+    return Cancelled(cancel.request_id)
+
+
+def _check(field: str, text: str) -> None:
+    if not text:
+        raise RequestRefused(f"empty {field}", "ChargerState must show it")
+    if len(text) > LONGEST_NAME or not text.isprintable():
+        raise RequestRefused(f"impossible {field}", f"{text[:40]!r}, {len(text)} characters")
+
+
+def _start_timeout_s(timeout: Duration) -> float:
+    seconds = in_seconds(timeout)
+    if seconds < 0:
+        raise RequestRefused("negative start_timeout", f"{seconds:g} s")
+    if seconds > LONGEST_TIMEOUT_S:
+        raise RequestRefused("absurd start_timeout", f"{seconds:g} s is more than a day")
+    return seconds
+
+
+def device_name(message: ChargerRequest | ChargerCancel | ChargerState) -> str:
+    """Which charger a message is about."""
+    return message.charger_name
+
+
+def state_message(
+    name: str, settings: ChargerSettings, shown: ChargerReport, stamp: Time
+) -> ChargerState:
+    """The report as RMF reads it; `stamp` is when the station was read."""
+    request_id = shown.request_id
+    if not request_id and shown.state is not ChargerStateValue.CHARGER_IDLE:
+        request_id = UNREQUESTED + name
+    return ChargerState(
+        charger_time=stamp,
+        state=int(shown.state),
+        charger_name=name,
+        error_message=shown.error_message,
+        request_id=request_id,
+        robot_fleet=shown.fleet,
+        robot_name=shown.robot,
+        time_to_fully_charged=duration(shown.measured.time_to_full_s or 0.0),
+    )
+
+
+def summary(shown: ChargerReport) -> Mapping[str, str]:
+    """What a person wants to read of it, in a line. A robot is only the one that asked, unless the
+    station has seen its receiver.
+    """
+    measured = shown.measured
+    seen = "" if measured.receiver_id else " (unverified)"
+    told = {
+        "state": shown.state.name.removeprefix("CHARGER_"),
+        "request": shown.request_id or "-",
+        "robot": f"{shown.fleet}/{shown.robot}{seen}" if shown.robot else "-",
+        "error": shown.error_message or "-",
+    }
+    optional = {
+        "receiver": measured.receiver_id,
+        "volts": measured.volts,
+        "amps": measured.amps,
+        "time_to_full_s": measured.time_to_full_s,
+    }
+    return told | {key: str(value) for key, value in optional.items() if value is not None}

@@ -1,0 +1,32 @@
+"""What RMF is told about a charger: ChargerState's content, and what the status file says beside it."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from bridges.charger.signals import Measured
+from bridges.decision import Fault
+from bridges.rmf.definitions import ChargerStateValue
+
+
+@dataclass(frozen=True, slots=True)
+class ChargerReport:
+    """ChargerState without its name and stamp.
+
+    `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:
+    blank unless `state` is CHARGER_ERROR. `request_id`, `fleet`, `robot`: blank while no request
+    holds the station. Where `measured.receiver_id` is None, the robot is only the one that asked.
+    """
+
+    read_at: float | None
+    state: ChargerStateValue
+    error_message: str = ""
+    request_id: str = ""
+    fleet: str = ""
+    robot: str = ""
+    faults: tuple[Fault, ...] = ()
+    measured: Measured = Measured()
+
+    def news(self) -> Any:
+        """All but the age and the measurements, which differ at each reading."""
+        measured = Measured(receiver_id=self.measured.receiver_id)
+        return replace(self, read_at=None, measured=measured)

@@ -1,0 +1,70 @@
+"""What a charger's driver tells its core, and what the core tells its driver: one scan's image.
+
+A station that answers HTTP as the first contract does fills in the activity and the error's text only.
+Richer controllers (CANopen, Modbus, another make's JSON) fill in `measured` and obey `power`.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Activity(StrEnum):
+    """What a station says that it is doing. The names are the YAML's, but for UNKNOWN.
+
+    STOPPING: asked to end or ramping down while current still flows. RELEASED: disconnected from
+    the robot, and not ready for another yet. UNKNOWN: a code that no list of the YAML names.
+    """
+
+    IDLE = "idle"
+    HANDSHAKE = "handshake"
+    CHARGING = "charging"
+    STOPPING = "stopping"
+    RELEASED = "released"
+    ERROR = "error"
+    UNKNOWN = "unknown"
+
+
+CURRENT_FLOWS = frozenset({Activity.CHARGING, Activity.STOPPING})
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What a richer controller knows beside its state; None where it does not say.
+
+    `receiver_id`: who is on the pad. `volts`, `amps`: at the battery.
+    """
+
+    receiver_id: str | None = None
+    in_range: bool | None = None
+    volts: float | None = None
+    amps: float | None = None
+    time_to_full_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ChargerSample:
+    """One reading of one station.
+
+    `code`: the vendor's number, for texts only. `error_text`: the station's own words, printable and
+    bounded.
+    """
+
+    activity: Activity
+    code: int
+    error_text: str = ""
+    measured: Measured = Measured()
+
+
+@dataclass(frozen=True, slots=True)
+class ChargerOutputs:
+    """Everything that a station is told.
+
+    `power`: whether it may energise; None leaves it as it is (a charge that we have not started, and
+    a station that does not answer, are neither started nor stopped blindly).
+    `clear_errors`: how many clearings of its errors were asked for since the daemon started. A driver
+    sends one for a rise and never sends it again, whatever became of it: clearing is not idempotent,
+    and as a count it may be written any number of times.
+    """
+
+    power: bool | None = None
+    clear_errors: int = 0

@@ -1,0 +1,19 @@
+"""Doors."""
+
+from bridges.door import core, messages
+from bridges.door.settings import DoorLimits
+from bridges.kind import Kind
+from bridges.rmf import topics
+
+KIND = Kind(
+    name="door",
+    devices_key="doors",
+    states=topics.DOOR_STATES,
+    requests={topics.DOOR_REQUESTS: messages.accept},
+    device_name=lambda message: str(message.door_name),
+    limits=DoorLimits.of,
+    initial=core.initial,
+    decide=core.decide,
+    state_message=messages.state_message,
+    summary=messages.summary,
+)

@@ -1,0 +1,149 @@
+"""What to believe of a door's inputs: debounce, age, and estimates where no contact is wired.
+
+Rules:
+- A change counts when it has lasted for its signal's debounce. A fire alarm or an obstruction that
+  ends must be away for `hazard_clear_s`. While one has never settled, a first sight of it counts.
+- A reading older than `stale_after_s` is no reading; what was believed before such a gap is
+  forgotten, because the door may have moved unseen.
+- A missing limit contact is estimated only when the YAML says so: from the time for which the relay
+  is known to have been on or off. A failed reading or write starts that time again.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from bridges.debounce import Settled, forget, settle
+from bridges.door.settings import DoorLimits
+from bridges.door.signals import DoorSample
+
+NEVER = float("inf")
+SIGNALS = ("opened", "closed", "obstruction", "fire")
+HAZARDS = ("obstruction", "fire")
+
+Contact = Settled[bool | None]
+"""One input with its debounce. Where it is not wired, both value and candidate are None."""
+
+
+@dataclass(frozen=True, slots=True)
+class Senses:
+    """Each contact (None: not read yet); when all were last read, and since when without a miss."""
+
+    opened: Contact | None = None
+    closed: Contact | None = None
+    obstruction: Contact | None = None
+    fire: Contact | None = None
+    read_at: float | None = None
+    linked_since: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The inputs as they are believed at one instant.
+
+    `fresh`: they were read lately. `seen`: and each has lasted for its debounce, so that something
+    can be said about where the door is. `estimated`: the ends that no contact proves.
+    `changes_at`: when this may differ though nothing happens (s).
+    """
+
+    fresh: bool
+    seen: bool
+    opened: bool
+    closed: bool
+    obstructed: bool
+    fire: bool
+    estimated: frozenset[str]
+    changes_at: float
+
+
+def take(senses: Senses, sample: DoorSample, now: float, limits: DoorLimits) -> Senses:
+    """Add one reading."""
+    if not is_fresh(senses, now, limits):
+        senses = Senses()
+    contacts: dict[str, Contact] = {}
+    for signal in SIGNALS:
+        before: Contact | None = getattr(senses, signal)
+        seen: bool | None = getattr(sample, signal)
+        contacts[signal] = settle(before, seen, now, _hold_s(before, seen, signal, limits))
+    linked_since = now if senses.linked_since is None else senses.linked_since
+    return Senses(**contacts, read_at=now, linked_since=linked_since)
+
+
+def miss(senses: Senses) -> Senses:
+    """A reading or a write has failed: what was half seen must be seen again."""
+    contacts = {signal: _missed(getattr(senses, signal)) for signal in SIGNALS}
+    return Senses(**contacts, read_at=senses.read_at, linked_since=None)
+
+
+def is_fresh(senses: Senses, now: float, limits: DoorLimits) -> bool:
+    """Is the last reading young enough to be a fact?"""
+    return senses.read_at is not None and now < senses.read_at + limits.t.stale_after_s
+
+
+def look(senses: Senses, held: bool, held_since: float, now: float, limits: DoorLimits) -> View:
+    """What is believed now, the relay having been on (`held`) or off since `held_since`."""
+    opened, closed = _believed(senses.opened), _believed(senses.closed)
+    opened_at, closed_at = _estimates(senses, held, held_since, limits)
+    guessed = frozenset(s for s in ("opened", "closed") if _unwired(getattr(senses, s)))
+    fresh = is_fresh(senses, now, limits)
+    return View(
+        fresh=fresh,
+        seen=fresh and all(_settled(getattr(senses, signal)) for signal in SIGNALS),
+        opened=opened or ("opened" in guessed and now >= opened_at and not closed),
+        closed=closed or ("closed" in guessed and now >= closed_at and not opened),
+        obstructed=_feared(senses.obstruction),
+        fire=_feared(senses.fire),
+        estimated=guessed,
+        changes_at=min(_changes(senses, limits, now, opened_at, closed_at), default=NEVER),
+    )
+
+
+def _hold_s(before: Contact | None, seen: bool | None, signal: str, limits: DoorLimits) -> float:
+    """How long `seen` must last: a hazard goes more slowly than it comes."""
+    hold_s = limits.debounce.get(signal, 0.0)
+    clearing = signal in HAZARDS and seen is False and before is not None and before.value
+    return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
+
+
+def _unwired(contact: Contact | None) -> bool:
+    return contact is not None and contact.value is None and contact.candidate is None
+
+
+def _settled(contact: Contact | None) -> bool:
+    return contact is not None and (contact.value is not None or contact.candidate is None)
+
+
+def _missed(contact: Contact | None) -> Contact | None:
+    return contact if _unwired(contact) else forget(contact)
+
+
+def _believed(contact: Contact | None) -> bool:
+    return contact is not None and contact.value is True
+
+
+def _feared(contact: Contact | None) -> bool:
+    """A hazard that is believed; or seen at all, where nothing is believed yet."""
+    if contact is None:
+        return False
+    return bool(contact.candidate if contact.value is None else contact.value)
+
+
+def _estimates(
+    senses: Senses, held: bool, held_since: float, limits: DoorLimits
+) -> tuple[float, float]:
+    """When a door without contacts is taken to be open, and closed; NEVER where it is not."""
+    if not limits.estimated or senses.linked_since is None:
+        return NEVER, NEVER
+    since = max(held_since, senses.linked_since)
+    delay_s = NEVER if limits.t.open_delay_s is None else limits.t.open_delay_s
+    return (since + delay_s, NEVER) if held else (NEVER, since + limits.t.travel_s)
+
+
+def _changes(senses: Senses, limits: DoorLimits, now: float, *estimates: float) -> Iterator[float]:
+    """When staleness, an estimate or a half-seen contact will next change the view."""
+    stale_at = NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
+    due = [stale_at, *estimates]
+    for signal in SIGNALS:
+        contact: Contact | None = getattr(senses, signal)
+        if contact is not None:
+            due.append(contact.due_at(_hold_s(contact, contact.candidate, signal, limits)))
+    yield from (at for at in due if at > now)

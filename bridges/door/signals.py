@@ -1,0 +1,24 @@
+"""What a door's driver tells its core, and what the core tells its driver: one scan's image."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class DoorSample:
+    """Every input of one door, polarity resolved but not debounced; None where not wired.
+
+    `opened`, `closed`: the limit contacts of the fully open and the fully closed door.
+    `obstruction`: somebody or something stands in the doorway. `fire`: the fire alarm's contact.
+    """
+
+    opened: bool | None = None
+    closed: bool | None = None
+    obstruction: bool | None = None
+    fire: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DoorOutputs:
+    """Every output of one door. There is no command to close: that is the operator's own doing."""
+
+    hold_open: bool = False

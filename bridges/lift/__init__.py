@@ -1,0 +1,21 @@
+"""Lifts: RMF's LiftRequest to relays, and the truth about the car as LiftState."""
+
+from bridges.kind import Kind
+from bridges.lift import core, messages
+from bridges.lift.limits import LiftLimits
+from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
+
+KIND = Kind(
+    name="lift",
+    devices_key="lifts",
+    states=LIFT_STATES,
+    requests={LIFT_REQUESTS: messages.accept},
+    device_name=messages.device_name,
+    limits=LiftLimits.of,
+    initial=core.initial,
+    decide=core.decide,
+    published=core.published,
+    alarm_topics=messages.alarm_topics,
+    state_message=messages.state_message,
+    summary=messages.summary,
+)

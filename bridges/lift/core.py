@@ -1,0 +1,315 @@
+"""The lift's decision core: who holds the lift, what its relays do, and what RMF is told.
+
+Rules, in the order in which they are applied:
+1. A session is granted to the first request while the lift is free, unless something forbids every
+   output (an obstacle); its own requests refresh it, those of others are refused. It ends by its own
+   END and by nothing else: never by a hazard, a fault or a timeout. One in HUMAN mode is a session
+   without outputs.
+2. After END the session is gone at once; AGV mode and the door may stay held for `release_grace_s`,
+   in which only the same session is granted, whatever else is wrong (a supervisor that restarts
+   sends END for a robot that is still inside, and it must get out in a fire, too).
+3. A request sets what is wanted; `bridges/lift/drive.py` says what may be energised.
+4. Obstacles switch everything off and never touch the session: fire (and its latch, where an
+   operator must reset it), code blue, earthquake, emergency, out of service, manual mode, a second
+   node for this lift, inputs that cannot be believed, outputs that cannot be written. A gap in
+   reading or writing shorter than `stale_after_s` is none. Overload only delays.
+5. The door is OPEN for RMF when its contact, the floor and the standstill say so freshly. While a
+   session is held and no open door at its destination has been published for it yet (the robot is
+   outside), AGV mode must be on too and nothing may be wrong: RMF's robots look at session, floor
+   and door only, and must not board a lift in a fire. Once it has been published, a robot may be
+   inside, and the true door is shown in any mode, so that it gets out.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from bridges.decision import (
+    Decision,
+    Fault,
+    IoFailed,
+    OperatorReset,
+    RivalSeen,
+    Sampled,
+    WriteFailed,
+)
+from bridges.lift import drive
+from bridges.lift.drive import Grace, Relays, Session
+from bridges.lift.limits import LiftLimits
+from bridges.lift.report import LiftReport, report
+from bridges.lift.sensing import Senses, View, gap, look, take, trust
+from bridges.lift.signals import Hazard, LiftOutputs, LiftSample
+from bridges.rmf.definitions import Bool, EmergencySignal, Message
+from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
+
+RIVAL_GONE_S = 5.0
+"""A second node for this lift is gone when nothing was heard of it for so long; states come at 1 Hz."""
+
+NOT_RMFS = frozenset(
+    {
+        Hazard.FIRE,
+        Hazard.CODE_BLUE,
+        Hazard.EARTHQUAKE,
+        Hazard.EMERGENCY,
+        Hazard.OUT_OF_SERVICE,
+        Hazard.MANUAL,
+    }
+)
+"""Hazards that take the lift away; overload only delays it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A LiftRequest for AGV or HUMAN mode that is ours, well formed and for a floor we serve."""
+
+    session_id: str
+    agv: bool
+    destination: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """A LiftRequest for END_SESSION, whatever its other fields say."""
+
+    session_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """Everything that outlives a scan.
+
+    `io_fault`: what reading or writing last said, "" when all is well. `unwritten_since`: since when
+    each scan's outputs could not be written; `write_failed`: those of the last scan.
+    """
+
+    senses: Senses = Senses()
+    session: Session | None = None
+    grace: Grace | None = None
+    relays: Relays = Relays()
+    fire_latched: bool = False
+    alarmed: bool = False
+    rival_at: float | None = None
+    io_fault: str = ""
+    unwritten_since: float | None = None
+    write_failed: bool = False
+
+
+Event = Sampled[Any] | IoFailed | RivalSeen | OperatorReset | Asked | Ended
+
+
+def initial(limits: LiftLimits, now: float) -> Memory:
+    """Nothing read, nobody in session, everything off."""
+    return Memory()
+
+
+def decide(
+    memory: Memory, event: Event, now: float, limits: LiftLimits
+) -> Decision[Memory, LiftOutputs, LiftReport]:
+    """One scan: take the event in, look, and derive outputs and report afresh."""
+    alarmed_before = memory.alarmed
+    memory, refused = _take(memory, event, now, limits)
+    view = look(memory.senses, now, limits)
+    memory = _latch(memory, view, now, limits)
+    allowed = not obstacles(memory, view, now, limits)
+    memory, outputs = _drive(memory, view, allowed, now, limits)
+    driven = memory.relays.outputs()
+    faults = _faults(memory, view, now, limits)
+    read_at = memory.senses.read_at
+    return Decision(
+        memory,
+        driven,
+        report(memory.session, view, read_at, faults, driven.agv_request, limits),
+        _wake_at(memory, view, outputs, now, limits),
+        refused,
+        _alarms(alarmed_before, memory, limits),
+    )
+
+
+def published(memory: Memory, shown: LiftReport) -> Memory:
+    """The report is out: if it offered an open door at the destination, a robot may be inside."""
+    session = memory.session
+    offered = shown.open_at == shown.destination != "" and shown.session == (session and session.id)
+    if session is None or session.boarded or not offered:
+        return memory
+    return replace(memory, session=replace(session, boarded=True))
+
+
+def obstacles(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
+    """What forbids every output now, most serious first."""
+    found = []
+    if memory.fire_latched and Hazard.FIRE not in view.hazards:
+        found.append(Fault("FIRE_LATCHED", "rmf-bridge reset when it is safe"))
+    found += [Fault(h.name) for h in Hazard if h in NOT_RMFS and h in view.hazards]
+    if memory.rival_at is not None:
+        found.append(Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes this lift's states"))
+    if not view.fresh:
+        found.append(Fault("INPUTS_NOT_FRESH", memory.io_fault or view.blind))
+    if now >= _unwritten_at(memory, limits):
+        found.append(Fault("OUTPUTS_NOT_WRITTEN", memory.io_fault))
+    return tuple(found)
+
+
+def _unwritten_at(memory: Memory, limits: LiftLimits) -> float:
+    """When outputs have not been written for so long that it matters."""
+    since = memory.unwritten_since
+    return math.inf if since is None else since + limits.t.stale_after_s
+
+
+def _drive(
+    memory: Memory, view: View, allowed: bool, now: float, limits: LiftLimits
+) -> tuple[Memory, LiftOutputs]:
+    """The next outputs, in memory's relays, and what they would be if relays needed no rest."""
+    session, grace, relays = memory.session, memory.grace, memory.relays
+    outputs = LiftOutputs()
+    if session and drive.serves(session, allowed, now, limits):
+        session = drive.advance(session, view, bool(relays.agv.on), now, limits)
+        outputs = drive.wanted(session, view, now, limits)
+    elif session:
+        session = drive.paused(session)
+    elif grace and now >= grace.until:
+        grace = None
+    elif grace and allowed:
+        outputs = drive.kept(grace, relays, view, now, limits)
+    relays = relays.step(outputs, now, limits)
+    if session and relays.call.on and session.call_at is None:
+        session = replace(session, call_at=now)
+    return replace(memory, session=session, grace=grace, relays=relays), outputs
+
+
+def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple[Memory, str]:
+    match event:
+        case Sampled(sample):
+            return _read(memory, sample, now, limits), ""
+        case WriteFailed(reason):
+            since = now if memory.unwritten_since is None else memory.unwritten_since
+            return replace(memory, io_fault=reason, unwritten_since=since, write_failed=True), ""
+        case IoFailed(reason):
+            return replace(memory, senses=gap(memory.senses, now), io_fault=reason), ""
+        case RivalSeen():
+            return replace(memory, rival_at=now), ""
+        case OperatorReset():
+            return _reset(memory), ""
+        case Asked():
+            return _ask(memory, event, now, limits)
+        case Ended(session_id):
+            return _end(memory, session_id, now, limits)
+
+
+def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) -> Memory:
+    """A reading; and what was written since the one before it, all went well."""
+    return replace(
+        memory,
+        senses=take(memory.senses, sample, now, limits),
+        io_fault=memory.io_fault if memory.write_failed else "",
+        unwritten_since=memory.unwritten_since if memory.write_failed else None,
+        write_failed=False,
+    )
+
+
+def _ask(memory: Memory, asked: Asked, now: float, limits: LiftLimits) -> tuple[Memory, str]:
+    held, grace = memory.session, memory.grace
+    if held and held.id != asked.session_id:
+        return memory, f"held by {held.id}"
+    if held:
+        return replace(memory, session=_refresh(held, asked, now)), ""
+    if grace and now < grace.until:
+        if grace.session.id != asked.session_id:
+            return memory, f"released by {grace.session.id} a moment ago"
+        resumed = drive.paused(grace.session)
+        return replace(memory, session=_refresh(resumed, asked, now), grace=None), ""
+    why_not = obstacles(memory, look(memory.senses, now, limits), now, limits)
+    if why_not:
+        return memory, why_not[0].code
+    session = Session(asked.session_id, asked.agv, asked.destination, now)
+    return replace(memory, session=session, grace=None), ""
+
+
+def _refresh(session: Session, asked: Asked, now: float) -> Session:
+    """A repeat only says that RMF is still there; another destination or mode is a new request."""
+    if (asked.agv, asked.destination) == (session.agv, session.destination):
+        return replace(session, asked_at=now)
+    seen = session.agv_seen
+    return Session(
+        session.id, asked.agv, asked.destination, now, boarded=session.boarded, agv_seen=seen
+    )
+
+
+def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tuple[Memory, str]:
+    held = memory.session
+    if held is None:
+        return memory, ""
+    if held.id != session_id:
+        return memory, f"held by {held.id}"
+    grace = None
+    if (memory.relays.agv.on or held.boarded) and limits.t.release_grace_s > 0:
+        grace = Grace(held, now + limits.t.release_grace_s)
+    return replace(memory, session=None, grace=grace), ""
+
+
+def _reset(memory: Memory) -> Memory:
+    """An operator says that it is safe: latches go, unless their cause is still there."""
+    session = memory.session
+    if session and session.fault:
+        session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
+    fire = memory.senses.hazards.get(Hazard.FIRE)
+    burning = fire is not None and bool(fire.value)
+    return replace(
+        memory,
+        session=session,
+        fire_latched=burning and memory.fire_latched,
+        alarmed=burning and memory.alarmed,
+        senses=trust(memory.senses),
+    )
+
+
+def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory:
+    """A fire stays until its policy lets it go; a rival until it has been silent long enough."""
+    burning = Hazard.FIRE in view.hazards
+    manual = limits.fire_reset == "manual"
+    rival_at = memory.rival_at
+    return replace(
+        memory,
+        fire_latched=manual and (burning or memory.fire_latched),
+        alarmed=memory.alarmed or burning,
+        rival_at=None if rival_at is None or now >= rival_at + RIVAL_GONE_S else rival_at,
+    )
+
+
+def _alarms(
+    before: bool, memory: Memory, limits: LiftLimits
+) -> tuple[tuple[Topic[Any], Message], ...]:
+    """One `true` on the rising edge; `false` only after an operator's reset; each once."""
+    if memory.alarmed == before or limits.alarm == "none":
+        return ()
+    if limits.alarm == FIRE_ALARM_TRIGGER.name:
+        return ((FIRE_ALARM_TRIGGER, Bool(memory.alarmed)),)
+    return ((EMERGENCY_SIGNAL, EmergencySignal((), memory.alarmed)),)
+
+
+def _faults(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
+    session = memory.session
+    found = [*obstacles(memory, view, now, limits)]
+    if session and session.fault:
+        found.append(session.fault)
+    if Hazard.OVERLOAD in view.hazards:
+        found.append(Fault("OVERLOAD", "waits until the car is lighter"))
+    if session and drive.silent(session, now, limits):
+        found.append(Fault("RMF_SILENT", f"no request from {session.id}"))
+    return (*found, *view.faults)
+
+
+def _wake_at(
+    memory: Memory, view: View, outputs: LiftOutputs, now: float, limits: LiftLimits
+) -> float:
+    due = [
+        view.changes_at,
+        memory.relays.changes_at(outputs, now, limits),
+        _unwritten_at(memory, limits),
+    ]
+    if memory.session:
+        due += drive.next_at(memory.session, limits)
+    if memory.grace:
+        due += [drive.let_go_at(memory.grace, limits), memory.grace.until]
+    if memory.rival_at is not None:
+        due.append(memory.rival_at + RIVAL_GONE_S)
+    return min((at for at in due if at > now), default=math.inf)

@@ -1,0 +1,303 @@
+"""What to believe of a lift's inputs: debounce, age, and whether they can be true together.
+
+Rules:
+- A change counts when it has lasted for its signal's debounce. A hazard that ends must be away for
+  `hazard_clear_s`. Nothing is believed before every input has settled once, nor while one has not
+  kept still for `RESTLESS_S`.
+- A reading older than `stale_after_s` is no reading, and what was believed before it is forgotten:
+  the lift may be anywhere. A shorter gap changes nothing, but what was half seen is seen anew.
+- A floor is a position only if the car can have come there: a code that cannot be, or that skips
+  floors faster than a car travels (or, with motion lines, changes while the car is seen standing) is
+  none, until the code shows the last good floor or another that can be true, or an operator resets.
+- A door is open when the contact that proves it says so. With one contact the other end is estimated
+  by the door's travel time, and marked.
+- A car is stopped when the motion lines say so; without such lines, nothing contradicts it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from bridges.debounce import Settled, forget, settle
+from bridges.decision import Fault
+from bridges.lift.limits import LiftLimits
+from bridges.lift.signals import Door, Hazard, LiftSample, Motion, Side
+
+NEVER = float("inf")
+
+MOTION_MEMORY_S = 2.0
+"""How long after the car was last seen moving a new floor is still its doing."""
+
+RESTLESS_S = 2.0
+"""An input that does not keep still for its debounce within this time is broken or torn about."""
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """`trusted`: the last floor that can be true, seen last at `seen_at`; `suspect`: one that can't.
+
+    `moved_at`: when the car was last not seen standing.
+    """
+
+    trusted: str | None = None
+    seen_at: float = 0.0
+    suspect: str | None = None
+    moved_at: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Senses:
+    """Every input with its debounce, since when it has been so, and when all were last read."""
+
+    read_at: float | None = None
+    code: Settled[tuple[str | None, str]] | None = None
+    doors: tuple[Settled[Door | None] | None, Settled[Door | None] | None] = (None, None)
+    motion: Settled[Motion | None] | None = None
+    agv: Settled[bool | None] | None = None
+    hazards: dict[Hazard, Settled[bool]] = field(default_factory=dict)
+    position: Position = Position()
+
+
+@dataclass(frozen=True, slots=True)
+class DoorSeen:
+    """One door: is it open, is it closed (neither: moving), and is that an estimate?"""
+
+    open: bool
+    closed: bool
+    estimated: bool = False
+    settles_at: float = NEVER
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The inputs as they are believed at one instant.
+
+    `blind`: why nothing can be believed, "" when all is fresh. `level`: the landing, None when
+    unknown. `agv`: None where not wired. `changes_at`: when this may differ if nothing is read (s).
+    """
+
+    blind: str
+    level: str | None
+    stopped: bool
+    motion: Motion | None
+    agv: bool | None
+    front: DoorSeen
+    rear: DoorSeen | None
+    hazards: frozenset[Hazard]
+    faults: tuple[Fault, ...]
+    changes_at: float
+
+    @property
+    def fresh(self) -> bool:
+        """Can the inputs be believed?"""
+        return not self.blind
+
+    def door(self, side: Side) -> DoorSeen:
+        """The door on that side; a side that is not wired is never open."""
+        if side is Side.FRONT:
+            return self.front
+        return self.rear or DoorSeen(open=False, closed=False)
+
+
+def take(senses: Senses, sample: LiftSample, now: float, limits: LiftLimits) -> Senses:
+    """Add one reading."""
+    if senses.read_at is not None and now >= stale_at(senses, limits):
+        senses = Senses(position=replace(senses.position, moved_at=now))
+    hold = limits.debounce_s
+    code = settle(senses.code, (sample.level, sample.code_fault), now, hold("floor"))
+    return Senses(
+        read_at=now,
+        code=code,
+        doors=(
+            settle(senses.doors[0], sample.door, now, hold("door")),
+            settle(senses.doors[1], sample.rear_door, now, hold("rear_door")),
+        ),
+        motion=settle(senses.motion, sample.motion, now, hold("motion")),
+        agv=settle(senses.agv, sample.agv, now, hold("agv_mode")),
+        hazards={
+            h: _settle_hazard(senses.hazards.get(h), h, h in sample.hazards, now, limits)
+            for h in Hazard
+        },
+        position=_locate(senses.position, code, sample.motion, now, limits),
+    )
+
+
+def gap(senses: Senses, now: float) -> Senses:
+    """A reading has failed: what was half seen must be seen again, and the car may have moved."""
+    return Senses(
+        senses.read_at,
+        forget(senses.code),
+        (forget(senses.doors[0]), forget(senses.doors[1])),
+        forget(senses.motion),
+        forget(senses.agv),
+        {h: s for h, before in senses.hazards.items() if (s := forget(before))},
+        replace(senses.position, moved_at=now),
+    )
+
+
+def trust(senses: Senses) -> Senses:
+    """An operator says that the floor code is right."""
+    position = senses.position
+    if position.suspect is None:
+        return senses
+    position = replace(position, trusted=position.suspect, suspect=None)
+    return replace(senses, position=position)
+
+
+def look(senses: Senses, now: float, limits: LiftLimits) -> View:
+    """What is believed now."""
+    stale = now >= stale_at(senses, limits)
+    motion = senses.motion.value if senses.motion else None
+    front = _door(senses.doors[0], now, limits)
+    rear = _door(senses.doors[1], now, limits) if _wired(senses.doors[1]) else None
+    code = senses.code.value if senses.code else None
+    hazards = frozenset(h for h, s in senses.hazards.items() if s.value)
+    return View(
+        blind=_blind(senses, now, limits),
+        level=code[0] if code and code[0] == senses.position.trusted else None,
+        stopped=_stands(senses.motion),
+        motion=motion,
+        agv=senses.agv.value if senses.agv else None,
+        front=front,
+        rear=rear,
+        hazards=frozenset() if stale else hazards,
+        faults=() if stale else _faults(senses),
+        changes_at=min(
+            (at for at in _changes(senses, front, rear, limits) if at > now), default=NEVER
+        ),
+    )
+
+
+def stale_at(senses: Senses, limits: LiftLimits) -> float:
+    """When the last reading is too old to be a fact; it is when there is none."""
+    return -NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
+
+
+def _settle_hazard(
+    before: Settled[bool] | None, hazard: Hazard, seen: bool, now: float, limits: LiftLimits
+) -> Settled[bool]:
+    return settle(before, seen, now, _hazard_hold_s(before, hazard, seen, limits))
+
+
+def _hazard_hold_s(
+    before: Settled[bool] | None, hazard: Hazard, seen: bool, limits: LiftLimits
+) -> float:
+    """How long it must last: a hazard goes more slowly than it comes."""
+    hold_s = limits.debounce_s(hazard)
+    clearing = before is not None and bool(before.value) and not seen
+    return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
+
+
+def _locate(
+    before: Position,
+    code: Settled[tuple[str | None, str]],
+    motion: Motion | None,
+    now: float,
+    limits: LiftLimits,
+) -> Position:
+    """Follow the car from floor to floor, and stop believing where it cannot have gone."""
+    if motion is not Motion.STOPPED:
+        before = replace(before, moved_at=now)
+    level = code.value[0] if code.value else None
+    if level is None or level == before.suspect:
+        return before
+    if level == before.trusted or _can_have_come(before, level, now, limits):
+        return replace(before, trusted=level, seen_at=now, suspect=None)
+    return replace(before, suspect=level)
+
+
+def _can_have_come(before: Position, level: str, now: float, limits: LiftLimits) -> bool:
+    if before.trusted is None:
+        return True
+    memory_s = MOTION_MEMORY_S + limits.debounce_s("floor")
+    if before.moved_at is None or now - before.moved_at > memory_s:
+        return False
+    skipped = abs(limits.index(level) - limits.index(before.trusted)) - 1
+    return now - before.seen_at >= skipped * limits.t.floor_travel_min_s
+
+
+def _stands(motion: Settled[Motion | None] | None) -> bool:
+    """Where the lines mean nothing (yet), the first sight of a movement counts."""
+    if motion is None:
+        return False
+    return (motion.candidate if motion.value is None else motion.value) in (None, Motion.STOPPED)
+
+
+def _wired(seen: Settled[Door | None] | None) -> bool:
+    return seen is not None and seen.candidate is not None
+
+
+def _door(seen: Settled[Door | None] | None, now: float, limits: LiftLimits) -> DoorSeen:
+    value = seen.value if seen else None
+    if seen is None or value in (None, Door.BETWEEN, Door.BOTH):
+        return DoorSeen(open=False, closed=False)
+    if value in (Door.OPEN, Door.CLOSED):
+        return DoorSeen(open=value is Door.OPEN, closed=value is Door.CLOSED)
+    there_at = seen.since + limits.t.door_travel_s
+    if seen.candidate != value or now < there_at:
+        return DoorSeen(open=False, closed=False, settles_at=there_at)
+    return DoorSeen(open=value is Door.NOT_CLOSED, closed=value is Door.NOT_OPEN, estimated=True)
+
+
+Waits = tuple[str, Settled[object] | None, float, float]
+"""An input: its name, what is seen, and how long that must last: now, and at the most (s)."""
+
+
+def _inputs(senses: Senses, limits: LiftLimits) -> Iterator[Waits]:
+    hold = limits.debounce_s
+    yield "floor", senses.code, hold("floor"), hold("floor")
+    yield "door", senses.doors[0], hold("door"), hold("door")
+    yield "rear_door", senses.doors[1], hold("rear_door"), hold("rear_door")
+    yield "motion", senses.motion, hold("motion"), hold("motion")
+    yield "agv_mode", senses.agv, hold("agv_mode"), hold("agv_mode")
+    for h in Hazard:
+        s = senses.hazards.get(h)
+        hold_s = _hazard_hold_s(s, h, bool(s and s.candidate), limits)
+        yield h, s, hold_s, max(hold(h), limits.t.hazard_clear_s)
+
+
+def _blind(senses: Senses, now: float, limits: LiftLimits) -> str:
+    if senses.read_at is None:
+        return "not read yet"
+    if now >= stale_at(senses, limits):
+        return f"no reading for {limits.t.stale_after_s:g} s"
+    restless = [
+        name
+        for name, seen, _, most_s in _inputs(senses, limits)
+        if seen is None or now >= _restless_at(seen, most_s)
+    ]
+    return f"not steady: {', '.join(restless)}" if restless else ""
+
+
+def _restless_at(seen: Settled[object], hold_s: float) -> float:
+    return -NEVER if seen.steady_at is None else seen.steady_at + hold_s + RESTLESS_S
+
+
+def _changes(
+    senses: Senses, front: DoorSeen, rear: DoorSeen | None, limits: LiftLimits
+) -> Iterator[float]:
+    """When age, an estimate or a half-seen change will next change the view."""
+    yield stale_at(senses, limits)
+    yield front.settles_at
+    if rear:
+        yield rear.settles_at
+    for _, seen, hold_s, most_s in _inputs(senses, limits):
+        if seen:
+            yield seen.due_at(hold_s)
+            yield _restless_at(seen, most_s)
+
+
+def _faults(senses: Senses) -> tuple[Fault, ...]:
+    found = []
+    code = senses.code.value if senses.code else None
+    if code and code[1]:
+        found.append(Fault("FLOOR_CODE_ILLEGAL", code[1]))
+    if code and code[0] is not None and code[0] == senses.position.suspect:
+        found.append(
+            Fault("POSITION_LOST", f"{code[0]} cannot follow {senses.position.trusted} like this")
+        )
+    for name, seen in zip(("door", "rear door"), senses.doors, strict=True):
+        if seen and seen.value is Door.BOTH:
+            found.append(Fault("DOOR_CONTACTS_CONTRADICT", f"{name} reads open and closed"))
+    if senses.motion and senses.motion.value is Motion.CONTRADICTORY:
+        found.append(Fault("MOTION_CONTRADICTORY", "the motion lines cannot all be true"))
+    return tuple(found)

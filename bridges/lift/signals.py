@@ -1,0 +1,86 @@
+"""What a lift's driver tells its core, and what the core tells its driver: one scan's image."""
+
+from dataclasses import dataclass
+from enum import Enum, StrEnum
+
+
+class Door(Enum):
+    """What the door contacts say at one instant.
+
+    With two contacts: OPEN, CLOSED, BETWEEN (neither) or BOTH (a fault). With one that proves open:
+    OPEN or NOT_OPEN. With one that proves closed: CLOSED or NOT_CLOSED.
+    """
+
+    OPEN = "open"
+    CLOSED = "closed"
+    BETWEEN = "between"
+    BOTH = "both"
+    NOT_OPEN = "not open"
+    NOT_CLOSED = "not closed"
+
+
+class Motion(Enum):
+    """What the motion lines say; CONTRADICTORY is a code that cannot be (up and down at once)."""
+
+    STOPPED = "stopped"
+    UP = "up"
+    DOWN = "down"
+    MOVING = "moving"
+    CONTRADICTORY = "contradictory"
+
+
+class Hazard(StrEnum):
+    """Inputs that take the lift away from RMF. The names are the YAML's signal names."""
+
+    FIRE = "fire_alarm"
+    CODE_BLUE = "code_blue"
+    EARTHQUAKE = "earthquake"
+    EMERGENCY = "emergency"
+    OUT_OF_SERVICE = "out_of_service"
+    MANUAL = "manual_mode"
+    OVERLOAD = "overload"
+
+
+@dataclass(frozen=True, slots=True)
+class LiftSample:
+    """Every input of one lift, decoded but not debounced.
+
+    `level`: the landing that the floor code names, None for no code (between floors).
+    `code_fault`: "" or why the code cannot be (illegal, two of one-hot, parity).
+    `motion`, `agv`, `rear_door`: None where not wired; `agv` None also while its line means nothing.
+    """
+
+    level: str | None
+    door: Door
+    code_fault: str = ""
+    rear_door: Door | None = None
+    motion: Motion | None = None
+    agv: bool | None = None
+    hazards: frozenset[Hazard] = frozenset()
+
+
+class Side(Enum):
+    """Which of the car's doors."""
+
+    FRONT = "front"
+    REAR = "rear"
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """One of RMF's floors of this lift: the landing that the floor code names, and the car's door."""
+
+    level: str
+    side: Side = Side.FRONT
+
+
+@dataclass(frozen=True, slots=True)
+class LiftOutputs:
+    """Every output of one lift. The default is all off.
+
+    `call`: the level (landing) whose call is asserted. `hold_door`: the door whose open command is.
+    """
+
+    agv_request: bool = False
+    call: str | None = None
+    hold_door: Side | None = None

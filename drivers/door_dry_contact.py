@@ -1,0 +1,155 @@
+"""A door operator on contacts: a relay that holds it open, and the limit contacts that see it.
+
+The contacts stand on the GPIO header, or at a Modbus I/O module (coils and discrete inputs). Which
+level means what, and what a cut wire reads as, is `drivers/points.py`; the rules are the core's.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+import msgspec
+
+from bridges.door.settings import DoorSettings
+from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.points import Input, Output, Points, PointsBus, Wire
+
+BUSES: Final = ("gpio", "modbus")
+
+DEBOUNCE_S: Final = 0.05
+
+BROKEN_MUST_READ: Final = {"opened": False, "obstruction": True, "fire": True}
+"""What a cut wire has to look like: never a door that is open, never an alarm or a body overlooked."""
+
+
+class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The contacts that are read; `opened` or `closed` may be missing with `feedback: estimated`."""
+
+    opened: Input | None = None
+    closed: Input | None = None
+    obstruction: Input | None = None
+    fire: Input | None = None
+
+
+class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The relay that holds the door open while it is on. There is no relay that closes."""
+
+    hold_open: Output
+
+
+class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A door and its wiring."""
+
+    inputs: Inputs = Inputs()
+    outputs: Outputs
+
+    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """What the fields cannot say one by one."""
+        yield from super().problems()
+        yield from self._feedback_problems()
+        if self.inputs.fire and self.on_fire is None:
+            yield (
+                ("inputs", "fire"),
+                "say what a fire alarm does: on_fire: open, or on_fire: release",
+            )
+        if self.on_fire and self.inputs.fire is None:
+            yield ("on_fire",), "there is no fire input; wire one under inputs, or leave this out"
+        for wire in _unsafe(self):
+            if wire.signal not in self.accept_unsafe:
+                yield wire.path, _unsafe_text(wire)
+
+    def _feedback_problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        missing = [s for s in ("opened", "closed") if getattr(self.inputs, s) is None]
+        if self.feedback == "sensors":
+            for signal in missing:
+                text = f"needs '{signal}'; without that contact say feedback: estimated"
+                yield ("inputs",), text
+        elif not missing:
+            yield ("feedback",), "both limit contacts are wired: leave feedback out"
+
+
+def wires(settings: Settings) -> list[Wire]:
+    """The wiring table, inputs first."""
+    inputs = [
+        Wire(
+            signal=signal,
+            direction="in",
+            point=contact.point,
+            active=contact.active,
+            pull=contact.pull,
+            debounce_s=DEBOUNCE_S if contact.debounce_s is None else contact.debounce_s,
+            path=("inputs", signal),
+        )
+        for signal in settings.inputs.__struct_fields__
+        if (contact := getattr(settings.inputs, signal)) is not None
+    ]
+    relay = settings.outputs.hold_open
+    path = ("outputs", "hold_open")
+    return [*inputs, Wire("hold_open", "out", relay.point, relay.active, path=path)]
+
+
+def debounce(settings: Settings) -> Mapping[str, float]:
+    """Seconds for which each input must last, by signal."""
+    return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
+
+
+def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What is legal, but should be read before the door is put into service: (path, text)."""
+    for wire in wires(settings):
+        if wire.signal == "closed" and wire.broken_reads() is not False:
+            yield (
+                wire.path,
+                "a cut wire may read as a closed door; wire a contact that shuts with it",
+            )
+    if settings.feedback == "estimated":
+        yield ("feedback",), "RMF is told OPEN or CLOSED by the clock, whatever the door does"
+
+
+def create(name: str, settings: Settings, bus: PointsBus) -> "DryContactDoor":
+    """The door on its bus; nothing is touched before `open`."""
+    return DryContactDoor(Points(wires(settings), bus))
+
+
+class DryContactDoor:
+    """`drivers.Driver` of one door."""
+
+    def __init__(self, points: Points) -> None:
+        self._points = points
+
+    def open(self) -> None:
+        """Claim the relay, off, and the contacts."""
+        self._points.open()
+
+    def read(self) -> DoorSample:
+        """Every contact, read now."""
+        return DoorSample(**self._points.read())
+
+    def write(self, outputs: DoorOutputs) -> None:
+        """The hold relay to this."""
+        self._points.write({"hold_open": outputs.hold_open})
+
+    def make_safe(self) -> None:
+        """The hold relay off, and seen to be off."""
+        self._points.make_safe()
+
+    def close(self) -> None:
+        """The relay off, and let go."""
+        self._points.close()
+
+
+def _unsafe(settings: Settings) -> list[Wire]:
+    return [
+        wire
+        for wire in wires(settings)
+        if wire.signal in BROKEN_MUST_READ
+        and wire.broken_reads() is not BROKEN_MUST_READ[wire.signal]
+    ]
+
+
+def _unsafe_text(wire: Wire) -> str:
+    must = "asserted" if BROKEN_MUST_READ[wire.signal] else "not asserted"
+    found = {True: "asserted", False: "not asserted", None: "anything (it floats)"}
+    return (
+        f"a cut wire would read as {found[wire.broken_reads()]}, and must read as {must}: wire the"
+        " contact the other way round and turn 'active', or write"
+        f" accept_unsafe: {{{wire.signal}: why}}"
+    )

@@ -1,0 +1,1 @@
+"""What the drivers of dry-contact devices share: codes on several lines, and which wiring is unsafe."""

@@ -1,0 +1,39 @@
+"""Numbers on several lines, least significant first, as lifts show floors: binary, gray, BCD."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+Encoding = Literal["binary", "gray", "bcd"]
+
+
+def decode(encoding: Encoding, lines: Sequence[bool]) -> int | None:
+    """The number that these lines show; None for a BCD digit above 9."""
+    number = sum(on << place for place, on in enumerate(lines))
+    if encoding == "gray":
+        return _from_gray(number)
+    return _from_bcd(number) if encoding == "bcd" else number
+
+
+def encode(encoding: Encoding, number: int, width: int) -> tuple[bool, ...]:
+    """The lines that show a number. ValueError when there are too few of them."""
+    pattern = number
+    if encoding == "gray":
+        pattern = number ^ (number >> 1)
+    if encoding == "bcd":
+        pattern = int(str(number), 16)
+    if number < 0 or pattern >> width:
+        raise ValueError(f"{number} does not fit on {width} lines in {encoding}")
+    return tuple(bool(pattern >> place & 1) for place in range(width))
+
+
+def _from_gray(pattern: int) -> int:
+    number = 0
+    while pattern:
+        number ^= pattern
+        pattern >>= 1
+    return number
+
+
+def _from_bcd(pattern: int) -> int | None:
+    digits = f"{pattern:x}"
+    return int(digits) if digits.isdecimal() else None

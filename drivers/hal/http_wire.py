@@ -1,0 +1,132 @@
+"""TCP connections on which a whole HTTP call ends by its deadline, whatever the far side does.
+
+A timeout of requests' (or of a socket's) is for one wait: a server that sends a byte now and then, in
+its headers or in its body, holds the caller for ever. Here each single wait of a call gets only the
+time that is left of it: the name's lookup, the connection, every send and every receive.
+"""
+
+import ipaddress
+import queue
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+Resolve = Callable[..., list[Any]]
+
+
+class Deadline:
+    """The end of the call under way, in monotonic seconds."""
+
+    def __init__(self) -> None:
+        self.at = 0.0
+
+    def start(self, timeout_s: float) -> None:
+        """A call begins."""
+        self.at = time.monotonic() + timeout_s
+
+    def left(self) -> float:
+        """Seconds until the call must be over. Raises TimeoutError when it already should."""
+        left_s = self.at - time.monotonic()
+        if left_s <= 0:
+            raise TimeoutError("the call's time is up")
+        return left_s
+
+    def passed(self) -> bool:
+        """Is the time up?"""
+        return time.monotonic() >= self.at
+
+
+class DeadlineSocket(socket.socket):
+    """A TCP socket whose every wait ends by the deadline of the call that it serves just then."""
+
+    deadline: Deadline
+
+    def recv_into(self, *args: Any, **kwargs: Any) -> int:
+        """As socket.recv_into. All of http.client's reading comes through here."""
+        self.settimeout(self.deadline.left())
+        return super().recv_into(*args, **kwargs)
+
+    def sendall(self, *args: Any, **kwargs: Any) -> None:
+        """As socket.sendall, whose timeout is already one for all of it."""
+        self.settimeout(self.deadline.left())
+        super().sendall(*args, **kwargs)
+
+
+class Dialler:
+    """Makes the connections to one host. `dialled` counts them, `failure` is why one failed.
+
+    `resolve`: socket.getaddrinfo, or a test's.
+    """
+
+    def __init__(self, host: str, port: int, resolve: Resolve = socket.getaddrinfo) -> None:
+        self.deadline = Deadline()
+        self.dialled = 0
+        self.failure: OSError | None = None
+        self._host = host
+        self._port = port
+        self._resolve = resolve
+        self._lookup: threading.Thread | None = None
+
+    def dial(self) -> socket.socket:
+        """A new connection, each address getting a fair part of the time. Raises OSError."""
+        self.dialled += 1
+        try:
+            return self._first_of(self._addresses())
+        except OSError as error:
+            self.failure = error
+            raise
+
+    def _first_of(self, addresses: list[Any]) -> socket.socket:
+        failure = OSError("the name has no address")
+        for n, address in enumerate(addresses):
+            try:
+                return self._connected(address, self.deadline.left() / (len(addresses) - n))
+            except OSError as error:
+                failure = error
+        raise failure
+
+    def _connected(self, address: Any, timeout_s: float) -> socket.socket:
+        family, kind, protocol, _, where = address
+        sock = DeadlineSocket(family, kind, protocol)
+        sock.deadline = self.deadline
+        try:
+            sock.settimeout(timeout_s)
+            sock.connect(where)
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        except OSError:
+            sock.close()
+            raise
+        return sock
+
+    def _addresses(self) -> list[Any]:
+        """The host's addresses. getaddrinfo knows no timeout, so a name is looked up in a thread."""
+        if _is_numeric(self._host):
+            return socket.getaddrinfo(self._host, self._port, type=socket.SOCK_STREAM)
+        if self._lookup is not None and self._lookup.is_alive():
+            raise TimeoutError("the name's last lookup has not ended yet")
+        answer: queue.SimpleQueue[list[Any] | OSError] = queue.SimpleQueue()
+        self._lookup = threading.Thread(target=self._look_up, args=(answer,), daemon=True)
+        self._lookup.start()
+        try:
+            found = answer.get(timeout=self.deadline.left())
+        except queue.Empty:
+            raise TimeoutError("the name's lookup takes too long") from None
+        if isinstance(found, OSError):
+            raise found
+        return found
+
+    def _look_up(self, answer: "queue.SimpleQueue[list[Any] | OSError]") -> None:
+        try:
+            answer.put(self._resolve(self._host, self._port, type=socket.SOCK_STREAM))
+        except OSError as error:
+            answer.put(error)
+
+
+def _is_numeric(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True

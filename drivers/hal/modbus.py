@@ -1,0 +1,340 @@
+"""Modbus TCP: the coils and discrete inputs of I/O modules, through pymodbus's synchronous client.
+
+- A request has `timeout_s` from the lookup of the name to the last byte of the reply, and is tried
+  `retries` times more, on a new connection, so that a late reply or half a frame is never taken for
+  the answer to another question. Only reads and coil writes are sent: a repeat changes nothing.
+- A connection that cannot be made pauses the bus, a unit that fails pauses that unit, from 0.5 to
+  30 s; meanwhile calls fail at once with the same text. So a dead unit behind a gateway costs the
+  others `timeout_s` x (`retries` + 1) a pause, and no more.
+- Nothing is written before a first good reading. What is written is read back, and looked at again in
+  each reading: a module that restarts with its coils off, or whose watchdog has tripped, is noticed.
+
+A gateway that waits for its serial units longer than `timeout_s` makes the others wait too: set its
+own timeout below ours.
+"""
+
+import functools
+import math
+import random
+import re
+import time
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Annotated, Final
+
+import msgspec
+
+from bridges.fields import Name, Period
+from drivers.hal import HalError
+from drivers.hal.modbus_points import (
+    Point,
+    Range,
+    canonical,
+    describe,
+    parse,
+    pieces,
+    ranges,
+    wire_problems,
+)
+from drivers.hal.modbus_wire import BadReply, Call, Connection, NoReply, Unreachable
+from drivers.points import Pull
+
+if TYPE_CHECKING:
+    from pymodbus.client import ModbusTcpClient
+    from pymodbus.pdu import ModbusPDU
+
+__all__ = ["ModbusBus", "Settings", "canonical", "describe", "open_bus", "wire_problems"]
+
+BACKOFF_FIRST_S: Final = 0.5
+BACKOFF_MAX_S: Final = 30.0
+JITTER: Final = 0.2
+"""By how much of itself a pause may be shorter, so that many daemons do not call in step."""
+
+READS: Final = {"coil": 1, "discrete input": 2}
+WRITE_COIL: Final = 5
+ILLEGAL_ADDRESS: Final = 2
+
+EXCEPTIONS: Final = {
+    1: "illegal function: the unit has no such table",
+    2: "illegal data address: the unit has no such address; addresses begin at 0",
+    3: "illegal data value",
+    4: "server device failure: look at the unit",
+    5: "acknowledge: the unit is still busy with the request",
+    6: "server device busy",
+    7: "negative acknowledge",
+    8: "memory parity error: look at the unit",
+    9: "an exception that Modbus does not define",
+    10: "gateway path unavailable: look at the gateway's settings",
+    11: "gateway target device failed to respond: look at the unit's power, cable and id",
+}
+"""Modbus Application Protocol V1.1b3, section 7."""
+
+Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
+
+
+class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the module or gateway listens."""
+
+    host: Name
+    port: Annotated[int, msgspec.Meta(ge=1, le=65535)] = 502
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """What cannot be right about the address."""
+        if re.fullmatch(r"[^:]*:[0-9]+", self.host):
+            yield ("host",), "write the host alone; its port goes into port"
+        elif not re.fullmatch(r"[A-Za-z0-9_.:-]+", self.host):
+            yield ("host",), f"{self.host!r} is no host: write its address, 192.168.1.50 say"
+
+
+class Settings(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    forbid_unknown_fields=True,
+    tag_field="type",
+    tag="modbus",
+):
+    """A module, or a gateway with several units.
+
+    `timeout_s`: for one try of one request. `retries`: how many more tries it gets.
+    `scan_s`: how often every input is read.
+    """
+
+    tcp: Tcp
+    timeout_s: Timeout = 0.3
+    retries: Annotated[int, msgspec.Meta(ge=0, le=5)] = 1
+    scan_s: Period = 0.1
+
+
+def open_bus(settings: Settings) -> "ModbusBus":
+    """The way to this module; nothing is sent yet."""
+    return ModbusBus(settings)
+
+
+class ModbusRefused(HalError):
+    """The unit answered with an exception; `code` is its number."""
+
+    def __init__(self, text: str, code: int) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+class Backoff:
+    """Pauses after failures. `jitter()` is between 0 and 1."""
+
+    def __init__(self, clock: Callable[[], float], jitter: Callable[[], float]) -> None:
+        self._clock = clock
+        self._jitter = jitter
+        self._pause_s = 0.0
+        self._retry_at = -math.inf
+        self._failure = ""
+        self._insisted = False
+
+    def check(self) -> None:
+        """Raises HalError with the last failure's text while it is not time again."""
+        if self._clock() < self._retry_at:
+            raise HalError(self._failure)
+
+    def failed(self, text: str) -> HalError:
+        """Begin a pause, twice as long as the last."""
+        self._failure = text
+        self._pause_s = min(max(2 * self._pause_s, BACKOFF_FIRST_S), BACKOFF_MAX_S)
+        self._retry_at = self._clock() + self._pause_s * (1 - JITTER * self._jitter())
+        return HalError(text)
+
+    def mended(self) -> None:
+        """It works: the next pause will be short."""
+        self._pause_s, self._retry_at, self._insisted = 0.0, -math.inf, False
+
+    def insist(self) -> None:
+        """Try at once, whatever the pause; only once until it works again."""
+        if not self._insisted:
+            self._insisted, self._retry_at = True, -math.inf
+
+
+class ModbusBus:
+    """One TCP connection to a module or gateway (`drivers.hal.Bus` and `drivers.points.PointsBus`).
+
+    `clock` and `jitter` are a test's in place of the real ones.
+    """
+
+    canonical = staticmethod(canonical)
+
+    def __init__(
+        self,
+        settings: Settings,
+        clock: Callable[[], float] = time.monotonic,
+        jitter: Callable[[], float] = random.random,
+    ) -> None:
+        self._settings = settings
+        tcp = settings.tcp
+        self._where = f"{tcp.host}:{tcp.port}"
+        self._connection = Connection(tcp.host, tcp.port, settings.timeout_s)
+        self._backoff = functools.partial(Backoff, clock, jitter)
+        self._link = self._backoff()
+        self._units: dict[int, Backoff] = {}
+
+    def lines(
+        self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]
+    ) -> "ModbusLines":
+        """Canonical inputs, and coils with their safe level (True is 1)."""
+        return ModbusLines(self, inputs, outputs)
+
+    def read(self, bits: Range) -> dict[Point, bool]:
+        """These bits, read now. Raises HalError."""
+        function = READS[bits.table]
+
+        def call(client: "ModbusTcpClient") -> "ModbusPDU":
+            ask = client.read_coils if bits.table == "coil" else client.read_discrete_inputs
+            reply = ask(bits.start, count=bits.count, device_id=bits.unit)
+            if not reply.isError() and len(reply.bits) != 8 * math.ceil(bits.count / 8):
+                raise BadReply(f"{len(reply.bits)} bits for {bits.count}")
+            return reply
+
+        reply = self._ask(bits.unit, function, f"read {bits}", call)
+        return dict(zip(bits.points(), reply.bits, strict=False))
+
+    def write(self, coil: Point, level: bool) -> None:
+        """Set this coil. Raises HalError; then it may be set or not."""
+
+        def call(client: "ModbusTcpClient") -> "ModbusPDU":
+            reply = client.write_coil(coil.address, level, device_id=coil.unit)
+            if not reply.isError() and (reply.address, reply.bits) != (coil.address, [level]):
+                raise BadReply("the echo of another write")
+            return reply
+
+        self._ask(coil.unit, WRITE_COIL, f"write coil {coil.address}", call)
+
+    def insist(self) -> None:
+        """Try at once what is asked next, whatever the pauses: to switch off before the end."""
+        for backoff in (self._link, *self._units.values()):
+            backoff.insist()
+
+    def on_edge(self, wake: Callable[[], None]) -> None:
+        """A polled bus has no edges."""
+
+    def close(self) -> None:
+        """Hang up."""
+        self._connection.close()
+
+    def _ask(self, unit: int, function: int, what: str, call: Call) -> "ModbusPDU":
+        """The unit's good answer to one request."""
+        backoff = self._units.setdefault(unit, self._backoff())
+        self._link.check()
+        backoff.check()
+        text = f"modbus unit {unit} at {self._where}, {what}: "
+        reason = ""
+        for _ in range(self._settings.retries + 1):
+            try:
+                self._connection.connect()
+                self._link.mended()
+                reply = self._connection.ask(function, call)
+            except Unreachable as error:
+                raise self._link.failed(str(error)) from error
+            except NoReply as error:
+                reason = str(error)
+                continue
+            if reply.isError():
+                raise _refused(backoff, text, reply.exception_code)
+            backoff.mended()
+            return reply
+        raise backoff.failed(f"{text}{reason}, tried {self._settings.retries + 1}x")
+
+
+def _refused(backoff: Backoff, text: str, code: int) -> HalError:
+    """An exception reply. One about the question itself shows that the unit lives: no pause."""
+    text += f"exception {code}, {EXCEPTIONS.get(code, EXCEPTIONS[9])}"
+    if code not in (1, 2, 3):
+        backoff.failed(text)
+    return ModbusRefused(text, code)
+
+
+class ModbusLines:
+    """The points of one device (`drivers.points.Lines`), by their canonical spelling."""
+
+    def __init__(self, bus: ModbusBus, inputs: Iterable[str], outputs: Mapping[str, bool]) -> None:
+        self._bus = bus
+        self._inputs = {name: parse(name) for name in inputs}
+        self._coils = {name: parse(name) for name in outputs}
+        self._safe = dict(outputs)
+        self._ranges = ranges([*self._inputs.values(), *self._coils.values()])
+        self._set: dict[Point, bool] = {}
+        self._touched = False
+        self._claimed = False
+
+    def claim(self) -> None:
+        """Read everything, then switch every output to its safe level, and see that it is.
+
+        Claimed again after a failure it only reads: the outputs are as they were, or as the next
+        write says. A door that is held must not drop because one reply was lost.
+        """
+        self._set.clear()
+        self._image()
+        if not self._claimed:
+            self.write(self._safe)
+            self._claimed = True
+
+    def read(self) -> dict[str, bool]:
+        """Every input's level. Raises HalError, also when an output is not as it was written."""
+        image = self._image()
+        self._verify(image)
+        return {name: image[point] for name, point in self._inputs.items()}
+
+    def write(self, levels: Mapping[str, bool]) -> None:
+        """Set these coils and read them back."""
+        self._touched = True
+        wanted = {self._coils[name]: level for name, level in levels.items()}
+        for coil, level in wanted.items():
+            self._set.pop(coil, None)
+            self._bus.write(coil, level)
+        self._set.update(wanted)
+        self._verify(self._read_all(ranges(wanted)))
+
+    def outputs(self) -> dict[str, bool]:
+        """The coils, read now."""
+        image = self._read_all(ranges(self._coils.values()))
+        return {name: image[coil] for name, coil in self._coils.items()}
+
+    def close(self) -> None:
+        """Every coil to its safe level, one try for each unit whatever the pauses; not if unclaimed."""
+        if not self._touched:
+            return
+        self._bus.insist()
+        for name, coil in self._coils.items():
+            try:
+                self._bus.write(coil, self._safe[name])
+            except HalError:
+                continue  # the unit pauses now: its other coils cost no time
+
+    def _image(self) -> dict[Point, bool]:
+        return self._read_all(self._ranges)
+
+    def _read_all(self, wanted: list[Range]) -> dict[Point, bool]:
+        image: dict[Point, bool] = {}
+        for bits in tuple(wanted):  # which may be split meanwhile
+            try:
+                image.update(self._bus.read(bits))
+            except ModbusRefused as refusal:
+                image.update(self._read_pieces(bits, refusal))
+        return image
+
+    def _read_pieces(self, bits: Range, refusal: ModbusRefused) -> dict[Point, bool]:
+        """A module may lack the addresses in a gap: from now on they are left out."""
+        parts = pieces(bits, [*self._inputs.values(), *self._coils.values()])
+        if refusal.code != ILLEGAL_ADDRESS or len(parts) == 1:
+            raise refusal
+        image: dict[Point, bool] = {}
+        for part in parts:
+            image.update(self._bus.read(part))
+        if bits in self._ranges:
+            at = self._ranges.index(bits)
+            self._ranges[at : at + 1] = parts
+        return image
+
+    def _verify(self, image: Mapping[Point, bool]) -> None:
+        for coil, level in self._set.items():
+            if image.get(coil, level) != level:
+                self._set.clear()
+                raise HalError(
+                    f"{coil} reads {int(not level)} after {int(level)} was written: the module has"
+                    " restarted, its watchdog has tripped, or somebody else writes it"
+                )

@@ -1,0 +1,169 @@
+"""Points: the named contacts of a device, on whichever bus carries them.
+
+A driver speaks of signals being asserted or not (`fire_alarm`, `call_L1`); this file knows their
+addresses and polarity; the bus (`drivers/hal/`) knows levels only. GPIO pins and the coils and
+discrete inputs of a Modbus I/O module are the same thing here.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal, Protocol
+
+import msgspec
+
+from drivers import DriverError
+
+Active = Literal["high", "low"]
+Pull = Literal["up", "down", "none"]
+Point = Annotated[str, msgspec.Meta(extra={"check": "point"})]
+"""Where a contact is. The bus's `canonical` judges it while the file is read, as it is written."""
+DebounceSeconds = Annotated[float, msgspec.Meta(ge=0, le=10, extra={"unit": "s"})]
+
+
+class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One contact that is read.
+
+    `point`: `BCM4` or `J8:7` on GPIO, `unit 1 discrete input 0` on Modbus.
+    `active`: the level at which the signal is asserted (on Modbus `high` is 1).
+    `pull`: the resistor on a GPIO input; needed there, and not meant elsewhere.
+    `debounce_s`: how long a change must last; the kind's default when absent.
+    """
+
+    point: Point
+    active: Active
+    pull: Pull | None = None
+    debounce_s: DebounceSeconds | None = None
+
+
+class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One relay or line that is driven. Not asserted is its safe level, always.
+
+    `point`: `BCM18` or `J8:12` on GPIO, `unit 1 coil 0` on Modbus. `active`: the asserted level.
+    """
+
+    point: Point
+    active: Active
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """One row of the wiring table: a signal, where it is, and what its level means."""
+
+    signal: str
+    direction: Literal["in", "out"]
+    point: str
+    active: Active
+    pull: Pull | None = None
+    debounce_s: float | None = None
+    path: tuple[str, ...] = ()
+    """Where the YAML names it, from the device downwards: for error messages."""
+
+    def level(self, asserted: bool) -> bool:
+        """The electrical level (True is high) for this meaning."""
+        return asserted == (self.active == "high")
+
+    def asserted(self, level: bool) -> bool:
+        """What this electrical level means."""
+        return level == (self.active == "high")
+
+    def broken_reads(self) -> bool | None:
+        """What a cut wire would read as: asserted, not asserted, or None when it floats.
+
+        A GPIO input falls to its pull; an open contact at a Modbus module reads 0.
+        """
+        if self.direction == "out":
+            return False
+        if self.pull == "none":
+            return None
+        return self.asserted(self.pull == "up")
+
+
+class Lines(Protocol):
+    """Raw levels of some points of one bus (True is high), claimed for one device."""
+
+    def claim(self) -> None:
+        """Take every output at its safe level in one step, and every input. Raises HalError."""
+
+    def read(self) -> Mapping[str, bool]:
+        """Every input's level by its canonical point, read now. Raises HalError."""
+
+    def write(self, levels: Mapping[str, bool]) -> None:
+        """Drive these outputs. Raises HalError; then the levels written are unknown."""
+
+    def outputs(self) -> Mapping[str, bool] | None:
+        """The outputs' levels as the bus itself says, for read-back; None where it cannot say."""
+
+    def close(self) -> None:
+        """Outputs to their safe level, and let go. Does not raise."""
+
+
+class PointsBus(Protocol):
+    """A bus that has points: GPIO, or Modbus."""
+
+    def canonical(self, point: str) -> str:
+        """One spelling for a point. Raises ValueError with what to write instead."""
+
+    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> Lines:
+        """A set of canonical points for one device; outputs with their safe levels."""
+
+
+class HalError(DriverError):
+    """The bus failed: no such chip, connection refused, timeout, exception reply, bad frame."""
+
+
+class Points:
+    """The signals of one device on its bus, in terms of asserted or not."""
+
+    def __init__(self, wires: Sequence[Wire], bus: PointsBus) -> None:
+        self._in = {w.signal: (w, bus.canonical(w.point)) for w in wires if w.direction == "in"}
+        self._out = {w.signal: (w, bus.canonical(w.point)) for w in wires if w.direction == "out"}
+        self._lines = bus.lines(
+            {point: w.pull for w, point in self._in.values()},
+            {point: w.level(False) for w, point in self._out.values()},
+        )
+        self._written: dict[str, bool] | None = None
+
+    def open(self) -> None:
+        """Claim all; outputs not asserted."""
+        self._written = None
+        self._lines.claim()
+
+    def read(self) -> dict[str, bool]:
+        """Each input signal: asserted or not. After a failure the outputs are written again."""
+        written, self._written = self._written, None
+        levels = self._lines.read()
+        self._written = written
+        return {signal: w.asserted(levels[point]) for signal, (w, point) in self._in.items()}
+
+    def write(self, asserted: Mapping[str, bool]) -> None:
+        """Bring every output to this. Off goes first, so that exclusive outputs never overlap."""
+        wanted = {signal: asserted.get(signal, False) for signal in self._out}
+        known = self._written or {}
+        changed = [s for s in wanted if known.get(s) != wanted[s]]
+        for turning_on in (False, True):
+            levels = {
+                self._out[s][1]: self._out[s][0].level(wanted[s])
+                for s in changed
+                if wanted[s] == turning_on
+            }
+            if levels:
+                self._written = None
+                self._lines.write(levels)
+        self._written = wanted
+
+    def make_safe(self) -> None:
+        """Every output off, written whatever was known, and read back where the bus can say."""
+        self._written = None
+        self.write({})
+        levels = self._lines.outputs()
+        stuck = [
+            signal
+            for signal, (w, point) in self._out.items()
+            if levels is not None and w.asserted(levels[point])
+        ]
+        if stuck:
+            raise DriverError(f"still on after being switched off: {', '.join(stuck)}")
+
+    def close(self) -> None:
+        """Outputs off and let go."""
+        self._lines.close()

@@ -1,0 +1,123 @@
+"""The demo's daemons: real processes, and the control sockets of the plants behind them."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from hal_fakes.plant import Edge
+
+STOP_WITHIN_S = 5.0
+CONNECT_WITHIN_S = 15.0
+
+
+class Wrong(Exception):
+    """The demo did not go as it should; the text says what was missing."""
+
+
+class Daemon:
+    """One `rmf-bridge run FILE --simulate`, in a session of its own.
+
+    So a Ctrl-C in the terminal reaches the demo alone, which then stops everybody in order.
+    """
+
+    def __init__(self, file: Path, directory: Path, domain_id: int) -> None:
+        self.name = file.stem
+        self.log = directory / f"{self.name}.log"
+        self.runtime_dir = directory / self.name
+        self._plant: socket.socket | None = None
+        command = [sys.executable, "-m", "bridges.cli", "run", str(file), "--simulate"]
+        command += ["--runtime-dir", str(self.runtime_dir), "--domain-id", str(domain_id)]
+        environment = {k: v for k, v in os.environ.items() if k != "RMF_BRIDGE_SERVICE"}
+        with self.log.open("wb") as log:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                start_new_session=True,
+            )
+
+    def check(self) -> None:
+        """Raises Wrong when the daemon has died."""
+        if self._exited():
+            raise Wrong(f"the daemon {self.name} has died; its log says why")
+
+    def follow(self, tell: Callable[[Edge], None]) -> None:
+        """Call `tell`, on a thread, with every edge of its plants from now on."""
+        connection = self._connect()
+        connection.sendall(b"follow\n")
+        threading.Thread(target=_read, args=(connection, tell), daemon=True).start()
+
+    def order(self, line: str) -> None:
+        """Give its plants one order. Raises Wrong when they refuse it."""
+        with self._connect() as connection, connection.makefile("r", encoding="utf-8") as answers:
+            connection.sendall(line.encode() + b"\n")
+            answer = answers.readline().strip()
+        if answer != "ok":
+            raise Wrong(f"{line}: {answer or 'no answer'}")
+
+    def tail(self, lines: int = 15) -> str:
+        """The end of its log."""
+        return "\n".join(self.log.read_text(errors="replace").splitlines()[-lines:])
+
+    def ask_to_stop(self) -> None:
+        """SIGTERM: outputs off, and off the graph."""
+        if not self._exited():
+            os.kill(self._process.pid, signal.SIGTERM)
+
+    def end(self, deadline: float) -> None:
+        """Wait until it is gone, then make sure that nothing of its session remains."""
+        while not self._exited() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        if self._process.returncode is None:
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+
+    def _exited(self) -> bool:
+        """Without reaping it: its number stays its own, and its session's, until `end`."""
+        if self._process.returncode is not None:
+            return True
+        look = os.WEXITED | os.WNOHANG | os.WNOWAIT
+        return os.waitid(os.P_PID, self._process.pid, look) is not None
+
+    def _connect(self) -> socket.socket:
+        path, deadline = self.runtime_dir / "plant.sock", time.monotonic() + CONNECT_WITHIN_S
+        while True:
+            self.check()
+            connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            try:
+                connection.connect(str(path))
+            except (FileNotFoundError, ConnectionRefusedError):
+                connection.close()
+                if time.monotonic() > deadline:
+                    raise Wrong(f"{self.name} made no {path.name}") from None
+                time.sleep(0.05)
+            else:
+                connection.settimeout(None)
+                return connection
+
+
+def _read(connection: socket.socket, tell: Callable[[Edge], None]) -> None:
+    with suppress(OSError), connection, connection.makefile("r", encoding="utf-8") as lines:
+        for line in lines:
+            if line.startswith("{"):
+                tell(Edge(**json.loads(line)))
+
+
+def stop_all(daemons: Iterable[Daemon], within_s: float = STOP_WITHIN_S) -> None:
+    """End every daemon, within `within_s` or by force."""
+    daemons = list(daemons)
+    for daemon in daemons:
+        daemon.ask_to_stop()
+    deadline = time.monotonic() + within_s
+    for daemon in daemons:
+        daemon.end(deadline)

@@ -1,0 +1,112 @@
+"""What happened in the demo, in order of time, and one readable line for each event."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from bridges.rmf import definitions as d
+from bridges.rmf import words
+from bridges.rmf.words import Requested, Stated
+from hal_fakes.plant import Edge
+
+What = Literal["robot", "request", "relay", "sensor", "state", "demo"]
+SETTLES_S = 0.15
+"""Events reach us by several ways, each stamped where it happened: lines wait to be sorted."""
+COLOURS = {"request": 36, "relay": 33, "sensor": 35, "state": 32, "robot": 1}
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One printed line; `at` is monotonic s."""
+
+    at: float
+    what: What
+    device: str
+    text: str
+
+    def render(self, began_at: float, *, colour: bool) -> str:
+        """`   1.234 s  state    Lift1        L1 OPEN AGV`."""
+        start = f"{self.at - began_at:8.3f} s  "
+        body = f"{self.what:<7}  {self.device:<10}  {self.text}"
+        code = COLOURS.get(self.what)
+        return f"{start}\x1b[{code}m{body}\x1b[0m" if colour and code else start + body
+
+
+class Journal:
+    """Everything that happened. Repeats are kept and counted, but not printed."""
+
+    def __init__(self, began_at: float, write: Callable[[str], object], *, colour: bool) -> None:
+        self.began_at = began_at
+        self.edges: list[Edge] = []
+        self.states: list[Stated] = []
+        self.requests: list[Requested] = []
+        self.legs: dict[str, float] = {}
+        self._write = write
+        self._colour = colour
+        self._waiting: list[Line] = []
+        self._told: dict[tuple[str, str], str] = {}
+
+    def edge(self, edge: Edge) -> None:
+        """A relay of ours, or a contact of the plant's."""
+        self.edges.append(edge)
+        value = ("off", "on")[edge.value] if isinstance(edge.value, bool) else edge.value
+        self._add(Line(edge.at, edge.what, edge.device, f"{edge.signal} {value}"))
+
+    def request(self, message: Requested, at: float) -> None:
+        """What a node is sent."""
+        self.requests.append(message)
+        self._once(Line(at, "request", words.device(message), words.request(message)))
+
+    def state(self, message: Stated, at: float) -> None:
+        """What a node says."""
+        self.states.append(message)
+        holder = words.holder(message)
+        text = words.condition(message) + (f", {_held(message)} {holder}" if holder else "")
+        self._once(Line(at, "state", words.device(message), text))
+
+    def note(self, what: Literal["robot", "demo"], text: str, at: float, device: str = "") -> None:
+        """What the robot does, or the demo itself."""
+        self._add(Line(at, what, device, text))
+
+    def flush(self, until: float) -> None:
+        """Print what happened before `until` (monotonic s)."""
+        due = sorted((line for line in self._waiting if line.at <= until), key=lambda x: x.at)
+        self._waiting = [line for line in self._waiting if line.at > until]
+        for line in due:
+            self._write(line.render(self.began_at, colour=self._colour) + "\n")
+
+    def begin_day(self) -> None:
+        """From here on it counts: keep only the last state of each device."""
+        self.states = [*{words.device(state): state for state in self.states}.values()]
+        self.edges, self.requests = [], []
+
+    def latest(self, device: str) -> Stated | None:
+        """The last state of a device."""
+        return next((s for s in reversed(self.states) if words.device(s) == device), None)
+
+    def relays_on(self) -> list[str]:
+        """`Lift1 door_open` for each relay that is energised."""
+        last = {(e.device, e.signal): e.value for e in self.edges if e.what == "relay"}
+        return [f"{device} {signal}" for (device, signal), value in last.items() if value]
+
+    def counts(self) -> Counter[str]:
+        """How many requests, states, relay edges and sensor edges there were."""
+        counts = Counter(f"{edge.what} edges" for edge in self.edges)
+        counts["requests"] = len(self.requests)
+        counts["states"] = len(self.states)
+        return counts
+
+    def _once(self, line: Line) -> None:
+        """Unless it says of this device what the last such line said."""
+        key = (line.what, line.device)
+        if self._told.get(key) != line.text:
+            self._told[key] = line.text
+            self._add(line)
+
+    def _add(self, line: Line) -> None:
+        self._waiting.append(replace(line, text=words.printable(line.text)))
+
+
+def _held(state: Stated) -> str:
+    return "session" if isinstance(state, d.LiftState) else "request"

@@ -1,0 +1,109 @@
+"""The far side of the GPIO header: gpiozero's mock pins, wired to plants.
+
+The daemon's own code runs down to gpiozero: only the pins are ours. They claim an output at its
+safe level in one call, as `drivers/hal/_gpio_pins.py` does on hardware (gpiozero's stock MockPin
+records a glitch there), and refuse what hardware refuses: a pin claimed twice, another pull where a
+resistor is fixed, driving an input, a pull on an output.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+from gpiozero import PinInvalidFunction
+from gpiozero.pins.mock import MockFactory, MockPin
+
+from bridges.settings import Config
+from drivers.hal.gpio import GpioBus, canonical
+from drivers.hal.gpio import Settings as GpioSettings
+from drivers.hal.gpio import open_bus as open_real_bus
+from hal_fakes.realtime import RealTime
+from hal_fakes.wiring import Wiring, wirings
+
+
+class WiredPin(MockPin):  # type: ignore[misc]
+    """One pin of the header, with what hangs on it."""
+
+    factory: "WiredFactory"
+
+    def __init__(self, factory: "WiredFactory", info: Any) -> None:
+        super().__init__(factory, info)
+        self.point = f"BCM{self._number}"
+        self._safe: bool | None = None
+
+    def output_with_state(self, state: bool) -> None:
+        """Claim as an output at this level, which is the one to leave it at."""
+        self._function = "output"
+        self._state = self._safe = bool(state)
+        self.clear_states()
+        self.factory.driven(self.point, self._state)
+
+    def input_with_pull(self, pull: str) -> None:
+        """Claim as an input; its level is the wire's from the first read on."""
+        if self._safe is not None:
+            raise PinInvalidFunction(f"{self.point} is an output")
+        super().input_with_pull(pull)
+        self.factory.show(self.factory.clock(), only=self)
+        self.clear_states()
+
+    def close(self) -> None:
+        """An output to its safe level, where the kernel keeps it; then let go."""
+        if self._safe is not None:
+            self._change_state(self._safe)
+        self._safe = None
+        self._when_changed = None
+        self._function = "input"
+
+    def shown(self, level: bool) -> None:
+        """The wire has this level now; an edge is told to whoever watches the pin."""
+        if self._function == "input":
+            (self.drive_high if level else self.drive_low)()
+
+    def _change_state(self, value: bool) -> bool:
+        changed = bool(super()._change_state(value))
+        if changed and self._function == "output":
+            self.factory.driven(self.point, value)
+        return changed
+
+
+class WiredFactory(MockFactory):  # type: ignore[misc]
+    """The header with its wiring.
+
+    `clock` gives the time (s) of what the daemon drives; `lock` is held while pins are brought to
+    their wires' levels, so that an older level never overtakes a newer one.
+    """
+
+    def __init__(
+        self,
+        wirings: Sequence[Wiring],
+        clock: Callable[[], float] = time.monotonic,
+        lock: AbstractContextManager[Any] | None = None,
+    ) -> None:
+        super().__init__(revision="a02082", pin_class=WiredPin)
+        self.clock = clock
+        self._lock = lock or nullcontext()
+        self._wirings = wirings
+
+    def driven(self, point: str, level: bool) -> None:
+        """The daemon has put an output at this level."""
+        for wiring in self._wirings:
+            if point in wiring.outputs:
+                wiring.drive(point, level, self.clock())
+
+    def show(self, now: float, only: WiredPin | None = None) -> None:
+        """Bring every claimed input (or this one) to the level of its wire at `now` (s)."""
+        pins = [only] if only else list(self.pins.values())
+        claimed = {pin.point: pin for pin in pins}
+        with self._lock:
+            for wiring in self._wirings:
+                for point, level in wiring.levels(now).items():
+                    if point in claimed:
+                        claimed[point].shown(level)
+
+
+def open_bus(settings: GpioSettings, config: Config, bus_name: str, world: RealTime) -> GpioBus:
+    """A real GPIO bus on pins that are wired to the plants of this bus."""
+    factory = WiredFactory(wirings(config, bus_name, world.plants, canonical), lock=world.lock)
+    world.on_step.append(factory.show)
+    return open_real_bus(settings, factory)

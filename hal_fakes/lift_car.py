@@ -1,0 +1,110 @@
+"""A lift's car and its doors: where they are and how they move, in virtual time."""
+
+from typing import Literal
+
+NEVER = float("inf")
+
+# A floor's travel: the car still shows the floor it leaves, then none, then the next one.
+LEGS = {"leaving": 0.25, "between": 0.5, "arriving": 0.25}
+
+
+class Car:
+    """`floor`: the landing's index, 0 for the lowest; `leg`: where it is on its way."""
+
+    def __init__(self) -> None:
+        self.floor = 0
+        self.leg: Literal["standing", "leaving", "between", "arriving"] = "standing"
+        self.course = 0
+        self.due_at = NEVER
+        self._frozen = False
+
+    @property
+    def standing(self) -> bool:
+        """At a landing, and not moving."""
+        return self.leg == "standing"
+
+    @property
+    def shown(self) -> int | None:
+        """The landing that the floor code shows; None between two."""
+        return None if self.leg == "between" else self.floor
+
+    def run(self, now: float, goal: int | None, floor_s: float | None) -> None:
+        """Travel on. `floor_s`: a floor takes so long (s), None: the car is stuck where it is."""
+        if floor_s is None:
+            self._frozen = True
+            return
+        if self._frozen and not self.standing:
+            self.due_at = max(self.due_at, now)
+        self._frozen = False
+        while self.due_at <= now:
+            self._next_leg(goal, floor_s)
+
+    def depart(self, now: float, goal: int, floor_s: float | None) -> None:
+        """Leave the landing, towards another. A stuck car stays."""
+        if floor_s is not None:
+            self.course = 1 if goal > self.floor else -1
+            self._begin("leaving", now, floor_s)
+
+    def event_at(self) -> float:
+        """When the next leg begins."""
+        return NEVER if self._frozen else self.due_at
+
+    def _next_leg(self, goal: int | None, floor_s: float) -> None:
+        if self.leg == "leaving":
+            self._begin("between", self.due_at, floor_s)
+        elif self.leg == "between":
+            self.floor += self.course
+            self._begin("arriving", self.due_at, floor_s)
+        elif goal is not None and (goal - self.floor) * self.course > 0:
+            self._begin("leaving", self.due_at, floor_s)
+        else:
+            self.leg, self.course, self.due_at = "standing", 0, NEVER
+
+    def _begin(
+        self, leg: Literal["leaving", "between", "arriving"], at: float, floor_s: float
+    ) -> None:
+        self.leg = leg
+        self.due_at = at + LEGS[leg] * floor_s
+
+
+class CarDoor:
+    """One door of the car with its landing door. `dwell_until`: it stays open by itself so long."""
+
+    def __init__(self) -> None:
+        self.dwell_until = 0.0
+        self.due_at = NEVER
+        self._position = 0.0
+        self._course = 0
+        self._travel_s = 0.0
+        self._since = 0.0
+
+    @property
+    def opened(self) -> bool:
+        """Fully open, as its limit contact says."""
+        return self._position == 1.0 and not self._course
+
+    @property
+    def closed(self) -> bool:
+        """Fully closed and locked."""
+        return self._position == 0.0 and not self._course
+
+    def run(self, now: float) -> None:
+        """Move to where it is at `now`."""
+        if now >= self.due_at:
+            self._position = 1.0 if self._course > 0 else 0.0
+            self._course, self.due_at = 0, NEVER
+        elif self._course:
+            moved = (now - self._since) / self._travel_s
+            self._position = min(1.0, max(0.0, self._position + self._course * moved))
+        self._since = now
+
+    def steer(self, now: float, open_it: bool, travel_s: float | None) -> None:
+        """Towards open or closed; None: the operator stands still."""
+        goal = 1.0 if open_it else 0.0
+        if travel_s is None or self._position == goal:
+            self._course, self.due_at = 0, NEVER
+            return
+        course = 1 if open_it else -1
+        if (course, travel_s) != (self._course, self._travel_s):
+            self._course, self._travel_s = course, travel_s
+            self.due_at = now + abs(goal - self._position) * travel_s

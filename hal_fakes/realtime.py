@@ -1,0 +1,123 @@
+"""Plants in real time: one lock around them, one thread that lets each event happen when it is due.
+
+The thread sleeps until the next event of any plant, so an idle simulation costs nothing.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+
+from hal_fakes.plant import Edge, FailureMode, Plant
+
+
+class RealTime:
+    """A running world. `plants` are views that any thread may call.
+
+    `on_step` callbacks run after each step, with the lock held: whoever must show a contact that
+    moved (GPIO pins) does it there.
+    """
+
+    def __init__(self, plants: Mapping[str, Plant]) -> None:
+        self.lock = threading.RLock()
+        self.plants: dict[str, Plant] = {n: _Serialised(p, self) for n, p in plants.items()}
+        self.on_step: list[Callable[[float], None]] = []
+        self._plain = list(plants.values())
+        self._due = threading.Condition(self.lock)
+        self._stirred = True
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name="plants", daemon=True)
+        self._thread.start()
+
+    def stir(self) -> None:
+        """Something was done to a plant: look again at what is due."""
+        with self.lock:
+            self._stirred = True
+            self._due.notify()
+
+    def close(self) -> None:
+        """Stop time. May be called twice."""
+        with self.lock:
+            self._closed = True
+            self._due.notify()
+        self._thread.join()
+
+    def _run(self) -> None:
+        with self.lock:
+            while not self._closed:
+                self._stirred = False
+                next_at = self._step()
+                if not self._stirred and not self._closed:
+                    self._due.wait(_timeout(next_at))
+
+    def _step(self) -> float:
+        now = time.monotonic()
+        for plant in self._plain:
+            plant.advance(now)
+        for shown in self.on_step:
+            shown(now)
+        return min((p.next_at() for p in self._plain), default=float("inf"))
+
+
+def _timeout(next_at: float) -> float | None:
+    return None if next_at == float("inf") else max(0.0, next_at - time.monotonic())
+
+
+class _Serialised:
+    """One plant behind the world's lock; whoever drives it also stirs the world."""
+
+    def __init__(self, plant: Plant, world: RealTime) -> None:
+        self.name = plant.name
+        self._plant = plant
+        self._world = world
+
+    @property
+    def edges(self) -> list[Edge]:
+        with self._world.lock:
+            return list(self._plant.edges)
+
+    @edges.setter
+    def edges(self, edges: list[Edge]) -> None:
+        with self._world.lock:
+            self._plant.edges = edges
+
+    @property
+    def on_edge(self) -> Callable[[Edge], None] | None:
+        return self._plant.on_edge
+
+    @on_edge.setter
+    def on_edge(self, listener: Callable[[Edge], None] | None) -> None:
+        with self._world.lock:
+            self._plant.on_edge = listener
+
+    @property
+    def failures(self) -> Mapping[str, FailureMode]:
+        with self._world.lock:
+            return dict(self._plant.failures)
+
+    def drive(self, signal: str, asserted: bool, now: float) -> None:
+        with self._world.lock:
+            self._plant.drive(signal, asserted, now)
+            self._world.stir()
+
+    def advance(self, now: float) -> None:
+        with self._world.lock:
+            self._plant.advance(now)
+
+    def sense(self, signal: str) -> bool:
+        with self._world.lock:
+            return self._plant.sense(signal)
+
+    def next_at(self) -> float:
+        with self._world.lock:
+            return self._plant.next_at()
+
+    def fail(self, part: str, mode: FailureMode | None) -> None:
+        with self._world.lock:
+            self._plant.advance(time.monotonic())
+            self._plant.fail(part, mode)
+            self._world.stir()
+
+    def press(self, signal: str, asserted: bool, now: float) -> None:
+        with self._world.lock:
+            self._plant.press(signal, asserted, now)
+            self._world.stir()

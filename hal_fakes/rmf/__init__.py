@@ -1,0 +1,50 @@
+"""A stand-in for RMF: the rules by which its supervisors and fleet adapters talk to our nodes.
+
+Read in rmf_ros2 9dedd0f (2026-05). Its habits are kept, the awkward ones too: nothing here times
+out, retries or looks at a lift's mode.
+
+No I/O and no clock: each party hears a message or is ticked at its `wake_at`, and returns what it
+publishes. `now` is RMF's clock in seconds (since the epoch where stamps are to be believed). A
+restarted party is a new object.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Final, Protocol
+
+from bridges.rmf import definitions as d
+from bridges.rmf.stamps import stamp
+from bridges.rmf.topics import Topic
+
+Said = tuple[Topic[Any], d.Message]
+"""One message and the topic that it is published on."""
+
+NEVER: Final = float("inf")
+
+
+class Party(Protocol):
+    """Somebody on RMF's side."""
+
+    subscribes: Sequence[Topic[Any]]
+
+    def hear(self, message: d.Message, now: float) -> list[Said]:
+        """A message has arrived on one of the topics subscribed."""
+
+    def tick(self, now: float) -> list[Said]:
+        """The timer that was due at `wake_at` fires."""
+
+    def wake_at(self) -> float:
+        """When a timer is due next: s, or inf."""
+
+
+def door_request(door: str, requester: str, mode: d.DoorModeValue, now: float) -> d.DoorRequest:
+    """A DoorRequest as RMF's nodes build it."""
+    return d.DoorRequest(stamp(now), requester, door, d.DoorMode(int(mode)))
+
+
+def has_session(heartbeat: d.SupervisorHeartbeat, requester: str, door: str) -> bool:
+    """Does the heartbeat list this requester for this door? (SupervisorHasSession.cpp)"""
+    return any(
+        sessions.door_name == door and session.requester_id == requester
+        for sessions in heartbeat.all_sessions
+        for session in sessions.sessions
+    )

@@ -1,0 +1,106 @@
+"""What stands in for the hardware in `rmf-bridge run FILE --simulate`: for each bus of the file, a
+plant for each of its devices and the far side of the bus in front of them.
+
+GPIO pins cannot leave a process, so their fake lives in the daemon's. Every other bus is served
+by a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus is pointed there.
+
+Each bus has a control socket in the runtime directory: `plant.sock`, or `plant-<bus>.sock` where
+the file has several buses.
+"""
+
+import contextlib
+import json
+import selectors
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any, cast
+
+import msgspec
+
+from bridges.settings import Config
+from drivers.hal import Bus, HalError
+from hal_fakes.control import Control
+from hal_fakes.realtime import RealTime
+from hal_fakes.wiring import plants_on
+
+READY_S = 15.0
+"""How long a child may take to serve (a busy Raspberry Pi imports slowly)."""
+
+
+class Simulation:
+    """The far sides of a file's buses.
+
+    Made before the daemon leaves the directory that a relative path of the file is relative to.
+    """
+
+    def __init__(self, config: Config, runtime_dir: Path) -> None:
+        self._config = config
+        self._file = str(Path(config.path).resolve())
+        self._runtime_dir = runtime_dir.resolve()
+        self._open = contextlib.ExitStack()
+
+    def open_bus(self, name: str, settings: Any) -> Bus:
+        """Start the fake for this bus; returns a real bus in front of it. Raises HalError.
+
+        Two buses may be opened one after the other, not at once.
+        """
+        bus_type = self._config.bus_types[name]
+        if bus_type == "gpio":
+            return self._inside(name, settings)
+        bus = import_module(f"drivers.hal.{bus_type}")
+        return cast(Bus, bus.open_bus(self._pointed_at_child(name, settings)))
+
+    def close(self) -> None:
+        """End every fake. Close the buses first. May be called twice."""
+        self._open.close()
+
+    def socket_path(self, name: str) -> Path:
+        """Where the control socket of this bus's plants is."""
+        several = len(self._config.buses) > 1
+        return self._runtime_dir / (f"plant-{name}.sock" if several else "plant.sock")
+
+    def _inside(self, name: str, settings: Any) -> Bus:
+        from hal_fakes import gpio
+
+        world = RealTime(plants_on(self._config, name))
+        self._open.callback(world.close)
+        self._open.callback(Control(self.socket_path(name), world.plants).close)
+        return gpio.open_bus(settings, self._config, name, world)
+
+    def _pointed_at_child(self, name: str, settings: Any) -> Any:
+        socket = self.socket_path(name)
+        child = subprocess.Popen(
+            [sys.executable, "-m", "hal_fakes", self._file, name, "--socket", str(socket)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C in a terminal is for the daemon alone
+        )
+        self._open.callback(_end, child)
+        replace = _first_line(child, name)
+        return msgspec.convert({**msgspec.to_builtins(settings), **replace}, type(settings))
+
+
+def _first_line(child: "subprocess.Popen[bytes]", bus_name: str) -> dict[str, Any]:
+    assert child.stdout is not None
+    with selectors.DefaultSelector() as ready:
+        ready.register(child.stdout, selectors.EVENT_READ)
+        line = child.stdout.readline() if ready.select(READY_S) else b""
+    if not line:
+        raise HalError(f"the simulated far side of bus {bus_name} did not start; its log says why")
+    return cast(dict[str, Any], json.loads(line))
+
+
+def _end(child: "subprocess.Popen[bytes]") -> None:
+    """Its standard input ends, so it ends; killed when it does not."""
+    assert child.stdin is not None
+    assert child.stdout is not None
+    with contextlib.suppress(OSError):
+        child.stdin.close()
+    try:
+        child.wait(5.0)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        child.wait()
+    child.stdout.close()

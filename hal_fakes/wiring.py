@@ -1,0 +1,56 @@
+"""Where a plant's signals meet a bus's points: levels and addresses on one side, meaning on the other.
+
+For buses with points (GPIO, Modbus). How wires fail is in `hal_fakes/contact.py`, below the plant.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
+from typing import Any
+
+from bridges.settings import Config
+from drivers.points import Wire
+from hal_fakes.plant import Plant
+
+
+class Wiring:
+    """The wires between one plant and one bus. `canonical` is the bus's spelling of a point."""
+
+    def __init__(
+        self, plant: Plant, wires: Iterable[Wire], canonical: Callable[[str], str]
+    ) -> None:
+        self.plant = plant
+        wires = list(wires)
+        self.inputs = {canonical(w.point): w for w in wires if w.direction == "in"}
+        self.outputs = {canonical(w.point): w for w in wires if w.direction == "out"}
+
+    def levels(self, now: float) -> dict[str, bool]:
+        """Every input's level (True is high) by canonical point, at `now` (monotonic s)."""
+        self.plant.advance(now)
+        return {p: w.level(self.plant.sense(w.signal)) for p, w in self.inputs.items()}
+
+    def drive(self, point: str, level: bool, now: float) -> None:
+        """An output's level, as the bus has it at `now`. KeyError for a point not wired here."""
+        wire = self.outputs[point]
+        self.plant.drive(wire.signal, wire.asserted(level), now)
+
+
+def devices_on(config: Config, bus_name: str) -> dict[str, Any]:
+    """The devices (name -> settings) that stand on this bus of a `bridges.settings.Config`."""
+    return {n: device for n, device in config.devices.items() if config.bus_of(n) == bus_name}
+
+
+def plants_on(config: Config, bus_name: str) -> dict[str, Plant]:
+    """A new plant for each device on this bus: `hal_fakes.<kind>_plant.build(name, settings)`."""
+    build = import_module(f"hal_fakes.{config.kind}_plant").build
+    return {name: build(name, device) for name, device in devices_on(config, bus_name).items()}
+
+
+def wirings(
+    config: Config, bus_name: str, plants: Mapping[str, Plant], canonical: Callable[[str], str]
+) -> list[Wiring]:
+    """A Wiring for each device on this bus, from the driver's own wiring table."""
+    driver = import_module(f"drivers.{config.kind}_{config.driver}")
+    return [
+        Wiring(plants[name], driver.wires(device), canonical)
+        for name, device in devices_on(config, bus_name).items()
+    ]

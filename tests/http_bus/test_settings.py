@@ -1,0 +1,52 @@
+"""The `http` bus in a YAML: which addresses are one, and what is said about the others."""
+
+import msgspec
+import pytest
+
+from drivers.hal.http import Base, Settings, base
+
+
+@pytest.mark.parametrize(
+    ("text", "parts", "url"),
+    [
+        ("192.168.1.60", Base("192.168.1.60", 80, ""), "http://192.168.1.60/state"),
+        ("192.168.1.60/", Base("192.168.1.60", 80, ""), "http://192.168.1.60/state"),
+        ("http://tpu-3.local:8080/api/v1/", Base("tpu-3.local", 8080, "/api/v1"), None),
+        ("[fe80::1]:81/api", Base("fe80::1", 81, "/api"), "http://[fe80::1]:81/api/state"),
+    ],
+)
+def test_an_address_is_host_port_and_path(text: str, parts: Base, url: str | None) -> None:
+    assert base(text) == parts
+    assert base(text).url("/state") == (url or "http://tpu-3.local:8080/api/v1/state")
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("https://tpu/api", "https is not supported"),
+        ("admin:secret@tpu/api", "token_file"),
+        ("tpu:99999", "ports are 1 to 65535"),
+        ("tpu:0", "ports are 1 to 65535"),
+        ("tpu/api?x=1", "is no address of an API"),
+        ("tpu/a b", "is no address of an API"),
+        ("ftp://tpu", "is no address of an API"),
+        ("-tpu", "is no address of an API"),
+        ("tpu\n", "is no address of an API"),
+        ("", "is no address of an API"),
+    ],
+)
+def test_what_is_no_address_is_refused_with_the_fix(text: str, hint: str) -> None:
+    with pytest.raises(ValueError, match=hint):
+        base(text)
+
+
+def test_a_wrong_address_is_a_problem_of_the_settings() -> None:
+    [(path, text)] = Settings(api_base="https://tpu").problems()
+    assert path == ("api_base",)
+    assert text == "https is not supported: write the address of the plain HTTP API"
+    assert list(Settings(api_base="tpu").problems()) == []
+
+
+def test_the_defaults_are_a_second() -> None:
+    made = msgspec.convert({"type": "http", "api_base": "tpu"}, Settings)
+    assert made == Settings(api_base="tpu", timeout_s=1.0, scan_s=1.0, token_file=None)
