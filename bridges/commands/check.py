@@ -1,0 +1,127 @@
+"""`rmf-bridge check FILE...`: what is wrong with device YAMLs, or their wiring as a table.
+
+The table is for the person at the terminal block: each signal with its point in every spelling, and
+what its levels mean, at rest and when its wire breaks.
+"""
+
+import argparse
+import os
+import sys
+import unicodedata
+from collections.abc import Iterable, Sequence
+
+from bridges import named
+from bridges.settings import Config, Problem, SettingsError, load
+from drivers.points import Wire
+
+HEADINGS = (
+    "device",
+    "signal",
+    "point",
+    "direction",
+    "active",
+    "pull",
+    "debounce",
+    "at rest",
+    "wire broken",
+)
+BROKEN = {True: "asserted", False: "not asserted", None: "floats"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `check`."""
+    parser.add_argument("files", nargs="+", metavar="FILE", help="a device YAML")
+    parser.add_argument(
+        "-q", "--quiet", action="store_true", help="print problems only: no table, no warning"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check every file. Returns 0, or 78 (EX_CONFIG) if any cannot be right."""
+    right = [_check(file, args.quiet) for file in args.files]
+    return 0 if all(right) else os.EX_CONFIG
+
+
+def _check(file: str, quiet: bool) -> bool:
+    try:
+        config = load(file)
+    except SettingsError as error:
+        _print_problems(file, error.problems)
+        return False
+    if not quiet:
+        _complain(map(str, config.warnings))
+        sys.stdout.write("\n".join(described(config)) + "\n")
+    return True
+
+
+def _print_problems(file: str, problems: Sequence[Problem]) -> None:
+    many = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
+    _complain([*map(str, problems), f"{file}: {many}"])
+
+
+def _complain(lines: Iterable[str]) -> None:
+    """To stderr, after what was printed: the two often end in one log."""
+    sys.stdout.flush()
+    sys.stderr.writelines(f"{line}\n" for line in lines)
+
+
+def described(config: Config) -> list[str]:
+    """A right file as lines: what it is, and its wiring or what it talks to."""
+    lines = [f"{config.path}: {config.kind}, driver {config.driver}"]
+    for bus in config.buses:
+        devices = [name for name in config.devices if config.bus_of(name) == bus]
+        lines += ["", f"bus {bus} ({config.bus_types[bus]})", *_bus(config, bus, devices)]
+    return [*lines, ""]
+
+
+def _bus(config: Config, bus: str, devices: Sequence[str]) -> list[str]:
+    wires = [(name, wire) for name in devices for wire in config.wires(name)]
+    if wires:
+        hal = named.bus_called(config.bus_types[bus])
+        describe = getattr(hal, "describe", None) or hal.canonical
+        return aligned(
+            [HEADINGS, *(_row(name, wire, describe(wire.point)) for name, wire in wires)]
+        )
+    driver = named.driver_called(config.kind, config.driver)
+    describe = getattr(driver, "describe", lambda settings, bus: [])
+    rows = [
+        (name, what, text)
+        for name in devices
+        for what, text in describe(config.devices[name], config.buses[bus]) or [("", "")]
+    ]
+    return aligned(rows)
+
+
+def _row(device: str, wire: Wire, point: str) -> tuple[str, ...]:
+    """One wire. `point`: as the bus describes it; how the YAML spells it is put beside."""
+    spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"
+    is_input = wire.direction == "in"
+    return (
+        device,
+        wire.signal,
+        spelled,
+        wire.direction,
+        wire.active,
+        wire.pull or "-",
+        _debounce(wire) if is_input else "-",
+        "-" if is_input else ("high" if wire.level(False) else "low"),
+        BROKEN[wire.broken_reads()],
+    )
+
+
+def _debounce(wire: Wire) -> str:
+    return "default" if wire.debounce_s is None else f"{wire.debounce_s:g} s"
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of equal length as lines with their columns under each other."""
+    widths = [max(map(_width, column)) for column in zip(*rows, strict=True)]
+    return [
+        "".join(f"  {c}{' ' * (w - _width(c))}" for c, w in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def _width(text: str) -> int:
+    """Columns on a terminal: 走 takes two."""
+    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)

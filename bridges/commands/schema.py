@@ -1,0 +1,19 @@
+"""`rmf-bridge schema`: what may stand in a device YAML, for editors and for the documentation."""
+
+import argparse
+import json
+
+from bridges import reference
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `schema`."""
+    parser.add_argument(
+        "--markdown", action="store_true", help="as the page docs/configuration.md, not JSON Schema"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print it."""
+    print(reference.page() if args.markdown else json.dumps(reference.schema(), indent=2), end="")
+    return 0

@@ -1,0 +1,234 @@
+"""YAML text as nodes that know their line and column; what is no YAML, or not for us, ends here.
+
+Only the pure Python loader of PyYAML is used: its texts say more, and libyaml's composer recurses
+in C without a limit, so that a deeply nested file ends the interpreter instead of raising.
+"""
+
+import difflib
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import cast
+
+import yaml
+from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNode, SequenceNode
+from yaml.reader import ReaderError
+
+MAX_BYTES = 256 * 1024
+MAX_DEPTH = 32
+MAX_VALUES = 20_000
+
+FIXES = {
+    "found character '\\t' that cannot start any token": "a tab: YAML indents with spaces",
+    "mapping values are not allowed here": (
+        "a second ': ' here: indent the line like its neighbours, or put the text in quotes"
+    ),
+    "could not find expected ':'": "a key without ': ' after it, or a line indented wrongly",
+    "found unexpected end of stream": "the file ends inside a text: its closing quote is missing",
+    "but found another document": (
+        "a second document ('---') starts here: a file describes one daemon, so split it"
+    ),
+    "found duplicate anchor": "an anchor ('&name') with a name that is taken already",
+}
+FIXES |= {
+    f"found character '{c}' that cannot start any token": f"a text that begins with {c} needs quotes"
+    for c in "@`%"
+}
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Problem:
+    """One thing to put right (or to know), and where: line and column count from 1."""
+
+    file: str
+    line: int
+    column: int
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}: {self.text}"
+
+
+class SettingsError(Exception):
+    """A file that cannot be right: `problems` holds every one that was found, in file order."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(sorted(set(problems)))
+        super().__init__("\n".join(map(str, self.problems)))
+
+
+class Page:
+    """One file and what has been found in it so far."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.problems: list[Problem] = []
+
+    def problem(self, where: Node | Mark | None, text: str) -> Problem:
+        """A problem at the start of a node. The text may quote from the file whatever it holds."""
+        mark = where.start_mark if isinstance(where, Node) else where
+        if mark is None:
+            return Problem(self.file, 1, 1, printable(text))
+        return Problem(self.file, mark.line + 1, mark.column + 1, printable(text))
+
+    def note(self, where: Node | Mark, text: str) -> None:
+        """Record a problem and go on."""
+        self.problems.append(self.problem(where, text))
+
+    def check(self) -> None:
+        """Raise SettingsError if anything was recorded."""
+        if self.problems:
+            raise SettingsError(self.problems)
+
+
+def printable(text: str) -> str:
+    """A text on one line, with what cannot be seen written as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def shown(text: str) -> str:
+    """A value for an error text, not long."""
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def either(names: Iterable[str]) -> str:
+    """`a, b or c`."""
+    *others, last = list(names) or ["nothing"]
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that was probably meant."""
+    return next(iter(difflib.get_close_matches(name, list(known), n=1)), None)
+
+
+def unknown(what: str, name: str, known: Iterable[str]) -> str:
+    """That this name is none of the known ones, with the nearest, and all of them."""
+    names = list(dict.fromkeys(known))
+    near = nearest(name, names)
+    meant = f"did you mean '{shown(near)}'? " if near else ""
+    there = f"known here: {', '.join(map(shown, names))}" if names else "none is known here"
+    return f"unknown {what} '{shown(name)}': {meant}{there}"
+
+
+class _Refused(MarkedYAMLError):
+    """YAML, but none that is taken here."""
+
+    def __init__(self, mark: Mark, text: str) -> None:
+        super().__init__(None, None, text, mark)
+
+
+class _Composer(yaml.SafeLoader):
+    """Nodes with limits; tags are refused, and aliases only repeat what is complete."""
+
+    def __init__(self, text: str, page: Page) -> None:
+        super().__init__(text)
+        self._page = page
+        self._depth = 0
+        self._sizes: dict[int, int] = {}
+
+    def compose_node(self, parent: Node | None, index: int) -> Node | None:
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        mark = cast(Mark, event.start_mark)
+        if getattr(event, "tag", None) is not None:
+            self._page.note(mark, "tags ('!...') are not read: delete it; a text may need quotes")
+        with self._deeper(mark):
+            node = super().compose_node(parent, index)
+        if isinstance(event, AliasEvent) and id(node) not in self._sizes:
+            raise _Refused(mark, "an alias ('*name') inside the very value that it repeats")
+        self._sizes[id(node)] = size = 1 + sum(self._sizes[id(n)] for n in _children(node))
+        if size > MAX_VALUES:
+            raise _Refused(mark, f"more than {MAX_VALUES} values, with aliases written out")
+        return node
+
+    @contextmanager
+    def _deeper(self, mark: Mark) -> Iterator[None]:
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise _Refused(mark, f"nested more than {MAX_DEPTH} deep")
+        yield
+        self._depth -= 1
+
+
+def _children(node: Node | None) -> Iterator[Node]:
+    if isinstance(node, SequenceNode):
+        yield from node.value
+    elif isinstance(node, MappingNode):
+        for pair in node.value:
+            yield from pair
+
+
+def read(file: str) -> bytes:
+    """The file's bytes. Raises SettingsError if it cannot be read or is too long for a YAML."""
+    try:
+        with open(file, "rb") as source:
+            text = source.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise SettingsError([Problem(file, 1, 1, f"cannot be read: {reason}")]) from None
+    if len(text) > MAX_BYTES:
+        reason = f"longer than {MAX_BYTES // 1024} KiB: this is no device YAML"
+        raise SettingsError([Problem(file, 1, 1, reason)])
+    return text
+
+
+def compose(page: Page, text: bytes) -> MappingNode:
+    """The mapping that a file is. Raises SettingsError where it is none."""
+    root = _root(page, _decoded(page, text))
+    if not isinstance(root, MappingNode):
+        found = "empty" if root is None else "not a mapping"
+        page.problems.append(
+            Problem(page.file, 1, 1, f"the file is {found}: it begins with 'kind: ...'")
+        )
+        raise SettingsError(page.problems)
+    return root
+
+
+def _decoded(page: Page, text: bytes) -> str:
+    try:
+        return text.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = error.object[: error.start].decode()
+        reason = f"byte 0x{error.object[error.start]:02x} is not UTF-8: save the file as UTF-8"
+        raise SettingsError([_problem_after(page, before, reason)]) from None
+
+
+def _root(page: Page, text: str) -> Node | None:
+    composer = None
+    try:
+        composer = _Composer(text, page)
+        return composer.get_single_node()
+    except ReaderError as error:
+        reason = f"the character U+{error.character:04X} may not stand in YAML: delete it"
+        raise SettingsError([_problem_after(page, text[: error.position], reason)]) from None
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        raise SettingsError([*page.problems, page.problem(mark, _reason(error))]) from None
+    except (ValueError, OverflowError):
+        # PyYAML lets these out for numbers that no character or version has, as in "\U00110000".
+        assert composer is not None
+        reason = "not YAML: a number too large, in an escape ('\\U...') or a directive ('%YAML')"
+        raise SettingsError([page.problem(composer.get_mark(), reason)]) from None
+
+
+def _problem_after(page: Page, before: str, text: str) -> Problem:
+    lines = re.split(r"\r\n|\r|\n", before)
+    return Problem(page.file, len(lines), len(lines[-1]) + 1, text)
+
+
+def _reason(error: MarkedYAMLError) -> str:
+    """PyYAML's text on one line, with the fix where the cause is a usual one."""
+    for usual, fix in FIXES.items():
+        if usual in (error.problem, (error.context or "").partition(" '")[0]):
+            return fix
+    if isinstance(error, _Refused):
+        return str(error.problem)
+    mark = error.context_mark
+    context = f" ({error.context}, from line {mark.line + 1})" if mark and error.context else ""
+    return f"not YAML: {error.problem}{context}"
+
+
+def is_plain(node: ScalarNode) -> bool:
+    """Whether a scalar is written without quotes, so that its looks decide what it is."""
+    return node.style is None

@@ -1,0 +1,27 @@
+"""The kinds, drivers and buses of `site/` beside the real ones, and where the tests' files stand."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import bridges
+import drivers
+import drivers.hal
+
+SITE = Path(__file__).parent / "site"
+
+
+@pytest.fixture(scope="package", autouse=True)
+def site() -> Iterator[None]:
+    """Their folders, where files are looked for by name."""
+    with pytest.MonkeyPatch.context() as patch:
+        for package, folder in ((bridges, "kinds"), (drivers, "drivers"), (drivers.hal, "hal")):
+            patch.setattr(package, "__path__", [*package.__path__, str(SITE / folder)])
+        yield
+
+
+@pytest.fixture(scope="package")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file to write and load, again and again."""
+    return tmp_path_factory.mktemp("settings") / "gate.yaml"

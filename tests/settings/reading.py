@@ -1,0 +1,45 @@
+"""How the loader's tests read a file: from text to a Config, or to its problems as they print."""
+
+from pathlib import Path
+
+from bridges.settings import Config, SettingsError, load
+
+RIGHT = """\
+kind: gate
+driver: contact
+rmf: {transport: dds, domain_id: 7}
+buses:
+  header: {type: pins}
+gates:
+  north:
+    lanes: [in, out]
+    inputs:
+      opened: {point: A0, active: high, pull: up}
+      closed: {point: 1A, active: low, pull: down, debounce_s: 1e-2}
+    outputs:
+      hold: {point: A2, active: high}
+    codes: {1: in, 2: out}
+    limits: {open_s: 3, tries: 2}
+"""
+
+
+def problems_of(path: Path, text: str | bytes) -> list[str]:
+    """The problems of a file with this text, as `line:column: text`."""
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    try:
+        load(path)
+    except SettingsError as error:
+        return [str(p).removeprefix(f"{path}:") for p in error.problems]
+    return []
+
+
+def config_of(path: Path, text: str) -> Config:
+    """The Config of a file with this text."""
+    path.write_bytes(text.encode())
+    return load(path)
+
+
+def changed(old: str, new: str, text: str = RIGHT) -> str:
+    """The right file with one place changed."""
+    assert text.count(old) == 1, old
+    return text.replace(old, new)

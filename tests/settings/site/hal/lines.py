@@ -1,0 +1,1 @@
+"""Not a bus: something that a bus's file needs."""

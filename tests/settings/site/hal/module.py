@@ -1,0 +1,24 @@
+"""Contacts with names in words, without a spelling of their own in a table."""
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+
+class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The module."""
+
+    host: str
+    port: Annotated[int, Meta(ge=1, le=65535)] = 502
+
+
+def canonical(point: str) -> str:
+    """One spelling."""
+    if not point.startswith("coil "):
+        raise ValueError(f"{point!r}: write coil and its number")
+    return point
+
+
+def open_bus(settings: Settings) -> None:
+    """Never."""

@@ -1,0 +1,44 @@
+"""Pins A0 to A9, which may be called 0A to 9A as well; A9 has no pull, A8 is an input."""
+
+import re
+from collections.abc import Iterable
+
+import msgspec
+
+from drivers.points import Wire
+
+
+class Settings(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="type"
+):
+    """The pins."""
+
+    chip: int | None = None
+
+
+def canonical(point: str) -> str:
+    """One spelling."""
+    found = re.fullmatch(r"A(\d)|(\d)A", point)
+    if not found:
+        raise ValueError(f"{point!r} is not a pin: write A{point[:1] or 0}")
+    return f"A{found[1] or found[2]}"
+
+
+def describe(point: str) -> str:
+    """Both spellings."""
+    name = canonical(point)
+    return f"{name} = {name[1]}A"
+
+
+def wire_problems(wire: Wire) -> Iterable[str]:
+    """What cannot be."""
+    if wire.direction == "in" and wire.pull is None:
+        yield "pull is missing"
+    if wire.direction == "in" and wire.pull == "up" and "9" in wire.point:
+        yield "A9 has no pull"
+    if wire.direction == "out" and "8" in wire.point:
+        yield "A8 cannot drive"
+
+
+def open_bus(settings: Settings) -> None:
+    """Never."""

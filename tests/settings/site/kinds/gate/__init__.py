@@ -1,0 +1,23 @@
+"""A kind of device that only the loader's tests know."""
+
+from typing import Any, cast
+
+from bridges.kind import Kind
+
+
+def _unused(*_: Any) -> Any:
+    raise AssertionError("the loader decides nothing")
+
+
+KIND = Kind(
+    name="gate",
+    devices_key="gates",
+    states=cast(Any, None),
+    requests={},
+    device_name=_unused,
+    limits=_unused,
+    initial=_unused,
+    decide=_unused,
+    state_message=_unused,
+    summary=_unused,
+)

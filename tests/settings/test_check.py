@@ -1,0 +1,115 @@
+"""`rmf-bridge check`: problems or the wiring table, as a person sees them."""
+
+from pathlib import Path
+
+import pytest
+
+from bridges.cli import main
+from tests.settings.reading import RIGHT, changed
+from tests.settings.test_sections import WEB
+
+TABLE = """\
+gate.yaml: gate, driver contact
+
+bus header (pins)
+  device  signal  point    direction  active  pull  debounce  at rest  wire broken
+  north   opened  A0 = 0A  in         high    up    default   -        asserted
+  north   closed  A1 = 1A  in         low     none  0.01 s    -        floats
+  north   hold    A2 = 2A  out        low     -     -         high     not asserted
+
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """File names as the user gives them, in the folder where they stand."""
+    monkeypatch.chdir(tmp_path)
+
+
+def check(*arguments: str) -> int:
+    return main(["check", *arguments])
+
+
+def test_the_wiring_is_a_table(capsys: pytest.CaptureFixture[str]) -> None:
+    text = changed("pull: down", "pull: none")
+    text = changed("{point: A2, active: high}", "{point: A2, active: low}", text)
+    Path("gate.yaml").write_text(text)
+    assert check("gate.yaml") == 0
+    assert capsys.readouterr() == (TABLE, "")
+
+
+def test_each_bus_has_its_table(capsys: pytest.CaptureFixture[str]) -> None:
+    text = changed(
+        "  header: {type: pins}", "  header: {type: pins}\n  box: {type: module, host: h}"
+    )
+    text = changed("    lanes:", "    bus: header\n    lanes:", text) + (
+        "  走廊:\n    bus: box\n    lanes: [in]\n    inputs: {}\n"
+        "    outputs: {hold: {point: coil 7, active: high}}\n"
+    )
+    Path("gate.yaml").write_text(text)
+    assert check("gate.yaml") == 0
+    out = capsys.readouterr().out
+    assert out[out.index("bus box") :] == (
+        "bus box (module)\n"
+        "  device  signal  point   direction  active  pull  debounce  at rest  wire broken\n"
+        "  走廊    hold    coil 7  out        high    -     -         low      not asserted\n"
+        "\n"
+    )
+
+
+def test_a_driver_without_wires_says_what_it_talks_to(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("gate.yaml").write_text(WEB)
+    assert check("gate.yaml") == 0
+    assert capsys.readouterr() == (
+        "gate.yaml: gate, driver web\n"
+        "\n"
+        "bus server (web)\n"
+        "  north  polls     http://192.168.1.7/side\n"
+        "  north  identity  not verified\n"
+        "  south  polls     http://192.168.1.7/gate\n"
+        "  south  identity  not verified\n"
+        "\n",
+        "",
+    )
+
+
+def test_problems_go_to_stderr_with_their_number(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("gate.yaml").write_text(changed("tries: 2", "tries: 0, gian: 1"))
+    assert check("gate.yaml") == 78
+    assert capsys.readouterr() == (
+        "",
+        "gate.yaml:15:32: 'tries' is 0: a whole number of at least 1 is wanted\n"
+        "gate.yaml:15:35: unknown key 'gian': did you mean 'gain'? known here: "
+        "open_s, close_s, tries, even, gain, loud, baud, label\n"
+        "gate.yaml: 2 problems\n",
+    )
+
+
+def test_one_wrong_file_among_several_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("gate.yaml").write_text(RIGHT)
+    assert check("no.yaml", "gate.yaml") == 78
+    out, err = capsys.readouterr()
+    assert out.startswith("gate.yaml: gate, driver contact\n")
+    assert err == ("no.yaml:1:1: cannot be read: No such file or directory\nno.yaml: 1 problem\n")
+
+
+def test_warnings_do_not_make_a_file_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    text = changed("    limits:", "    accept_unsafe: {hold: the door is light}\n    limits:")
+    Path("gate.yaml").write_text(changed("tries: 2", "loud: true", text))
+    assert check("gate.yaml") == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("gate.yaml: gate, driver contact\n")
+    assert err == (
+        "gate.yaml:15:21: warning: 'north': unsafe wiring of 'hold' is accepted: "
+        "the door is light\n"
+        "gate.yaml:16:31: warning: 'north': it will be loud\n"
+    )
+
+
+def test_quiet_prints_problems_only(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("gate.yaml").write_text(changed("tries: 2", "loud: true"))
+    assert check("-q", "gate.yaml") == 0
+    assert capsys.readouterr() == ("", "")
+    Path("gate.yaml").write_text(changed("tries: 2", "loud: yes"))
+    assert check("--quiet", "gate.yaml") == 78
+    assert len(capsys.readouterr().err.splitlines()) == 2

@@ -1,0 +1,228 @@
+"""Every shipped YAML is right; with any one thing in it wrong, the loader points at that thing."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import pytest
+import yaml
+from msgspec.inspect import (
+    BoolType,
+    DictType,
+    EnumType,
+    FloatType,
+    IntType,
+    ListType,
+    LiteralType,
+    Metadata,
+    NoneType,
+    StrType,
+    StructType,
+    Type,
+    UnionType,
+    VarTupleType,
+    type_info,
+)
+from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
+
+from bridges import named
+from bridges.commands.check import described
+from bridges.fields import Rmf
+from bridges.settings import load
+from tests.settings.reading import problems_of
+
+CONFIG = Path(__file__).parents[2] / "config"
+FILES = sorted(CONFIG.glob("*.yaml"))
+NAMES = ['"17"', "x", ""]  # where a name may stand, these are wrong elsewhere or not at all
+TRAPS = ["017", "1:30", "no", "1e3", "~", "1.0", "17", "[]", *NAMES]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A mapping's entry in a file's text; `parent` is the key of the mapping that it is in."""
+
+    key: ScalarNode
+    value: Node
+    parent: Node
+    flow: bool
+
+    @property
+    def end(self) -> int:
+        """Where the entry's text ends: block values end at the next token, which is too far."""
+        node = self.value
+        while isinstance(node, CollectionNode) and not node.flow_style and node.value:
+            last = node.value[-1]
+            node = last[1] if isinstance(last, tuple) else last
+        return int(node.end_mark.index)
+
+
+def composed(text: str) -> MappingNode:
+    """A file's own mapping, with its marks."""
+    root = yaml.compose(text)
+    assert isinstance(root, MappingNode)
+    return root
+
+
+def places(node: Node, parent: Node) -> Iterator[Place]:
+    """Every entry of every mapping."""
+    if isinstance(node, SequenceNode):
+        for item in node.value:
+            yield from places(item, item)
+    if isinstance(node, MappingNode):
+        for key, value in node.value:
+            yield Place(key, value, parent, bool(node.flow_style))
+            yield from places(value, key)
+
+
+def scalars(node: Node) -> Iterator[ScalarNode]:
+    """Every scalar value, keys left out."""
+    if isinstance(node, ScalarNode):
+        yield node
+    elif isinstance(node, SequenceNode):
+        for item in node.value:
+            yield from scalars(item)
+    else:
+        for _, value in node.value:
+            yield from scalars(value)
+
+
+def at(node: Node) -> str:
+    return f"{node.start_mark.line + 1}:{node.start_mark.column + 1}"
+
+
+def spots(problems: list[str]) -> list[str]:
+    return [":".join(p.split(":", 2)[:2]) for p in problems]
+
+
+def own_names(config: Path) -> set[str]:
+    """The names of a file's buses and devices, which may be anything."""
+    loaded = load(config)
+    return {*loaded.buses, *loaded.devices}
+
+
+def is_own(name: str, names: set[str]) -> bool:
+    """Whether a key is the site's own; floors and codes are `L1` and `1` in these files."""
+    return name in names or name[0].isupper() or name[0].isdigit()
+
+
+@pytest.fixture(params=FILES, ids=lambda path: str(path.stem))
+def config(request: pytest.FixtureRequest) -> Path:
+    path: Path = request.param
+    return path
+
+
+def test_there_are_shipped_files() -> None:
+    assert len(FILES) >= 3
+
+
+def test_a_shipped_file_is_right_and_has_something_to_show(config: Path) -> None:
+    loaded = load(config)
+    assert len(described(loaded)) > 4
+    assert loaded.text == config.read_bytes()
+
+
+def test_a_shipped_files_devices_are_what_msgspec_makes_of_them(config: Path) -> None:
+    for settings in load(config).devices.values():
+        raw = msgspec.to_builtins(settings, str_keys=True)
+        assert msgspec.convert(raw, type(settings), strict=False) == settings
+
+
+def leaves(wanted: Type) -> Iterator[Type]:
+    """Every type that a struct is made of, down to texts and numbers."""
+    if isinstance(wanted, Metadata):
+        yield from leaves(wanted.type)
+    elif isinstance(wanted, StructType):
+        for a_field in wanted.fields:
+            yield from leaves(a_field.type)
+    elif isinstance(wanted, UnionType):
+        assert sum(isinstance(t, StructType) for t in wanted.types) <= 1, wanted
+        for member in wanted.types:
+            yield from leaves(member)
+    elif isinstance(wanted, ListType | VarTupleType):
+        yield from leaves(wanted.item_type)
+    elif isinstance(wanted, DictType):
+        yield from leaves(wanted.key_type)
+        yield from leaves(wanted.value_type)
+    else:
+        yield wanted
+
+
+def test_every_field_of_every_driver_and_bus_is_of_a_sort_that_is_read() -> None:
+    structs = [Rmf, *(named.bus_called(name).Settings for name in named.bus_types())]
+    for kind in named.kind_names():
+        structs += [named.driver_called(kind, name).Settings for name in named.driver_names(kind)]
+    sorts = {type(leaf) for struct in structs for leaf in leaves(type_info(struct))}
+    assert sorts <= {BoolType, EnumType, FloatType, IntType, LiteralType, NoneType, StrType}
+    assert len(structs) >= 7
+
+
+def test_every_misspelt_key_is_found_where_it_stands(config: Path, file: Path) -> None:
+    text = config.read_text()
+    root = composed(text)
+    names = own_names(config)
+    for place in places(root, root):
+        if is_own(place.key.value, names):
+            continue
+        start = place.key.start_mark.index
+        wrong = text[:start] + "z" + text[start:]
+        found = problems_of(file, wrong)
+        start_of_text = f"{at(place.key)}: unknown key 'z{place.key.value}': "
+        assert [p for p in found if p.startswith(start_of_text)], (place.key, found)
+
+
+def test_every_doubled_key_is_found_where_it_stands(config: Path, file: Path) -> None:
+    text = config.read_text()
+    root = composed(text)
+    for place in places(root, root):
+        start = place.key.start_mark.index
+        gap = ", " if place.flow else "\n" + " " * place.key.start_mark.column
+        added = text[start : place.end] + gap
+        found = problems_of(file, text[:start] + added + text[start:])
+        before = text[:start] + added
+        second = f"{before.count(chr(10)) + 1}:{len(before) - before.rfind(chr(10))}"
+        line = place.key.start_mark.line + 1
+        assert found == [
+            f"{second}: the key '{place.key.value}' is on line {line} already: "
+            "delete one of the two"
+        ]
+
+
+def test_every_key_that_is_taken_out_leaves_a_right_file_or_is_missed(
+    config: Path, file: Path
+) -> None:
+    text = config.read_text()
+    root = composed(text)
+    missed = set()
+    for place in places(root, root):
+        start, end = place.key.start_mark.index, place.end
+        while place.flow and text[end] in ", ":
+            end += 1
+        rest = text[:start] + text[end:]
+        found = problems_of(file, rest)
+        if f"needs '{place.key.value}'" in " ".join(found):
+            assert at(composed(rest) if place.parent is root else place.parent) in spots(found)
+            missed.add(place.key.value)
+    assert missed >= {"kind", "driver", "buses", "type"}
+
+
+def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file: Path) -> None:
+    text = config.read_text()
+    accepted = 0
+    for node in scalars(composed(text)):
+        for trap in TRAPS:
+            found = problems_of(
+                file, f"{text[: node.start_mark.index]}{trap}{text[node.end_mark.index :]}"
+            )
+            accepted += not found
+            if found and trap in ("[]", "~"):  # at the key, or at the key of what lacks it
+                assert at(node).partition(":")[0] in {s.partition(":")[0] for s in spots(found)}
+            elif found and trap not in NAMES:
+                assert at(node) in spots(found), (trap, found)
+    assert accepted < 40
+
+
+def test_every_shipped_file_is_judged_when_cut_anywhere(config: Path, file: Path) -> None:
+    text = config.read_bytes()
+    for end in range(0, len(text), 23):
+        problems_of(file, text[:end])
