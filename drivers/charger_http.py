@@ -33,9 +33,12 @@ Path = Annotated[str, msgspec.Meta(pattern=r"^/[A-Za-z0-9._~/-]*$", max_length=2
 class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the maker's state numbers mean. A number in no list is an error, with its number.
 
-    `handshake`: a robot is being recognised, no current yet. `charging`: current flows. `stopping`:
-    it still flows, ramping down. `released`: disconnected, and not ready for another robot yet.
-    `error`: out of service, manual operation too. For numbers between 0 and 65535.
+    `idle`: nothing is on the pad, and a robot may come.
+    `handshake`: a robot is being recognised, no current yet.
+    `charging`: current flows.
+    `stopping`: current still flows, ramping down.
+    `released`: disconnected, and not ready for another robot yet.
+    `error`: out of service, manual operation too.
     """
 
     idle: Annotated[list[Code], msgspec.Meta(min_length=1)]
@@ -67,7 +70,12 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One station. The paths follow the bus's `api_base`."""
+    """One station. The paths follow the bus's `api_base`.
+
+    `codes`: what the maker's state numbers mean.
+    `state_path`: where GET answers {"state": number, "error_msg": text}.
+    `clear_error_path`: where POST clears the station's error.
+    """
 
     codes: Codes
     state_path: Path = "/state"

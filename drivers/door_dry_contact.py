@@ -11,18 +11,29 @@ import msgspec
 
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.dry_contact.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
 from drivers.points import Input, Output, Points, PointsBus, Wire
 
 BUSES: Final = ("gpio", "modbus")
 
 DEBOUNCE_S: Final = 0.05
 
-BROKEN_MUST_READ: Final = {"opened": False, "obstruction": True, "fire": True}
-"""What a cut wire has to look like: never a door that is open, never an alarm or a body overlooked."""
+CUT_MUST_READ: Final = {
+    "opened": (False, "the door reads open"),
+    "obstruction": (True, "somebody in the doorway is not seen"),
+    "fire": (True, "a fire alarm reads clear"),
+}
+"""What a cut wire has to read as, and what it would mean if it did not."""
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The contacts that are read; `opened` or `closed` may be missing with `feedback: estimated`."""
+    """The contacts that are read; a limit may be missing with `feedback: estimated`.
+
+    `opened`: the limit contact at the open end: asserted is fully open.
+    `closed`: the limit contact at the closed end.
+    `obstruction`: somebody is in the doorway: after CLOSE, the hold is kept until they are not.
+    `fire`: the fire alarm; `on_fire` says what it does.
+    """
 
     opened: Input | None = None
     closed: Input | None = None
@@ -31,13 +42,20 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The relay that holds the door open while it is on. There is no relay that closes."""
+    """What we ask of the operator. There is no relay that closes.
+
+    `hold_open`: holds the door open while it is on.
+    """
 
     hold_open: Output
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door and its wiring."""
+    """A door and its wiring.
+
+    `inputs`: the contacts that are read.
+    `outputs`: the relay that is driven.
+    """
 
     inputs: Inputs = Inputs()
     outputs: Outputs
@@ -53,9 +71,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             )
         if self.on_fire and self.inputs.fire is None:
             yield ("on_fire",), "there is no fire input; wire one under inputs, or leave this out"
-        for wire in _unsafe(self):
-            if wire.signal not in self.accept_unsafe:
-                yield wire.path, _unsafe_text(wire)
+        yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
     def _feedback_problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
         missing = [s for s in ("opened", "closed") if getattr(self.inputs, s) is None]
@@ -100,6 +116,8 @@ def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
                 wire.path,
                 "a cut wire may read as a closed door; wire a contact that shuts with it",
             )
+    for signal in settings.accept_unsafe.keys() - {signal for signal, _, _ in _unsafe(settings)}:
+        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
     if settings.feedback == "estimated":
         yield ("feedback",), "RMF is told OPEN or CLOSED by the clock, whatever the door does"
 
@@ -136,20 +154,9 @@ class DryContactDoor:
         self._points.close()
 
 
-def _unsafe(settings: Settings) -> list[Wire]:
-    return [
-        wire
-        for wire in wires(settings)
-        if wire.signal in BROKEN_MUST_READ
-        and wire.broken_reads() is not BROKEN_MUST_READ[wire.signal]
-    ]
-
-
-def _unsafe_text(wire: Wire) -> str:
-    must = "asserted" if BROKEN_MUST_READ[wire.signal] else "not asserted"
-    found = {True: "asserted", False: "not asserted", None: "anything (it floats)"}
-    return (
-        f"a cut wire would read as {found[wire.broken_reads()]}, and must read as {must}: wire the"
-        " contact the other way round and turn 'active', or write"
-        f" accept_unsafe: {{{wire.signal}: why}}"
-    )
+def _unsafe(settings: Settings) -> Iterator[Unsafe]:
+    table = wires(settings)
+    for wire in table:
+        if wire.signal in CUT_MUST_READ:
+            yield from cut_must_read(wire, *CUT_MUST_READ[wire.signal])
+    yield from energised_at_boot(table)

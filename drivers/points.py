@@ -23,7 +23,7 @@ DebounceSeconds = Annotated[float, msgspec.Meta(ge=0, le=10, extra={"unit": "s"}
 class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One contact that is read.
 
-    `point`: `BCM4` or `J8:7` on GPIO, `unit 1 discrete input 0` on Modbus.
+    `point`: its address: `BCM4` or `J8:7` on GPIO, `unit 1 discrete input 0` on Modbus.
     `active`: the level at which the signal is asserted (on Modbus `high` is 1).
     `pull`: the resistor on a GPIO input; needed there, and not meant elsewhere.
     `debounce_s`: how long a change must last; the kind's default when absent.
@@ -38,7 +38,8 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One relay or line that is driven. Not asserted is its safe level, always.
 
-    `point`: `BCM18` or `J8:12` on GPIO, `unit 1 coil 0` on Modbus. `active`: the asserted level.
+    `point`: its address: `BCM18` or `J8:12` on GPIO, `unit 1 coil 0` on Modbus.
+    `active`: the level at which it is asserted.
     """
 
     point: Point

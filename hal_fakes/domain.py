@@ -1,5 +1,6 @@
 """A DDS domain that nobody on this machine uses, for the demo and the tests."""
 
+import atexit
 import random
 import socket
 from typing import Final
@@ -7,8 +8,6 @@ from typing import Final
 DOMAINS: Final = range(10, 100)
 """Above 101 a domain's ports reach into those that Linux hands out to clients."""
 CLAIM: Final = "\0rmf-bridges-test-domain-{}"
-
-_claims: list[socket.socket] = []
 
 
 def free_domain() -> int:
@@ -40,5 +39,5 @@ def _claimed(domain: int) -> bool:
     except OSError:
         claim.close()
         return False
-    _claims.append(claim)
+    atexit.register(claim.close)
     return True

@@ -29,6 +29,9 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every charger has, whatever its driver."""
+    """What every charger has, whatever its driver.
+
+    `limits`: durations and counts, where the defaults do not suit.
+    """
 
     limits: Limits = Limits()

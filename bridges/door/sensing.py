@@ -70,7 +70,7 @@ def take(senses: Senses, sample: DoorSample, now: float, limits: DoorLimits) -> 
 
 def miss(senses: Senses) -> Senses:
     """A reading or a write has failed: what was half seen must be seen again."""
-    contacts = {signal: _missed(getattr(senses, signal)) for signal in SIGNALS}
+    contacts: dict[str, Contact | None] = {s: forget(getattr(senses, s)) for s in SIGNALS}
     return Senses(**contacts, read_at=senses.read_at, linked_since=None)
 
 
@@ -105,15 +105,11 @@ def _hold_s(before: Contact | None, seen: bool | None, signal: str, limits: Door
 
 
 def _unwired(contact: Contact | None) -> bool:
-    return contact is not None and contact.value is None and contact.candidate is None
+    return contact is not None and contact.candidate is None
 
 
 def _settled(contact: Contact | None) -> bool:
-    return contact is not None and (contact.value is not None or contact.candidate is None)
-
-
-def _missed(contact: Contact | None) -> Contact | None:
-    return contact if _unwired(contact) else forget(contact)
+    return contact is not None and contact.steady_at is not None
 
 
 def _believed(contact: Contact | None) -> bool:
@@ -124,7 +120,7 @@ def _feared(contact: Contact | None) -> bool:
     """A hazard that is believed; or seen at all, where nothing is believed yet."""
     if contact is None:
         return False
-    return bool(contact.candidate if contact.value is None else contact.value)
+    return bool(contact.value if _settled(contact) else contact.candidate)
 
 
 def _estimates(

@@ -35,7 +35,11 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """For an operator that closes by itself: the relay is on for `on_s`, again each `every_s`."""
+    """For an operator that closes by itself: the relay is triggered again while RMF holds the door.
+
+    `on_s`: how long the relay is on.
+    `every_s`: from one trigger to the next.
+    """
 
     on_s: PulseSeconds
     every_s: PulseSeconds
@@ -44,6 +48,7 @@ class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What RMF and the building agree on about one door.
 
+    `limits`: durations, where the defaults do not suit.
     `feedback`: `estimated` where a limit contact is missing and the door's times must do; such a
     state is marked in logs and status, and RMF cannot see the difference.
     `on_fire`: whether a fire alarm holds the door `open`, or takes the hold away (`release`).

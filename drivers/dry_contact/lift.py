@@ -17,27 +17,37 @@ Number = Annotated[int, msgspec.Meta(ge=0, le=65535)]
 class LiftInput(Input, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One line from the lift.
 
-    `valid_when: agv_mode`: the line means something only while AGV mode is on. Outside it a floor or
-    motion is not known, a door is neither open nor closed, and a hazard is not there.
+    `valid_when`: with `agv_mode` the line means something only while AGV mode is on. Outside it a
+    floor or motion is not known, a door is neither open nor closed, and a hazard is not there.
     """
 
     valid_when: Literal["agv_mode"] | None = None
 
 
 class DoorInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The only contact of a door. `proves`: what is sure when it is asserted."""
+    """The only contact of a door.
+
+    `proves`: what is sure when it is asserted; the other end is estimated by `door_travel_s`.
+    """
 
     proves: Literal["open", "closed"]
 
 
 class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The line that makes the asserted lines of a code, itself included, even or odd in number."""
+    """A line that makes a broken line of the code show.
+
+    `total`: whether the asserted lines of the code, this one included, are even or odd in number.
+    """
 
     total: Literal["even", "odd"]
 
 
 class MotionCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Motion as a number on several lines, least significant first. A number not listed is a fault."""
+    """Motion as a number on several lines.
+
+    `bits`: least significant first.
+    `codes`: number -> motion; a number not listed is a fault.
+    """
 
     bits: list[LiftInput]
     codes: dict[Number, Literal["stopped", "up", "down", "moving"]]
@@ -57,7 +67,11 @@ ServiceState = Literal[
 
 
 class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The lift's service state as a number on several lines. Every number must be listed."""
+    """The lift's service state as a number on several lines.
+
+    `bits`: least significant first.
+    `codes`: number -> state; every number must be listed.
+    """
 
     bits: list[LiftInput]
     codes: dict[Number, ServiceState]
@@ -66,9 +80,22 @@ class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the lift tells us.
 
-    Hazards: `fire_alarm` to `overload`. A door has one contact (`door`, which says what it `proves`)
-    or two (`door_opened` and `door_closed`). Motion is one of: `moving`, `stopped`, `up` with
-    `down`, or the code `motion`. AGV mode is the line `agv_mode` or one state of `service`.
+    A hazard takes the lift away from RMF at once. A door has one contact or two. Motion is one of:
+    `moving`, `stopped`, `up` with `down`, or a code.
+
+    `fire_alarm`: fire, shown as MODE_FIRE; latched with `fire_reset: manual`.
+    `code_blue`, `earthquake`, `emergency`: shown as MODE_EMERGENCY.
+    `out_of_service`, `manual_mode`: shown as MODE_OFFLINE; the second is the key switch.
+    `overload`: delays the ride, and nothing else.
+    `agv_mode`: AGV mode is on; or one state of `service`.
+    `service`: the lift's service state as a code.
+    `door`, `rear_door`: the door's only contact.
+    `door_opened`, `rear_door_opened`: the contact at the open end, with one at the closed end.
+    `door_closed`, `rear_door_closed`: the contact at the closed end, with one at the open end.
+    `moving`: the car moves, whichever way.
+    `stopped`: the car stands.
+    `up`, `down`: the car moves that way; neither is standing still.
+    `motion`: motion as a code.
     """
 
     fire_alarm: LiftInput | None = None
@@ -96,9 +123,13 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Where the car is.
 
-    `binary`, `gray`, `bcd`: `bits` (least significant first) show a number, and `codes` says which
-    landing each number is. `one_hot`: `lines` has one for each landing, and no line on is between
-    floors. `between_floors`: the numbers that mean no landing. A number in neither is a fault.
+    `encoding`: how the lines say it; `one_hot` is one line for each landing.
+    `bits`: the lines that show a number, least significant first.
+    `codes`: number -> landing.
+    `parity`: a line that makes a broken one show.
+    `lines`: with `one_hot`, landing -> its line; none on is between floors.
+    `between_floors`: the numbers that mean no landing. One that is neither this nor a landing's is a
+    fault.
     """
 
     encoding: Literal["binary", "gray", "bcd", "one_hot"]
@@ -151,7 +182,11 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Calls as a binary number on several lines, least significant first; 0 is no call."""
+    """Calls as a binary number on several lines; 0 is no call.
+
+    `bits`: least significant first.
+    `codes`: number -> landing.
+    """
 
     bits: list[Output]
     codes: dict[Number, Name]
@@ -163,7 +198,11 @@ class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What we ask of the lift, besides calls. Each is a level, and off is its safe state."""
+    """What we ask of the lift, besides calls. Each is a level, and off is its safe state.
+
+    `agv_mode_request`: asks for AGV mode for as long as a robot holds the lift.
+    `door_open`, `rear_door_open`: holds that door open where the car stands.
+    """
 
     agv_mode_request: Output | None = None
     door_open: Output | None = None
@@ -173,7 +212,11 @@ class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 class LiftWiring(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A lift on dry contacts, behind GPIO pins or a Modbus I/O module.
 
-    `calls`: one line for each landing; or `call_code`.
+    `inputs`: the lines from the lift.
+    `floor_code`: where the car is.
+    `outputs`: the lines to the lift, but for calls.
+    `calls`: landing -> its line; or `call_code`.
+    `call_code`: calls as a number on several lines.
     """
 
     inputs: Inputs

@@ -22,6 +22,9 @@ class Bus:
     def scanned(self) -> None:
         """A scan has finished: a dead-man, where there is one, drops the outputs when this stops."""
 
+    def insist(self) -> None:
+        """Try at once what is asked next, whatever the backoff: outputs are about to go off."""
+
     def close(self) -> None:
         """Release the bus. Does not raise; may be called twice."""
 

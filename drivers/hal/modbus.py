@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import msgspec
 
 from bridges.fields import Name, Period
-from drivers.hal import HalError
+from drivers.hal import Bus, HalError
 from drivers.hal.modbus_points import (
     Point,
     Range,
@@ -72,7 +72,11 @@ Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 
 
 class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the module or gateway listens."""
+    """Where the module or gateway listens.
+
+    `host`: its address or name.
+    `port`: its TCP port.
+    """
 
     host: Name
     port: Annotated[int, msgspec.Meta(ge=1, le=65535)] = 502
@@ -95,7 +99,9 @@ class Settings(
 ):
     """A module, or a gateway with several units.
 
-    `timeout_s`: for one try of one request. `retries`: how many more tries it gets.
+    `tcp`: where it listens.
+    `timeout_s`: for one try of one request.
+    `retries`: how many more tries a request gets.
     `scan_s`: how often every input is read.
     """
 
@@ -151,8 +157,8 @@ class Backoff:
             self._insisted, self._retry_at = True, -math.inf
 
 
-class ModbusBus:
-    """One TCP connection to a module or gateway (`drivers.hal.Bus` and `drivers.points.PointsBus`).
+class ModbusBus(Bus):
+    """One TCP connection to a module or gateway (also a `drivers.points.PointsBus`).
 
     `clock` and `jitter` are a test's in place of the real ones.
     """
@@ -209,9 +215,6 @@ class ModbusBus:
         for backoff in (self._link, *self._units.values()):
             backoff.insist()
 
-    def on_edge(self, wake: Callable[[], None]) -> None:
-        """A polled bus has no edges."""
-
     def close(self) -> None:
         """Hang up."""
         self._connection.close()
@@ -226,13 +229,13 @@ class ModbusBus:
         for _ in range(self._settings.retries + 1):
             try:
                 self._connection.connect()
-                self._link.mended()
                 reply = self._connection.ask(function, call)
             except Unreachable as error:
                 raise self._link.failed(str(error)) from error
             except NoReply as error:
                 reason = str(error)
                 continue
+            self._link.mended()
             if reply.isError():
                 raise _refused(backoff, text, reply.exception_code)
             backoff.mended()

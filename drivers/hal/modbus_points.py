@@ -36,7 +36,7 @@ class Point:
 
     def __str__(self) -> str:
         plain = str(self.address)
-        address = f"{self.address}" if _is_model_number(self.table, plain) else plain
+        address = f"0x{self.address:x}" if _is_model_number(self.table, plain) else plain
         return f"unit {self.unit} {self.table} {address}"
 
 

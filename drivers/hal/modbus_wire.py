@@ -15,7 +15,7 @@ import struct
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from drivers.hal.http_wire import Deadline, Dialler
+from drivers.hal.http_wire import Deadline, Dialler, Resolve
 
 if TYPE_CHECKING:
     from pymodbus.client import ModbusTcpClient
@@ -37,12 +37,14 @@ class BadReply(Exception):
 
 
 class Connection:
-    """The way to one host, made anew when it is needed."""
+    """The way to one host, made anew when it is needed. `resolve` is a test's in place of DNS."""
 
-    def __init__(self, host: str, port: int, timeout_s: float) -> None:
+    def __init__(
+        self, host: str, port: int, timeout_s: float, resolve: Resolve = socket.getaddrinfo
+    ) -> None:
         self._timeout_s = timeout_s
         self._where = f"{host}:{port}"
-        self._dialler = Dialler(host, port)
+        self._dialler = Dialler(host, port, resolve)
         self._client: Any = None
         self._last_number = 0
 
@@ -85,10 +87,12 @@ class Connection:
         return text + (error.strerror or str(error))
 
     def _reason(self, error: Exception) -> str:
-        from pymodbus.exceptions import ModbusIOException
+        from pymodbus.exceptions import ConnectionException, ModbusIOException
 
         if isinstance(error, ModbusIOException) and self._dialler.deadline.passed():
             return f"no reply within {self._timeout_s:g} s"
+        if isinstance(error, ConnectionException):
+            return "the connection broke"
         if isinstance(error, OSError):
             return f"the connection broke ({error.strerror or error})"
         return f"no Modbus reply to it ({error})"
@@ -104,10 +108,9 @@ def _failures() -> tuple[type[Exception], ...]:
 
 @functools.cache
 def _client_class() -> Any:
-    """pymodbus's client on a connection of ours, with our deadline, and three functions to decode."""
+    """pymodbus's client on a connection of ours, with our deadline, and strict decoders."""
     from pymodbus.client import ModbusTcpClient
     from pymodbus.exceptions import ConnectionException
-    from pymodbus.pdu import ModbusPDU
     from pymodbus.pdu.bit_message import ReadCoilsResponse, WriteSingleCoilResponse
 
     logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # our HalErrors say it all
@@ -127,22 +130,18 @@ def _client_class() -> Any:
     class Inputs(Bits):
         function_code = 2
 
-    replies: dict[int, tuple[type[ModbusPDU], type[ModbusPDU]]] = {
-        reply.function_code: (reply, reply) for reply in (Bits, Inputs, Echo)
-    }
-
     class Client(ModbusTcpClient):
         def __init__(self, connection: socket.socket, deadline: Deadline, number: int) -> None:
             super().__init__("", retries=0)
             self.transaction.next_tid = number  # a late reply must not match on a new connection
             self.socket = connection
-            self.framer.decoder.pdu_table = replies
+            for reply in (Bits, Inputs, Echo):
+                self.register(reply)
             self._deadline = deadline
 
         def recv(self, size: int | None) -> bytes:
             """What has come; nothing when the time is up."""
-            if self.socket is None:
-                raise ConnectionException("closed")
+            assert self.socket is not None
             try:
                 left_s = self._deadline.left()
             except TimeoutError:

@@ -20,7 +20,7 @@ from bridges.rmf import topics
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
-from tests.rmf.domains import claim_domain
+from hal_fakes.domain import free_domain
 from tests.waiting import wait_until
 
 M = TypeVar("M", bound=d.Message)
@@ -214,7 +214,7 @@ def command(line: str, domain: int) -> Iterator[subprocess.Popen[str]]:
 
 
 def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic() -> None:
-    domain = claim_domain()
+    domain = free_domain()
     with on_dds(domain) as node:
         states = node.publisher(topics.LIFT_STATES)
         requests: list[d.LiftRequest] = []
@@ -236,7 +236,7 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic() -> None:
 def test_watch_prints_changes_and_leaves_the_graph_at_once_when_told_to(
     number: signal.Signals,
 ) -> None:
-    domain = claim_domain()
+    domain = free_domain()
     with on_dds(domain) as node, command("watch", domain) as process:
         states = node.publisher(topics.DOOR_STATES)
         wait_until(lambda: states.matched() > 0, "watch listens to door_states")
@@ -249,7 +249,7 @@ def test_watch_prints_changes_and_leaves_the_graph_at_once_when_told_to(
 
 
 def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_door() -> None:
-    domain = claim_domain()
+    domain = free_domain()
     with on_dds(domain) as node, command("send door ward open --direct", domain) as process:
         heard = node.subscribe(topics.DOOR_REQUESTS, lambda _: None)
         wait_until(lambda: heard.matched() > 0, "send is there")

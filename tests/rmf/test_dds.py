@@ -23,14 +23,15 @@ from bridges.rmf.dds import LOOPBACK, DdsTransport
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE, Topic
 from bridges.rmf.transport import Publisher, TransportError
+from hal_fakes.domain import free_domain
 from tests.rmf import peer
 from tests.rmf.conftest import Join
-from tests.rmf.domains import claim_domain, domain_of_this_run
+from tests.rmf.domains import domain_of_this_run
 from tests.rmf.values import repeatable, values
 from tests.waiting import wait_until
 
 DOMAIN = domain_of_this_run()
-OTHER_DOMAIN = claim_domain()
+OTHER_DOMAIN = free_domain()
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,1 @@
+"""Benchmarks: what the daemons cost beside a bare transport node, as ratios in one run."""

@@ -1,0 +1,32 @@
+"""The thing to compare with: a transport node that does nothing but answer (run as its own process)."""
+
+import signal
+import sys
+import threading
+
+from bridges.rmf.choose import open_transport
+
+from bridges.fields import Rmf
+from bridges.rmf.definitions import LiftRequest, LiftState
+from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
+
+
+def main(domain: int) -> None:
+    """Answer each LiftRequest with a LiftState until SIGTERM."""
+    done = threading.Event()
+    signal.signal(signal.SIGTERM, lambda number, frame: done.set())
+    transport = open_transport(Rmf(transport="dds", domain_id=domain), "bare", localhost=True)
+    states = transport.publisher(LIFT_STATES)
+
+    def answer(request: LiftRequest) -> None:
+        states.publish(LiftState(session_id=request.session_id))
+
+    transport.subscribe(LIFT_REQUESTS, answer)
+    print("ready", file=sys.stderr, flush=True)
+    while not done.wait(1.0):
+        states.publish(LiftState(lift_name="idle"))
+    transport.close()
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -1,0 +1,46 @@
+"""The command `rmf-bridge`. Each subcommand is a file in `bridges/commands/`."""
+
+import argparse
+import importlib
+import os
+import sys
+
+from bridges import __version__
+
+COMMANDS = {
+    "run": "serve a device, from its YAML, until SIGTERM or SIGINT",
+    "check": "validate device YAMLs and print their wiring as a table",
+    "schema": "print what may stand in a device YAML, as JSON Schema",
+    "watch": "show lifts, doors and chargers live, as RMF sees them",
+    "send": "send a request as RMF does, and wait for its effect",
+    "reset": "tell a running daemon that its latched faults may clear",
+    "outputs-off": "switch off every output of a device whose daemon is dead",
+}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one subcommand and return its exit code."""
+    parser = argparse.ArgumentParser(
+        prog="rmf-bridge", description="Connect Open-RMF to lifts, doors and chargers."
+    )
+    parser.add_argument("--version", action="version", version=f"rmf-bridge {__version__}")
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    arguments = sys.argv[1:] if argv is None else argv
+    for name, text in COMMANDS.items():
+        subparser = subparsers.add_parser(name, help=text, description=text)
+        if name in arguments:  # only the command that runs is imported
+            _module(name).add_arguments(subparser)
+    parsed = parser.parse_args(arguments)
+    try:
+        return int(_module(parsed.command).run(parsed))
+    except BrokenPipeError:  # the reader of a pipe has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _module(command: str):  # type: ignore[no-untyped-def]
+    return importlib.import_module(f"bridges.commands.{command.replace('-', '_')}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

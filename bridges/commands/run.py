@@ -1,0 +1,90 @@
+"""`rmf-bridge run FILE`: the daemon that systemd starts, and the same daemon on fake hardware."""
+
+import argparse
+import logging
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+
+from bridges import log, runtime
+from bridges.daemon import Daemon, open_bus
+from bridges.rmf.transport import TransportError
+from bridges.settings import Config, SettingsError, load
+from drivers.hal import HalError
+
+EX_USAGE, EX_UNAVAILABLE, EX_CONFIG = 64, 69, 78
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `run`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
+    parser.add_argument(
+        "--simulate",
+        action="store_true",
+        help="fake hardware behind the same daemon; loopback only",
+    )
+    parser.add_argument(
+        "--expose", action="store_true", help="with --simulate: let the network see the fake device"
+    )
+    parser.add_argument("--domain-id", type=int, metavar="N", help="instead of the YAML's")
+    parser.add_argument(
+        "--runtime-dir", metavar="DIR", help="default: as systemd says, or the user's"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Validate, claim, serve. 78 for a configuration that cannot be right."""
+    log.start()
+    if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
+        logging.error("a service never simulates: --simulate is refused where RMF_BRIDGE_SERVICE=1")
+        return EX_USAGE
+    if args.expose and not args.simulate:
+        logging.error("--expose goes with --simulate: a real device is on the network already")
+        return EX_USAGE
+    try:
+        config = _overridden(load(args.file), args)
+    except SettingsError as error:
+        for problem in error.problems:
+            logging.error(str(problem))
+        return EX_CONFIG
+    try:
+        held = runtime.RuntimeDirectory(runtime.directory(args.file, args.runtime_dir))
+    except (runtime.AlreadyRunning, OSError) as error:
+        logging.error(str(error))
+        return EX_UNAVAILABLE
+    try:
+        return _serve(config, held, args)
+    except (TransportError, HalError) as error:
+        logging.error(str(error))
+        return EX_UNAVAILABLE
+    finally:
+        held.close()
+
+
+def _overridden(config: Config, args: argparse.Namespace) -> Config:
+    rmf = config.rmf
+    if args.domain_id is not None:
+        rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
+    return replace(config, rmf=rmf)
+
+
+def _serve(config: Config, held: runtime.RuntimeDirectory, args: argparse.Namespace) -> int:
+    if not args.simulate:
+        os.chdir(held.path)  # lgpio leaves a FIFO where it is imported
+        return Daemon(config, held, open_bus=open_bus).serve()
+    from hal_fakes.simulate import Simulation
+
+    logging.warning("SIMULATED: no hardware moves, and nothing that RMF is told is true")
+    simulation = Simulation(config, held.path)
+    try:
+        return Daemon(
+            config,
+            held,
+            open_bus=simulation.open_bus,
+            localhost=not args.expose,
+            simulated=True,
+        ).serve()
+    finally:
+        simulation.close()

@@ -1,0 +1,146 @@
+"""A door on a real Modbus TCP connection: the real daemon on one side, a fake module on the other."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from bridges.rmf.dds import DdsTransport
+from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState
+from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
+from tests.waiting import wait_until
+
+YAML = """
+kind: door
+driver: dry_contact
+rmf: {{transport: dds, network: localhost, domain_id: {domain}}}
+buses:
+  module: {{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}}}
+doors:
+  ward_door:
+    limits: {{close_grace_s: 0}}
+    inputs:
+      opened: {{point: "unit 1 discrete input 0", active: high}}
+      closed: {{point: "unit 1 discrete input 1", active: high}}
+    outputs:
+      hold_open: {{point: "unit 1 coil 0", active: high}}
+"""
+
+
+class Module:
+    """The I/O module and the door behind it; it outlives every daemon."""
+
+    def __init__(self, directory: Path, domain: int) -> None:
+        self.directory = directory
+        self.domain = domain
+        self.edges: list[dict[str, Any]] = []
+        draft = directory / "draft.yaml"
+        draft.write_text(YAML.format(domain=domain, port=502))
+        path = directory / "plant.sock"
+        self._far_side = subprocess.Popen(
+            [sys.executable, "-m", "hal_fakes", str(draft), "module", "--socket", str(path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        assert self._far_side.stdout
+        tcp = json.loads(self._far_side.stdout.readline())["tcp"]
+        self.file = directory / "ward_door.yaml"
+        self.file.write_text(YAML.format(domain=domain, port=tcp["port"]))
+        self._follow = socket.socket(socket.AF_UNIX)
+        self._follow.connect(str(path))
+        self._follow.sendall(b"follow\n")
+        self._follow.setblocking(False)
+        self._partial = b""
+
+    def relay(self) -> list[bool]:
+        """Every edge of the hold relay so far."""
+        try:
+            while chunk := self._follow.recv(65536):
+                self._partial += chunk
+        except BlockingIOError:
+            pass
+        *lines, self._partial = self._partial.split(b"\n")
+        self.edges += [json.loads(line) for line in lines if line.startswith(b"{")]
+        return [edge["value"] for edge in self.edges if edge["signal"] == "hold_open"]
+
+    def close(self) -> None:
+        """Take the module off the wall."""
+        self._follow.close()
+        assert self._far_side.stdin
+        assert self._far_side.stdout
+        self._far_side.stdin.close()
+        self._far_side.wait(10)
+        self._far_side.stdout.close()
+
+
+def command(*arguments: str | Path) -> list[str]:
+    """`rmf-bridge …` in this environment."""
+    return [sys.executable, "-m", "bridges.cli", *map(str, arguments)]
+
+
+def environment(**more: str) -> dict[str, str]:
+    """This one's, as no service."""
+    own = {k: v for k, v in os.environ.items() if not k.startswith(("RMF_", "NOTIFY", "WATCHDOG"))}
+    return own | more
+
+
+class Daemon:
+    """`rmf-bridge run`, with its log."""
+
+    def __init__(self, file: Path, runtime_dir: Path, *options: str, **env: str) -> None:
+        self.log = runtime_dir.parent / f"{runtime_dir.name}.log"
+        with self.log.open("wb") as out:
+            self.process = subprocess.Popen(
+                command("run", file, "--runtime-dir", runtime_dir, *options),
+                stdout=out,
+                stderr=out,
+                env=environment(**env),
+            )
+
+    def wait_for(self, text: str) -> None:
+        """Until the log says so."""
+        wait_until(lambda: text in self.log.read_text(), f"{text!r} in {self.log}")
+
+    def end(self, number: signal.Signals) -> int:
+        """Send a signal and give the exit code."""
+        self.process.send_signal(number)
+        return self.process.wait(20)
+
+
+@contextmanager
+def daemon(file: Path, runtime_dir: Path, *options: str, **env: str) -> Iterator[Daemon]:
+    """A daemon that does not outlive its test."""
+    started = Daemon(file, runtime_dir, *options, **env)
+    try:
+        yield started
+    finally:
+        started.process.kill()
+        started.process.wait()
+
+
+class Graph:
+    """The other end of the graph: asks for the door, and hears its states."""
+
+    def __init__(self, domain: int) -> None:
+        self.states: list[DoorState] = []
+        self.transport = DdsTransport("rmf", domain, loopback=True)
+        self._requests = self.transport.publisher(DOOR_REQUESTS)
+        self.heard = self.transport.subscribe(DOOR_STATES, self.states.append)
+
+    def ask(self, mode: DoorModeValue) -> None:
+        """Send a request once the node has matched."""
+        wait_until(self._requests.matched, "the node listens")
+        request = DoorRequest(
+            door_name="ward_door", requester_id="r", requested_mode=DoorMode(int(mode))
+        )
+        self._requests.publish(request)
+
+    def last(self) -> DoorModeValue | None:
+        """The mode that the door showed last."""
+        return DoorModeValue(self.states[-1].current_mode.value) if self.states else None
