@@ -13,35 +13,37 @@ T_co = TypeVar("T_co", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class Settled(Generic[T_co]):
-    """`value` is believed; `candidate` has been seen since `since` (s).
+    """`value` is believed, and `candidate` has been seen since `since` (s).
 
-    `steady_at`: when `value` was last seen with its time behind it; None: nothing is believed yet.
+    `steady_at`: when `value` last came to be believed; None: nothing is yet. `torn_since`: since
+    when what is seen has not lasted for long enough; None while it has.
     """
 
     value: T_co | None
     candidate: T_co
     since: float
     steady_at: float | None = None
+    torn_since: float | None = None
 
     def due_at(self, hold_s: float) -> float:
-        """When what is seen will have lasted for `hold_s` if it stays; inf when it has."""
-        at = self.since + hold_s
-        return float("inf") if self.steady_at is not None and self.steady_at >= at else at
+        """When what is seen will count, if it stays; inf when it does."""
+        return float("inf") if self.torn_since is None else self.since + hold_s
 
 
 def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "Settled[T]":
     """Take one sample. A value must be seen for `hold_s` seconds before it counts; 0: at once."""
     if before is None:
-        before = Settled(None, seen, now)
+        before = Settled(None, seen, now, torn_since=now)
     elif seen != before.candidate:
-        before = replace(before, candidate=seen, since=now)
-    if now < before.since + hold_s:
+        torn_since = now if before.torn_since is None else before.torn_since
+        before = replace(before, candidate=seen, since=now, torn_since=torn_since)
+    if before.torn_since is None or now < before.since + hold_s:
         return before
-    return Settled(seen, seen, before.since, now)
+    return Settled(seen, seen, before.since, steady_at=now)
 
 
 def forget(before: "Settled[T] | None") -> "Settled[T] | None":
     """After a gap in the readings the value stands, but a half-seen candidate starts again."""
     if before is None or before.steady_at is None:
         return None
-    return replace(before, candidate=cast(T, before.value))
+    return replace(before, candidate=cast(T, before.value), torn_since=None)

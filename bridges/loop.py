@@ -118,6 +118,7 @@ class Loop:
             while not self._stopping:
                 self._round()
         finally:
+            self._bus.insist()
             safe = [node.make_safe() for node in self.nodes]
             for node in self.nodes:
                 node.close()

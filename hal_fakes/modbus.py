@@ -16,7 +16,7 @@ import random
 import threading
 import time
 from collections.abc import Coroutine, Iterable, Mapping
-from typing import Any, Final, Literal, cast
+from typing import Any, Final, Literal
 
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
@@ -62,7 +62,7 @@ class Units:
 
     def failure(self, part: Part, unit: int | None = None) -> FailureMode | None:
         """How the server, or this unit, is told to fail."""
-        modes = (_failures(plant).get(part) for plant in self._plants.get(unit, ()))
+        modes = (plant.failures.get(part) for plant in self._plants.get(unit, ()))
         return next((mode for mode in modes if mode is not None), None)
 
     async def async_getValues(
@@ -188,14 +188,6 @@ class ModbusServer:
         if server == "wrong":
             return bytes((packet[0] ^ 0x55,)) + packet[1:]
         return packet
-
-
-def _failures(plant: Plant) -> Mapping[str, FailureMode]:
-    """What a plant says of the far side of its bus; not every kind's does."""
-    try:
-        return cast(Mapping[str, FailureMode], plant.sense("failures"))
-    except KeyError:
-        return {}
 
 
 def _placeholder() -> SimDevice:

@@ -265,20 +265,21 @@ class ModbusLines:
         self._claimed = False
 
     def claim(self) -> None:
-        """Read everything, then switch every output to its safe level, and see that it is.
+        """Read the coils, then switch each to its safe level, and see that it is.
 
-        Claimed again after a failure it only reads: the outputs are as they were, or as the next
-        write says. A door that is held must not drop because one reply was lost.
+        Inputs are not asked: one that cannot be read must not keep an output from going off. Claimed
+        again after a failure it only reads: the outputs are as they were, or as the next write says.
+        A door that is held must not drop because one reply was lost.
         """
         self._set.clear()
-        self._image()
+        self.outputs()
         if not self._claimed:
             self.write(self._safe)
             self._claimed = True
 
     def read(self) -> dict[str, bool]:
         """Every input's level. Raises HalError, also when an output is not as it was written."""
-        image = self._image()
+        image = self._read_all(self._ranges)
         self._verify(image)
         return {name: image[point] for name, point in self._inputs.items()}
 
@@ -307,9 +308,6 @@ class ModbusLines:
                 self._bus.write(coil, self._safe[name])
             except HalError:
                 continue  # the unit pauses now: its other coils cost no time
-
-    def _image(self) -> dict[Point, bool]:
-        return self._read_all(self._ranges)
 
     def _read_all(self, wanted: list[Range]) -> dict[Point, bool]:
         image: dict[Point, bool] = {}

@@ -1,0 +1,62 @@
+"""RMF's door messages at the edge."""
+
+import pytest
+
+from bridges.decision import Fault, RequestRefused
+from bridges.door import KIND, messages
+from bridges.door.core import CloseDoor, DoorReport, OpenDoor
+from bridges.door.settings import DoorLimits
+from bridges.rmf import topics
+from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Time
+from tests.door.virtual import settings
+
+SETTINGS = settings()
+
+
+def request(mode: int, requester: str = "door_supervisor") -> DoorRequest:
+    return DoorRequest(Time(7, 0), requester, "ward_door", DoorMode(mode))
+
+
+def test_open_and_closed_can_be_asked() -> None:
+    assert messages.accept(request(2), SETTINGS) == OpenDoor("door_supervisor")
+    assert messages.accept(request(0), SETTINGS) == CloseDoor("door_supervisor")
+
+
+@pytest.mark.parametrize("mode", [1, 3, 4, 5, 7, 2**32 - 1])
+def test_no_other_mode_can_be_asked(mode: int) -> None:
+    with pytest.raises(RequestRefused) as caught:
+        messages.accept(request(mode), SETTINGS)
+    assert (caught.value.kind, caught.value.detail) == (
+        "mode that cannot be asked",
+        f"requested_mode {mode}; only OPEN (2) and CLOSED (0) can be",
+    )
+
+
+def test_a_request_that_nobody_has_filled_in_closes_no_door() -> None:
+    with pytest.raises(RequestRefused) as caught:
+        messages.accept(DoorRequest(door_name="ward_door"), SETTINGS)
+    assert caught.value.kind == "no requester"
+
+
+@pytest.mark.parametrize("mode", list(DoorModeValue))
+def test_the_state_is_the_reports_mode_with_the_stamp_of_its_reading(mode: DoorModeValue) -> None:
+    report = DoorReport(mode=mode, read_at=12.0, hold=True)
+    assert messages.state_message("ward_door", SETTINGS, report, Time(3, 4)) == DoorState(
+        door_time=Time(3, 4), door_name="ward_door", current_mode=DoorMode(int(mode))
+    )
+
+
+def test_the_summary_marks_what_is_only_guessed() -> None:
+    seen = DoorReport(mode=DoorModeValue.MODE_OPEN, hold=True, faults=(Fault("X"),))
+    guessed = DoorReport(mode=DoorModeValue.MODE_CLOSED, estimated=True)
+    assert messages.summary(seen) == {"mode": "OPEN", "hold": "on"}
+    assert messages.summary(guessed) == {"mode": "CLOSED", "hold": "off", "feedback": "estimated"}
+
+
+def test_the_kind_obeys_the_supervisors_topic_and_knows_its_doors() -> None:
+    assert list(KIND.requests) == [topics.DOOR_REQUESTS]
+    assert KIND.device_name(request(2)) == "ward_door"
+    assert KIND.device_name(DoorState(door_name="ward_door")) == "ward_door"
+    assert KIND.limits(SETTINGS, {"opened": 0.5}) == DoorLimits(
+        t=SETTINGS.limits, debounce={"opened": 0.5}
+    )

@@ -1,0 +1,22 @@
+"""Modules and buses that are closed after each test."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.modbus.module import Module, opened
+
+
+@pytest.fixture
+def module() -> Iterator[Module]:
+    """A module that answers as the specification says."""
+    started = Module()
+    yield started
+    started.close()
+
+
+@pytest.fixture(autouse=True)
+def _hang_up() -> Iterator[None]:
+    yield
+    while opened:
+        opened.pop().close()

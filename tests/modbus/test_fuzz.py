@@ -1,0 +1,110 @@
+"""Whatever a module sends: HalErrors and nothing else, and never a door that is open by mistake."""
+
+from collections.abc import Callable, Iterator
+
+import msgspec
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bridges.door.signals import DoorOutputs
+from drivers import DriverError
+from drivers.door_dry_contact import DryContactDoor, Settings, create
+from tests.modbus.module import Module, Time, bits_reply, bus_to, frame
+
+DOOR = msgspec.convert(
+    {
+        "inputs": {
+            "opened": {"point": "unit 1 discrete input 0", "active": "high"},
+            "closed": {"point": "unit 1 discrete input 1", "active": "high"},
+        },
+        "outputs": {"hold_open": {"point": "unit 1 coil 0", "active": "high"}},
+    },
+    Settings,
+)
+
+Spoil = Callable[[bytes, bytes], bytes | None]
+"""A request and its good reply to what is sent instead."""
+
+
+def _flipped(good: bytes, at: int, mask: int) -> bytes:
+    at %= len(good)
+    return good[:at] + bytes((good[at] ^ mask,)) + good[at + 1 :]
+
+
+BYTES = st.binary(max_size=40)
+SPOILS: st.SearchStrategy[Spoil] = st.one_of(
+    BYTES.map(lambda junk: lambda request, good: junk),
+    BYTES.map(lambda junk: lambda request, good: junk + good),
+    BYTES.map(lambda pdu: lambda request, good: frame(request, pdu)),
+    st.tuples(st.integers(0, 255), BYTES).map(
+        lambda drawn: lambda request, good: frame(request, bytes((drawn[0],)) + drawn[1])
+    ),
+    st.integers(0, 12).map(lambda kept: lambda request, good: good[:kept]),
+    st.tuples(st.integers(0, 20), st.integers(1, 255)).map(
+        lambda drawn: lambda request, good: _flipped(good, *drawn)
+    ),
+    st.just(lambda request, good: good),
+    st.just(lambda request, good: None),
+)
+
+
+@pytest.fixture(scope="module")
+def one_module() -> Iterator[Module]:
+    module = Module()
+    yield module
+    module.close()
+
+
+class Spoiled:
+    """Answers a door that is shut, spoiled in turn; hangs up when the spoils are used up."""
+
+    def __init__(self, module: Module, spoils: list[Spoil]) -> None:
+        module.inputs.update({(1, 0): False, (1, 1): True})
+        module.coils.update({(1, 0): False})
+        self._module = module
+        self._spoils = iter(spoils)
+        self.may_be_open = False
+
+    def __call__(self, request: bytes) -> bytes | None:
+        spoil = next(self._spoils, None)
+        sent = spoil(request, self._module.answer(request)) if spoil else None
+        says_open = (bits_reply(request, bytes((bits,))) for bits in range(1, 256, 2))
+        if request[7] == 2 and sent and any(reply in sent for reply in says_open):
+            self.may_be_open = True
+        return sent
+
+
+def _attempt(step: Callable[[], object], clock: Time) -> object:
+    clock.now += 60.0
+    try:
+        return step()
+    except DriverError:
+        return None
+
+
+@settings(
+    derandomize=True,
+    deadline=None,
+    max_examples=250,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+@given(spoils=st.lists(SPOILS, min_size=1, max_size=6), hangs_up=st.booleans())
+def test_no_bytes_at_all_break_the_driver_or_open_the_door(
+    one_module: Module, spoils: list[Spoil], hangs_up: bool
+) -> None:
+    one_module.hangs_up = hangs_up
+    spoiled = Spoiled(one_module, spoils)
+    one_module.reply = spoiled
+    clock = Time()
+    bus = bus_to(one_module.port, clock, timeout_s=0.02, retries=0)
+    door: DryContactDoor = create("door", DOOR, bus)
+    _attempt(door.open, clock)
+    for _ in range(2):
+        sample = _attempt(door.read, clock)
+        opened = getattr(sample, "opened", False)
+        assert opened is False or spoiled.may_be_open
+        _attempt(lambda: door.write(DoorOutputs(hold_open=True)), clock)
+    _attempt(door.make_safe, clock)
+    door.close()
+    bus.close()
