@@ -11,6 +11,7 @@ KIND = Kind(
     states=LIFT_STATES,
     requests={LIFT_REQUESTS: messages.accept},
     device_name=messages.device_name,
+    sender=lambda request: str(request.session_id),
     limits=LiftLimits.of,
     initial=core.initial,
     decide=core.decide,

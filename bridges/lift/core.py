@@ -37,7 +37,7 @@ from bridges.lift import drive
 from bridges.lift.drive import Grace, Relays, Session
 from bridges.lift.limits import LiftLimits
 from bridges.lift.report import LiftReport, report
-from bridges.lift.sensing import Senses, View, gap, look, take, trust
+from bridges.lift.sensing import HAZARDS, Senses, View, gap, look, take, trust
 from bridges.lift.signals import Hazard, LiftOutputs, LiftSample
 from bridges.rmf.definitions import Bool, EmergencySignal, Message
 from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
@@ -139,7 +139,7 @@ def obstacles(memory: Memory, view: View, now: float, limits: LiftLimits) -> tup
     found = []
     if memory.fire_latched and Hazard.FIRE not in view.hazards:
         found.append(Fault("FIRE_LATCHED", "rmf-bridge reset when it is safe"))
-    found += [Fault(h.name) for h in Hazard if h in NOT_RMFS and h in view.hazards]
+    found += [Fault(h.name) for h in HAZARDS if h in NOT_RMFS and h in view.hazards]
     if memory.rival_at is not None:
         found.append(Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes this lift's states"))
     if not view.fresh:
@@ -191,8 +191,7 @@ def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple
             return _reset(memory), ""
         case Asked():
             return _ask(memory, event, now, limits)
-        case Ended(session_id):
-            return _end(memory, session_id, now, limits)
+    return _end(memory, event.session_id, now, limits)
 
 
 def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) -> Memory:

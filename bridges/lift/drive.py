@@ -9,7 +9,8 @@ Rules:
 - A call only in AGV mode, away from the destination, not while overloaded. A door command only while
   standing at the destination's landing. Never both; and neither within `dead_time_s` of the last one.
 - A call is held until the car stands at its destination, or pulsed; it is given again when the car is
-  seen at another floor after it had arrived, and after every interruption.
+  seen at another floor after it had arrived, and after every interruption; never for a floor code
+  that is just changing, which may say that the car is there.
 - What is waited for (AGV mode, the floor, the open door) has its time; when it is up the outputs go
   off and a fault is shown; three more tries follow 10, 30 and 60 s later; then the fault latches.
   So does AGV mode that ends while we ask for it. An overload only stops the clock.
@@ -196,7 +197,9 @@ def wanted(session: Session, view: View, now: float, limits: LiftLimits) -> Lift
     stop = limits.stops[session.destination]
     if at_destination(session, view, limits):
         return LiftOutputs(agv_request=True, hold_door=stop.side)
-    if Hazard.OVERLOAD in view.hazards or session.arrived or now >= _pulse_ends_at(session, limits):
+    may_call = not session.arrived and now < _pulse_ends_at(session, limits)
+    is_new_call = session.call_at is None
+    if not may_call or Hazard.OVERLOAD in view.hazards or (is_new_call and view.level_settles):
         return LiftOutputs(agv_request=True)
     return LiftOutputs(agv_request=True, call=stop.level)
 

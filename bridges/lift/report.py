@@ -37,8 +37,9 @@ class LiftReport:
         return self.floor if self.door is LiftDoor.DOOR_OPEN else ""
 
     def news(self) -> Any:
-        """What LiftState carries of it, but for its age."""
-        return self.floor, self.destination, self.door, self.motion, self.mode, self.session
+        """All but the age and the details of faults, which may differ with each reading."""
+        shown = (self.floor, self.destination, self.door, self.motion, self.mode, self.session)
+        return *shown, self.estimated, tuple(fault.code for fault in self.faults)
 
 
 def report(

@@ -14,8 +14,9 @@ Rules:
 - A car is stopped when the motion lines say so; without such lines, nothing contradicts it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from bridges.debounce import Settled, forget, settle
 from bridges.decision import Fault
@@ -23,6 +24,7 @@ from bridges.lift.limits import LiftLimits
 from bridges.lift.signals import Door, Hazard, LiftSample, Motion, Side
 
 NEVER = float("inf")
+HAZARDS = tuple(Hazard)
 
 MOTION_MEMORY_S = 2.0
 """How long after the car was last seen moving a new floor is still its doing."""
@@ -72,11 +74,13 @@ class View:
     """The inputs as they are believed at one instant.
 
     `blind`: why nothing can be believed, "" when all is fresh. `level`: the landing, None when
-    unknown. `agv`: None where not wired. `changes_at`: when this may differ if nothing is read (s).
+    unknown; `level_settles`: another one is being shown. `agv`: None where not wired. `changes_at`:
+    when this may differ if nothing is read (s).
     """
 
     blind: str
     level: str | None
+    level_settles: bool
     stopped: bool
     motion: Motion | None
     agv: bool | None
@@ -115,7 +119,7 @@ def take(senses: Senses, sample: LiftSample, now: float, limits: LiftLimits) -> 
         agv=settle(senses.agv, sample.agv, now, hold("agv_mode")),
         hazards={
             h: _settle_hazard(senses.hazards.get(h), h, h in sample.hazards, now, limits)
-            for h in Hazard
+            for h in HAZARDS
         },
         position=_locate(senses.position, code, sample.motion, now, limits),
     )
@@ -151,9 +155,14 @@ def look(senses: Senses, now: float, limits: LiftLimits) -> View:
     rear = _door(senses.doors[1], now, limits) if _wired(senses.doors[1]) else None
     code = senses.code.value if senses.code else None
     hazards = frozenset(h for h, s in senses.hazards.items() if s.value)
+    unsettled = tuple(_unsettled(senses, limits))
+    due = [stale_at(senses, limits), front.settles_at, rear.settles_at if rear else NEVER]
+    for wait in unsettled:
+        due += [wait.due_at, wait.torn_at]
     return View(
-        blind=_blind(senses, now, limits),
+        blind=_blind(senses, unsettled, now, limits),
         level=code[0] if code and code[0] == senses.position.trusted else None,
+        level_settles=senses.code is not None and senses.code.candidate != senses.code.value,
         stopped=_stands(senses.motion),
         motion=motion,
         agv=senses.agv.value if senses.agv else None,
@@ -161,9 +170,7 @@ def look(senses: Senses, now: float, limits: LiftLimits) -> View:
         rear=rear,
         hazards=frozenset() if stale else hazards,
         faults=() if stale else _faults(senses),
-        changes_at=min(
-            (at for at in _changes(senses, front, rear, limits) if at > now), default=NEVER
-        ),
+        changes_at=min((at for at in due if at > now), default=NEVER),
     )
 
 
@@ -238,52 +245,47 @@ def _door(seen: Settled[Door | None] | None, now: float, limits: LiftLimits) -> 
     return DoorSeen(open=value is Door.NOT_CLOSED, closed=value is Door.NOT_OPEN, estimated=True)
 
 
-Waits = tuple[str, Settled[object] | None, float, float]
-"""An input: its name, what is seen, and how long that must last: now, and at the most (s)."""
+@dataclass(frozen=True, slots=True)
+class Unsettled:
+    """An input that is just changing, or has never settled. Both times are s, -inf for long ago."""
+
+    name: str
+    due_at: float
+    torn_at: float
 
 
-def _inputs(senses: Senses, limits: LiftLimits) -> Iterator[Waits]:
+def _unsettled(senses: Senses, limits: LiftLimits) -> Iterator[Unsettled]:
     hold = limits.debounce_s
-    yield "floor", senses.code, hold("floor"), hold("floor")
-    yield "door", senses.doors[0], hold("door"), hold("door")
-    yield "rear_door", senses.doors[1], hold("rear_door"), hold("rear_door")
-    yield "motion", senses.motion, hold("motion"), hold("motion")
-    yield "agv_mode", senses.agv, hold("agv_mode"), hold("agv_mode")
-    for h in Hazard:
-        s = senses.hazards.get(h)
-        hold_s = _hazard_hold_s(s, h, bool(s and s.candidate), limits)
-        yield h, s, hold_s, max(hold(h), limits.t.hazard_clear_s)
+    plain: list[tuple[str, Settled[Any] | None]] = [
+        ("floor", senses.code),
+        ("door", senses.doors[0]),
+        ("rear_door", senses.doors[1]),
+        ("motion", senses.motion),
+        ("agv_mode", senses.agv),
+    ]
+    for name, seen in plain:
+        if seen is None or seen.torn_since is not None:
+            yield _wait(name, seen, hold(name), hold(name))
+    for h in HAZARDS:
+        fear = senses.hazards.get(h)
+        if fear is None or fear.torn_since is not None:
+            hold_s = _hazard_hold_s(fear, h, bool(fear and fear.candidate), limits)
+            yield _wait(h, fear, hold_s, max(hold_s, limits.t.hazard_clear_s))
 
 
-def _blind(senses: Senses, now: float, limits: LiftLimits) -> str:
+def _wait(name: str, seen: Settled[Any] | None, hold_s: float, most_s: float) -> Unsettled:
+    if seen is None or seen.steady_at is None or seen.torn_since is None:
+        return Unsettled(name, seen.due_at(hold_s) if seen else -NEVER, -NEVER)
+    return Unsettled(name, seen.due_at(hold_s), seen.torn_since + most_s + RESTLESS_S)
+
+
+def _blind(senses: Senses, unsettled: Sequence[Unsettled], now: float, limits: LiftLimits) -> str:
     if senses.read_at is None:
         return "not read yet"
     if now >= stale_at(senses, limits):
         return f"no reading for {limits.t.stale_after_s:g} s"
-    restless = [
-        name
-        for name, seen, _, most_s in _inputs(senses, limits)
-        if seen is None or now >= _restless_at(seen, most_s)
-    ]
-    return f"not steady: {', '.join(restless)}" if restless else ""
-
-
-def _restless_at(seen: Settled[object], hold_s: float) -> float:
-    return -NEVER if seen.steady_at is None else seen.steady_at + hold_s + RESTLESS_S
-
-
-def _changes(
-    senses: Senses, front: DoorSeen, rear: DoorSeen | None, limits: LiftLimits
-) -> Iterator[float]:
-    """When age, an estimate or a half-seen change will next change the view."""
-    yield stale_at(senses, limits)
-    yield front.settles_at
-    if rear:
-        yield rear.settles_at
-    for _, seen, hold_s, most_s in _inputs(senses, limits):
-        if seen:
-            yield seen.due_at(hold_s)
-            yield _restless_at(seen, most_s)
+    torn = [wait.name for wait in unsettled if now >= wait.torn_at]
+    return f"not steady: {', '.join(torn)}" if torn else ""
 
 
 def _faults(senses: Senses) -> tuple[Fault, ...]:

@@ -14,6 +14,7 @@ class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """A floor that differs from its landing's name, or is served by the car's rear door.
 
     `level`: the landing as the floor code table names it; the floor's own name when absent.
+    `side`: which of the car's doors opens there.
     """
 
     level: Name | None = None
@@ -57,6 +58,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
 
     `floors`: as RMF's map names them, from the lowest up; a mapping where a floor has another name
     than its landing, or `side: rear`.
+    `limits`: durations and counts, where the defaults do not suit.
     `fire_reset`: whether the lift is RMF's again when the alarm clears (`auto`), or only after
     `rmf-bridge reset` (`manual`).
     `alarm`: tell the fleets of a fire on this topic; `none` unless the site has decided so.

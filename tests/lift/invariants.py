@@ -1,0 +1,131 @@
+"""What must be true of every decision of the lift's core, whatever happened before it.
+
+Judged from the event, the inputs and the outputs; the core's own conclusions are not asked.
+"""
+
+from typing import Any
+
+from bridges.decision import IoFailed, Sampled, WriteFailed
+from bridges.lift.core import Asked, Ended, Memory, decide
+from bridges.lift.limits import LiftLimits
+from bridges.lift.report import LiftReport
+from bridges.lift.signals import Door, Hazard, LiftOutputs, Motion
+from bridges.rmf.definitions import LiftDoor
+from tests.lift.walk import Step, World, reading
+
+RIVAL_S = 5.0
+OFF = LiftOutputs()
+
+
+def check(step: Step) -> None:
+    """Everything at once; AssertionError says what is broken."""
+    outputs_make_sense(step)
+    nothing_is_driven_when_forbidden(step)
+    sessions_end_by_end_alone(step)
+    open_is_the_truth(step)
+    assert step.decision.wake_at > step.now
+
+
+def outputs_make_sense(step: Step) -> None:
+    """Calls and door commands exclude each other, need AGV mode, a session, and the right place."""
+    driven, memory, sample = step.decision.outputs, step.decision.memory, step.world.sample
+    session, grace = memory.session, memory.grace
+    assert driven == memory.relays.outputs()
+    assert not (driven.call and driven.hold_door)
+    assert driven.agv_request or not (driven.call or driven.hold_door)
+    assert session or not driven.call
+    assert session or grace or driven == OFF
+    assert grace is None or step.now < grace.until
+    standing = sample.motion in (None, Motion.STOPPED)
+    if not _sampled(step):
+        return
+    if driven.call:
+        assert sample.agv is not False
+        assert Hazard.OVERLOAD not in sample.hazards
+        assert driven.call == session.destination
+        trusted = memory.senses.position.trusted
+        assert not (standing and driven.call == sample.level == trusted)
+    if driven.hold_door:
+        assert standing
+        assert sample.agv is not False
+        assert sample.level == (session or grace.session).destination
+
+
+def nothing_is_driven_when_forbidden(step: Step) -> None:
+    """Hazards, another node, blindness and HUMAN mode switch everything off, at once."""
+    memory, now = step.decision.memory, step.now
+    session = memory.session
+    forbidden = (
+        bool(step.world.sample.hazards - {Hazard.OVERLOAD} and _sampled(step))
+        or (memory.rival_at is not None and now < memory.rival_at + RIVAL_S)
+        or memory.senses.read_at is None
+        or now >= memory.senses.read_at + step.limits.t.stale_after_s
+        or memory.fire_latched
+        or (session is not None and not session.agv)
+        or (session is not None and session.fault is not None and session.retry_at is not None)
+    )
+    assert not forbidden or step.decision.outputs == OFF
+
+
+def sessions_end_by_end_alone(step: Step) -> None:
+    """Granted by a request while free, ended by the holder's END, and untouched by all else."""
+    before, after, event = _id(step.before), _id(step.decision.memory), step.event
+    if isinstance(event, Ended) and event.session_id == before:
+        assert after is None
+    elif isinstance(event, Asked) and before is None:
+        assert after in (None, event.session_id)
+        assert (after is None) == bool(step.decision.refused)
+        grace = step.before.grace
+        others = grace is not None and step.now < grace.until and grace.session.id != after
+        assert after is None or not others
+    else:
+        assert after == before
+    shown: LiftReport = step.decision.report
+    assert shown.session == (after or "")
+    assert (shown.destination == "") == (after is None)
+
+
+def open_is_the_truth(step: Step) -> None:
+    """OPEN only of an open door of a standing car at a known floor; for boarding, of a sound lift."""
+    shown: LiftReport = step.decision.report
+    if shown.door is not LiftDoor.DOOR_OPEN:
+        return
+    sample, session = step.world.sample, step.decision.memory.session
+    assert step.now < step.decision.memory.senses.read_at + step.limits.t.stale_after_s
+    if _sampled(step):
+        assert sample.door is Door.OPEN
+        assert sample.motion in (None, Motion.STOPPED)
+        assert shown.floor == sample.level != ""
+    if session and not session.boarded:
+        assert shown.faults == ()
+        assert shown.mode.name == "MODE_AGV"
+        if _sampled(step):
+            assert sample.agv is not False
+            assert not sample.hazards
+
+
+def nothing_changes_before_wake_at(world: World, limits: LiftLimits) -> None:
+    """Scans of the same inputs between now and `wake_at` decide nothing else."""
+    now = _scan(world, world.memory, 0.0, limits)
+    until = min(now.wake_at, 1e4)
+    later = _scan(world, now.memory, until * (1.0 - 1e-6), limits)
+    assert later.outputs == now.outputs
+    assert later.report.news() == now.report.news()
+    assert later.report.faults == now.report.faults
+
+
+def _scan(world: World, memory: Memory, now: float, limits: LiftLimits) -> Any:
+    decision = decide(memory, reading(world), now, limits)
+    if world.writable:
+        return decision
+    return decide(decision.memory, WriteFailed("timeout"), now, limits)
+
+
+def _sampled(step: Step) -> bool:
+    """Has the core just seen the world's inputs, and do they count at once?"""
+    read = step.world.readable and not isinstance(step.event, IoFailed)
+    return step.exact and (read or isinstance(step.event, Sampled))
+
+
+def _id(memory: Memory) -> str | None:
+    return memory.session.id if memory.session else None

@@ -1,0 +1,142 @@
+"""Relays: what may never be on together, what rests between what, and that off never waits."""
+
+from dataclasses import replace
+
+import pytest
+
+from bridges.lift.drive import Channel, Relays
+from bridges.lift.limits import LiftLimits
+from bridges.lift.settings import LiftSettings, Limits
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from tests.lift.story import Building, Controller, Story
+
+AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+
+
+def limits(**changes: float) -> LiftLimits:
+    settings = LiftSettings(floors=["L1", "L2", "L3"], limits=Limits(**changes))  # type: ignore[arg-type]
+    return LiftLimits.of(settings, {})
+
+
+def driven(relays: Relays, wishes: list[tuple[float, LiftOutputs]], rules: LiftLimits) -> list[str]:
+    """What is on after each wish: `A` for AGV mode, the called floor, the held door."""
+    shown = []
+    for now, wish in wishes:
+        relays = relays.step(wish, now, rules)
+        on = relays.outputs()
+        side = on.hold_door.value if on.hold_door else ""
+        shown.append(" ".join(filter(None, ("A" if on.agv_request else "", on.call, side))))
+    return shown
+
+
+def call(floor: str) -> LiftOutputs:
+    return LiftOutputs(agv_request=True, call=floor)
+
+
+def hold(side: Side = Side.FRONT) -> LiftOutputs:
+    return LiftOutputs(agv_request=True, hold_door=side)
+
+
+def test_two_calls_are_never_on_together_and_rest_between() -> None:
+    wishes = [(0.0, call("L1")), (1.0, call("L2")), (1.29, call("L2")), (1.3, call("L2"))]
+    assert driven(Relays(), wishes, limits(min_off_s=0)) == ["A L1", "A", "A", "A L2"]
+
+
+def test_a_call_and_a_door_command_rest_between() -> None:
+    wishes = [(0.0, hold()), (1.0, call("L1")), (1.2, call("L1")), (1.3, call("L1")),
+              (2.0, hold()), (2.2, hold()), (2.3, hold())]  # fmt: skip
+    assert driven(Relays(), wishes, limits(min_off_s=0)) == [
+        "A front", "A", "A", "A L1", "A", "A", "A front"]  # fmt: skip
+
+
+def test_two_doors_are_never_commanded_together_and_rest_between() -> None:
+    wishes = [(0.0, hold()), (1.0, hold(Side.REAR)), (1.2, hold(Side.REAR)), (1.3, hold(Side.REAR))]
+    assert driven(Relays(), wishes, limits(min_off_s=0)) == ["A front", "A", "A", "A rear"]
+
+
+def test_an_output_that_went_off_stays_off_for_its_time() -> None:
+    wishes = [(0.0, call("L1")), (1.0, LiftOutputs()), (1.1, call("L1")), (2.9, call("L1")),
+              (3.0, call("L1"))]  # fmt: skip
+    assert driven(Relays(), wishes, limits(min_off_s=2.0)) == ["A L1", "", "", "", "A L1"]
+
+
+def test_no_call_and_no_door_command_while_the_agv_relay_has_to_rest() -> None:
+    wishes = [(0.0, LiftOutputs(agv_request=True)), (1.0, LiftOutputs()),
+              (1.1, call("L1")), (1.5, call("L1"))]  # fmt: skip
+    assert driven(Relays(), wishes, limits()) == ["A", "", "", "A L1"]
+
+
+def test_a_relay_switches_on_so_many_times_a_minute_and_no_more() -> None:
+    on, off = LiftOutputs(agv_request=True), LiftOutputs()
+    wishes = [(float(i), (on, off)[i % 2]) for i in range(12)]
+    rules = limits(max_cycles_per_min=3)
+    assert driven(Relays(), [*wishes, (59.9, on), (60.0, on)], rules) == [
+        "A", "", "A", "", "A", "", "", "", "", "", "", "", "", "A"]  # fmt: skip
+
+
+def test_off_never_waits() -> None:
+    rules = limits(min_off_s=60, dead_time_s=60, max_cycles_per_min=1)
+    relays = Relays().step(call("L1"), 0.0, rules)
+    assert relays.step(LiftOutputs(), 0.0, rules).outputs() == LiftOutputs()
+
+
+def test_relays_say_when_they_will_have_rested() -> None:
+    rules = limits(min_off_s=2.0, max_cycles_per_min=2)
+    relays = Relays()
+    for now, wish in ((0.0, call("L1")), (1.0, call("L2")), (3.0, call("L2")), (4.0, hold())):
+        assert relays.changes_at(wish, now, rules) > now
+        relays = relays.step(wish, now, rules)
+    assert relays.changes_at(hold(), 4.0, rules) == 4.3
+    assert relays.changes_at(call("L1"), 4.0, rules) == 60.0
+    assert relays.changes_at(LiftOutputs(), 4.0, rules) == float("inf")
+    assert Relays(agv=Channel(None, 4.0)).changes_at(call("L1"), 4.0, rules) == 6.0
+
+
+def test_a_lift_without_rests_still_changes_its_call_by_way_of_off() -> None:
+    story = Story(Building(replace(AT_L1, level="L4")), dead_time_s=0, min_off_s=0)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(2.0)
+    story.asks("A", "L2")
+    story.run(2.04)
+    assert story.edges == [
+        (1.0, "agv_request", True),
+        (1.0, "call", "L1"),
+        (2.0, "call", None),
+        (2.0, "call", "L2"),
+    ]
+
+
+def test_the_door_is_let_go_before_agv_mode_at_the_end_and_all_at_once_in_a_hazard() -> None:
+    for hazard in (False, True):
+        story = Story(Building(AT_L1), release_grace_s=2.0, dead_time_s=0.5)
+        story.run(1.0)
+        story.asks("A", "L1")
+        story.run(2.0)
+        if hazard:
+            story.building.hazard(Hazard.FIRE)
+        else:
+            story.ends("A")
+        story.run(9.0)
+        times = [at for at, _, value in story.edges if not value]
+        assert times == ([2.1, 2.1] if hazard else [3.5, 4.0])
+
+
+def test_a_burst_of_changing_requests_wears_no_relay() -> None:
+    story = Story(Controller(), max_cycles_per_min=5)
+    story.run(1.0)
+    for i in range(600):
+        story.asks("A", f"L{i % 4 + 1}")
+        story.run(story.now + 0.1)
+    ons = [edge for edge in story.edges if edge[1] == "call" and edge[2]]
+    assert 0 < len(ons) <= 5
+
+
+@pytest.mark.parametrize("pulse_s", [0.3, 1.0])
+def test_a_pulse_has_its_whole_width(pulse_s: float) -> None:
+    story = Story(Controller(), call_pulse_s=pulse_s)
+    story.run(1.0)
+    story.asks("A", "L4")
+    story.run(5.0)
+    on, off = [at for at, name, _ in story.edges if name == "call"]
+    assert round(off - on, 2) == pulse_s

@@ -1,0 +1,355 @@
+"""What is believed of the inputs: broken, contradictory, glitching, stale, restless, moving."""
+
+from dataclasses import replace
+
+import pytest
+
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
+from bridges.rmf.definitions import LiftMotion
+from bridges.rmf.stamps import in_seconds
+from tests.lift.story import WALL, Building, Controller, Story
+
+OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+
+
+def boarding(**inputs: object) -> Story:
+    """A waits at L1, where the lift stands open, but for these inputs."""
+    story = Story(Building(replace(OPEN_AT_L1, **inputs)))  # type: ignore[arg-type]
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(2.0)
+    return story
+
+
+def test_an_open_door_is_offered_when_everything_says_so() -> None:
+    assert boarding().state == "AGV, open at L1, A to L1"
+
+
+@pytest.mark.parametrize(
+    ("inputs", "state", "faults"),
+    [
+        ({"door": Door.BOTH}, "AGV, moving at L1", ["DOOR_CONTACTS_CONTRADICT"]),
+        ({"door": Door.BETWEEN}, "AGV, moving at L1", []),
+        ({"door": Door.NOT_OPEN}, "AGV, moving at L1", []),
+        ({"level": None}, "AGV, moving at ?", []),
+        (
+            {"level": None, "code_fault": "the lines of L1 and L3 are on at once"},
+            "AGV, moving at ?",
+            ["FLOOR_CODE_ILLEGAL"],
+        ),
+        (
+            {"level": None, "code_fault": "code 7 is no floor's"},
+            "AGV, moving at ?",
+            ["FLOOR_CODE_ILLEGAL"],
+        ),
+        ({"motion": Motion.UP}, "AGV, moving at L1", []),
+        ({"motion": Motion.DOWN}, "AGV, moving at L1", []),
+        ({"motion": Motion.MOVING}, "AGV, moving at L1", []),
+        ({"motion": Motion.CONTRADICTORY}, "AGV, moving at L1", ["MOTION_CONTRADICTORY"]),
+        ({"agv": False}, "HUMAN, moving at L1", []),
+    ],
+)
+def test_one_input_that_does_not_say_so_and_no_open_door_is_offered(
+    inputs: dict[str, object], state: str, faults: list[str]
+) -> None:
+    story = boarding(**inputs)
+    assert story.state == f"{state}, A to L1"
+    assert story.faults == faults
+
+
+@pytest.mark.parametrize(
+    ("motion", "told"),
+    [
+        (Motion.UP, LiftMotion.MOTION_UP),
+        (Motion.DOWN, LiftMotion.MOTION_DOWN),
+        (Motion.STOPPED, LiftMotion.MOTION_STOPPED),
+        (Motion.MOVING, LiftMotion.MOTION_UNKNOWN),
+        (Motion.CONTRADICTORY, LiftMotion.MOTION_UNKNOWN),
+    ],
+)
+def test_motion_is_what_the_lines_say(motion: Motion, told: LiftMotion) -> None:
+    assert boarding(motion=motion).motions[-1] is told
+
+
+def test_a_door_contact_that_glitches_on_the_way_never_reads_as_open() -> None:
+    building = Building(replace(OPEN_AT_L1, door=Door.CLOSED))
+    story = Story(building)
+    story.run(1.0)
+    story.asks("A", "L3")
+    for level in (None, "L2", None):
+        building.set(level=level, motion=Motion.UP)
+        story.run(story.now + 0.5)
+        building.set(door=Door.OPEN)
+        story.run(story.now + 0.05)
+        building.set(door=Door.CLOSED)
+        story.run(story.now + 0.5)
+    assert [state for _, state in story.states if "open" in state] == []
+    assert [edge for edge in story.edges if edge[1] == "hold_door"] == []
+
+
+def test_a_short_glitch_at_the_very_floor_of_the_destination_is_no_open_door_either() -> None:
+    story = boarding(door=Door.CLOSED)
+    story.run(2.01)
+    story.building.set(door=Door.OPEN)
+    story._scan()
+    story.run(2.03)
+    story.building.set(door=Door.CLOSED)
+    story.run(4.0)
+    assert [state for _, state in story.states if "open" in state] == []
+
+
+def test_an_open_contact_while_moving_is_a_moving_door_and_no_command_to_open() -> None:
+    story = boarding(motion=Motion.UP)
+    story.run(5.0)
+    assert story.state == "AGV, moving at L1, A to L1"
+    assert story.edges == [(1.0, "agv_request", True), (1.0, "call", "L1")]
+
+
+def test_a_floor_that_is_only_passed_is_no_arrival() -> None:
+    story = Story(Controller())
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.until(lambda: story.state == "AGV, closed at L2, A to L3")
+    story.asks("A", "L2")
+    story.run(story.now + 1.0)
+    assert story.outputs.hold_door is None
+    assert [state for _, state in story.states if "open" in state] == []
+
+
+def test_a_code_that_jumps_over_a_floor_is_no_position_until_it_comes_back() -> None:
+    story = boarding()
+    story.building.set(level="L3")
+    story.run(5.0)
+    assert story.state == "AGV, moving at ?, A to L1"
+    assert story.faults == ["POSITION_LOST"]
+    assert story.outputs == LiftOutputs(agv_request=True)
+    story.building.set(level="L1")
+    story.run(6.0)
+    assert story.state == "AGV, open at L1, A to L1"
+    assert story.faults == []
+
+
+def test_a_code_that_changes_while_the_car_stands_is_no_position() -> None:
+    story = boarding()
+    story.run(5.0)
+    story.building.set(level="L2")
+    story.run(6.0)
+    assert story.state == "AGV, moving at ?, A to L1"
+    assert story.faults == ["POSITION_LOST"]
+
+
+def test_an_operator_who_resets_says_that_the_code_is_right() -> None:
+    story = boarding()
+    story.building.set(level="L3")
+    story.run(5.0)
+    story.resets()
+    story.run(6.0)
+    assert story.faults == []
+    assert story.state == "AGV, open at L3, A to L1"
+    assert story.outputs == LiftOutputs(agv_request=True, call="L1")
+
+
+def test_a_reset_moves_nothing_where_nothing_is_wrong() -> None:
+    story = boarding()
+    edges, states = list(story.edges), list(story.states)
+    story.resets()
+    story.run(3.0)
+    assert (story.edges, story.states) == (edges, states)
+
+
+def test_without_motion_lines_the_next_floor_is_believed_and_a_jump_is_not() -> None:
+    story = boarding(motion=None)
+    story.building.set(level="L2")
+    story.run(3.0)
+    assert story.faults == []
+    story.building.set(level="L4")
+    story.run(4.0)
+    assert story.faults == ["POSITION_LOST"]
+
+
+def test_a_fast_car_may_skip_the_code_of_a_floor_that_it_has_had_time_to_pass() -> None:
+    story = boarding(door=Door.CLOSED)
+    story.building.set(level=None, motion=Motion.UP)
+    story.run(3.0)
+    story.building.set(level="L3", motion=Motion.STOPPED)
+    story.run(4.0)
+    assert (story.faults, story.state) == ([], "AGV, closed at L3, A to L1")
+
+
+def test_the_lines_of_a_lift_that_only_speak_in_agv_mode_are_believed_when_they_do() -> None:
+    building = Building(LiftSample(None, Door.BETWEEN, motion=None, agv=False))
+    story = Story(building)
+    story.run(1.0)
+    for floor in ("L1", "L3"):
+        story.asks("A", floor)
+        story.run(story.now + 1.0)
+        building.set(agv=True, level=floor, door=Door.OPEN, motion=Motion.STOPPED)
+        story.run(story.now + 1.0)
+        assert story.state == f"AGV, open at {floor}, A to {floor}"
+        story.ends("A")
+        story.run(story.now + 3.0)
+        building.set(agv=False, level=None, door=Door.BETWEEN, motion=None)
+        story.run(story.now + 9.0)
+        assert story.state == "HUMAN, moving at ?"
+    assert story.edges == [
+        (1.0, "agv_request", True),
+        (2.13, "hold_door", "front"),
+        (5.7, "hold_door", None),
+        (6.0, "agv_request", False),
+        (15.0, "agv_request", True),
+        (16.13, "hold_door", "front"),
+        (19.7, "hold_door", None),
+        (20.0, "agv_request", False),
+    ]
+
+
+def test_a_movement_counts_at_first_sight_where_the_motion_lines_meant_nothing_before() -> None:
+    building = Building(LiftSample("L1", Door.OPEN, motion=None, agv=True))
+    story = Story(building, debounce={"motion": 5.0})
+    story.run(7.0)
+    building.set(motion=Motion.UP)
+    story.run(8.0)
+    assert story.state == "AGV, moving at L1"
+
+
+def test_one_missed_reading_changes_nothing() -> None:
+    for inputs in ({}, {"motion": None, "agv": None}):
+        story = boarding(**inputs)
+        edges, states = list(story.edges), list(story.states)
+        story.building.unreadable = "timeout"
+        story.run(2.5)
+        story.building.unreadable = ""
+        story.run(4.0)
+        assert (story.edges, story.states) == (edges, states)
+
+
+def test_without_readings_the_lift_is_offline_dark_and_still_heard_of() -> None:
+    story = boarding()
+    story.building.unreadable = "no answer from 10.0.0.7"
+    story.run(12.0)
+    assert story.edges[2:] == [(3.0, "hold_door", None), (3.0, "agv_request", False)]
+    assert story.states[-1] == (3.0, "OFFLINE, moving at ?, A to L1")
+    offline = [state for at, state in story.told if at >= 3.0]
+    assert len(offline) == 10
+    assert {in_seconds(state.lift_time) for state in offline} == {WALL + 2.0}
+    assert story.node.status()["faults"] == [
+        {"code": "INPUTS_NOT_FRESH", "detail": "no answer from 10.0.0.7"}
+    ]
+
+
+def test_readings_that_come_back_bring_the_lift_back_without_anybody() -> None:
+    story = boarding()
+    story.building.unreadable = "no answer"
+    story.run(12.0)
+    story.building.unreadable = ""
+    story.run(14.0)
+    assert story.state == "AGV, open at L1, A to L1"
+    assert story.outputs == LiftOutputs(agv_request=True, hold_door=boarding().outputs.hold_door)
+    assert story.faults == []
+
+
+def test_what_was_believed_before_the_readings_stopped_is_not_believed_after() -> None:
+    story = boarding()
+    story.building.unreadable = "no answer"
+    story.run(12.0)
+    told = len(story.told)
+    story.building.unreadable = ""
+    story.building.set(level="L3", door=Door.CLOSED)
+    story.run(14.0)
+    back = [state for at, state in story.states if at >= 12.0]
+    assert back == ["AGV, closed at L3, A to L1"]
+    assert all(state.door_state != 2 for _, state in story.told[told:])
+    assert story.faults == []
+
+
+def test_half_a_glitch_before_a_gap_and_half_after_it_are_no_change() -> None:
+    story = boarding(door=Door.CLOSED)
+    story.building.set(door=Door.OPEN)
+    story._scan()
+    story.building.unreadable = "timeout"
+    story.run(2.5)
+    story.building.unreadable = ""
+    story.run(2.51)
+    story.building.set(door=Door.CLOSED)
+    story.run(4.0)
+    assert [state for _, state in story.states if "open" in state] == []
+
+
+def test_an_input_that_never_keeps_still_is_not_believed() -> None:
+    story = boarding()
+    for i in range(100):
+        story.building.set(level=("L1", "L2")[i % 2])
+        story.run(2.0 + 0.05 * (i + 1))
+    assert story.states[-1] == (4.18, "OFFLINE, moving at ?, A to L1")
+    assert story.outputs == LiftOutputs()
+    assert story.node.status()["faults"] == [
+        {"code": "INPUTS_NOT_FRESH", "detail": "not steady: floor"}
+    ]
+    story.building.set(level="L1")
+    story.run(8.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L1, A to L1")
+
+
+def test_a_fire_loop_that_chatters_takes_the_lift_away() -> None:
+    story = boarding()
+    for i in range(100):
+        story.building.hazard(*((Hazard.FIRE,) if i % 2 else ()))
+        story.run(2.0 + 0.05 * (i + 1))
+    assert story.outputs == LiftOutputs()
+    assert story.state == "OFFLINE, moving at ?, A to L1"
+
+
+def test_a_door_that_never_settles_at_the_start_is_never_believed() -> None:
+    story = Story(Building(OPEN_AT_L1))
+    for i in range(100):
+        story.building.set(door=(Door.OPEN, Door.CLOSED)[i % 2])
+        story.run(0.02 * (i + 1))
+        story._scan()
+    assert [state for _, state in story.states] == ["OFFLINE, moving at ?"]
+
+
+def test_without_any_debounce_the_first_reading_counts() -> None:
+    story = Story(Building(OPEN_AT_L1), debounce={})
+    assert story.states == [(0.0, "AGV, open at L1")]
+    story.asks("A", "L1")
+    assert story.edges == [(0.0, "agv_request", True), (0.0, "hold_door", "front")]
+
+
+def test_one_contact_that_proves_open_proves_nothing_else() -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_OPEN)), door_travel_s=4.0)
+    story.run(3.0)
+    assert story.state == "AGV, moving at L1"
+    story.run(5.0)
+    assert story.state == "AGV, closed at L1"
+    assert story.node.status()["door"] == "closed (estimated)"
+    story.building.set(door=Door.OPEN)
+    story.run(6.0)
+    assert story.node.status()["door"] == "open"
+    story.building.set(door=Door.NOT_OPEN)
+    story.run(12.0)
+    assert [state for _, state in story.states[-3:]] == [
+        "AGV, open at L1",
+        "AGV, moving at L1",
+        "AGV, closed at L1",
+    ]
+    assert [round(at, 1) for at, _ in story.states[-3:]] == [5.1, 6.1, 10.1]
+
+
+def test_one_contact_that_proves_closed_lets_an_open_door_be_estimated_and_marked() -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=Door.CLOSED)), door_travel_s=4.0)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.building.set(door=Door.NOT_CLOSED)
+    story.run(7.0)
+    assert story.states[-1][1] == "AGV, open at L1, A to L1"
+    assert story.states[-1][0] == 5.05
+    assert story.node.status()["door"] == "open (estimated)"
+
+
+def test_an_estimated_door_that_stirs_is_not_there() -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_CLOSED)), door_travel_s=4.0)
+    story.run(6.0)
+    assert story.state == "AGV, open at L1"
+    story.building.set(door=Door.CLOSED)
+    story._scan()
+    assert story.node.status()["door"] == "moving"

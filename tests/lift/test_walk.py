@@ -1,0 +1,110 @@
+"""Every state within some steps of the start, and of each stage of a ride: what is true in all."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf
+
+import pytest
+
+from bridges.lift.limits import LiftLimits
+from bridges.lift.signals import Door, LiftOutputs, Motion
+from tests.lift.invariants import check, nothing_changes_before_wake_at
+from tests.lift.walk import IDLE, MOVES, Step, World, limits_of, moved, start, waited, walk
+
+LIMITS = limits_of()
+OFF = LiftOutputs()
+
+
+def unseen(step: Step) -> None:
+    """Not looked at."""
+
+
+def path(*steps: str | float, limits: LiftLimits = LIMITS) -> World:
+    """The state that these moves and waits lead to."""
+    world = start(limits)
+    for step in steps:
+        if isinstance(step, str):
+            world = moved(world, MOVES[step], limits, unseen)
+        else:
+            world = waited(world, step, limits, unseen)
+    return world
+
+
+CALLED = (1.0, "A asks L3", 1.0, "agv on", 0.05)
+ARRIVED = (*CALLED, "moving", "at None", 1.0, "at L2", 1.0, "at L3", "standing", 1.0)
+BOARDED = (*ARRIVED, "door open", 1.0)
+RIDING = (*BOARDED, "A asks L1", 1.0, "door closed", "moving", "at None", 1.0)
+ROOTS = {
+    "idle": (1.0,),
+    "called": CALLED,
+    "arrived": ARRIVED,
+    "boarded": BOARDED,
+    "riding": RIDING,
+    "in the grace": (*BOARDED, "A ends", 0.05),
+    "burnt out, latched": (*BOARDED, "fire_alarm", 1.0, "fire_alarm", 4.0),
+    "failed, latched": (*ARRIVED, *("A asks L3", 25.0) * 7),
+}
+
+
+def test_the_stages_of_a_ride_are_what_they_are_called() -> None:
+    def stage(name: str) -> tuple[object, ...]:
+        memory = path(*ROOTS[name]).memory
+        session = memory.session
+        return (session and (session.boarded, session.retry_at), memory.grace is not None,
+                memory.relays.outputs().call, memory.fire_latched)  # fmt: skip
+
+    assert {name: stage(name) for name in ROOTS} == {
+        "idle": (None, False, None, False),
+        "called": ((False, None), False, "L3", False),
+        "arrived": ((False, None), False, None, False),
+        "boarded": ((True, None), False, None, False),
+        "riding": ((True, None), False, "L1", False),
+        "in the grace": (None, True, None, False),
+        "burnt out, latched": ((True, None), False, None, True),
+        "failed, latched": ((False, inf), False, None, False),
+    }
+
+
+def all_is_true_in(states: Callable[[], list[World]]) -> int:
+    """Checks every step and state; how many states."""
+    found = states()
+    for world in found:
+        nothing_changes_before_wake_at(world, LIMITS)
+    return len(found)
+
+
+def test_every_state_within_three_steps_of_the_start() -> None:
+    assert all_is_true_in(lambda: walk([start(LIMITS)], 3, LIMITS, check)) > 4000
+
+
+@pytest.mark.parametrize("root", ROOTS)
+def test_every_state_within_three_steps_of_a_stage_of_a_ride(root: str) -> None:
+    assert all_is_true_in(lambda: walk([path(*ROOTS[root])], 3, LIMITS, check)) > 1000
+
+
+def home(world: World) -> World:
+    """The building mends itself and stands idle at L1; RMF ends every session; an operator resets."""
+    world = replace(world, sample=IDLE, readable=True, writable=True)
+    world = waited(world, 6.0, LIMITS, check)
+    for move in ("A ends", "B ends", "reset"):
+        world = moved(world, MOVES[move], LIMITS, check)
+    return waited(world, 9.0, LIMITS, check)
+
+
+def serves(world: World) -> bool:
+    """Somebody new asks, AGV mode comes, the car comes, the door opens."""
+    world = moved(world, MOVES["B asks L1"], LIMITS, check)
+    wanted = waited(world, 1.0, LIMITS, check).memory.relays.outputs()
+    sample = replace(IDLE, agv=True, door=Door.OPEN, motion=Motion.STOPPED)
+    world = waited(replace(world, sample=sample), 1.0, LIMITS, check)
+    session = world.memory.session
+    return wanted.agv_request and session is not None and session.boarded
+
+
+def test_from_every_state_a_building_without_faults_returns_to_idle_and_serves_again() -> None:
+    roots = [start(LIMITS), *(path(*steps) for steps in ROOTS.values())]
+    for world in walk(roots, 2, LIMITS, unseen):
+        idle = home(world)
+        assert (idle.memory.session, idle.memory.grace) == (None, None)
+        assert idle.memory.relays.outputs() == OFF
+        assert serves(idle)

@@ -1,0 +1,295 @@
+"""Every state that the decision core can reach within some steps, and what must be true in each.
+
+A state is the core's memory, with every time relative to now, and the building around it. Ages that
+are beyond every limit are made equal, so that states that cannot behave differently are one.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+from bridges.debounce import Settled
+from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.lift.core import Asked, Ended, Event, Memory, decide, initial, published
+from bridges.lift.drive import Channel
+from bridges.lift.limits import LiftLimits
+from bridges.lift.settings import LiftSettings, Limits
+from bridges.lift.signals import Door, Hazard, LiftSample, Motion
+
+LONG_S = 55.0
+"""Without a wake_at, a scan each so many seconds is enough here; below `stale_after_s`."""
+
+
+def limits_of(debounce: dict[str, float] | None = None, **changes: Any) -> LiftLimits:
+    """The default durations, but for the age of readings, which costs scans."""
+    settings = LiftSettings(
+        floors=["L1", "L2", "L3"],
+        limits=Limits(**{"stale_after_s": 60.0, **changes}),
+        fire_reset="manual",
+        alarm="fire_alarm_trigger",
+    )
+    return LiftLimits.of(settings, debounce or {})
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """Memory at time 0, and the building: its inputs; whether it can be read, and written to."""
+
+    memory: Memory
+    sample: LiftSample
+    readable: bool = True
+    writable: bool = True
+
+
+IDLE = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=False)
+
+
+def start(limits: LiftLimits) -> World:
+    """A daemon that has just started on an idle lift."""
+    return World(initial(limits, 0.0), IDLE)
+
+
+# ---- what can happen
+
+Move = Callable[[World], tuple[World, Event]]
+
+
+def _inputs(**changes: Any) -> Move:
+    def move(world: World) -> tuple[World, Event]:
+        world = replace(world, sample=replace(world.sample, **changes))
+        return world, reading(world)
+
+    return move
+
+
+def _hazard(hazard: Hazard) -> Move:
+    def move(world: World) -> tuple[World, Event]:
+        world = replace(
+            world, sample=replace(world.sample, hazards=world.sample.hazards ^ {hazard})
+        )
+        return world, reading(world)
+
+    return move
+
+
+def _event(event: Event) -> Move:
+    return lambda world: (world, event)
+
+
+def _bus(world: World) -> tuple[World, Event]:
+    world = replace(world, readable=not world.readable)
+    return world, reading(world)
+
+
+def _relays(world: World) -> tuple[World, Event]:
+    world = replace(world, writable=not world.writable)
+    return world, reading(world)
+
+
+def reading(world: World) -> Event:
+    """What a scan reads."""
+    return Sampled(world.sample) if world.readable else IoFailed("timeout")
+
+
+MOVES: dict[str, Move] = {
+    **{
+        f"{who} asks {floor}": _event(Asked(who, True, floor))
+        for who in ("A", "B")
+        for floor in ("L1", "L3")
+    },
+    "A asks human": _event(Asked("A", False, "L1")),
+    "A ends": _event(Ended("A")),
+    "B ends": _event(Ended("B")),
+    "agv on": _inputs(agv=True),
+    "agv off": _inputs(agv=False),
+    **{f"at {level}": _inputs(level=level, code_fault="") for level in ("L1", "L2", "L3", None)},
+    "illegal code": _inputs(level=None, code_fault="parity"),
+    "door open": _inputs(door=Door.OPEN),
+    "door closed": _inputs(door=Door.CLOSED),
+    "moving": _inputs(motion=Motion.MOVING),
+    "standing": _inputs(motion=Motion.STOPPED),
+    **{hazard: _hazard(hazard) for hazard in (Hazard.FIRE, Hazard.MANUAL, Hazard.OVERLOAD)},
+    "bus lost or back": _bus,
+    "relays lost or back": _relays,
+    "rival": _event(RivalSeen()),
+    "reset": _event(OperatorReset()),
+}
+TIMES = (0.05, 1.0, 4.0, 15.0, 700.0)
+
+
+# ---- one step
+
+Seen = Callable[["Step"], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One decision, at time `now` after the state began. `exact`: no input is debounced."""
+
+    before: Memory
+    event: Event
+    decision: Any
+    world: World
+    now: float
+    limits: LiftLimits
+    exact: bool = True
+
+
+def moved(world: World, move: Move, limits: LiftLimits, seen: Seen) -> World:
+    """The state after a move, at the same instant."""
+    around, event = move(world)
+    return _decided(around, event, 0.0, limits, seen)
+
+
+def waited(world: World, seconds: float, limits: LiftLimits, seen: Seen) -> World:
+    """The state after some time, with a scan whenever the core wants one."""
+    now, wake_at = 0.0, 0.0
+    while now < seconds:
+        now = min(seconds, max(now + 0.001, min(wake_at, now + LONG_S)))
+
+        def note(step: Step) -> None:
+            nonlocal wake_at
+            wake_at = step.decision.wake_at
+            seen(step)
+
+        world = _decided(world, reading(world), now, limits, note)
+    return replace(world, memory=shifted(world.memory, -now))
+
+
+def _decided(world: World, event: Event, now: float, limits: LiftLimits, seen: Seen) -> World:
+    """One scan: decide, write, and publish what was decided."""
+    step = _step(world, world.memory, event, now, limits, seen)
+    if not world.writable:
+        step = _step(world, step.decision.memory, WriteFailed("timeout"), now, limits, seen)
+    return replace(world, memory=published(step.decision.memory, step.decision.report))
+
+
+def _step(
+    world: World, before: Memory, event: Event, now: float, limits: LiftLimits, seen: Seen
+) -> Step:
+    step = Step(before, event, decide(before, event, now, limits), world, now, limits)
+    seen(step)
+    return step
+
+
+# ---- states with their times relative to now
+
+AGES = {
+    "off_at": 2.0,
+    "ons": 60.0,
+    "asked_at": 31.0,
+    "call_at": 10.0,
+    "seen_at": 2.0,
+    "moved_at": 5.0,
+    "read_at": 61.0,
+    "torn_since": 10.0,
+    "unwritten_since": 61.0,
+    "since": 700.0,
+}
+"""Beyond this age (s) a time's distance makes no difference any more."""
+
+
+def shifted(memory: Memory, by: float) -> Memory:
+    """The same memory with every time moved by so much, and old ones cut off."""
+    senses, session, grace = memory.senses, memory.session, memory.grace
+    return replace(
+        memory,
+        senses=replace(
+            senses,
+            read_at=_at(senses.read_at, by, "read_at"),
+            code=_settled(senses.code, by),
+            doors=tuple(_settled(door, by) for door in senses.doors),
+            motion=_settled(senses.motion, by),
+            agv=_settled(senses.agv, by),
+            hazards={h: _settled(s, by) for h, s in senses.hazards.items()},
+            position=replace(
+                senses.position,
+                seen_at=_at(senses.position.seen_at, by, "seen_at"),
+                moved_at=_at(senses.position.moved_at, by, "moved_at"),
+            ),
+        ),
+        session=session and _session(session, by),
+        grace=grace
+        and replace(grace, session=_session(grace.session, by), until=_at(grace.until, by)),
+        relays=replace(
+            memory.relays,
+            agv=_channel(memory.relays.agv, by),
+            call=_channel(memory.relays.call, by),
+            hold=_channel(memory.relays.hold, by),
+        ),
+        rival_at=_at(memory.rival_at, by),
+        unwritten_since=_at(memory.unwritten_since, by, "unwritten_since"),
+    )
+
+
+def _at(at: Any, by: float, kind: str = "") -> Any:
+    """A time, moved; None stays. A time that is not named has no age that is too old."""
+    if at is None:
+        return None
+    return max(round(at + by, 6), -AGES.get(kind, 1e9))
+
+
+@lru_cache(maxsize=4096)
+def _settled(seen: Settled[Any] | None, by: float) -> Any:
+    return seen and replace(
+        seen,
+        since=max(_at(seen.since, by), -10.0),
+        steady_at=None if seen.steady_at is None else 0.0,
+        torn_since=_at(seen.torn_since, by, "torn_since"),
+    )
+
+
+def _session(session: Any, by: float) -> Any:
+    return replace(
+        session,
+        asked_at=_at(session.asked_at, by, "asked_at"),
+        call_at=_at(session.call_at, by, "call_at"),
+        since=_at(session.since, by, "since") if session.waiting else 0.0,
+        retry_at=_at(session.retry_at, by),
+    )
+
+
+def _channel(channel: Channel[Any], by: float) -> Any:
+    ons = tuple(_at(on, by) for on in channel.ons)
+    return replace(
+        channel,
+        off_at=_at(channel.off_at, by, "off_at"),
+        ons=tuple(on for on in ons if on > -AGES["ons"]),
+    )
+
+
+def key(world: World) -> tuple[Any, ...]:
+    """Equal for states that cannot behave differently."""
+    memory, senses = world.memory, world.memory.senses
+    hazards = tuple(senses.hazards.get(h) for h in Hazard)
+    return (
+        (senses.read_at, senses.code, senses.doors, senses.motion, senses.agv, hazards),
+        (senses.position, memory.session, memory.grace, memory.relays, memory.fire_latched),
+        (memory.alarmed, memory.rival_at, memory.io_fault, memory.unwritten_since),
+        (memory.write_failed, world.sample, world.readable, world.writable),
+    )
+
+
+def neighbours(world: World, limits: LiftLimits, seen: Seen) -> Iterator[World]:
+    """Every state one step away."""
+    for move in MOVES.values():
+        yield moved(world, move, limits, seen)
+    for seconds in TIMES:
+        yield waited(world, seconds, limits, seen)
+
+
+def walk(roots: list[World], depth: int, limits: LiftLimits, seen: Seen) -> list[World]:
+    """Breadth first from the roots; every state within `depth` steps, once."""
+    found = {key(root): root for root in roots}
+    edge = list(found.values())
+    for _ in range(depth):
+        fresh: list[World] = []
+        for world in edge:
+            for state in neighbours(world, limits, seen):
+                name = key(state)
+                if name not in found:
+                    found[name] = state
+                    fresh.append(state)
+        edge = fresh
+    return list(found.values())

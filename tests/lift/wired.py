@@ -1,0 +1,102 @@
+"""The whole lift without its pins: node, driver, wires and plant, in virtual time."""
+
+from pathlib import Path
+from typing import Any
+
+from bridges.lift.signals import LiftOutputs, LiftSample
+from bridges.settings import load
+from drivers.lift_dry_contact import Settings, create, debounce, wires
+from drivers.points import Pull
+from hal_fakes.lift_plant import LiftPlant
+from hal_fakes.plant import FailureMode
+from hal_fakes.wiring import Wiring
+from tests.lift.story import Building, Story
+
+SHIPPED = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
+
+
+def shipped() -> Settings:
+    """The example of `config/`."""
+    settings = load(SHIPPED).devices["Lift1"]
+    assert isinstance(settings, Settings)
+    return settings
+
+
+class WiredBuilding(Building):
+    """The plant at the far ends of the wires; it is also the bus (`drivers.points.PointsBus`)."""
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__()
+        self.plant = LiftPlant("Lift1", settings)
+        self._wiring = Wiring(self.plant, wires(settings), str)
+        self._driver = create("Lift1", settings, self)
+
+    def canonical(self, point: str) -> str:
+        return point
+
+    def lines(self, inputs: dict[str, Pull | None], outputs: dict[str, bool]) -> "_Lines":
+        return _Lines(self, outputs)
+
+    def open(self) -> None:
+        self._driver.open()
+
+    def read(self) -> LiftSample:
+        super().read()
+        return self._driver.read()
+
+    def write(self, outputs: LiftOutputs) -> None:
+        super().write(outputs)
+        self._driver.write(outputs)
+
+    @property
+    def standing_open_at(self) -> str | None:
+        """The landing where the car really stands with its door really open."""
+        car, (door,) = self.plant.car, self.plant.doors.values()
+        return f"L{car.floor + 1}" if car.standing and door.opened else None
+
+
+class _Lines:
+    """Levels straight from the plant and to it (`drivers.points.Lines`)."""
+
+    def __init__(self, building: WiredBuilding, safe: dict[str, bool]) -> None:
+        self._building, self._safe = building, safe
+
+    def claim(self) -> None:
+        self.write(self._safe)
+
+    def read(self) -> dict[str, bool]:
+        return self._building._wiring.levels(self._building.now)
+
+    def write(self, levels: dict[str, bool]) -> None:
+        for point, level in levels.items():
+            self._building._wiring.drive(point, level, self._building.now)
+
+    def outputs(self) -> None:
+        return None
+
+    def close(self) -> None:
+        self.write(self._safe)
+
+
+class WiredStory(Story):
+    """The shipped lift in service."""
+
+    building: WiredBuilding
+
+    def __init__(self, **limits: Any) -> None:
+        settings = shipped()
+        super().__init__(
+            WiredBuilding(settings),
+            floors=list(settings.stops()),
+            debounce=dict(debounce(settings)),
+            **limits,
+        )
+
+    def fail(self, part: str, mode: FailureMode | None) -> None:
+        """A wire or part breaks (None: is mended)."""
+        self.building.plant.advance(self.now)
+        self.building.plant.fail(part, mode)
+
+    def press(self, what: str, asserted: bool) -> None:
+        """Somebody in the building does something."""
+        self.building.plant.press(what, asserted, self.now)
