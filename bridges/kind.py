@@ -19,7 +19,8 @@ class Kind:
     `devices_key`: the YAML's section of them. `states`: the topic of its state messages.
     `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
     RequestRefused for a message that is malformed or cannot be asked of this device.
-    `device_name`: which device a message (request or state) is about.
+    `device_name`: which device a message (request or state) is about. `sender`: on whose behalf a
+    request was sent; of several that wait for a scan, only the last of each sender counts.
     `limits(settings, debounce_s)`: the core's durations, from the device's settings and the wiring
     table's per-signal debounce. `initial(limits, now)`: the core's memory at start.
     `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
@@ -33,6 +34,7 @@ class Kind:
     states: Topic[Any]
     requests: Mapping[Topic[Any], Callable[[Any, Any], Any]]
     device_name: Callable[[Any], str]
+    sender: Callable[[Any], str]
     limits: Callable[[Any, Mapping[str, float]], Any]
     initial: Callable[[Any, float], Any]
     decide: Callable[[Any, Any, float, Any], Decision[Any, Any, Any]]

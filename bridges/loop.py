@@ -8,44 +8,52 @@ import logging
 import math
 import queue
 import threading
-from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
 from bridges.log import pairs
 from bridges.node import Clock, Node
-from bridges.rmf.topics import Topic
 from drivers.hal import Bus
 
 log = logging.getLogger(__name__)
 
-INBOX_SIZE = 4096
-"""More messages than this between two scans are a flood: the oldest are dropped and counted."""
+INBOX_SIZE = 512
+"""More events than this for one device between two scans are a flood: the oldest go, counted."""
 
 LEAST_GAP_S = 0.001
 """Time alone never asks for scans faster than this."""
 
-Item = tuple[str, Topic[Any] | None, Any]
+Item = tuple[str, Any]
 
 
 class Inbox:
-    """Messages for the devices of one loop; any thread may put, the loop's thread takes."""
+    """Events for the devices of one loop; any thread may put, the loop's thread takes.
+
+    A request is a level, not a pulse: of several with the same `key` only the last one is kept, in
+    the place of the first, so that a flood of repeats costs a scan no more than one of them.
+    """
 
     def __init__(self) -> None:
-        self._items: deque[Item] = deque(maxlen=INBOX_SIZE)
+        self._items: dict[str, dict[Any, Any]] = {}
+        self._lock = threading.Lock()
         self._bell: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._rung = False
         self.dropped = 0
 
-    def put(self, item: Item) -> None:
-        """Add one message and wake the loop."""
-        if len(self._items) == INBOX_SIZE:
-            self.dropped += 1
-        self._items.append(item)
+    def put(self, item: Item, key: Any = None) -> None:
+        """Add one event for a device and wake the loop. An event without a key replaces none."""
+        device, event = item
+        with self._lock:
+            waiting = self._items.setdefault(device, {})
+            key = object() if key is None else key
+            if key not in waiting and len(waiting) == INBOX_SIZE:
+                del waiting[next(iter(waiting))]
+                self.dropped += 1
+            waiting[key] = event
         self.wake()
 
     def wake(self) -> None:
-        """Wake the loop without a message. A bell that rings already is not rung again."""
+        """Wake the loop without an event. A bell that rings already is not rung again."""
         if not self._rung:
             self._rung = True
             self._bell.put(None)
@@ -59,13 +67,11 @@ class Inbox:
         self._rung = False
         return True
 
-    def take(self) -> dict[str, list[tuple[Topic[Any] | None, Any]]]:
-        """All messages so far, by device, in order."""
-        taken: dict[str, list[tuple[Topic[Any] | None, Any]]] = {}
-        while self._items:
-            device, topic, message = self._items.popleft()
-            taken.setdefault(device, []).append((topic, message))
-        return taken
+    def take(self) -> dict[str, list[Any]]:
+        """All events so far, by device, in order."""
+        with self._lock:
+            taken, self._items = self._items, {}
+        return {device: list(waiting.values()) for device, waiting in taken.items()}
 
 
 class Loop:
@@ -128,15 +134,15 @@ class Loop:
 
     def _round(self) -> None:
         self.inbox.wait(min(self._due.values()) - self._clock.monotonic())
-        messages = self.inbox.take()
+        events = self.inbox.take()
         everything, self._edge = self._edge, False
         for node in self.nodes:
             if self._stopping:
                 return
             due = self._clock.monotonic() >= self._due[node.name]
-            if due or everything or node.name in messages:
+            if due or everything or node.name in events:
                 started = self._clock.monotonic()
-                node.scan(messages.get(node.name, ()))
+                node.scan(events.get(node.name, ()))
                 next_at = min(node.wake_at, started + self._scan_s)
                 self._due[node.name] = max(next_at, started + LEAST_GAP_S)
         self.scans += 1

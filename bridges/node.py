@@ -6,6 +6,7 @@ owns the device's bus calls it; nothing here waits or keeps a thread.
 
 import logging
 import math
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -78,10 +79,12 @@ class Node:
         self._has_read = False
         self._io_fault = ""
         self._failing = False
-        self._shown: Any = None
+        self._news: Any = None
+        self._told: Any = None
         self._published_at = -math.inf
         self._logged: Mapping[str, str] = {}
         self.refused: Counter[str] = Counter()
+        self._counting = threading.Lock()
         self.wake_at = -math.inf
 
     @property
@@ -89,12 +92,24 @@ class Node:
         """Each input was read, or timed out, once, and the first state is out."""
         return self._published_at > -math.inf
 
-    def scan(self, messages: Iterable[tuple[Topic[Any] | None, Any]] = ()) -> None:
-        """Read, decide, write, publish. A message without a topic is an event for the core."""
+    def event(self, topic: Topic[Any], message: Any) -> Any:
+        """What a message is to the core; None for one that is refused. Any thread may ask."""
+        if topic == self._kind.states:
+            return RivalSeen()
+        try:
+            return self._kind.requests[topic](message, self._settings)
+        except RequestRefused as refusal:
+            self._refuse(refusal.kind, refusal.detail)
+            return None
+
+    def scan(self, events: Iterable[Any] = ()) -> None:
+        """Read, decide with each event, write, publish."""
         self._failing = False
         self._decide(self._read())
-        for topic, message in messages:
-            self._receive(topic, message)
+        for event in events:
+            if isinstance(event, OperatorReset):  # a device that has failed is claimed anew
+                self._open = self._open and not self._io_fault
+            self._decide(event)
         self._write()
         if not self._failing:
             self._mended()
@@ -161,43 +176,32 @@ class Node:
         if before is not None and before.outputs != self._decision.outputs:
             log.info(pairs("outputs", device=self.name, outputs=self._decision.outputs))
 
-    def _receive(self, topic: Topic[Any] | None, message: Any) -> None:
-        if topic is None:  # an operator's reset: a device that has failed is claimed anew
-            self._open = self._open and not self._io_fault
-            self._decide(message)
-            return
-        if topic == self._kind.states:
-            self._decide(RivalSeen())
-            return
-        try:
-            event = self._kind.requests[topic](message, self._settings)
-        except RequestRefused as refusal:
-            self._refuse(refusal.kind, refusal.detail)
-            return
-        self._decide(event)
-
     def _refuse(self, kind: str, detail: str) -> None:
         """Count it, and log the first of each kind."""
-        self.refused[kind] += 1
-        if self.refused[kind] == 1:
+        with self._counting:
+            self.refused[kind] += 1
+            first = self.refused[kind] == 1
+        if first:
             log.warning(pairs("refused", device=self.name, kind=kind, detail=detail))
 
     def _tell(self) -> None:
         """Publish when it is due; never because a request came."""
         assert self._decision is not None
         report, now = self._decision.report, self._clock.monotonic()
-        self._log_changes(report)
+        news = report.news()
+        if news != self._news:
+            self._log_changes(report)
+            self._news = news
         since_s = now - self._published_at
-        changed = self._shown is None or report.news() != self._shown.news()
-        if since_s < (PUBLISH_GAP_S if changed else PUBLISH_EVERY_S):
-            due_s = PUBLISH_GAP_S if changed else PUBLISH_EVERY_S
+        due_s = PUBLISH_EVERY_S if news == self._told else PUBLISH_GAP_S
+        if since_s < due_s:
             self.wake_at = min(self.wake_at, self._published_at + due_s)
             return
         at = stamp(report.read_at, self._clock)
         self._publish(
             self._kind.states, self._kind.state_message(self.name, self._settings, report, at)
         )
-        self._shown, self._published_at = report, now
+        self._told, self._published_at = news, now
         self._memory = self._kind.published(self._memory, report)
         self.wake_at = min(self.wake_at, now + PUBLISH_EVERY_S)
 
@@ -227,7 +231,3 @@ class Node:
         if self._io_fault:
             log.info(pairs("device_back", device=self.name))
         self._io_fault = ""
-
-
-RESET = (None, OperatorReset())
-"""What the loop is given when an operator resets."""

@@ -16,6 +16,7 @@ from msgspec import inspect as mi
 
 from bridges import named
 from bridges.fields import Rmf
+from bridges.graph_kind import GraphKind
 
 KEYS = r"(?:^|(?<=[.;]\s))((?:`\w+`(?:,\s)?)+): "
 MEANING = re.compile(rf"{KEYS}(.*?)(?={KEYS}|\Z)", re.M | re.S)
@@ -32,17 +33,24 @@ class Shape:
 
 
 def shapes() -> Iterator[Shape]:
-    """Every sort of file there is."""
+    """Every sort of file with devices."""
     for kind in named.kind_names():
         key = named.kind_called(kind).devices_key
         for driver in named.driver_names(kind):
             yield Shape(kind, key, driver, named.driver_called(kind, driver))
 
 
+def graph_kinds() -> list[GraphKind]:
+    """Every sort of file without devices."""
+    kinds = (named.kind_called(name) for name in named.kind_names())
+    return [kind for kind in kinds if isinstance(kind, GraphKind)]
+
+
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of a device YAML, for editors."""
     buses = {name: named.bus_called(name).Settings for name in named.bus_types()}
-    types = [Rmf, *buses.values(), *(shape.module.Settings for shape in shapes())]
+    graph = [kind.settings for kind in graph_kinds()]
+    types = [Rmf, *buses.values(), *(shape.module.Settings for shape in shapes()), *graph]
     refs, components = msgspec.json.schema_components(types, ref_template="#/$defs/{name}")
     by_type = dict(zip(types, refs, strict=True))
     for bus in buses.values():
@@ -50,7 +58,10 @@ def schema() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "rmf-bridges device",
-        "oneOf": [_file(shape, buses, by_type) for shape in shapes()],
+        "oneOf": [
+            *(_file(shape, buses, by_type) for shape in shapes()),
+            *(_graph_file(kind, by_type) for kind in graph_kinds()),
+        ],
         "$defs": components,
     }
 
@@ -84,13 +95,27 @@ def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[
     }
 
 
+def _graph_file(kind: GraphKind, by_type: dict[Any, Any]) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "additionalProperties": False,
+        "required": ["kind"],
+        "properties": {
+            "kind": {"const": kind.name},
+            "rmf": by_type[Rmf],
+            kind.devices_key: by_type[kind.settings],
+        },
+    }
+
+
 def page() -> str:
     """`docs/configuration.md`."""
     sections = [
         "# Configuration reference",
         "Made by `rmf-bridge schema --markdown` from the structs that read the YAML: do not edit."
         " `rmf-bridge schema` prints the same as JSON Schema, for editors.",
-        "A file has `kind`, `driver`, `rmf`, `buses` and the devices under their kind's own key.",
+        "A file has `kind`, `driver`, `rmf`, `buses` and the devices under their kind's own key. A"
+        " supervisor's has `kind`, `rmf` and a section of its own.",
         *_sections("`rmf`", Rmf),
     ]
     for name in named.bus_types():
@@ -98,6 +123,8 @@ def page() -> str:
     for shape in shapes():
         title = f"`{shape.devices_key}` with `driver: {shape.driver}`"
         sections += _sections(title, shape.module.Settings)
+    for kind in graph_kinds():
+        sections += _sections(f"`{kind.devices_key}` of `kind: {kind.name}`", kind.settings)
     return "\n\n".join(sections) + "\n"
 
 

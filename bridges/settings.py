@@ -6,12 +6,15 @@
     buses: {name: {type: a file of drivers/hal/, ...}}
     lifts: {name: {...}}    the kind's own key; what each holds is the driver's `Settings`
 
+A kind that lives on RMF's graph alone has `kind`, `rmf` and one section of its own.
+
 Structs say what may stand in a section (`yaml_values`); what concerns several sections is checked
 here and in `wiring`. The daemon takes nothing else from the file, and checks nothing again.
 
 A driver's file may have, besides what `drivers/__init__.py` says: `warnings(settings)`, as (path,
 text) of what is legal but worth a look; and where there are no wires, `describe(settings, bus's
-settings)`, as (what, text), for `check`.
+settings)`, as (what, text), for `check`; and `claims(settings)`, as (place, path), of what no other
+device of its bus may use.
 """
 
 from collections.abc import Mapping
@@ -25,6 +28,7 @@ from yaml import MappingNode, Node, ScalarNode
 
 from bridges import named
 from bridges.fields import Name, Rmf
+from bridges.graph_kind import GraphKind
 from bridges.kind import Kind
 from bridges.wiring import Use, Wiring, note_conflicts, note_unknown_signals
 from bridges.yaml_nodes import Page, Problem, SettingsError, compose, either, nearest, read, unknown
@@ -42,6 +46,8 @@ class Config:
 
     `text`: its bytes as they were read. `buses` and `devices`: name -> the `Settings` of the bus's
     or driver's file. `bus_types`: name -> `type:`. `warnings`: what is legal but worth a look.
+    `section`: the settings of a kind without devices (`bridges/graph_kind.py`), which has no driver
+    and no buses.
     """
 
     path: Path
@@ -53,6 +59,7 @@ class Config:
     devices: Mapping[str, Any]
     bus_types: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
+    section: Any = None
 
     def bus_of(self, device_name: str) -> str:
         """The name of the bus that a device stands on."""
@@ -99,7 +106,8 @@ class _Reading:
         self._page = page
         self._top = Spot(root, root, "the file")
         self._values = Values(page)
-        self._kind: Kind | None = None
+        self._kind: Kind | GraphKind | None = None
+        self._section: Any = None
         self._kind_name = ""
         self._driver: ModuleType | None = None
         self._driver_name = ""
@@ -121,25 +129,31 @@ class _Reading:
             devices=self._devices,
             bus_types={name: bus.type or "" for name, bus in self._buses.items()},
             warnings=tuple(sorted(self._warnings)),
+            section=self._section,
         )
 
     def all(self) -> None:
         """Every section, as far as those before it allow."""
         entries = self._values.entries(self._top)
         self._read_kind(below(self._top.node, "kind"))
-        self._read_driver(below(self._top.node, "driver"))
+        if not isinstance(self._kind, GraphKind):
+            self._read_driver(below(self._top.node, "driver"))
         sections = self._values.known(entries, self._top, self._keys())
         if "rmf" in sections:
             self._rmf = self._values.make(Rmf, sections["rmf"].spot())
         if "buses" in sections:
             self._read_buses(sections["buses"].spot())
-        if self._kind and self._kind.devices_key in sections:
+        if isinstance(self._kind, GraphKind):
+            self._read_section(sections.get(self._kind.devices_key), self._kind)
+        elif self._kind and self._kind.devices_key in sections:
             self._read_devices(sections[self._kind.devices_key].spot())
         note_conflicts(self._page, self._uses)
 
     def _keys(self) -> dict[str, str | None]:
         """The keys of a file of this kind; of every kind while the kind is not known."""
         keys = {"kind": either(named.kind_names()), "driver": "a driver of that kind"}
+        if isinstance(self._kind, GraphKind):
+            return {"kind": keys["kind"], "rmf": None, self._kind.devices_key: None}
         sections = {"rmf": None, "buses": MAPPING}
         if self._kind:
             keys["driver"] = either(named.driver_names(self._kind_name))
@@ -158,6 +172,10 @@ class _Reading:
         if name:
             self._driver_name = name
             self._driver = named.driver_called(self._kind_name, name)
+
+    def _read_section(self, entry: Entry | None, kind: GraphKind) -> None:
+        """The settings of a kind without devices; all of them have defaults."""
+        self._section = self._values.make(kind.settings, entry.spot()) if entry else kind.settings()
 
     def _word(self, entry: Entry | None, words: list[str]) -> str | None:
         """One of these words; None where it is none of them, or not there."""
@@ -192,7 +210,11 @@ class _Reading:
         if name is None:
             return _Bus(entry, None, None, BROKEN)
         hal = named.bus_called(name)
-        return _Bus(entry, name, hal, self._values.make(hal.Settings, entry.spot(), ("type",)))
+        settings = self._values.make(hal.Settings, entry.spot(), ("type",))
+        warnings = getattr(hal, "warnings", None)
+        for path, text in warnings(settings) if warnings and settings is not BROKEN else ():
+            self._warn(locate(entry.spot(), path).where(), f"bus '{entry.name}': {text}")
+        return _Bus(entry, name, hal, settings)
 
     def _note_untyped(self, bus: Entry, allowed: list[str]) -> None:
         """That a bus has no type, or none that is spelt so; its other keys mean nothing yet."""
@@ -264,6 +286,8 @@ class _Reading:
         """The wires of a device whose settings are all there and of the right sort."""
         wires = wires_of(driver, settings)
         wiring.wires(wires, spot)
+        claims = getattr(driver, "claims", None)
+        wiring.claims(claims(settings) if claims else (), spot)
         signals = [wire.signal for wire in wires]
         note_unknown_signals(self._page, settings.accept_unsafe, signals, spot)
 

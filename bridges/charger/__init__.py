@@ -22,6 +22,7 @@ KIND = Kind(
         CHARGER_CANCELS: messages.accept_cancel,
     },
     device_name=messages.device_name,
+    sender=lambda request: str(request.request_id),
     limits=limits,
     initial=core.initial,
     decide=core.decide,

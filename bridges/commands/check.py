@@ -10,6 +10,8 @@ import sys
 import unicodedata
 from collections.abc import Iterable, Sequence
 
+import msgspec
+
 from bridges import named
 from bridges.settings import Config, Problem, SettingsError, load
 from drivers.points import Wire
@@ -67,6 +69,12 @@ def _complain(lines: Iterable[str]) -> None:
 
 def described(config: Config) -> list[str]:
     """A right file as lines: what it is, and its wiring or what it talks to."""
+    if config.section is not None:
+        rows = [
+            (key, "-" if value is None else str(value))
+            for key, value in msgspec.to_builtins(config.section).items()
+        ]
+        return [f"{config.path}: {config.kind}", "", *aligned(rows), ""]
     lines = [f"{config.path}: {config.kind}, driver {config.driver}"]
     for bus in config.buses:
         devices = [name for name in config.devices if config.bus_of(name) == bus]

@@ -45,7 +45,9 @@ def _off(held: runtime.RuntimeDirectory, file: Path) -> int:
             logging.error(str(problem))
         return EX_CONFIG
     if not outputs_off(config, TIMEOUT_S):
-        logging.error("outputs not verified off: cut the relays' supply before working on the device")
+        logging.error(
+            "outputs not verified off: cut the relays' supply before working on the device"
+        )
         return 1
     held.released()
     return 0

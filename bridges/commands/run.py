@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 
 from bridges import log, runtime
-from bridges.daemon import Daemon, open_bus
+from bridges.daemon import Daemon
 from bridges.rmf.transport import TransportError
 from bridges.settings import Config, SettingsError, load
 from drivers.hal import HalError
@@ -73,7 +73,7 @@ def _overridden(config: Config, args: argparse.Namespace) -> Config:
 def _serve(config: Config, held: runtime.RuntimeDirectory, args: argparse.Namespace) -> int:
     if not args.simulate:
         os.chdir(held.path)  # lgpio leaves a FIFO where it is imported
-        return Daemon(config, held, open_bus=open_bus).serve()
+        return Daemon(config, held).serve()
     from hal_fakes.simulate import Simulation
 
     logging.warning("SIMULATED: no hardware moves, and nothing that RMF is told is true")

@@ -11,6 +11,7 @@ KIND = Kind(
     states=topics.DOOR_STATES,
     requests={topics.DOOR_REQUESTS: messages.accept},
     device_name=lambda message: str(message.door_name),
+    sender=lambda request: str(request.requester_id),
     limits=DoorLimits.of,
     initial=core.initial,
     decide=core.decide,

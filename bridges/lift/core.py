@@ -188,7 +188,7 @@ def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple
         case RivalSeen():
             return replace(memory, rival_at=now), ""
         case OperatorReset():
-            return _reset(memory), ""
+            return _reset(memory, now, limits), ""
         case Asked():
             return _ask(memory, event, now, limits)
     return _end(memory, event.session_id, now, limits)
@@ -214,23 +214,22 @@ def _ask(memory: Memory, asked: Asked, now: float, limits: LiftLimits) -> tuple[
     if grace and now < grace.until:
         if grace.session.id != asked.session_id:
             return memory, f"released by {grace.session.id} a moment ago"
-        resumed = drive.paused(grace.session)
-        return replace(memory, session=_refresh(resumed, asked, now), grace=None), ""
+        return replace(memory, session=_grant(asked, now, grace.session.boarded), grace=None), ""
     why_not = obstacles(memory, look(memory.senses, now, limits), now, limits)
     if why_not:
         return memory, why_not[0].code
-    session = Session(asked.session_id, asked.agv, asked.destination, now)
-    return replace(memory, session=session, grace=None), ""
+    return replace(memory, session=_grant(asked, now, boarded=False), grace=None), ""
+
+
+def _grant(asked: Asked, now: float, boarded: bool) -> Session:
+    return Session(asked.session_id, asked.agv, asked.destination, now, boarded=boarded)
 
 
 def _refresh(session: Session, asked: Asked, now: float) -> Session:
     """A repeat only says that RMF is still there; another destination or mode is a new request."""
     if (asked.agv, asked.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
-    seen = session.agv_seen
-    return Session(
-        session.id, asked.agv, asked.destination, now, boarded=session.boarded, agv_seen=seen
-    )
+    return replace(_grant(asked, now, session.boarded), agv_seen=session.agv_seen)
 
 
 def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tuple[Memory, str]:
@@ -245,18 +244,18 @@ def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tup
     return replace(memory, session=None, grace=grace), ""
 
 
-def _reset(memory: Memory) -> Memory:
-    """An operator says that it is safe: latches go, unless their cause is still there."""
+def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
+    """An operator says that it is safe: latches go, unless their cause may still be there."""
     session = memory.session
     if session and session.fault:
         session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
-    fire = memory.senses.hazards.get(Hazard.FIRE)
-    burning = fire is not None and bool(fire.value)
+    view = look(memory.senses, now, limits)
+    may_burn = not view.fresh or Hazard.FIRE in view.hazards
     return replace(
         memory,
         session=session,
-        fire_latched=burning and memory.fire_latched,
-        alarmed=burning and memory.alarmed,
+        fire_latched=may_burn and memory.fire_latched,
+        alarmed=may_burn and memory.alarmed,
         senses=trust(memory.senses),
     )
 

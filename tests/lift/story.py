@@ -259,7 +259,7 @@ class Story:
 
     def resets(self) -> None:
         """An operator's `rmf-bridge reset`."""
-        self._scan((None, OperatorReset()))
+        self._scan(OperatorReset())
 
     # ---- what is known of it
 
@@ -300,9 +300,8 @@ class Story:
 
     # ---- inside
 
-    def _scan(self, *messages: tuple[Topic[Any] | None, Any]) -> None:
+    def _scan(self, *events: Any) -> None:
         self.building.advance(self.now)
-        events = (m if topic is None else self.node.event(topic, m) for topic, m in messages)
         self.node.scan([event for event in events if event is not None])
         if self.incoming:
             arrived, self.incoming = self.incoming, []

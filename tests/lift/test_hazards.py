@@ -335,16 +335,26 @@ def test_a_fire_that_can_no_longer_be_seen_is_not_shown_as_a_fact() -> None:
     )
 
 
-def test_a_latched_fire_stays_shown_when_the_inputs_are_lost() -> None:
-    story = waiting(fire_reset="manual")
+@pytest.mark.parametrize("over", [False, True])
+def test_a_latched_fire_stays_latched_while_nobody_can_see_whether_it_is_over(over: bool) -> None:
+    story = waiting(fire_reset="manual", alarm="fire_alarm_trigger")
     story.building.hazard(Hazard.FIRE)
     story.run(5.0)
+    if over:
+        story.building.hazard()
+    story.run(8.0)
     story.building.unreadable = "no answer"
     story.run(10.0)
-    story.resets()  # last seen, it burnt
+    story.resets()
     story.run(11.0)
     assert story.state == "FIRE, moving at ?, A to L1"
     assert story.faults == ["FIRE_LATCHED", "INPUTS_NOT_FRESH"]
+    story.building.unreadable = ""
+    story.run(11.05)
+    story.resets()  # read, but not settled yet
+    story.run(20.0)
+    assert story.faults == ["FIRE_LATCHED" if over else "FIRE"]
+    assert story.alarms == [(2.1, Bool(True))]
 
 
 def test_a_second_node_for_this_lift_switches_it_off_until_it_is_gone() -> None:

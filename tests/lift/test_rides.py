@@ -384,7 +384,8 @@ def test_a_request_that_cannot_be_asked_is_refused_by_name(
 
 def test_a_person_reads_the_state_in_a_few_words() -> None:
     story = Story(Building(replace(STANDING, door=Door.NOT_OPEN)), door_travel_s=2.0)
-    assert messages.summary(story.node._decision.report) == {
+    status = story.node.status()
+    assert {key: status[key] for key in SUMMARY} == {
         "mode": "OFFLINE",
         "floor": "?",
         "door": "moving",

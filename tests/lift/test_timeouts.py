@@ -82,6 +82,22 @@ def test_a_latched_fault_ends_with_the_session() -> None:
     assert story.outputs == HELD
 
 
+def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_once() -> None:
+    """An operator ends the session, and the fleet adapter asks again within a second."""
+    story = lift("L1", Door.OPEN, agv=True, door_timeout_s=4.0)
+    story.run(3.0)
+    story.building.set(door=Door.CLOSED)
+    keep_asking(story, 200.0)
+    assert (story.faults, story.outputs) == (["DOOR_OPENING_FAULT"], OFF)
+    story.ends("A")
+    story.run(200.5)
+    story.asks("A", "L1")
+    assert (story.faults, story.outputs) == ([], HELD)
+    story.building.set(agv=False, door=Door.OPEN)  # and it is still known to be inside
+    story.run(202.0)
+    assert story.state == "HUMAN, open at L1, A to L1"
+
+
 def test_a_latched_fault_ends_with_another_destination() -> None:
     story = latched()
     story.asks("A", "L3")

@@ -121,9 +121,12 @@ def test_a_lost_end_is_repeated_until_it_is_heard(times: int) -> None:
     assert rmf.story.outputs == LiftOutputs()
 
 
-def test_a_supervisor_that_restarts_with_a_robot_in_the_car_ends_nothing() -> None:
+@pytest.mark.parametrize("adapters_first", [False, True])
+def test_a_supervisor_that_restarts_with_a_robot_in_the_car_ends_nothing(
+    adapters_first: bool,
+) -> None:
     robot = Robot(A)
-    rmf = world(robot, adapters_first=False)
+    rmf = world(robot, adapters_first=adapters_first)
     rmf.asks(robot, "L2")
     rmf.until_done(robot)
     robot.in_car = True
@@ -131,7 +134,8 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_ends_nothing() -> No
     edges = list(rmf.story.edges)
     rmf.supervisor.slots.clear()  # it has started, and the first it hears is a state of ours
     rmf.run(rmf.story.now + 20.0)
-    assert [r.request_type for r in rmf.requested if r.request_type == END] == [END]
+    ends = [request for request in rmf.requested if request.request_type == END]
+    assert len(ends) == (0 if adapters_first else 1)
     assert rmf.story.edges == edges
     assert sessions(rmf.story) == ["", A]
     assert rmf.story.state == "AGV, open at L2, fleet/a to L2"

@@ -1,0 +1,278 @@
+"""A kind without hardware in service: its cores' memories, and their place on the RMF graph.
+
+It has the loop's face towards the daemon, and one thread, which waits on the inbox until some core
+wants to be woken. It only listens until it has been alone on its topics for the kind's quiet time; only
+then does it declare its publishers, so that a node that waits for another's end is no rival to it.
+"""
+
+import logging
+import math
+import threading
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from bridges.decision import Fault, RequestRefused
+from bridges.graph_kind import GraphKind, MaySpeak, Woken
+from bridges.log import pairs
+from bridges.loop import LEAST_GAP_S, Inbox
+from bridges.node import Clock
+from bridges.rmf.definitions import Message
+from bridges.rmf.stamps import stamp
+from bridges.rmf.topics import Topic
+from bridges.rmf.transport import Publisher, Subscription, Transport, TransportError
+
+log = logging.getLogger(__name__)
+
+LOOK_EVERY_S = 0.25
+"""How often to look who else is on the graph."""
+MAX_SUBJECTS = 1000
+"""More lifts or doors than any site has: somebody makes names up."""
+
+
+def _same(topic: Topic[Any]) -> Topic[Any]:
+    return topic
+
+
+class Subject:
+    """One lift or door that the kind's core looks after."""
+
+    def __init__(
+        self, name: str, kind: GraphKind, limits: Any, started_at: float, clock: Clock
+    ) -> None:
+        self.name = name
+        self._kind = kind
+        self._limits = limits
+        self._clock = clock
+        self.memory = kind.initial(name, started_at)
+        self.wake_at = math.inf
+        self._report: Any = None
+        self._news: Any = None
+        self._faults: tuple[Fault, ...] = ()
+
+    def decide(self, event: Any) -> tuple[Sequence[tuple[Topic[Any], Message]], str]:
+        """One step of the core: what to publish, and why the event was refused."""
+        now = self._clock.monotonic()
+        decision = self._kind.decide(self.memory, event, now, self._limits)
+        self.memory, self.wake_at = decision.memory, decision.wake_at
+        self._report = decision.report
+        self._log_changes(now)
+        return decision.publish, decision.refused
+
+    def idle(self, now: float) -> bool:
+        """It need not be remembered."""
+        return self._kind.idle(self.memory, now)
+
+    def status(self) -> Mapping[str, Any]:
+        """For the status file."""
+        now, read_at = self._clock.monotonic(), self._report.read_at
+        return {
+            **self._kind.summary(self._report, now),
+            "faults": [{"code": f.code, "detail": f.detail} for f in self._report.faults],
+            "input_age_s": None if read_at is None else round(now - read_at, 3),
+        }
+
+    def _log_changes(self, now: float) -> None:
+        faults, before = self._report.faults, self._faults
+        if self._report.news() != self._news:
+            log.info(pairs("state", subject=self.name, **self._kind.summary(self._report, now)))
+        known = {fault.code for fault in before}
+        for fault in faults:
+            if fault.code not in known:
+                log.warning(pairs("fault", subject=self.name, code=fault.code, detail=fault.detail))
+        for code in known - {fault.code for fault in faults}:
+            log.info(pairs("fault_over", subject=self.name, code=code))
+        self._news, self._faults = self._report.news(), faults
+
+
+class GraphNode:
+    """Serves one GraphKind. `named`: a topic under the site's own name for it.
+
+    `scans` counts finished rounds, for the watchdog. Beside `round` and `status`, its public face is
+    that of `bridges.loop.Loop`.
+    """
+
+    def __init__(
+        self,
+        kind: GraphKind,
+        settings: Any,
+        transport: Transport,
+        clock: Clock,
+        named: Callable[[Topic[Any]], Topic[Any]] = _same,
+    ) -> None:
+        self.name = kind.name
+        self.inbox = Inbox()
+        self.scans = 0
+        self.safe = True
+        self.refused: Counter[str] = Counter()
+        self.subjects: dict[str, Subject] = {}
+        self.may_speak = False
+        self.rivals = 0
+        self._kind = kind
+        self._settings = settings
+        self._limits = kind.limits(settings)
+        self._transport = transport
+        self._clock = clock
+        self._named = named
+        self._publishers: dict[str, Publisher[Any]] = {}
+        self._rival_ends: list[Subscription] = []
+        self._started_at = clock.monotonic()
+        self._alone_since: float | None = None
+        self._look_at = -math.inf
+        self._stopping = False
+        self._thread = threading.Thread(target=self._run, name=f"graph-{kind.name}", daemon=True)
+
+    def subscribe(self) -> None:
+        """Begin to hear. What is retained for us comes at once."""
+        for topic in self._kind.sole:
+            end = self._transport.subscribe(self._named(topic), _ignore, others_only=True)
+            self._rival_ends.append(end)
+        for topic in self._kind.requests:
+            self._transport.subscribe(self._named(topic), self._to_inbox(topic))
+
+    def start(self) -> None:
+        """Begin to serve."""
+        self._thread.start()
+
+    def stop(self, timeout_s: float) -> bool:
+        """End after the round under way; False if it does not end."""
+        self._stopping = True
+        self.inbox.wake()
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    @property
+    def alive(self) -> bool:
+        """False when it has ended, by stop or by a defect of ours."""
+        return self._thread.is_alive()
+
+    @property
+    def ready(self) -> bool:
+        """It listens. (A passive node is in order: the other one speaks.)"""
+        return self.scans > 0
+
+    @property
+    def wake_at(self) -> float:
+        """When the next round is due if nothing is heard."""
+        return min([self._look_at, *(subject.wake_at for subject in self.subjects.values())])
+
+    def round(self) -> None:
+        """Take what was heard, wake whose time has come, send what they say."""
+        self._look_around(self._clock.monotonic())
+        for name, messages in self.inbox.take().items():
+            for topic, message in messages:
+                self._receive(name, topic, message)
+        now = self._clock.monotonic()
+        for subject in list(self.subjects.values()):
+            if now >= subject.wake_at:
+                self._decide(subject, Woken())
+            if subject.idle(now):
+                del self.subjects[subject.name]
+        self.scans += 1
+
+    def status(self) -> Mapping[str, Any]:
+        """For the status file: how it stands on the graph."""
+        return {
+            "passive": not self.may_speak,
+            "other_publishers": self.rivals,
+            "refused": dict(self.refused),
+        }
+
+    @property
+    def nodes(self) -> list[Subject]:
+        """The subjects, each with a `name` and a `status` of its own."""
+        return list(self.subjects.values())
+
+    def _run(self) -> None:
+        while not self._stopping:
+            self.inbox.wait(max(self.wake_at - self._clock.monotonic(), LEAST_GAP_S))
+            self.round()
+
+    def _to_inbox(self, topic: Topic[Any]) -> Callable[[Any], None]:
+        """A callback for the transport's thread."""
+
+        def put(message: Any) -> None:
+            self.inbox.put((self._kind.device_name(message), (topic, message)))
+
+        return put
+
+    def _look_around(self, now: float) -> None:
+        """Who else publishes what only one may? Nobody, for the quiet time: then we may."""
+        if now < self._look_at:
+            return
+        rivals = sum(end.matched() for end in self._rival_ends)
+        self._log_rivals(rivals)
+        self.rivals = rivals
+        if rivals:
+            self._alone_since = None
+        elif self._alone_since is None:
+            self._alone_since = now
+        speak_at = math.inf if self._alone_since is None else self._alone_since + self._quiet_s
+        self._look_at = min(at for at in (now + LOOK_EVERY_S, speak_at) if at > now)
+        self._set_may_speak(now >= speak_at)
+
+    @property
+    def _quiet_s(self) -> float:
+        return self._kind.quiet_s(self._settings)
+
+    def _log_rivals(self, rivals: int) -> None:
+        if rivals and not self.rivals:
+            log.warning(pairs("passive", kind=self.name, reason="another node does the same"))
+        elif self.rivals and not rivals:
+            log.info(pairs("other_node_gone", kind=self.name, speaks_in_s=self._quiet_s))
+
+    def _set_may_speak(self, yes: bool) -> None:
+        if yes == self.may_speak:
+            return
+        if yes:
+            for topic in self._kind.publishes:
+                if topic.name not in self._publishers:
+                    self._publishers[topic.name] = self._transport.publisher(self._named(topic))
+            log.info(pairs("active", kind=self.name))
+        self.may_speak = yes
+        for subject in self.subjects.values():
+            self._decide(subject, MaySpeak(yes))
+
+    def _receive(self, name: str, topic: Topic[Any], message: Any) -> None:
+        try:
+            event = self._kind.requests[topic](message, self._settings, self._clock.wall())
+            subject = self._subject(name)
+        except RequestRefused as refusal:
+            self._refuse(refusal.kind, refusal.detail)
+            return
+        self._decide(subject, event)
+
+    def _subject(self, name: str) -> Subject:
+        """What this message is about; it may be new to us."""
+        if name in self.subjects:
+            return self.subjects[name]
+        if len(self.subjects) == MAX_SUBJECTS:
+            raise RequestRefused("too many names", name)
+        subject = Subject(name, self._kind, self._limits, self._started_at, self._clock)
+        self.subjects[name] = subject
+        self._decide(subject, MaySpeak(self.may_speak))
+        return subject
+
+    def _decide(self, subject: Subject, event: Any) -> None:
+        publish, refused = subject.decide(event)
+        for topic, message in publish:
+            self._publish(topic, message)
+        if refused:
+            self._refuse(refused, f"{subject.name}: {event}")
+
+    def _publish(self, topic: Topic[Any], message: Message) -> None:
+        now = stamp(self._clock.wall())
+        try:
+            self._publishers[topic.name].publish(self._kind.stamped(message, now))
+        except TransportError as error:
+            log.error(pairs("not_published", topic=topic.name, reason=error))
+
+    def _refuse(self, kind: str, detail: str) -> None:
+        """Count it, and log the first of each kind."""
+        self.refused[kind] += 1
+        if self.refused[kind] == 1:
+            log.warning(pairs("refused", kind=kind, detail=detail))
+
+
+def _ignore(message: Any) -> None:
+    """A rival is counted, not listened to."""

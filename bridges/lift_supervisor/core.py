@@ -1,0 +1,293 @@
+"""The lift supervisor's core, for one lift: who is to have it, and what its node is told.
+
+It stands in for RMF's own (rmf_ros2, lift_supervisor/Node.cpp): fleet adapters ask on
+`adapter_lift_requests`, one session at a time is passed on to the lift's node on `lift_requests`,
+until the lift's states show that it has been obeyed. Rules:
+1. Who wants the lift is served in the order of first requests. Who ENDs, or is silent for
+   `silent_after_s`, leaves the queue. A silence of the lift itself is nobody's: adapters only repeat
+   themselves at its states.
+2. The lift's states say who has it. A session that they show goes before every queue if its robot
+   asks for it, and is ended if nobody has asked for `orphan_after_s`.
+3. One session at a time has its turn. Its request is sent when it is new or changed; again when the
+   state does not show what was asked, or when the adapter has repeated it (the node takes our silence
+   for RMF's); never while the lift shows another session.
+4. A turn ends by END: the holder's own, wherever the lift is and in whatever mode; or ours, for a
+   holder that the lift never accepted and that has gone silent, and after `holder_ttl_s` where the
+   site wants that. END is repeated until a state that has come after it shows another session, or
+   none. Only then is the next one served.
+5. While the lift is in fire, emergency or offline mode nobody is sent to it and no queue moves; END,
+   and HUMAN mode, which asks for nothing, are passed on.
+6. Until it may speak, and beside another supervisor, it only listens. It then starts from what the
+   states show and who has asked, so a restart ends no ride.
+7. Nothing is sent twice within GAP_S, and nothing again, unchanged, within REPEAT_S.
+"""
+
+import math
+from dataclasses import replace
+from typing import Final
+
+from bridges.decision import Decision
+from bridges.graph_kind import MaySpeak
+from bridges.lift_supervisor.freshness import FUTURE_S, Rules, Voice
+from bridges.lift_supervisor.memory import (
+    FLOWING_S,
+    NEVER,
+    Asked,
+    Claim,
+    Ended,
+    Event,
+    Limits,
+    Memory,
+    Shown,
+    Turn,
+)
+from bridges.lift_supervisor.report import SupervisorReport, alarms, report
+from bridges.rmf.definitions import LiftRequest, LiftRequestType
+from bridges.rmf.topics import LIFT_REQUESTS
+
+GAP_S: Final = 0.1
+REPEAT_S: Final = 1.0
+FORGOTTEN_S: Final = 60.0
+MAX_CLAIMS: Final = 100
+MAX_VOICES: Final = 200
+
+END: Final = LiftRequestType.REQUEST_END_SESSION
+AGV: Final = LiftRequestType.REQUEST_AGV_MODE
+
+Decided = Decision[Memory, None, SupervisorReport]
+
+
+def initial(lift: str, started_at: float) -> Memory:
+    """Nobody was heard of; we may not speak yet."""
+    return Memory(lift, started_at)
+
+
+def idle(memory: Memory, now: float) -> bool:
+    """A lift that has never been heard, and that nobody has asked for in a while."""
+    return memory.shown is None and not memory.claims and now >= memory.heard_at + FORGOTTEN_S
+
+
+def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
+    """Take the event in, see whose turn it is, and send what is due: one message at the most."""
+    memory, refused = _take(memory, event, now, limits)
+    memory = _forget_silent(memory, now, limits)
+    memory = _take_turns(memory, now, limits)
+    due = now >= _due_at(memory)
+    message = wanted(memory)
+    if due:
+        memory = replace(memory, sent=message, sent_at=now, prompted=False)
+    return Decision(
+        memory,
+        None,
+        report(memory, now, limits),
+        _wake_at(memory, now, limits),
+        refused,
+        ((LIFT_REQUESTS, message),) if due and message else (),
+    )
+
+
+# --- what is heard -----------------------------------------------------------------------------
+
+
+def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Memory, str]:
+    match event:
+        case Asked() | Ended():
+            memory, counts = _listen(memory, event, now, limits)
+            if not counts:
+                return memory, "stale request"
+            if isinstance(event, Ended):
+                return _end(memory, event.session, now), ""
+            return _ask(memory, event, now)
+        case Shown():
+            return _see(memory, event, now), ""
+        case MaySpeak(yes):
+            return _speak(memory, yes), ""
+        case _:  # only time has passed
+            return memory, ""
+
+
+def _listen(
+    memory: Memory, event: Asked | Ended, now: float, limits: Limits
+) -> tuple[Memory, bool]:
+    """Does it count? Voices are kept in the order in which they were last heard."""
+    voices = {k: v for k, v in memory.voices.items() if k != event.session}
+    if len(voices) == MAX_VOICES:
+        del voices[next(iter(voices))]
+    known = memory.voices.get(event.session, Voice())
+    voices[event.session], counts = known.heard(
+        event.stamp, event.age_s, now, _rules(memory, now, limits), ends=isinstance(event, Ended)
+    )
+    return replace(memory, heard_at=now, voices=voices), counts
+
+
+def _rules(memory: Memory, now: float, limits: Limits) -> Rules:
+    if limits.clock_synchronised:
+        return Rules(limits.max_request_age_s, known_clocks=False)
+    future_s = NEVER if memory.may_speak else FUTURE_S
+    return Rules(now - memory.started_at, future_s=future_s)
+
+
+def _ask(memory: Memory, asked: Asked, now: float) -> tuple[Memory, str]:
+    """Join the queue, or say the same or something else from one's place in it."""
+    before = memory.claim(asked.session)
+    served = memory.shown.floors if memory.shown else ()
+    if served and asked.wish.request_type == AGV and asked.wish.floor not in served:
+        return _still_there(memory, before, now), "floor not served"
+    if before is None and len(memory.claims) == MAX_CLAIMS:
+        return memory, "queue full"
+    since = before.since if before else now
+    claim = Claim(asked.session, asked.wish, since, now)
+    turn = memory.turn
+    holds = turn is not None and turn.session == asked.session and not turn.ends
+    return replace(_with(memory, before, claim), prompted=memory.prompted or holds), ""
+
+
+def _still_there(memory: Memory, before: Claim | None, now: float) -> Memory:
+    """A request that cannot be obeyed is a sign of life all the same."""
+    return memory if before is None else _with(memory, before, replace(before, heard_at=now))
+
+
+def _with(memory: Memory, before: Claim | None, claim: Claim) -> Memory:
+    if before is None:
+        return replace(memory, claims=(*memory.claims, claim))
+    return replace(memory, claims=tuple(claim if c is before else c for c in memory.claims))
+
+
+def _end(memory: Memory, session: str, now: float) -> Memory:
+    """It wants the lift no more; if it has it, or its turn, the node is told so."""
+    memory = _without(memory, session)
+    turn = memory.turn
+    has_it = session in (memory.session_shown, turn.session if turn else "")
+    if not has_it or not memory.may_speak or (turn and turn.ends):
+        return memory
+    return _begin(memory, Turn(session, now, ends=True))
+
+
+def _without(memory: Memory, session: str) -> Memory:
+    return replace(memory, claims=tuple(c for c in memory.claims if c.session != session))
+
+
+def _see(memory: Memory, shown: Shown, now: float) -> Memory:
+    """A state: it may confirm an END, ask for a repeat, or show somebody else's session."""
+    flowed = now <= memory.shown_at + FLOWING_S
+    same = flowed and shown.session == memory.session_shown
+    turn, prompted = memory.turn, memory.prompted
+    if turn and turn.ends:
+        gone = memory.sent is not None and shown.session != turn.session
+        turn, prompted = (None, False) if gone else (turn, True)
+    elif turn:
+        claim = memory.claim(turn.session)
+        assert claim is not None
+        turn = replace(turn, seen=turn.seen or shown.session == turn.session)
+        prompted = prompted or not shown.satisfies(turn.session, claim.wish)
+    return replace(
+        memory,
+        turn=turn,
+        prompted=prompted,
+        shown=shown,
+        shown_at=now,
+        session_since=memory.session_since if same else now,
+        flowing_since=memory.flowing_since if flowed else now,
+    )
+
+
+def _speak(memory: Memory, yes: bool) -> Memory:
+    """Whoever has had the turn, the states will show it when we speak again."""
+    return replace(memory, may_speak=yes, turn=memory.turn if yes else None)
+
+
+# --- whose turn it is --------------------------------------------------------------------------
+
+
+def _forget_silent(memory: Memory, now: float, limits: Limits) -> Memory:
+    """Age-out of those who wait; the holder leaves by END alone."""
+    holder = memory.turn.session if memory.turn and not memory.turn.ends else ""
+    staying = tuple(
+        claim
+        for claim in memory.claims
+        if claim.session == holder or now < memory.gone_at(claim, now, limits.silent_after_s)
+    )
+    return replace(memory, claims=staying)
+
+
+def _begin(memory: Memory, turn: Turn) -> Memory:
+    return replace(memory, turn=turn, sent=None, prompted=False)
+
+
+def _take_turns(memory: Memory, now: float, limits: Limits) -> Memory:
+    turn, shown = memory.turn, memory.session_shown
+    if not memory.may_speak or (turn and turn.ends):
+        return memory
+    if shown and (turn is None or shown != turn.session):
+        return _obey_the_lift(memory, shown, now, limits)
+    if turn:
+        return _let_go(memory, turn, now, limits)
+    if memory.claims and not memory.nobody_is_sent:
+        return _begin(memory, Turn(memory.claims[0].session, now))
+    return memory
+
+
+def _obey_the_lift(memory: Memory, shown: str, now: float, limits: Limits) -> Memory:
+    """It has taken a session whose turn it is not: after a restart, or a request past us."""
+    if memory.claim(shown):
+        return _begin(memory, Turn(shown, now, seen=True))
+    if memory.shown_at >= memory.session_since + limits.orphan_after_s:
+        return _begin(memory, Turn(shown, now, ends=True))
+    return memory
+
+
+def _let_go(memory: Memory, turn: Turn, now: float, limits: Limits) -> Memory:
+    """A holder that is heard no more: at once if the lift never took it, else as the site wants."""
+    claim = memory.claim(turn.session)
+    assert claim is not None
+    after_s = limits.holder_ttl_s if turn.seen else limits.silent_after_s
+    if now < memory.gone_at(claim, now, after_s):
+        return memory
+    return _begin(_without(memory, turn.session), Turn(turn.session, now, ends=True))
+
+
+# --- what is sent ------------------------------------------------------------------------------
+
+
+def wanted(memory: Memory) -> LiftRequest | None:
+    """What the lift's node should have been told, without its stamp."""
+    turn = memory.turn
+    if turn is None:
+        return None
+    if turn.ends:
+        floor = memory.shown.floor if memory.shown else ""
+        return LiftRequest(memory.lift, session_id=turn.session, destination_floor=floor)
+    claim = memory.claim(turn.session)
+    assert claim is not None
+    wish = claim.wish
+    somebody_elses = memory.session_shown not in ("", turn.session)
+    if somebody_elses or (wish.request_type == AGV and memory.nobody_is_sent):
+        return None
+    return LiftRequest(
+        lift_name=memory.lift,
+        session_id=turn.session,
+        request_type=wish.request_type,
+        destination_floor=wish.floor,
+        door_state=wish.door,
+    )
+
+
+def _due_at(memory: Memory) -> float:
+    """When to send it: at once if it is new, later if it is only worth repeating."""
+    message, sent = wanted(memory), memory.sent
+    if message is None:
+        return NEVER
+    if sent is None or (message != sent and message.request_type != END):
+        return memory.sent_at + GAP_S
+    return memory.sent_at + REPEAT_S if memory.prompted else NEVER
+
+
+def _wake_at(memory: Memory, now: float, limits: Limits) -> float:
+    """When time alone may change something."""
+    due = [_due_at(memory), *(at for at, _ in alarms(memory, now, limits))]
+    if memory.shown is not None and memory.flows(now):
+        due.append(math.nextafter(memory.shown_at + FLOWING_S, NEVER))
+    for claim in memory.claims:
+        due.append(memory.gone_at(claim, now, limits.silent_after_s))
+        due.append(memory.gone_at(claim, now, limits.holder_ttl_s))
+    return min((at for at in due if at > now), default=NEVER)

@@ -1,0 +1,78 @@
+"""Adapters' LiftRequests and the lifts' LiftStates in: are they well formed, and for a lift of ours?"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from bridges.decision import RequestRefused
+from bridges.lift_supervisor.core import AGV, END
+from bridges.lift_supervisor.memory import Asked, Ended, Shown, Wish
+from bridges.lift_supervisor.report import SupervisorReport
+from bridges.lift_supervisor.settings import Settings
+from bridges.rmf.definitions import (
+    LiftRequest,
+    LiftRequestDoor,
+    LiftRequestType,
+    LiftState,
+    Time,
+)
+from bridges.rmf.stamps import in_seconds
+
+
+def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Asked | Ended:
+    """The event that an adapter's request is; `wall` is our clock (s since the epoch).
+
+    Of an END_SESSION only the session is looked at: fleet adapters send no floor with it
+    (rmf_fleet_adapter RobotContext.cpp).
+    """
+    _check_lift(request.lift_name, settings)
+    if not request.session_id:
+        raise RequestRefused("empty session_id", "a session needs a name")
+    stamp = in_seconds(request.request_time)
+    if request.request_type == END:
+        return Ended(request.session_id, stamp, wall - stamp)
+    if request.request_type not in set(LiftRequestType):
+        raise RequestRefused("unknown request_type", str(request.request_type))
+    if request.door_state not in set(LiftRequestDoor):
+        raise RequestRefused("unknown door_state", str(request.door_state))
+    if request.request_type == AGV and not request.destination_floor:
+        raise RequestRefused("no destination_floor", f"{request.session_id} wants to go nowhere")
+    wish = Wish(request.request_type, request.destination_floor, request.door_state)
+    return Asked(request.session_id, wish, stamp, wall - stamp)
+
+
+def accept_state(state: LiftState, settings: Settings, wall: float) -> Shown:
+    """The event that a lift's state is."""
+    _check_lift(state.lift_name, settings)
+    return Shown(
+        session=state.session_id,
+        floor=state.current_floor,
+        destination=state.destination_floor,
+        door=state.door_state,
+        mode=state.current_mode,
+        floors=state.available_floors,
+    )
+
+
+def _check_lift(name: str, settings: Settings) -> None:
+    if not name:
+        raise RequestRefused("empty lift_name", "a lift needs a name")
+    if settings.lifts is not None and name not in settings.lifts:
+        raise RequestRefused("not ours", f"{name!r} is none of {', '.join(settings.lifts)}")
+
+
+def device_name(message: LiftRequest | LiftState) -> str:
+    """Which lift a message is about."""
+    return message.lift_name
+
+
+def stamped(message: LiftRequest, time: Time) -> LiftRequest:
+    """As it is sent at this time."""
+    return replace(message, request_time=time)
+
+
+def summary(report: SupervisorReport, now: float) -> Mapping[str, str]:
+    """What a person wants to read of one lift, in a line."""
+    word = "ending" if report.ending else "holder"
+    held = f"{report.holder} ({now - report.since:.0f} s)" if report.holder else "-"
+    waiting = ", ".join(f"{session} ({now - since:.0f} s)" for session, since in report.waiting)
+    return {"session": report.shown or "-", word: held, "waiting": waiting or "-"}

@@ -1,0 +1,72 @@
+"""What the log and the status file are told of one lift: who has it, who waits, what is wrong."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+from bridges.decision import Fault
+from bridges.lift_supervisor.memory import FLOWING_S, Limits, Memory
+
+OVERDUE_S: Final = 30.0
+"""What the lift has not done by then is worth a fault."""
+
+
+@dataclass(frozen=True, slots=True)
+class SupervisorReport:
+    """One lift, for the log and the status file. Times are monotonic seconds.
+
+    `holder`: whom we speak for, `since` when; `ending`: by sending END. `waiting`: the queue, with
+    the time of each first request. `read_at`: when the lift's last state came.
+    """
+
+    read_at: float | None
+    shown: str = ""
+    holder: str = ""
+    since: float = 0.0
+    ending: bool = False
+    waiting: tuple[tuple[str, float], ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+    def news(self) -> Any:
+        """What is worth a line in the log."""
+        return self.shown, self.holder, self.ending, tuple(session for session, _ in self.waiting)
+
+
+def report(memory: Memory, now: float, limits: Limits) -> SupervisorReport:
+    """As it is now."""
+    turn = memory.turn
+    waiting = tuple(
+        (claim.session, claim.since)
+        for claim in memory.claims
+        if turn is None or turn.ends or claim.session != turn.session
+    )
+    return SupervisorReport(
+        read_at=None if memory.shown is None else memory.shown_at,
+        shown=memory.session_shown,
+        holder=turn.session if turn else "",
+        since=turn.since if turn else 0.0,
+        ending=bool(turn and turn.ends),
+        waiting=waiting,
+        faults=tuple(fault for at, fault in alarms(memory, now, limits) if now >= at),
+    )
+
+
+def alarms(memory: Memory, now: float, limits: Limits) -> Iterator[tuple[float, Fault]]:
+    """Each fault that may come, and when it does if nothing changes."""
+    turn = memory.turn
+    if not memory.flows(now):
+        if turn or memory.claims:
+            yield memory.shown_at + FLOWING_S, Fault("LIFT_SILENT", "no LiftState comes")
+        return
+    if turn is None:
+        return
+    overdue_at = turn.since + OVERDUE_S
+    if turn.ends:
+        yield overdue_at, Fault("END_NOT_OBEYED", f"the lift does not release {turn.session}")
+        return
+    if not turn.seen and not memory.nobody_is_sent:
+        yield overdue_at, Fault("NOT_GRANTED", f"the lift does not take {turn.session}")
+    claim = memory.claim(turn.session)
+    assert claim is not None
+    silent_at = memory.gone_at(claim, now, limits.holder_alarm_s)
+    yield silent_at, Fault("HOLDER_SILENT", f"no request from {turn.session}")

@@ -1,0 +1,44 @@
+"""The lift supervisor's section of its YAML."""
+
+from collections.abc import Iterable
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from bridges.fields import Name, Seconds
+
+QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
+Patience = Annotated[float, Meta(ge=3, le=86400, extra={"unit": "s"})]
+
+
+class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the lift supervisor may decide by itself.
+
+    `lifts`: the lifts that it serves; every lift that it hears of when absent, as RMF's own does.
+    `quiet_start_s`: how long it only listens, so that a restart ends no ride; and how long a session
+    must be shown by a lift, with nobody asking for it, before it is ended.
+    `silent_after_s`: a requester without the lift that has been silent for so long has gone; fleet
+    adapters repeat themselves at every LiftState.
+    `holder_alarm_s`: a fault is shown when the holder has been silent for so long.
+    `holder_ttl_s`: then the session is ended. Off when absent: the robot may be in the car.
+    `clock_synchronised`: this clock and the fleet adapters' agree (NTP); only then is a request's age
+    judged. Without it only the order of each requester's own stamps is.
+    `max_request_age_s`: with `clock_synchronised`, older requests count only when repeated.
+    """
+
+    lifts: list[Name] | None = None
+    quiet_start_s: QuietStart = 3.0
+    silent_after_s: Patience = 10.0
+    holder_alarm_s: Patience = 60.0
+    holder_ttl_s: Patience | None = None
+    clock_synchronised: bool = False
+    max_request_age_s: Seconds = 10.0
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """An alarm comes before what it warns of."""
+        if self.holder_ttl_s is not None and self.holder_ttl_s <= self.holder_alarm_s:
+            text = f"must be more than 'holder_alarm_s' ({self.holder_alarm_s:g} s): alarm first"
+            yield ("holder_ttl_s",), text
+        if self.lifts == []:
+            yield ("lifts",), "is empty: name the lifts, or leave it out to serve every lift"
