@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench import idle, latency
+from bench import doors, idle, latency
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -24,12 +24,14 @@ def main() -> int:
             "machine": _machine(),
             "latency": latency.measure(Path(scratch)),
             "idle": idle.measure(Path(scratch)),
+            "doors": doors.measure(Path(scratch)),
         }
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "bench.json").write_text(json.dumps(figures, indent=2) + "\n")
     print(f"\n{figures['machine']}\n")
     latency.show(figures["latency"])
     idle.show(figures["idle"])
+    doors.show(figures["doors"])
     print(f"\nwritten to {RESULTS / 'bench.json'}")
     return 0
 

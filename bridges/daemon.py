@@ -17,7 +17,7 @@ from bridges import __version__
 from bridges.log import pairs
 from bridges.notify import notify, watchdog_s
 from bridges.rmf.choose import open_transport
-from bridges.runtime import RuntimeDirectory
+from bridges.runtime import KeptFile, RuntimeDirectory, state_file
 from bridges.service import OpenBus, open_bus, service
 from bridges.settings import Config
 from drivers import DriverError
@@ -51,7 +51,8 @@ class Daemon:
         self._transport = open_transport(config.rmf, node_name, localhost=localhost)
         if config.buses and not simulated:
             runtime.claim(config.text)  # before anything is: `outputs-off` goes by it
-        self._service = service(config, self._transport, open_bus)
+        kept = None if simulated else KeptFile(state_file(config.path))
+        self._service = service(config, self._transport, open_bus, kept)
         self._loops = self._service.loops
 
     def serve(self) -> int:

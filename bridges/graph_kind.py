@@ -42,6 +42,11 @@ class GraphKind:
     `decide`: the core; its `publish` leaves stamps to `stamped(message, time)`, at the time of sending.
     `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`: nothing
     worth remembering is left of this subject.
+
+    For a kind that speaks of all its subjects in one message: `together(memories)`, sent when it has
+    changed and each second. For one whose memory must outlive the daemon: `persist(memories)`, the
+    same bytes while nothing worth keeping has changed, and `restore(kept, settings, now)`, which
+    raises ValueError for bytes that are not that. What is kept is kept before it is told together.
     """
 
     name: str
@@ -58,3 +63,6 @@ class GraphKind:
     stamped: Callable[[Any, Time], Message]
     summary: Callable[[Any, float], Mapping[str, str]]
     idle: Callable[[Any, float], bool]
+    together: Callable[[Mapping[str, Any]], tuple[Topic[Any], Message]] | None = None
+    persist: Callable[[Mapping[str, Any]], bytes] | None = None
+    restore: Callable[[bytes, Any, float], Mapping[str, Any]] | None = None

@@ -7,10 +7,11 @@ then does it declare its publishers, so that a node that waits for another's end
 
 import logging
 import math
+import random
 import threading
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from bridges.decision import Fault, RequestRefused
 from bridges.graph_kind import GraphKind, MaySpeak, Woken
@@ -26,8 +27,22 @@ log = logging.getLogger(__name__)
 
 LOOK_EVERY_S = 0.25
 """How often to look who else is on the graph."""
+SPREAD_LEAST_S, SPREAD_MOST_S = 0.5, 3.0
+"""How much longer one listens that has met a rival: more than discovery takes, and never alike."""
 MAX_SUBJECTS = 1000
 """More lifts or doors than any site has: somebody makes names up."""
+
+TOGETHER_EVERY_S = 1.0
+TOGETHER_GAP_S = 0.1
+
+
+class Kept(Protocol):
+    """What outlives the daemon: one file, or nothing yet. `write` replaces it whole; both may raise
+    OSError."""
+
+    def read(self) -> bytes | None: ...
+
+    def write(self, kept: bytes) -> None: ...
 
 
 def _same(topic: Topic[Any]) -> Topic[Any]:
@@ -99,6 +114,7 @@ class GraphNode:
         transport: Transport,
         clock: Clock,
         named: Callable[[Topic[Any]], Topic[Any]] = _same,
+        kept: Kept | None = None,
     ) -> None:
         self.name = kind.name
         self.inbox = Inbox()
@@ -118,8 +134,14 @@ class GraphNode:
         self._rival_ends: list[Subscription] = []
         self._started_at = clock.monotonic()
         self._alone_since: float | None = None
+        self._spread_s = 0.0
         self._look_at = -math.inf
+        self._kept = kept
+        self._kept_bytes: bytes | None = None
+        self._told_together: Message | None = None
+        self._told_at = self._tell_at = -math.inf
         self._stopping = False
+        self._restore()
         self._thread = threading.Thread(target=self._run, name=f"graph-{kind.name}", daemon=True)
 
     def subscribe(self) -> None:
@@ -154,7 +176,11 @@ class GraphNode:
     @property
     def wake_at(self) -> float:
         """When the next round is due if nothing is heard."""
-        return min([self._look_at, *(subject.wake_at for subject in self.subjects.values())])
+        tells = self.may_speak and self._kind.together is not None
+        tell_at = self._tell_at if tells else math.inf
+        return min(
+            [self._look_at, tell_at, *(subject.wake_at for subject in self.subjects.values())]
+        )
 
     def round(self) -> None:
         """Take what was heard, wake whose time has come, send what they say."""
@@ -168,6 +194,7 @@ class GraphNode:
                 self._decide(subject, Woken())
             if subject.idle(now):
                 del self.subjects[subject.name]
+        self._keep_and_tell(now)
         self.scans += 1
 
     def status(self) -> Mapping[str, Any]:
@@ -207,7 +234,8 @@ class GraphNode:
             self._alone_since = None
         elif self._alone_since is None:
             self._alone_since = now
-        speak_at = math.inf if self._alone_since is None else self._alone_since + self._quiet_s
+        quiet_s = self._quiet_s + self._spread_s
+        speak_at = math.inf if self._alone_since is None else self._alone_since + quiet_s
         self._look_at = min(at for at in (now + LOOK_EVERY_S, speak_at) if at > now)
         self._set_may_speak(now >= speak_at)
 
@@ -219,19 +247,69 @@ class GraphNode:
         if rivals and not self.rivals:
             log.warning(pairs("passive", kind=self.name, reason="another node does the same"))
         elif self.rivals and not rivals:
-            log.info(pairs("other_node_gone", kind=self.name, speaks_in_s=self._quiet_s))
+            log.info(pairs("other_node_gone", kind=self.name))
 
     def _set_may_speak(self, yes: bool) -> None:
         if yes == self.may_speak:
             return
         if yes:
             for topic in self._kind.publishes:
-                if topic.name not in self._publishers:
-                    self._publishers[topic.name] = self._transport.publisher(self._named(topic))
+                self._publishers[topic.name] = self._transport.publisher(self._named(topic))
             log.info(pairs("active", kind=self.name))
+        else:
+            self._withdraw()
         self.may_speak = yes
         for subject in self.subjects.values():
             self._decide(subject, MaySpeak(yes))
+
+    def _restore(self) -> None:
+        """What was kept; a file that cannot be right is as good as none, and says so."""
+        if self._kept is None or self._kind.restore is None:
+            return
+        try:
+            kept = self._kept.read()
+            if kept is None:
+                return
+            found = self._kind.restore(kept, self._settings, self._started_at)
+        except (OSError, ValueError) as error:
+            log.error(pairs("not_restored", kind=self.name, reason=error))
+            return
+        self._kept_bytes = kept
+        for name, memory in found.items():
+            self._subject(name, memory)
+
+    def _keep_and_tell(self, now: float) -> None:
+        """Keep what must outlive us, then tell of all subjects together."""
+        memories = {name: subject.memory for name, subject in self.subjects.items()}
+        self._keep(memories)
+        if self._kind.together is None or not self.may_speak:
+            return
+        topic, message = self._kind.together(memories)
+        changed = message != self._told_together
+        self._tell_at = self._told_at + (TOGETHER_GAP_S if changed else TOGETHER_EVERY_S)
+        if now >= self._tell_at:
+            self._publish(topic, message)
+            self._told_together, self._told_at = message, now
+            self._tell_at = now + TOGETHER_EVERY_S
+
+    def _keep(self, memories: Mapping[str, Any]) -> None:
+        if self._kept is None or self._kind.persist is None:
+            return
+        kept = self._kind.persist(memories)
+        if kept == self._kept_bytes:
+            return
+        self._kept_bytes = kept
+        try:
+            self._kept.write(kept)
+        except OSError as error:
+            log.error(pairs("not_kept", kind=self.name, reason=error))
+
+    def _withdraw(self) -> None:
+        """Be no rival to the other. Two that began at once both do; one is back before the other."""
+        for publisher in self._publishers.values():
+            publisher.close()
+        self._publishers.clear()
+        self._spread_s = random.uniform(SPREAD_LEAST_S, SPREAD_MOST_S)
 
     def _receive(self, name: str, topic: Topic[Any], message: Any) -> None:
         try:
@@ -242,13 +320,14 @@ class GraphNode:
             return
         self._decide(subject, event)
 
-    def _subject(self, name: str) -> Subject:
+    def _subject(self, name: str, memory: Any = None) -> Subject:
         """What this message is about; it may be new to us."""
         if name in self.subjects:
             return self.subjects[name]
         if len(self.subjects) == MAX_SUBJECTS:
             raise RequestRefused("too many names", name)
         subject = Subject(name, self._kind, self._limits, self._started_at, self._clock)
+        subject.memory = subject.memory if memory is None else memory
         self.subjects[name] = subject
         self._decide(subject, MaySpeak(self.may_speak))
         return subject

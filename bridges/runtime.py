@@ -27,6 +27,37 @@ def directory(file: Path, given: str | None) -> Path:
     return Path(base) / "rmf-bridge" / file.stem
 
 
+def state_file(file: Path) -> Path:
+    """What outlives a daemon and a reboot: where systemd says, else the user's state directory."""
+    given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
+    base = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    return Path(given or Path(base) / "rmf-bridge" / file.stem).absolute() / "kept.json"
+
+
+class KeptFile:
+    """One file that is replaced whole and is on the disk before `write` returns."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def read(self) -> bytes | None:
+        """What was kept; None when nothing was. Raises OSError."""
+        try:
+            return self._path.read_bytes()
+        except FileNotFoundError:
+            return None
+
+    def write(self, kept: bytes) -> None:
+        """Replace it. Raises OSError, and then the old one stands."""
+        self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        new = self._path.with_suffix(".new")
+        with new.open("wb") as out:
+            out.write(kept)
+            out.flush()
+            os.fsync(out.fileno())
+        new.replace(self._path)
+
+
 def running_pid(path: Path) -> int | None:
     """The process id of the daemon that holds a runtime directory; None when none does."""
     try:

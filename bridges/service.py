@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from bridges.decision import OperatorReset
 from bridges.graph_kind import GraphKind
-from bridges.graph_node import GraphNode
+from bridges.graph_node import GraphNode, Kept
 from bridges.kind import Kind
 from bridges.log import pairs
 from bridges.loop import Loop
@@ -73,15 +73,20 @@ class Service(Protocol):
         """For the status file."""
 
 
-def service(config: Config, transport: Transport, open_bus: OpenBus) -> Service:
-    """What serves this YAML. Raises HalError when a bus cannot be opened."""
+def service(
+    config: Config, transport: Transport, open_bus: OpenBus, kept: Kept | None = None
+) -> Service:
+    """What serves this YAML. Raises HalError when a bus cannot be opened.
+
+    `kept`: where a kind that has to remembers across restarts; None to forget.
+    """
     kind: Kind | GraphKind = importlib.import_module(f"bridges.{config.kind}").KIND
 
     def named(topic: Topic[Any]) -> Topic[Any]:
         return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
     if isinstance(kind, GraphKind):
-        return GraphService(GraphNode(kind, config.section, transport, CLOCK, named))
+        return GraphService(GraphNode(kind, config.section, transport, CLOCK, named, kept))
     return Devices(config, kind, transport, open_bus, named)
 
 

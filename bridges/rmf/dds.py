@@ -97,7 +97,7 @@ class DdsTransport:
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             qos = _writer_qos(topic.publish, topic.type)
             writer = self._keep(DataWriter(self._participant, self._topic(topic), qos=qos))
-            publisher = _Publisher(topic, writer, self._thread)
+            publisher = _Publisher(topic, writer, self._thread, self._withdraw)
             self._watch(publisher, writer, DDSStatus.OfferedIncompatibleQos)
             self._node.add_writer(writer)
         return publisher
@@ -160,6 +160,17 @@ class DdsTransport:
         except DDSException as error:
             log.error(pairs("reader_lost", node=self.name, reason=error))
 
+    def _withdraw(self, publisher: "_Publisher[Any]", writer: Any) -> None:
+        """Take one writer off the graph; after close there is none left to take."""
+        with self._lock:
+            if self._closed or publisher not in self._ends:
+                return
+            self._ends = tuple(end for end in self._ends if end is not publisher)
+            self._waitset.detach(writer)
+            self._node.drop_writer(writer)
+            self._entities = [entity for entity in self._entities if entity is not writer]
+            writer.__del__()
+
     def _keep(self, entity: Any) -> Any:
         self._entities.append(entity)
         return entity
@@ -180,7 +191,14 @@ class DdsTransport:
 
 
 class _Publisher(Generic[M]):
-    def __init__(self, topic: Topic[M], writer: Any, reader_thread: threading.Thread) -> None:
+    def __init__(
+        self,
+        topic: Topic[M],
+        writer: Any,
+        reader_thread: threading.Thread,
+        withdraw: Callable[["_Publisher[Any]", Any], None],
+    ) -> None:
+        self._withdraw = withdraw
         self._topic = topic
         self._writer = writer
         self._reader_thread = reader_thread
@@ -201,6 +219,10 @@ class _Publisher(Generic[M]):
             return len(self._writer.get_matched_subscriptions())
         except DDSException:
             return 0
+
+    def close(self) -> None:
+        """Take this end off the graph."""
+        self._withdraw(self, self._writer)
 
     def log_misfits(self) -> None:
         """Say that a subscription of this topic cannot be served, when there is a new one."""

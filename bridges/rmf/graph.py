@@ -62,6 +62,11 @@ class NodeOnGraph:
         self._node.writer_gid_seq.append(_gid(writer))
         self.writer.write(self._info)
 
+    def drop_writer(self, writer: Any) -> None:
+        """Say that this writer is no longer there."""
+        self._node.writer_gid_seq.remove(_gid(writer))
+        self.writer.write(self._info)
+
 
 def _gid(entity: Any) -> Gid:
     return Gid(list(entity.guid.bytes))

@@ -86,6 +86,11 @@ class _Publisher(Generic[M]):
         open_here = self in self._network.publishers
         return sum(open_here and end.hears(self) for end in self._network.subscriptions)
 
+    def close(self) -> None:
+        """Take this end off the graph."""
+        if self in self._network.publishers:
+            self._network.publishers.remove(self)
+
 
 class _Subscription(Generic[M]):
     def __init__(

@@ -26,6 +26,9 @@ class Publisher(Protocol[M_contra]):
     def matched(self) -> int:
         """How many subscriptions, of any process, receive what is sent here."""
 
+    def close(self) -> None:
+        """Take this end off the graph at once; the node stays. May be called twice."""
+
 
 class Subscription(Protocol):
     """The receiving end of one topic."""

@@ -3,7 +3,14 @@ from pathlib import Path
 
 import pytest
 
-from bridges.runtime import AlreadyRunning, RuntimeDirectory, directory, running_pid
+from bridges.runtime import (
+    AlreadyRunning,
+    KeptFile,
+    RuntimeDirectory,
+    directory,
+    running_pid,
+    state_file,
+)
 
 
 def test_a_runtime_directory_has_one_daemon_at_a_time(tmp_path: Path) -> None:
@@ -56,3 +63,18 @@ def test_the_runtime_directory_is_as_given_else_systemds_else_the_users(
     assert directory(file, None) == Path("/run/user/7/rmf-bridge/lift")
     monkeypatch.delenv("XDG_RUNTIME_DIR")
     assert directory(file, None) == Path(f"/tmp/rmf-bridge-{os.getuid()}/rmf-bridge/lift")
+
+
+def test_what_must_outlive_the_daemon_is_replaced_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STATE_DIRECTORY", str(tmp_path / "var" / "doors"))
+    kept = KeptFile(state_file(Path("/etc/rmf-bridges/doors.yaml")))
+    assert kept.read() is None
+    kept.write(b"one")
+    kept.write(b"two")
+    assert kept.read() == b"two"
+    assert [path.name for path in (tmp_path / "var" / "doors").iterdir()] == ["kept.json"]
+    monkeypatch.delenv("STATE_DIRECTORY")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "home"))
+    assert state_file(Path("doors.yaml")) == tmp_path / "home/rmf-bridge/doors/kept.json"

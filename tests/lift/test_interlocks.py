@@ -89,7 +89,18 @@ def test_relays_say_when_they_will_have_rested() -> None:
     assert relays.changes_at(hold(), 4.0, rules) == 4.3
     assert relays.changes_at(call("L1"), 4.0, rules) == 60.0
     assert relays.changes_at(LiftOutputs(), 4.0, rules) == float("inf")
-    assert Relays(agv=Channel(None, 4.0)).changes_at(call("L1"), 4.0, rules) == 6.0
+    rested = Relays(agv=Channel(None, 4.0))
+    assert rested.changes_at(call("L1"), 4.0, rules) == 6.0
+    assert rested.changes_at(LiftOutputs(agv_request=True), 4.0, rules) == 6.0
+    rested = replace(rested, call=Channel(None, 4.9))
+    assert rested.changes_at(call("L1"), 5.0, rules) == 6.0
+    worn = Relays(agv=Channel(True, 4.0, (0.0, 5.0)), call=Channel(None, 5.0))
+    assert worn.changes_at(call("L1"), 6.0, rules) == 7.0
+
+
+def test_whoever_wants_a_call_and_a_door_command_at_once_gets_the_call() -> None:
+    both = LiftOutputs(agv_request=True, call="L1", hold_door=Side.FRONT)
+    assert driven(Relays(), [(0.0, both), (9.0, both)], limits()) == ["A L1", "A L1"]
 
 
 def test_a_lift_without_rests_still_changes_its_call_by_way_of_off() -> None:

@@ -135,7 +135,7 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_ends_nothing(
     rmf.supervisor.slots.clear()  # it has started, and the first it hears is a state of ours
     rmf.run(rmf.story.now + 20.0)
     ends = [request for request in rmf.requested if request.request_type == END]
-    assert len(ends) == (0 if adapters_first else 1)
+    assert len(ends) == 1
     assert rmf.story.edges == edges
     assert sessions(rmf.story) == ["", A]
     assert rmf.story.state == "AGV, open at L2, fleet/a to L2"

@@ -345,6 +345,18 @@ def test_a_session_that_the_lift_shows_goes_before_the_queue_if_its_robot_asks()
     assert desk.sent == [(0.0, "AGV b L1"), (0.5, "AGV a L3")]
 
 
+def test_who_has_had_the_lift_is_not_ended_for_a_short_silence_though_the_node_has_lost_it() -> (
+    None
+):
+    desk = Alone()
+    desk.shows("a", "L2")
+    desk.asks("a")
+    for second in range(1, 20):
+        desk.until(float(second))
+        desk.shows("", "L2")
+    assert {text for _, text in desk.sent} == {"AGV a L3"}
+
+
 def test_while_the_lift_shows_a_stranger_nobody_else_is_sent_to_it() -> None:
     desk = Alone()
     desk.asks("b")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from bridges.graph_kind import MaySpeak
+from bridges.lift_supervisor import core
 from bridges.lift_supervisor.memory import Asked, Claim, Limits, Wish
 from bridges.lift_supervisor.report import SupervisorReport
 from tests.lift_supervisor.alone import Alone
@@ -123,6 +124,10 @@ def test_beside_another_supervisor_it_falls_silent_and_goes_on_from_what_it_sees
     assert desk.sent == [(0.0, "AGV a L3"), (5.0, "AGV b L1")]
 
 
+def test_it_may_not_speak_before_it_is_told_so() -> None:
+    assert not core.initial("Lift1", 0.0).may_speak
+
+
 # --- stale requests ----------------------------------------------------------------------------
 
 
@@ -151,8 +156,10 @@ def test_with_synchronised_clocks_a_young_request_from_before_our_start_counts_a
     desk = Alone(Limits(clock_synchronised=True))
     desk.asks("a", "L3", aged=9.0)
     desk.asks("b", "L3", aged=11.0)
-    assert desk.sent == [(0.0, "AGV a L3")]
-    assert desk.refused == [(0.0, "stale request")]
+    desk.until(60.0)
+    desk.asks("a", "L1", aged=11.0)
+    assert [text for _, text in desk.sent] == ["AGV a L3", "END a"]
+    assert desk.refused == [(0.0, "stale request"), (60.0, "stale request")]
 
 
 def test_in_the_quiet_time_what_comes_from_the_future_is_not_believed() -> None:

@@ -221,6 +221,9 @@ class _End:
         """Others' publishers."""
         return len(self._node.world.publishers[self._topic.name] - {self._node.name})
 
+    def close(self) -> None:
+        self._node.world.publishers[self._topic.name].discard(self._node.name)
+
 
 class OurSupervisor:
     """Our supervisor, as the daemon serves it."""

@@ -1,0 +1,31 @@
+"""The door supervisor's section of its YAML."""
+
+from collections.abc import Iterable
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from bridges.fields import Name
+
+QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
+Patience = Annotated[float, Meta(ge=3, le=86400, extra={"unit": "s"})]
+
+
+class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the door supervisor may decide by itself: nothing but when to complain.
+
+    `doors`: the doors that it serves; every door that it hears of when absent, as RMF's own does.
+    `quiet_start_s`: how long it only listens, so that a restart closes nothing.
+    `open_alarm_s`: a fault is shown when one requester has held a door open for so long. The door
+    stays open: its robot may stand in the doorway.
+    """
+
+    doors: list[Name] | None = None
+    quiet_start_s: QuietStart = 3.0
+    open_alarm_s: Patience = 600.0
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """An empty list would serve nobody."""
+        if self.doors == []:
+            yield ("doors",), "is empty: name the doors, or leave it out to serve every door"

@@ -1,0 +1,129 @@
+"""The door supervisor as the daemon runs it, on the memory transport, in virtual time."""
+
+from typing import Any
+
+from bridges.door_supervisor import KIND
+from bridges.door_supervisor.settings import Settings
+from bridges.graph_node import GraphNode
+from bridges.node import Clock
+from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.stamps import stamp
+
+HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT
+
+
+class Kept:
+    """The state directory; `full`: nothing more can be written."""
+
+    def __init__(self) -> None:
+        self.kept: bytes | None = None
+        self.full = False
+
+    def read(self) -> bytes | None:
+        return self.kept
+
+    def write(self, kept: bytes) -> None:
+        if self.full:
+            raise OSError("no space left on device")
+        self.kept = kept
+
+
+class Graph:
+    """One network, our node on it, and everything that is heard of it: (s, words)."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.network = MemoryNetwork()
+        self.kept = Kept()
+        self.heard: list[tuple[float, str]] = []
+        self.rmf = MemoryTransport(self.network, "rmf")
+        self.rmf.subscribe(topics.DOOR_REQUESTS, self._request)
+        self.rmf.subscribe(HEARTBEAT, self._heartbeat)
+        self.adapter = self.rmf.publisher(topics.ADAPTER_DOOR_REQUESTS)
+        self.states = self.rmf.publisher(topics.DOOR_STATES)
+        self.starts()
+
+    def starts(self) -> None:
+        self.transport = MemoryTransport(self.network, "ours")
+        clock = Clock(lambda: self.now, lambda: 1e6 + self.now)
+        self.node = GraphNode(KIND, Settings(), self.transport, clock, kept=self.kept)
+        self.node.subscribe()
+
+    def asks(self, who: str, mode: int, door: str = "ward") -> None:
+        at = stamp(1e6 + self.now)
+        self.adapter.publish(d.DoorRequest(at, who, door, d.DoorMode(mode)))
+        self.node.round()
+
+    def shows(self, mode: int) -> None:
+        self.states.publish(d.DoorState(d.Time(), "ward", d.DoorMode(mode)))
+        self.node.round()
+
+    def until(self, at: float) -> None:
+        while self.node.wake_at <= at:
+            self.now = max(self.now, self.node.wake_at)
+            self.node.round()
+        self.now = at
+
+    def _request(self, request: Any) -> None:
+        word = d.DoorModeValue(request.requested_mode.value).name[5:]
+        self.heard.append((round(self.now, 3), f"{word} {request.door_name}"))
+
+    def _heartbeat(self, beat: Any) -> None:
+        doors = [
+            f"{s.door_name}:{','.join(h.requester_id for h in s.sessions)}"
+            for s in beat.all_sessions
+        ]
+        self.heard.append((round(self.now, 3), f"beat {' '.join(doors)}".strip()))
+
+
+def test_it_listens_for_the_quiet_start_then_speaks_and_beats_each_second() -> None:
+    graph = Graph()
+    graph.until(1.0)
+    graph.asks("a", 2)
+    graph.until(5.2)
+    graph.asks("b", 2, "lab")
+    graph.until(6.5)
+    assert graph.heard == [
+        (3.0, "OPEN ward"),
+        (3.0, "beat ward:a"),
+        (4.0, "beat ward:a"),
+        (5.0, "beat ward:a"),
+        (5.2, "OPEN lab"),
+        (5.2, "beat lab:b ward:a"),
+        (6.2, "beat lab:b ward:a"),
+    ]
+
+
+def test_a_restart_closes_nothing_and_the_next_heartbeat_lists_who_holds() -> None:
+    graph = Graph()
+    graph.until(4.0)
+    graph.asks("a", 2)
+    graph.until(20.0)
+    graph.transport.close()
+    graph.heard.clear()
+    graph.starts()
+    for quarter in range(80, 100):
+        graph.until(quarter / 4)
+        graph.shows(2)
+    assert graph.heard == [
+        (23.0, "OPEN ward"),
+        (23.0, "beat ward:a"),
+        (24.0, "OPEN ward"),
+        (24.0, "beat ward:a"),
+    ]
+
+
+def test_what_cannot_be_kept_is_still_told_and_what_was_spoilt_is_left_out() -> None:
+    graph = Graph()
+    graph.until(4.0)
+    graph.kept.full = True
+    graph.asks("a", 2)
+    assert graph.heard[-1] == (4.1, "beat ward:a") or graph.heard[-1][1] == "OPEN ward"
+    graph.until(4.2)
+    assert graph.heard[-1] == (4.1, "beat ward:a")
+    graph.kept.kept = b"\x00"
+    graph.transport.close()
+    graph.starts()
+    assert graph.node.subjects == {}
