@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench import doors, idle, latency
+from bench import doors, idle, latency, lifts
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -24,6 +24,7 @@ def main() -> int:
             "machine": _machine(),
             "latency": latency.measure(Path(scratch)),
             "idle": idle.measure(Path(scratch)),
+            "lifts": lifts.measure(Path(scratch)),
             "doors": doors.measure(Path(scratch)),
         }
     RESULTS.mkdir(exist_ok=True)
@@ -31,6 +32,7 @@ def main() -> int:
     print(f"\n{figures['machine']}\n")
     latency.show(figures["latency"])
     idle.show(figures["idle"])
+    lifts.show(figures["lifts"])
     doors.show(figures["doors"])
     print(f"\nwritten to {RESULTS / 'bench.json'}")
     return 0

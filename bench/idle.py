@@ -14,11 +14,11 @@ WATCHED_S = 10.0
 def measure(scratch: Path) -> dict[str, Any]:
     """One row for the bare node and for each shipped device."""
     rows = {
-        "bare node": _watch([sys.executable, "-m", "bench.bare", str(DOMAIN)], scratch / "b.log")
+        "bare node": watch([sys.executable, "-m", "bench.bare", str(DOMAIN)], scratch / "b.log")
     }
     for name in ("lift_dry_contact", "door_modbus", "charger_http"):
         command = daemon(ROOT / f"config/{name}.yaml", scratch / name, DOMAIN)
-        rows[name] = _watch(command, scratch / f"{name}.log")
+        rows[name] = watch(command, scratch / f"{name}.log")
     return rows
 
 
@@ -30,7 +30,7 @@ def show(figures: dict[str, Any]) -> None:
         print(f"{name:28}{size}{row['cpu_percent']:>8.2f}{row['ready_s']:>9.2f}")
 
 
-def _watch(command: list[str], log: Path) -> dict[str, float]:
+def watch(command: list[str], log: Path) -> dict[str, float]:
     started_at = time.monotonic()
     with running(command, log) as child:
         wait_for_log(log, "ready")

@@ -27,9 +27,9 @@ def measure(scratch: Path) -> dict[str, Any]:
     bare = _bare_round_trips(scratch)
     relay, state = _daemon_paths(scratch)
     return {
-        "bare round trip": _figures(bare, bare),
-        "LiftRequest to relay edge": _figures(relay, bare),
-        "input edge to LiftState": _figures(state, bare),
+        "bare round trip": figures(bare, bare),
+        "LiftRequest to relay edge": figures(relay, bare),
+        "input edge to LiftState": figures(state, bare),
     }
 
 
@@ -41,7 +41,7 @@ def show(figures: dict[str, Any]) -> None:
         print(f"{name:28}{row['p50_ms']:>9.3f}{row['p99_ms']:>9.3f}{ratios}")
 
 
-def _figures(seconds: list[float], bare: list[float]) -> dict[str, float]:
+def figures(seconds: list[float], bare: list[float]) -> dict[str, float]:
     p50, p99 = _percentiles(seconds)
     bare50, bare99 = _percentiles(bare)
     return {
@@ -58,7 +58,7 @@ def _percentiles(seconds: list[float]) -> tuple[float, float]:
     return cuts[49], cuts[98]
 
 
-class _Graph:
+class Graph:
     """This process's end: sends LiftRequests, and times the LiftStates that come."""
 
     def __init__(self) -> None:
@@ -97,7 +97,7 @@ def _bare_round_trips(scratch: Path) -> list[float]:
     log = scratch / "bare.log"
     with running([sys.executable, "-m", "bench.bare", str(DOMAIN)], log):
         wait_for_log(log, "ready")
-        graph = _Graph()
+        graph = Graph()
         times = []
         for i in range(WARM_UP + ROUNDS):
             sent_at = graph.send(str(i), LiftRequestType.REQUEST_AGV_MODE, "L1")
@@ -122,7 +122,7 @@ def _daemon_paths(scratch: Path) -> tuple[list[float], list[float]]:
     log, directory = scratch / "quick.log", scratch / "quick"
     with running(daemon(quick_lift(scratch), directory, DOMAIN), log):
         wait_for_log(log, "ready")
-        graph = _Graph()
+        graph = Graph()
         plant = PlantSocket(directory / "plant.sock")
         plant.say("follow")
         driver = PlantSocket(directory / "plant.sock")
@@ -134,7 +134,7 @@ def _daemon_paths(scratch: Path) -> tuple[list[float], list[float]]:
     return relay[WARM_UP:], state[WARM_UP:]
 
 
-def _to_relay(graph: _Graph, plant: PlantSocket) -> float:
+def _to_relay(graph: Graph, plant: PlantSocket) -> float:
     sent_at = graph.send("bench", LiftRequestType.REQUEST_AGV_MODE, "L1")
     took = plant.edge("agv_mode_request", True) - sent_at
     graph.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
@@ -143,7 +143,7 @@ def _to_relay(graph: _Graph, plant: PlantSocket) -> float:
     return took
 
 
-def _to_state(graph: _Graph, plant: PlantSocket, driver: PlantSocket) -> float:
+def _to_state(graph: Graph, plant: PlantSocket, driver: PlantSocket) -> float:
     emergency = LiftMode.MODE_EMERGENCY
     driver.say("press Lift1 code_blue on")
     edge_at = plant.edge("code_blue", True)

@@ -13,6 +13,7 @@ COMMANDS = {
     "schema": "print what may stand in a device YAML, as JSON Schema",
     "watch": "show lifts, doors and chargers live, as RMF sees them",
     "send": "send a request as RMF does, and wait for its effect",
+    "release": "end the session of whoever holds a lift",
     "reset": "tell a running daemon that its latched faults may clear",
     "outputs-off": "switch off every output of a device whose daemon is dead",
 }

@@ -65,6 +65,12 @@ class Wiring:
             else:
                 self._judge(wire, spot)
 
+    def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
+        """What the device has for itself where there are no wires: (place, path in its YAML)."""
+        for text, path in places:
+            user = f"{self._device} {'.'.join(path)}"
+            self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
+
     def parts(self, structs: Iterable[tuple[tuple[str, ...], Any]], spot: Spot) -> None:
         """Judge the wires of a device that is otherwise not in order, so that no table exists."""
         for path, struct in structs:

@@ -139,7 +139,8 @@ class DryContactDoor:
 
     def read(self) -> DoorSample:
         """Every contact, read now."""
-        return DoorSample(**self._points.read())
+        read = self._points.read().get
+        return DoorSample(read("opened"), read("closed"), read("obstruction"), read("fire"))
 
     def write(self, outputs: DoorOutputs) -> None:
         """The hold relay to this."""

@@ -21,8 +21,11 @@ SLOWNESS: Final = 5.0
 
 def build(name: str, settings: Any) -> "DoorPlant":
     """The door that these settings are wired to."""
-    from drivers.door_dry_contact import wires
+    from drivers import door_dry_contact, door_register
+    from hal_fakes.register_door import contacts
 
+    wired = door_dry_contact.wires
+    wires = contacts if isinstance(settings, door_register.Settings) else wired
     every_s = settings.pulse.every_s if settings.pulse else 0.0
     return DoorPlant(name, wires(settings), auto_close_s=max(AUTO_CLOSE_S, every_s))
 

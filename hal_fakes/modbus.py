@@ -1,5 +1,7 @@
 """The far side of a `modbus` bus: a real pymodbus TCP server on 127.0.0.1, as a gateway with units.
 
+A bus on a serial line has its own far side, `hal_fakes/modbus_rtu.py`.
+
 Each device's points are bits of its units, with the plant behind them; an address that nobody has
 answers exception 2, a unit that nobody has exception 11, as a gateway does. On command (`fail DEVICE
 unit|server MODE`) one unit, or the server with all of them, is
@@ -14,108 +16,46 @@ unit|server MODE`) one unit, or the server with all of them, is
 import asyncio
 import random
 import threading
-import time
 from collections.abc import Coroutine, Iterable, Mapping
-from typing import Any, Final, Literal
+from typing import Any, Final
 
-from pymodbus.constants import ExcCodes
-from pymodbus.exceptions import NoSuchIdException
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from drivers.hal.modbus_points import Point, Range, Table, canonical, parse
-from hal_fakes.plant import FailureMode, Plant
-from hal_fakes.wiring import Wiring, wirings
-
-Part = Literal["unit", "server"]
+from drivers.hal.modbus_points import canonical
+from hal_fakes.modbus_dead_man import DeadMan
+from hal_fakes.modbus_rtu import RtuLine
+from hal_fakes.modbus_units import FarSide, Units
+from hal_fakes.plant import Plant
+from hal_fakes.register_door import RegisterDoor
+from hal_fakes.wiring import devices_on, wirings
 
 LOOK_S: Final = 0.02
 """How soon a server that is told to be off is off."""
 READY_S: Final = 10.0
-TABLES: Final[dict[int, Table]] = {1: "coil", 2: "discrete input", 5: "coil", 15: "coil"}
-"""The functions that are served, and the table that each is about."""
 
 
-def serve(settings: Any, plants: Mapping[str, Plant], config: Any, bus_name: str) -> "ModbusServer":
-    """Serve the devices of this bus on a free port of 127.0.0.1."""
-    devices = wirings(config, bus_name, plants, canonical)
+def serve(
+    settings: Any, plants: Mapping[str, Plant], config: Any, bus_name: str
+) -> "ModbusServer | RtuLine":
+    """Serve the devices of this bus on a free port of 127.0.0.1, or on a line of their own."""
+    devices = far_sides(settings, plants, config, bus_name)
+    if settings.serial:
+        slow_s = (settings.retries + 1.2) * settings.timeout_s
+        return RtuLine(devices, settings.serial, slow_s)
     return ModbusServer(devices, slow_s=1.5 * settings.timeout_s)
 
 
-class Units:
-    """What pymodbus's server asks for and sets: the bits of all units. `slow_s`: a slow reply's delay.
-
-    Coils keep what was written; inputs are what the plants' contacts show.
-    """
-
-    def __init__(self, devices: Iterable[Wiring], slow_s: float) -> None:
-        self._slow_s = slow_s
-        self._at: dict[Point, tuple[Wiring, str]] = {}
-        self._plants: dict[int | None, list[Plant]] = {None: []}
-        for wiring in devices:
-            points = {parse(name): name for name in (*wiring.inputs, *wiring.outputs)}
-            self._at.update({point: (wiring, name) for point, name in points.items()})
-            for unit in (None, *{point.unit for point in points}):
-                self._plants.setdefault(unit, []).append(wiring.plant)
-        self._coils: dict[Point, bool] = {}
-        self._before: dict[Point, bool] = {}
-
-    def failure(self, part: Part, unit: int | None = None) -> FailureMode | None:
-        """How the server, or this unit, is told to fail."""
-        modes = (plant.failures.get(part) for plant in self._plants.get(unit, ()))
-        return next((mode for mode in modes if mode is not None), None)
-
-    async def async_getValues(
-        self, device_id: int, func_code: int, address: int, count: int = 1
-    ) -> list[bool] | ExcCodes:
-        """The bits of a read request, or of a write's echo."""
-        points = await self._points(device_id, func_code, address, count)
-        if isinstance(points, ExcCodes):
-            return points
-        return [self._bit(point) for point in points]
-
-    async def async_setValues(
-        self, device_id: int, func_code: int, address: int, values: list[bool]
-    ) -> ExcCodes | None:
-        """A write to coils."""
-        points = await self._points(device_id, func_code, address, len(values))
-        if isinstance(points, ExcCodes):
-            return points
-        for point, value in zip(points, values, strict=True):
-            wiring, name = self._at[point]
-            self._coils[point] = bool(value)
-            if name in wiring.outputs:
-                wiring.drive(name, bool(value), time.monotonic())
-        return None
-
-    async def _points(
-        self, unit: int, function: int, address: int, count: int
-    ) -> list[Point] | ExcCodes:
-        """The points that a request is about; or the exception, or the silence, that answers it."""
-        table = TABLES.get(function)
-        if table is None:
-            return ExcCodes.ILLEGAL_FUNCTION
-        failures = (self.failure("server"), self.failure("unit", unit))
-        if failures[0] == "stuck" or failures[1] == "off":
-            raise NoSuchIdException("silent")
-        if "slow" in failures:
-            await asyncio.sleep(self._slow_s)
-        if failures[1] == "wrong":
-            return ExcCodes.DEVICE_FAILURE
-        points = Range(unit, table, address, count).points()
-        if unit not in self._plants:
-            return ExcCodes.GATEWAY_NO_RESPONSE
-        if any(point not in self._at for point in points):
-            return ExcCodes.ILLEGAL_ADDRESS
-        return points
-
-    def _bit(self, point: Point) -> bool:
-        wiring, name = self._at[point]
-        if name not in wiring.inputs:
-            return self._coils.get(point, False)
-        if self.failure("unit", point.unit) != "stuck":
-            self._before[point] = wiring.levels(time.monotonic())[name]
-        return self._before.get(point, False)
+def far_sides(
+    settings: Any, plants: Mapping[str, Plant], config: Any, bus_name: str
+) -> list[FarSide]:
+    """What the units of this bus consist of."""
+    dog = settings.module_watchdog
+    dead_men = [DeadMan(unit) for unit in dog.units] if dog else []
+    if config.driver == "register":
+        on_bus = devices_on(config, bus_name).items()
+        return [*dead_men, *(RegisterDoor(plants[name], one) for name, one in on_bus)]
+    return [*dead_men, *wirings(config, bus_name, plants, canonical)]
 
 
 class ModbusServer:
@@ -124,7 +64,7 @@ class ModbusServer:
     `replace`: what must stand in the bus's settings instead.
     """
 
-    def __init__(self, devices: Iterable[Wiring], slow_s: float) -> None:
+    def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
         self._units = Units(devices, slow_s)
         self._noise = random.Random("modbus")
         self._port = 0
@@ -169,8 +109,9 @@ class ModbusServer:
         await asyncio.sleep(0)  # the connections close in the loop's next round
 
     async def _look(self) -> None:
-        """Be off while told so."""
+        """Be off while told so, and let watchdogs trip."""
         while True:
+            self._units.tick()
             off = self._units.failure("server") == "off"
             if off and self._server is not None:
                 await self._hang_up()

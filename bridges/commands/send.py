@@ -75,6 +75,16 @@ def _lift_arguments(parser: argparse.ArgumentParser) -> None:
     _common(parser, direct=True)
 
 
+def release_arguments(parser: argparse.ArgumentParser) -> None:
+    """A lift's END and nothing else, for `rmf-bridge release`."""
+    parser.add_argument("name", metavar="LIFT")
+    parser.add_argument(
+        "--session", default="", metavar="ID", help="only if this one holds it (whoever does)"
+    )
+    parser.set_defaults(kind="lift", end=True, floor=None, granted_only=False)
+    _common(parser, direct=True)
+
+
 def _door_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME")
     parser.add_argument("action", choices=("open", "close"))

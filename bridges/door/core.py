@@ -12,7 +12,7 @@ Rules:
 - Without a fresh reading the state is OFFLINE and the hold off; the latch is kept, and asserted
   again with the first good reading.
 - OPEN is what the contact of the fully open door says, and nothing else. Both contacts: UNKNOWN.
-  Neither: MOVING, and after `travel_s` UNKNOWN.
+  Neither: MOVING, and after `travel_s` UNKNOWN. A controller that does not say: UNKNOWN.
 - While somebody else publishes states under this door's name: OFFLINE and the hold off.
 
 Faults here describe, and change nothing that is driven: each lasts as long as its cause, so there is
@@ -166,14 +166,14 @@ def _hold(memory: DoorMemory, view: View, now: float, limits: DoorLimits) -> Doo
     if _released_by_fire(view, limits):
         memory = replace(memory, latched_at=None, close_at=None)
     held = view.fresh and not _rivalled(memory, now) and _wanted(memory, view, limits)
-    shut = view.seen and view.closed
+    shut = view.seen and view.closed and not view.lost
     return replace(
         memory,
         held=held,
         held_since=now if held != memory.held else memory.held_since,
         closing=(memory.closing or (memory.held and not held)) and not shut,
         between_since=_since(
-            memory.between_since, view.seen and not view.opened and not view.closed, now
+            memory.between_since, view.seen and not (view.opened or view.closed or view.lost), now
         ),
         shut_since=_since(memory.shut_since, view.seen and not view.opened, now),
     )
@@ -236,7 +236,9 @@ _PROOFS = {
 def _mode(memory: DoorMemory, view: View, now: float, limits: DoorLimits) -> DoorModeValue:
     if _rivalled(memory, now) or not view.fresh:
         return DoorModeValue.MODE_OFFLINE
-    if not view.seen or _released_by_fire(view, limits) or (view.opened and view.closed):
+    if not view.seen or _released_by_fire(view, limits):
+        return DoorModeValue.MODE_UNKNOWN
+    if view.lost or (view.opened and view.closed):
         return DoorModeValue.MODE_UNKNOWN
     if view.opened:
         return DoorModeValue.MODE_OPEN
@@ -273,6 +275,8 @@ def _hazards(memory: DoorMemory, view: View, limits: DoorLimits) -> Iterator[Fau
         yield Fault("FIRE_ALARM", f"the door is {done}")
     if memory.closing and memory.held and memory.latched_at is None and view.obstructed:
         yield Fault("DOOR_OBSTRUCTED", "held open after CLOSE while the doorway is not clear")
+    if view.errors:
+        yield Fault("DOOR_CONTROLLER_FAULT", "; ".join(view.errors))
 
 
 def _contradictions(
@@ -280,6 +284,8 @@ def _contradictions(
 ) -> Iterator[Fault]:
     if view.seen and view.opened and view.closed:
         yield Fault("DOOR_CONTACTS_CONTRADICT", "the door reads opened and closed")
+    if view.lost:
+        yield Fault("DOOR_POSITION_UNKNOWN", view.lost)
     if now >= _travel_ends_at(memory, limits):
         yield Fault("DOOR_TRAVEL_TIMEOUT", f"at neither limit for {limits.t.travel_s} s")
     if now >= _opening_ends_at(memory, limits):

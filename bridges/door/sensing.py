@@ -7,10 +7,11 @@ Rules:
   forgotten, because the door may have moved unseen.
 - A missing limit contact is estimated only when the YAML says so: from the time for which the relay
   is known to have been on or off. A failed reading or write starts that time again.
+- A controller that does not say where the door is (`lost`) is believed at once.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bridges.debounce import Settled, forget, settle
 from bridges.door.settings import DoorLimits
@@ -26,7 +27,10 @@ Contact = Settled[bool | None]
 
 @dataclass(frozen=True, slots=True)
 class Senses:
-    """Each contact (None: not read yet); when all were last read, and since when without a miss."""
+    """Each contact (None: not read yet); when all were last read, and since when without a miss.
+
+    `lost`, `errors`: the last reading's (`DoorSample`).
+    """
 
     opened: Contact | None = None
     closed: Contact | None = None
@@ -34,6 +38,8 @@ class Senses:
     fire: Contact | None = None
     read_at: float | None = None
     linked_since: float | None = None
+    lost: str = ""
+    errors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +48,7 @@ class View:
 
     `fresh`: they were read lately. `seen`: and each has lasted for its debounce, so that something
     can be said about where the door is. `estimated`: the ends that no contact proves.
-    `changes_at`: when this may differ though nothing happens (s).
+    `changes_at`: when this may differ though nothing happens (s). `lost`, `errors`: see DoorSample.
     """
 
     fresh: bool
@@ -53,6 +59,8 @@ class View:
     fire: bool
     estimated: frozenset[str]
     changes_at: float
+    lost: str = ""
+    errors: tuple[str, ...] = ()
 
 
 def take(senses: Senses, sample: DoorSample, now: float, limits: DoorLimits) -> Senses:
@@ -65,13 +73,25 @@ def take(senses: Senses, sample: DoorSample, now: float, limits: DoorLimits) -> 
         seen: bool | None = getattr(sample, signal)
         contacts[signal] = settle(before, seen, now, _hold_s(before, seen, signal, limits))
     linked_since = now if senses.linked_since is None else senses.linked_since
-    return Senses(**contacts, read_at=now, linked_since=linked_since)
+    return Senses(
+        **contacts,
+        read_at=now,
+        linked_since=linked_since,
+        lost=sample.lost,
+        errors=sample.errors,
+    )
 
 
 def miss(senses: Senses) -> Senses:
     """A reading or a write has failed: what was half seen must be seen again."""
-    contacts: dict[str, Contact | None] = {s: forget(getattr(senses, s)) for s in SIGNALS}
-    return Senses(**contacts, read_at=senses.read_at, linked_since=None)
+    return replace(
+        senses,
+        opened=forget(senses.opened),
+        closed=forget(senses.closed),
+        obstruction=forget(senses.obstruction),
+        fire=forget(senses.fire),
+        linked_since=None,
+    )
 
 
 def is_fresh(senses: Senses, now: float, limits: DoorLimits) -> bool:
@@ -94,6 +114,8 @@ def look(senses: Senses, held: bool, held_since: float, now: float, limits: Door
         fire=_feared(senses.fire),
         estimated=guessed,
         changes_at=min(_changes(senses, limits, now, opened_at, closed_at), default=NEVER),
+        lost=senses.lost,
+        errors=senses.errors,
     )
 
 

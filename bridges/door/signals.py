@@ -9,12 +9,16 @@ class DoorSample:
 
     `opened`, `closed`: the limit contacts of the fully open and the fully closed door.
     `obstruction`: somebody or something stands in the doorway. `fire`: the fire alarm's contact.
+    `lost`: why a controller that was asked has not said where the door is; "" when it has.
+    `errors`: what the controller itself says is wrong.
     """
 
     opened: bool | None = None
     closed: bool | None = None
     obstruction: bool | None = None
     fire: bool | None = None
+    lost: str = ""
+    errors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,7 +78,7 @@ class Ended:
 class Memory:
     """Everything that outlives a scan.
 
-    `io_fault`: what reading or writing last said, "" when all is well. `unwritten_since`: since when
+    `io_fault`: what reading or writing said that has just failed. `unwritten_since`: since when
     each scan's outputs could not be written; `write_failed`: those of the last scan.
     """
 
@@ -126,10 +126,9 @@ def decide(
 
 
 def published(memory: Memory, shown: LiftReport) -> Memory:
-    """The report is out: if it offered an open door at the destination, a robot may be inside."""
+    """The last report is out: if it offered an open door at the destination, a robot may be inside."""
     session = memory.session
-    offered = shown.open_at == shown.destination != "" and shown.session == (session and session.id)
-    if session is None or session.boarded or not offered:
+    if session is None or shown.open_at != session.destination:
         return memory
     return replace(memory, session=replace(session, boarded=True))
 
@@ -199,7 +198,7 @@ def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) ->
     return replace(
         memory,
         senses=take(memory.senses, sample, now, limits),
-        io_fault=memory.io_fault if memory.write_failed else "",
+        io_fault="",
         unwritten_since=memory.unwritten_since if memory.write_failed else None,
         write_failed=False,
     )

@@ -37,7 +37,7 @@ class Session:
     """Who holds the lift, what they asked, and how far we are with it.
 
     `boarded`: an open door at the destination has been published for this session: a robot may be
-    inside. `agv_seen`: AGV mode came on for our request. `arrived`: the car stood at the destination.
+    inside. `agv_seen`: AGV mode is on for our request. `arrived`: the car stood at the destination.
     `call_at`: when the present call began. `waiting`, `since`: what we wait for. `tries`: how often
     that has failed; `retry_at`: outputs stay off until then (inf: latched).
     """
@@ -174,7 +174,7 @@ def advance(
         session = replace(session, retry_at=None)
     if session.agv_seen and not agv_ok(view):
         return _trip(session, Fault("AGV_MODE_LOST", "AGV mode ended during the ride"), now)
-    session = replace(session, agv_seen=session.agv_seen or (requested and view.agv is True))
+    session = replace(session, agv_seen=requested and view.agv is True)
     session = _arrive(session, view, limits)
     if Hazard.OVERLOAD in view.hazards:
         return replace(session, call_at=None, waiting=None)

@@ -104,7 +104,7 @@ class View:
 
 def take(senses: Senses, sample: LiftSample, now: float, limits: LiftLimits) -> Senses:
     """Add one reading."""
-    if senses.read_at is not None and now >= stale_at(senses, limits):
+    if now >= stale_at(senses, limits):
         senses = Senses(position=replace(senses.position, moved_at=now))
     hold = limits.debounce_s
     code = settle(senses.code, (sample.level, sample.code_fault), now, hold("floor"))

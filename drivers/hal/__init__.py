@@ -32,3 +32,5 @@ class Bus:
 # A bus file whose bus has points also holds, at module level and without its vendor library:
 #   canonical(point: str) -> str            one spelling; ValueError says what to write instead
 #   wire_problems(wire: Wire) -> Iterable[str]   what cannot be right about this wire on this bus
+#
+# A bus file may also have `warnings(settings)`: (path, text) of what is legal but worth a look.

@@ -1,7 +1,7 @@
 """HTTP: one controller that answers requests, through requests.
 
 Every call has one deadline from the lookup of the name to the last byte of the body
-(`drivers/hal/http_wire.py`). The body is capped; proxies, redirects and compression are off. A kept
+(`drivers/hal/deadline.py`). The body is capped; proxies, redirects and compression are off. A kept
 connection that the server has closed is dialled again for a GET; a POST is sent on a new connection,
 and once, whatever becomes of it.
 """
@@ -20,7 +20,7 @@ import msgspec
 
 from bridges.fields import Name, Period
 from drivers.hal import Bus, HalError
-from drivers.hal.http_wire import Dialler, Resolve
+from drivers.hal.deadline import Dialler, Resolve
 
 if TYPE_CHECKING:
     from requests.adapters import HTTPAdapter

@@ -1,11 +1,12 @@
-"""Modbus TCP: the coils and discrete inputs of I/O modules, through pymodbus's synchronous client.
+"""Modbus: the coils and discrete inputs of I/O modules, over TCP or on a serial line (RTU).
 
 - A request has `timeout_s` from the lookup of the name to the last byte of the reply, and is tried
-  `retries` times more, on a new connection, so that a late reply or half a frame is never taken for
-  the answer to another question. Only reads and coil writes are sent: a repeat changes nothing.
-- A connection that cannot be made pauses the bus, a unit that fails pauses that unit, from 0.5 to
-  30 s; meanwhile calls fail at once with the same text. So a dead unit behind a gateway costs the
-  others `timeout_s` x (`retries` + 1) a pause, and no more.
+  `retries` times more. That a late reply or half a frame is never taken for the answer to another
+  question is the work of `modbus_wire.py` (TCP: new connections) and `modbus_rtu.py` (RTU: silence).
+  Only reads and coil writes are sent: a repeat changes nothing.
+- A connection or port that cannot be opened pauses the bus, a unit that fails pauses that unit, from
+  0.5 to 30 s; meanwhile calls fail at once with the same text. After a pause there is one try until the
+  unit answers again: a dead unit costs the others one `timeout_s` a pause, and no more.
 - Nothing is written before a first good reading. What is written is read back, and looked at again in
   each reading: a module that restarts with its coils off, or whose watchdog has tripped, is noticed.
 
@@ -16,15 +17,16 @@ own timeout below ours.
 import functools
 import math
 import random
-import re
 import time
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Final
 
 import msgspec
 
-from bridges.fields import Name, Period
+from bridges.fields import Period
 from drivers.hal import Bus, HalError
+from drivers.hal.backoff import Backoff
+from drivers.hal.modbus_places import Serial, Tcp
 from drivers.hal.modbus_points import (
     Point,
     Range,
@@ -35,19 +37,26 @@ from drivers.hal.modbus_points import (
     ranges,
     wire_problems,
 )
+from drivers.hal.modbus_rtu import Line
+from drivers.hal.modbus_watchdog import Guard, Watchdog, Watchdogs
 from drivers.hal.modbus_wire import BadReply, Call, Connection, NoReply, Unreachable
 from drivers.points import Pull
 
 if TYPE_CHECKING:
-    from pymodbus.client import ModbusTcpClient
+    from pymodbus.client.mixin import ModbusClientMixin
     from pymodbus.pdu import ModbusPDU
 
-__all__ = ["ModbusBus", "Settings", "canonical", "describe", "open_bus", "wire_problems"]
-
-BACKOFF_FIRST_S: Final = 0.5
-BACKOFF_MAX_S: Final = 30.0
-JITTER: Final = 0.2
-"""By how much of itself a pause may be shorter, so that many daemons do not call in step."""
+__all__ = [
+    "ModbusBus",
+    "Serial",
+    "Settings",
+    "Tcp",
+    "canonical",
+    "describe",
+    "open_bus",
+    "warnings",
+    "wire_problems",
+]
 
 READS: Final = {"coil": 1, "discrete input": 2}
 WRITE_COIL: Final = 5
@@ -71,24 +80,6 @@ EXCEPTIONS: Final = {
 Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 
 
-class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the module or gateway listens.
-
-    `host`: its address or name.
-    `port`: its TCP port.
-    """
-
-    host: Name
-    port: Annotated[int, msgspec.Meta(ge=1, le=65535)] = 502
-
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """What cannot be right about the address."""
-        if re.fullmatch(r"[^:]*:[0-9]+", self.host):
-            yield ("host",), "write the host alone; its port goes into port"
-        elif not re.fullmatch(r"[A-Za-z0-9_.:-]+", self.host):
-            yield ("host",), f"{self.host!r} is no host: write its address, 192.168.1.50 say"
-
-
 class Settings(
     msgspec.Struct,
     frozen=True,
@@ -97,18 +88,37 @@ class Settings(
     tag_field="type",
     tag="modbus",
 ):
-    """A module, or a gateway with several units.
+    """A module, or a gateway or serial line with several units: `tcp` or `serial`, one of the two.
 
-    `tcp`: where it listens.
+    `tcp`: where the module or gateway listens.
+    `serial`: the serial line (Modbus RTU).
     `timeout_s`: for one try of one request.
     `retries`: how many more tries a request gets.
     `scan_s`: how often every input is read.
+    `module_watchdog`: the modules' own dead-man switch for their outputs.
     """
 
-    tcp: Tcp
+    tcp: Tcp | None = None
+    serial: Serial | None = None
     timeout_s: Timeout = 0.3
     retries: Annotated[int, msgspec.Meta(ge=0, le=5)] = 1
     scan_s: Period = 0.1
+    module_watchdog: Watchdog | None = None
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """What the fields cannot say one by one."""
+        if self.tcp is None and self.serial is None:
+            yield (), "says not where the units are: write tcp: {host: …} or serial: {port: …}"
+        elif self.tcp and self.serial:
+            yield ("serial",), "a bus has tcp or serial: write a second bus for the other"
+
+
+def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+    """What is legal but worth a look: (path, text)."""
+    for path, text in settings.serial.warnings() if settings.serial else ():
+        yield ("serial", *path), text
+    for path, text in settings.module_watchdog.warnings() if settings.module_watchdog else ():
+        yield ("module_watchdog", *path), text
 
 
 def open_bus(settings: Settings) -> "ModbusBus":
@@ -124,41 +134,8 @@ class ModbusRefused(HalError):
         self.code = code
 
 
-class Backoff:
-    """Pauses after failures. `jitter()` is between 0 and 1."""
-
-    def __init__(self, clock: Callable[[], float], jitter: Callable[[], float]) -> None:
-        self._clock = clock
-        self._jitter = jitter
-        self._pause_s = 0.0
-        self._retry_at = -math.inf
-        self._failure = ""
-        self._insisted = False
-
-    def check(self) -> None:
-        """Raises HalError with the last failure's text while it is not time again."""
-        if self._clock() < self._retry_at:
-            raise HalError(self._failure)
-
-    def failed(self, text: str) -> HalError:
-        """Begin a pause, twice as long as the last."""
-        self._failure = text
-        self._pause_s = min(max(2 * self._pause_s, BACKOFF_FIRST_S), BACKOFF_MAX_S)
-        self._retry_at = self._clock() + self._pause_s * (1 - JITTER * self._jitter())
-        return HalError(text)
-
-    def mended(self) -> None:
-        """It works: the next pause will be short."""
-        self._pause_s, self._retry_at, self._insisted = 0.0, -math.inf, False
-
-    def insist(self) -> None:
-        """Try at once, whatever the pause; only once until it works again."""
-        if not self._insisted:
-            self._insisted, self._retry_at = True, -math.inf
-
-
 class ModbusBus(Bus):
-    """One TCP connection to a module or gateway (also a `drivers.points.PointsBus`).
+    """One TCP connection or serial line, and the units there (also a `drivers.points.PointsBus`).
 
     `clock` and `jitter` are a test's in place of the real ones.
     """
@@ -172,12 +149,11 @@ class ModbusBus(Bus):
         jitter: Callable[[], float] = random.random,
     ) -> None:
         self._settings = settings
-        tcp = settings.tcp
-        self._where = f"{tcp.host}:{tcp.port}"
-        self._connection = Connection(tcp.host, tcp.port, settings.timeout_s)
+        self._connection, self._where = _way(settings)
         self._backoff = functools.partial(Backoff, clock, jitter)
         self._link = self._backoff()
         self._units: dict[int, Backoff] = {}
+        self._watchdogs = Watchdogs(self, settings.module_watchdog, clock)
 
     def lines(
         self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]
@@ -189,26 +165,34 @@ class ModbusBus(Bus):
         """These bits, read now. Raises HalError."""
         function = READS[bits.table]
 
-        def call(client: "ModbusTcpClient") -> "ModbusPDU":
+        def call(client: "ModbusClientMixin[ModbusPDU]") -> "ModbusPDU":
             ask = client.read_coils if bits.table == "coil" else client.read_discrete_inputs
             reply = ask(bits.start, count=bits.count, device_id=bits.unit)
             if not reply.isError() and len(reply.bits) != 8 * math.ceil(bits.count / 8):
                 raise BadReply(f"{len(reply.bits)} bits for {bits.count}")
             return reply
 
-        reply = self._ask(bits.unit, function, f"read {bits}", call)
+        reply = self.ask(bits.unit, function, f"read {bits}", call)
         return dict(zip(bits.points(), reply.bits, strict=False))
 
     def write(self, coil: Point, level: bool) -> None:
         """Set this coil. Raises HalError; then it may be set or not."""
 
-        def call(client: "ModbusTcpClient") -> "ModbusPDU":
+        def call(client: "ModbusClientMixin[ModbusPDU]") -> "ModbusPDU":
             reply = client.write_coil(coil.address, level, device_id=coil.unit)
             if not reply.isError() and (reply.address, reply.bits) != (coil.address, [level]):
                 raise BadReply("the echo of another write")
             return reply
 
-        self._ask(coil.unit, WRITE_COIL, f"write coil {coil.address}", call)
+        self.ask(coil.unit, WRITE_COIL, f"write coil {coil.address}", call)
+
+    def guard(self, units: Iterable[int]) -> Guard:
+        """The modules' own watchdogs, for a device with outputs at these units."""
+        return self._watchdogs.guard(units)
+
+    def scanned(self) -> None:
+        """Keep the modules' watchdogs from tripping."""
+        self._watchdogs.scanned()
 
     def insist(self) -> None:
         """Try at once what is asked next, whatever the pauses: to switch off before the end."""
@@ -219,14 +203,17 @@ class ModbusBus(Bus):
         """Hang up."""
         self._connection.close()
 
-    def _ask(self, unit: int, function: int, what: str, call: Call) -> "ModbusPDU":
+    def ask(self, unit: int, function: int, what: str, call: Call) -> "ModbusPDU":
         """The unit's good answer to one request."""
         backoff = self._units.setdefault(unit, self._backoff())
         self._link.check()
-        backoff.check()
+        backoff.check(not_yet=backoff.probing and self._connection.owes(unit))
         text = f"modbus unit {unit} at {self._where}, {what}: "
         reason = ""
-        for _ in range(self._settings.retries + 1):
+        tries = 1 if backoff.probing else self._settings.retries + 1
+        if not backoff.insisting:
+            self._connection.begin(unit)
+        for _ in range(tries):
             try:
                 self._connection.connect()
                 reply = self._connection.ask(function, call)
@@ -237,10 +224,20 @@ class ModbusBus(Bus):
                 continue
             self._link.mended()
             if reply.isError():
+                self._watchdogs.refused(unit, reply.exception_code)
                 raise _refused(backoff, text, reply.exception_code)
             backoff.mended()
             return reply
-        raise backoff.failed(f"{text}{reason}, tried {self._settings.retries + 1}x")
+        raise backoff.failed(f"{text}{reason}, tried {tries}x")
+
+
+def _way(settings: Settings) -> tuple[Connection | Line, str]:
+    """How to reach the units, and where that is, for texts."""
+    if settings.serial:
+        return Line(settings.serial, settings.timeout_s), settings.serial.port
+    assert settings.tcp  # or `problems` has said so
+    host, port = settings.tcp.host, settings.tcp.port
+    return Connection(host, port, settings.timeout_s), f"{host}:{port}"
 
 
 def _refused(backoff: Backoff, text: str, code: int) -> HalError:
@@ -263,6 +260,7 @@ class ModbusLines:
         self._set: dict[Point, bool] = {}
         self._touched = False
         self._claimed = False
+        self._guard = bus.guard(coil.unit for coil in self._coils.values())
 
     def claim(self) -> None:
         """Read the coils, then switch each to its safe level, and see that it is.
@@ -272,6 +270,7 @@ class ModbusLines:
         A door that is held must not drop because one reply was lost.
         """
         self._set.clear()
+        self._guard.check()
         self.outputs()
         if not self._claimed:
             self.write(self._safe)
@@ -279,6 +278,7 @@ class ModbusLines:
 
     def read(self) -> dict[str, bool]:
         """Every input's level. Raises HalError, also when an output is not as it was written."""
+        self._see_watchdogs()
         image = self._read_all(self._ranges)
         self._verify(image)
         return {name: image[point] for name, point in self._inputs.items()}
@@ -308,6 +308,13 @@ class ModbusLines:
                 self._bus.write(coil, self._safe[name])
             except HalError:
                 continue  # the unit pauses now: its other coils cost no time
+
+    def _see_watchdogs(self) -> None:
+        try:
+            self._guard.check()
+        except HalError:
+            self._set.clear()
+            raise
 
     def _read_all(self, wanted: list[Range]) -> dict[Point, bool]:
         image: dict[Point, bool] = {}

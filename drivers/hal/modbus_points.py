@@ -12,7 +12,8 @@ from typing import Final, Literal
 
 from drivers.points import Wire
 
-Table = Literal["coil", "discrete input"]
+Table = Literal["coil", "discrete input", "holding register", "input register"]
+"""A point is in one of the first two; registers are for `modbus_registers.py`."""
 
 GAP_MAX: Final = 8
 """Addresses between two points that are rather read along than asked for in two requests."""

@@ -15,13 +15,15 @@ import struct
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from drivers.hal.http_wire import Deadline, Dialler, Resolve
+from drivers.hal.deadline import Deadline, Dialler, Resolve
+from drivers.hal.modbus_replies import register_replies
 
 if TYPE_CHECKING:
-    from pymodbus.client import ModbusTcpClient
+    from pymodbus.client.mixin import ModbusClientMixin
     from pymodbus.pdu import ModbusPDU
 
-Call = Callable[["ModbusTcpClient"], "ModbusPDU"]
+Call = Callable[["ModbusClientMixin[ModbusPDU]"], "ModbusPDU"]
+"""Asks one question of a client, and says BadReply when the reply does not answer it."""
 
 
 class Unreachable(Exception):
@@ -48,6 +50,13 @@ class Connection:
         self._client: Any = None
         self._last_number = 0
 
+    def owes(self, unit: int) -> bool:
+        """May this unit still answer an older question, so that a new one had better wait?"""
+        return False
+
+    def begin(self, unit: int) -> None:
+        """A new question comes. Replies have numbers here: no late one can be taken for another's."""
+
     def connect(self) -> None:
         """Have a connection; a try begins here. Raises Unreachable."""
         self._dialler.deadline.start(self._timeout_s)
@@ -64,7 +73,7 @@ class Connection:
             reply = call(self._client)
             if reply.function_code & 0x7F != function:
                 raise BadReply(f"function {reply.function_code} instead of {function}")
-        except _failures() as error:
+        except failures() as error:
             self.close()
             raise NoReply(self._reason(error)) from error
         return reply
@@ -99,7 +108,7 @@ class Connection:
 
 
 @functools.cache
-def _failures() -> tuple[type[Exception], ...]:
+def failures() -> tuple[type[Exception], ...]:
     """What a request can raise: pymodbus's own, the socket's, and what its decoders let through."""
     from pymodbus.exceptions import ModbusException
 
@@ -107,13 +116,9 @@ def _failures() -> tuple[type[Exception], ...]:
 
 
 @functools.cache
-def _client_class() -> Any:
-    """pymodbus's client on a connection of ours, with our deadline, and strict decoders."""
-    from pymodbus.client import ModbusTcpClient
-    from pymodbus.exceptions import ConnectionException
+def strict_replies() -> tuple[Any, ...]:
+    """pymodbus's replies, refusing what theirs let through: for `register` of a client or decoder."""
     from pymodbus.pdu.bit_message import ReadCoilsResponse, WriteSingleCoilResponse
-
-    logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # our HalErrors say it all
 
     class Bits(ReadCoilsResponse):
         def decode(self, data: bytes) -> None:
@@ -130,12 +135,22 @@ def _client_class() -> Any:
     class Inputs(Bits):
         function_code = 2
 
+    logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # our HalErrors say it all
+    return (Bits, Inputs, Echo, *register_replies())
+
+
+@functools.cache
+def _client_class() -> Any:
+    """pymodbus's client on a connection of ours, with our deadline, and strict decoders."""
+    from pymodbus.client import ModbusTcpClient
+    from pymodbus.exceptions import ConnectionException
+
     class Client(ModbusTcpClient):
         def __init__(self, connection: socket.socket, deadline: Deadline, number: int) -> None:
             super().__init__("", retries=0)
             self.transaction.next_tid = number  # a late reply must not match on a new connection
             self.socket = connection
-            for reply in (Bits, Inputs, Echo):
+            for reply in strict_replies():
                 self.register(reply)
             self._deadline = deadline
 

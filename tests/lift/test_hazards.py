@@ -174,6 +174,32 @@ def test_overload_keeps_the_door_and_only_delays() -> None:
     assert story.outputs == LiftOutputs(agv_request=True, call="L3")
 
 
+def test_the_time_of_an_overload_does_not_count_as_waiting() -> None:
+    story = Story(Building(CLOSED_AT_L1), floor_timeout_s=20, request_timeout_s=600)
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.run(15.0)
+    story.building.hazard(Hazard.OVERLOAD)
+    story.run(300.0)
+    story.building.hazard()
+    story.run(318.0)
+    assert story.faults == []
+    story.run(322.0)
+    assert story.faults == ["RUNTIME_LIMIT_EXCEEDED"]
+
+
+def test_a_car_that_a_hazard_has_left_between_floors_is_called_anew() -> None:
+    story = inside()
+    building = story.building
+    building.hazard(Hazard.CODE_BLUE)
+    building.set(level=None, motion=Motion.DOWN, door=Door.CLOSED)
+    story.run(4.0)
+    building.hazard()
+    building.set(motion=Motion.STOPPED)
+    story.run(7.0)
+    assert story.outputs == LiftOutputs(agv_request=True, call="L1")
+
+
 def test_an_overloaded_lift_is_not_offered_for_boarding() -> None:
     story = waiting()
     story.building.hazard(Hazard.OVERLOAD)

@@ -286,21 +286,22 @@ def test_a_pulsed_call_is_given_once_and_for_its_time() -> None:
     ]
 
 
-def test_a_car_that_has_drifted_from_its_destination_is_called_anew() -> None:
-    story = Story(Building(at("L1")))
+@pytest.mark.parametrize("pulse_s", [None, 0.5])
+def test_a_car_that_has_drifted_from_its_destination_is_called_anew(pulse_s: float | None) -> None:
+    story = Story(Building(at("L2")), call_pulse_s=pulse_s)
     story.run(1.0)
     story.asks("A", "L1")
+    story.building.set(level="L1", motion=Motion.DOWN)
+    story.run(1.2)
+    story.building.set(motion=Motion.STOPPED)
     story.run(2.0)
     story.building.set(level=None, motion=Motion.UP)
     story.run(3.0)
     story.building.set(level="L2", motion=Motion.STOPPED)
-    story.run(4.0)
-    assert story.edges == [
-        (1.0, "agv_request", True),
-        (1.0, "hold_door", "front"),
-        (2.1, "hold_door", None),
-        (3.13, "call", "L1"),
-    ]
+    story.run(3.3)
+    called = [(at_s, value) for at_s, name, value in story.edges if name == "call"]
+    assert called == [(1.0, "L1"), (called[1][0], None), (3.13, "L1")]
+    assert story.outputs == LiftOutputs(agv_request=True, call="L1")
 
 
 def test_without_an_agv_status_line_the_request_is_all_there_is_to_know() -> None:
@@ -352,6 +353,14 @@ def test_each_of_a_landings_two_floor_names_holds_and_shows_its_own_door() -> No
         (3.0, "hold_door", None),
         (3.5, "hold_door", "front"),
     ]
+
+
+def test_a_door_that_is_not_wired_is_never_open() -> None:
+    story = Story(Building(at("L2", Door.OPEN)), floors=TWO_DOORS)
+    story.run(1.0)
+    story.asks("A", "L2_rear")
+    story.run(3.0)
+    assert story.state == "AGV, moving at L2_rear, A to L2_rear"
 
 
 def test_without_a_session_either_door_is_the_door() -> None:

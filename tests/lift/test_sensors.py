@@ -262,6 +262,37 @@ def test_what_was_believed_before_the_readings_stopped_is_not_believed_after() -
     assert story.faults == []
 
 
+def test_a_code_that_cannot_be_right_does_not_become_right_by_a_loss_of_readings() -> None:
+    story = boarding()
+    story.building.set(level="L3")
+    story.run(3.0)
+    story.building.unreadable = "no answer"
+    story.run(6.0)
+    story.building.unreadable = ""
+    story.run(8.0)
+    assert story.faults == ["POSITION_LOST"]
+
+
+def test_a_car_that_nobody_looked_at_for_a_while_may_have_moved() -> None:
+    story = boarding()
+    story.run(9.0)
+    story.building.set(level="L3")
+    story.now = 19.0  # the loop has stalled
+    story.run(20.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
+
+
+def test_a_floor_that_was_reached_in_a_short_gap_is_believed() -> None:
+    story = boarding()
+    story.run(9.0)
+    story.building.unreadable = "timeout"
+    story.run(9.9)
+    story.building.unreadable = ""
+    story.building.set(level="L2")
+    story.run(11.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L2, A to L1")
+
+
 def test_half_a_glitch_before_a_gap_and_half_after_it_are_no_change() -> None:
     story = boarding(door=Door.CLOSED)
     story.building.set(door=Door.OPEN)
@@ -277,10 +308,13 @@ def test_half_a_glitch_before_a_gap_and_half_after_it_are_no_change() -> None:
 
 def test_an_input_that_never_keeps_still_is_not_believed() -> None:
     story = boarding()
+    story.building.unreadable = "timeout"
+    story.run(2.05)
+    story.building.unreadable = ""
     for i in range(100):
         story.building.set(level=("L1", "L2")[i % 2])
-        story.run(2.0 + 0.05 * (i + 1))
-    assert story.states[-1] == (4.18, "OFFLINE, moving at ?, A to L1")
+        story.run(2.05 + 0.05 * (i + 1))
+    assert story.states[-1] == (4.23, "OFFLINE, moving at ?, A to L1")
     assert story.outputs == LiftOutputs()
     assert story.node.status()["faults"] == [
         {"code": "INPUTS_NOT_FRESH", "detail": "not steady: floor"}

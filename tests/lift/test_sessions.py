@@ -165,6 +165,27 @@ def test_agv_mode_lost_in_the_grace_lets_the_door_go() -> None:
     assert story.edges[2:] == [(4.1, "hold_door", None), (7.0, "agv_request", False)]
 
 
+def test_a_car_that_stirs_in_the_grace_is_not_held_open() -> None:
+    story = boarded()
+    story.ends("A")
+    story.building.set(motion=Motion.UP)
+    story.run(6.0)
+    assert story.edges[2:] == [(4.1, "hold_door", None)]
+
+
+def test_agv_mode_that_ends_before_the_relay_has_rested_was_the_session_before() -> None:
+    story = Story(Building(OPEN_AT_L1), release_grace_s=0)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(2.0)
+    story.ends("A")
+    story.asks("B", "L1")
+    story.run(2.1)
+    story.building.set(agv=False)
+    story.run(3.0)
+    assert (story.faults, story.outputs) == ([], LiftOutputs(agv_request=True))
+
+
 def test_a_session_that_never_had_agv_mode_leaves_no_grace() -> None:
     story = Story()
     story.run(1.0)

@@ -218,9 +218,9 @@ def test_outputs_that_cannot_be_written_are_tried_again_and_soon_a_fault_with_al
     story = lift("L1", Door.OPEN, agv=True)
     story.run(5.0)
     story.building.unwritable = "no answer from the relay module"
-    story.run(5.5)
+    story.run(6.0)
     assert story.faults == []
-    story.run(7.0)
+    story.run(6.5)
     assert story.node.status()["faults"] == [
         {"code": "OUTPUTS_NOT_WRITTEN", "detail": "no answer from the relay module"}
     ]

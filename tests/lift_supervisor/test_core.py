@@ -297,6 +297,15 @@ def test_while_the_lift_is_silent_its_requesters_may_be() -> None:
     assert desk.waiting == []
 
 
+def test_a_lift_that_falls_silent_is_a_fault_to_those_who_wait_and_to_nobody_else() -> None:
+    desk = Alone()
+    desk.shows("", mode="FIRE")
+    desk.until(10.0)
+    assert desk.faults == []
+    desk.asks("a")
+    assert (desk.waiting, desk.faults) == (["a"], ["LIFT_SILENT"])
+
+
 def test_a_lift_that_was_never_heard_is_not_waited_for() -> None:
     desk = Alone()
     desk.asks("a")

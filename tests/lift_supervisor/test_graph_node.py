@@ -184,9 +184,13 @@ def test_faults_are_logged_when_they_come_and_when_they_go(
     site.until(10.0)
     site.lift.publish(state)
     site.node.round()
-    lines = [r.getMessage() for r in caplog.records if r.getMessage().startswith("fault")]
+    lines = [r.getMessage() for r in caplog.records if "Lift1" in r.getMessage()]
     assert lines == [
+        "state subject=Lift1 session=- holder=- waiting=-",
+        'state subject=Lift1 session=- holder="fleet/a (0 s)" waiting=-',
+        'state subject=Lift1 session=fleet/a holder="fleet/a (0 s)" waiting=-',
         'fault subject=Lift1 code=LIFT_SILENT detail="no LiftState comes"',
+        'state subject=Lift1 session=fleet/a holder="fleet/a (6 s)" waiting="fleet/b (0 s)"',
         "fault_over subject=Lift1 code=LIFT_SILENT",
     ]
 
@@ -236,6 +240,7 @@ def test_in_a_thread_it_serves_until_it_is_stopped(join: Callable[[str], Transpo
     kind = replace(KIND, quiet_s=lambda settings: 0.5)
     node = GraphNode(kind, Settings(), ours, Clock(time.monotonic, time.time))
     node.subscribe()
+    assert not node.ready
     node.start()
     wait_until(lambda: node.ready and node.rivals == 1, "the rival is seen")
     rival.close()

@@ -37,9 +37,9 @@ class LateTransport(MemoryTransport):
         super().__init__(network, name)
         self.ends: list[Late] = []
 
-    def subscribe(
+    def subscribe(  # type: ignore[override]
         self, topic: Topic[Any], received: Callable[[Any], None], *, others_only: bool = False
-    ) -> Late:  # type: ignore[override]
+    ) -> Late:
         self.ends.append(Late(super().subscribe(topic, received, others_only=others_only)))
         return self.ends[-1]
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.modbus.line import SerialModule
 from tests.modbus.module import Module, opened
 
 
@@ -11,6 +12,22 @@ from tests.modbus.module import Module, opened
 def module() -> Iterator[Module]:
     """A module that answers as the specification says."""
     started = Module()
+    yield started
+    started.close()
+
+
+@pytest.fixture(params=[Module, SerialModule], ids=["tcp", "rtu"])
+def either(request: pytest.FixtureRequest) -> Iterator[Module]:
+    """A module on TCP, and one on a serial line."""
+    started: Module = request.param()
+    yield started
+    started.close()
+
+
+@pytest.fixture
+def line() -> Iterator[SerialModule]:
+    """A module on a serial line."""
+    started = SerialModule()
     yield started
     started.close()
 

@@ -9,7 +9,10 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from drivers.hal.modbus import ModbusBus, Settings, Tcp
+import pytest
+
+from drivers.hal.modbus import ModbusBus, Serial, Settings, Tcp
+from drivers.points import HalError
 
 Reply = Callable[[bytes], bytes | None]
 """A request's bytes to what is sent; None hangs up."""
@@ -18,7 +21,7 @@ Reply = Callable[[bytes], bytes | None]
 class Module:
     """Units with coils and inputs behind one listening socket. `reply` may be replaced.
 
-    `hangs_up`: after each reply.
+    `hangs_up`: after each reply. `where`: how the bus's texts call it.
     """
 
     def __init__(self, reply: Reply | None = None) -> None:
@@ -29,9 +32,13 @@ class Module:
         self.units: set[int] = {1}
         self.coils: dict[tuple[int, int], bool] = {}
         self.inputs: dict[tuple[int, int], bool] = {}
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.port: int = self._listener.getsockname()[1]
         self._ends: list[socket.socket] = []
+        self._listen()
+
+    def _listen(self) -> None:
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port: int | str = self._listener.getsockname()[1]
+        self.where = f"127.0.0.1:{self.port}"
         self._threads = [self._started(self._accept)]
 
     def functions(self) -> list[int]:
@@ -101,6 +108,7 @@ class Module:
                     break
         with suppress(OSError):
             end.shutdown(socket.SHUT_RDWR)
+        end.close()
 
 
 def frame(request: bytes, pdu: bytes) -> bytes:
@@ -123,14 +131,43 @@ class Time:
         return self.now
 
 
+def door(module: Module, unit: int = 1) -> None:
+    """Give this unit a door's two inputs and one coil."""
+    module.units.add(unit)
+    module.inputs.update({(unit, 0): False, (unit, 1): True})
+    module.coils.update({(unit, 0): False})
+
+
+def fails(bus: ModbusBus, point: str) -> str:
+    """The text of the HalError that reading this point raises."""
+    with pytest.raises(HalError) as caught:
+        bus.lines({point: None}, {}).read()
+    return str(caught.value)
+
+
+def serial(port: str, ignore_echo: bool = False) -> Serial:
+    """A quick line."""
+    return Serial(port=port, baudrate=115200, parity="none", stopbits=1, ignore_echo=ignore_echo)
+
+
 opened: list[ModbusBus] = []
 """By `bus_to`; the conftest closes them after each test."""
 
 
 def bus_to(
-    port: int, clock: Time | None = None, *, timeout_s: float = 2.0, retries: int = 1
+    port: int | str,
+    clock: Time | None = None,
+    *,
+    timeout_s: float = 2.0,
+    retries: int = 1,
+    ignore_echo: bool = False,
 ) -> ModbusBus:
     """A bus to this port of this machine, whose pauses follow the clock and have no jitter."""
-    settings = Settings(tcp=Tcp(host="127.0.0.1", port=port), timeout_s=timeout_s, retries=retries)
+    settings = Settings(
+        tcp=Tcp(host="127.0.0.1", port=port) if isinstance(port, int) else None,
+        serial=serial(port, ignore_echo) if isinstance(port, str) else None,
+        timeout_s=timeout_s,
+        retries=retries,
+    )
     opened.append(ModbusBus(settings, clock or Time(), lambda: 0.0))
     return opened[-1]

@@ -1,5 +1,6 @@
-"""Whatever a module sends: HalErrors and nothing else, and never a door that is open by mistake."""
+"""Whatever a module sends, on TCP or on a line: only HalErrors, and no door open by mistake."""
 
+import itertools
 from collections.abc import Callable, Iterator
 
 import msgspec
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from bridges.door.signals import DoorOutputs
 from drivers import DriverError
 from drivers.door_dry_contact import DryContactDoor, Settings, create
+from tests.modbus.line import SerialModule, crc, rtu
 from tests.modbus.module import Module, Time, bits_reply, bus_to, frame
 
 DOOR = msgspec.convert(
@@ -106,5 +108,79 @@ def test_no_bytes_at_all_break_the_driver_or_open_the_door(
         assert opened is False or spoiled.may_be_open
         _attempt(lambda: door.write(DoorOutputs(hold_open=True)), clock)
     _attempt(door.make_safe, clock)
+    door.close()
+    bus.close()
+
+
+FRAMES = BYTES.map(lambda begin: begin[:30])
+LINE_SPOILS: st.SearchStrategy[Spoil] = st.one_of(
+    BYTES.map(lambda junk: lambda request, good: junk),
+    BYTES.map(lambda junk: lambda request, good: junk + good),
+    BYTES.map(lambda junk: lambda request, good: good + junk),
+    FRAMES.map(lambda frame: lambda request, good: frame + crc(frame)),
+    FRAMES.map(lambda rest: lambda request, good: request[:2] + rest + crc(request[:2] + rest)),
+    FRAMES.map(lambda rest: lambda request, good: request[:1] + rest + crc(request[:1] + rest)),
+    st.integers(0, 8).map(lambda kept: lambda request, good: good[:kept]),
+    st.tuples(st.integers(0, 20), st.integers(1, 255)).map(
+        lambda drawn: lambda request, good: _flipped(good, *drawn)
+    ),
+    st.just(lambda request, good: request + good),
+    st.just(lambda request, good: good),
+)
+SAYS_OPEN = [rtu(f"010201{bits:02x}") for bits in range(1, 256, 2)]
+
+
+@pytest.fixture(scope="module")
+def one_line() -> Iterator[SerialModule]:
+    line = SerialModule()
+    yield line
+    line.close()
+
+
+class SpoiledLine:
+    """Answers a door that is shut, spoiled in turn, over and over."""
+
+    def __init__(self, line: SerialModule, spoils: list[Spoil]) -> None:
+        line.inputs.update({(1, 0): False, (1, 1): True})
+        line.coils.update({(1, 0): False})
+        self._line = line
+        self._spoils = itertools.cycle(spoils)
+        self.may_be_open = False
+
+    def __call__(self, frame: bytes) -> bytes:
+        good = self._line.answer(b"\0\0\0\0\0\6" + frame[:-2])[6:]
+        sent = next(self._spoils)(frame, good + crc(good)) or b""
+        if frame[1] == 2 and any(reply in sent for reply in SAYS_OPEN):
+            self.may_be_open = True
+        return sent
+
+
+@settings(
+    derandomize=True,
+    deadline=None,
+    max_examples=150,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+@given(spoils=st.lists(LINE_SPOILS, min_size=1, max_size=5), ignore_echo=st.booleans())
+def test_no_bytes_on_a_line_break_the_driver_or_open_the_door(
+    one_line: SerialModule, spoils: list[Spoil], ignore_echo: bool
+) -> None:
+    spoiled = SpoiledLine(one_line, spoils)
+    one_line.on_wire = spoiled
+    clock = Time()
+    bus = bus_to(one_line.port, clock, timeout_s=0.01, retries=1, ignore_echo=ignore_echo)
+    door: DryContactDoor = create("door", DOOR, bus)
+
+    def step(work: Callable[[], object]) -> object:
+        while bus._connection.owes(1):
+            bus._connection.begin(1)
+        return _attempt(work, clock)
+
+    step(door.open)
+    for _ in range(2):
+        sample = step(door.read)
+        assert getattr(sample, "opened", False) is False or spoiled.may_be_open
+        step(lambda: door.write(DoorOutputs(hold_open=True)))
+    step(door.make_safe)
     door.close()
     bus.close()

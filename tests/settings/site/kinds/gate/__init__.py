@@ -15,6 +15,7 @@ KIND = Kind(
     states=cast(Any, None),
     requests={},
     device_name=_unused,
+    sender=lambda message: "",
     limits=_unused,
     initial=_unused,
     decide=_unused,

@@ -1,0 +1,20 @@
+"""`rmf-bridge release LIFT`: an operator ends the session of whoever holds a lift.
+
+It is `send lift LIFT --end` under the name that an operator looks for: the holder's END, to the lift
+supervisor, until the lift shows that it has been obeyed. A robot that goes on asking gets the lift back
+after those who wait.
+"""
+
+import argparse
+
+from bridges.commands import send
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The lift, and the options that every sender has."""
+    send.release_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """As `send`: 0 when the session was seen to end, 1 with the reason when not."""
+    return send.run(args)

@@ -1,0 +1,55 @@
+"""How a bus waits after failures: from 0.5 to 30 s, and never longer than it must."""
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from drivers.points import HalError
+
+BACKOFF_FIRST_S: Final = 0.5
+BACKOFF_MAX_S: Final = 30.0
+JITTER: Final = 0.2
+"""By how much of itself a pause may be shorter, so that many daemons do not call in step."""
+
+
+class Backoff:
+    """Pauses after failures. `jitter()` is between 0 and 1."""
+
+    def __init__(self, clock: Callable[[], float], jitter: Callable[[], float]) -> None:
+        self._clock = clock
+        self._jitter = jitter
+        self._pause_s = 0.0
+        self._retry_at = -math.inf
+        self._failure = ""
+        self._insisted = False
+
+    @property
+    def insisting(self) -> bool:
+        """Is the next attempt made whatever the pause?"""
+        return self._insisted
+
+    @property
+    def probing(self) -> bool:
+        """Is the next attempt only to see whether it works again?"""
+        return self._pause_s > 0 and not self._insisted
+
+    def check(self, not_yet: bool = False) -> None:
+        """Raises HalError with the last failure's text while it is not time again, or `not_yet`."""
+        if self._clock() < self._retry_at or not_yet:
+            raise HalError(self._failure)
+
+    def failed(self, text: str) -> HalError:
+        """Begin a pause, twice as long as the last."""
+        self._failure = text
+        self._pause_s = min(max(2 * self._pause_s, BACKOFF_FIRST_S), BACKOFF_MAX_S)
+        self._retry_at = self._clock() + self._pause_s * (1 - JITTER * self._jitter())
+        return HalError(text)
+
+    def mended(self) -> None:
+        """It works: the next pause will be short."""
+        self._pause_s, self._retry_at, self._insisted = 0.0, -math.inf, False
+
+    def insist(self) -> None:
+        """Try at once, whatever the pause; only once until it works again."""
+        if not self._insisted:
+            self._insisted, self._retry_at = True, -math.inf
