@@ -6,8 +6,12 @@ from bridges.lift.signals import Hazard
 from drivers.dry_contact.lift import LiftInput, LiftWiring
 from drivers.points import Output, Wire
 
-DEBOUNCE_S = {"floor": 0.08, "door": 0.03, "rear_door": 0.03, "motion": 0.05, "agv_mode": 0.05}
-"""What each group of signals must last by default; hazards and service codes HAZARD_DEBOUNCE_S."""
+DEBOUNCE_S = {"floor": 0.08, "door": 0.1, "rear_door": 0.1, "motion": 0.05, "agv_mode": 0.05}
+"""What each group of signals must last by default; hazards and service codes HAZARD_DEBOUNCE_S.
+
+A door that seems open for 50 ms while the car passes a floor is a glitch, and where no motion line is
+wired nothing else would tell.
+"""
 
 HAZARD_DEBOUNCE_S = 0.05
 MOTION = ("moving", "stopped", "up", "down", "motion")

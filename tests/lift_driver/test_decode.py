@@ -221,7 +221,7 @@ def test_states_of_the_service_code_are_debounced_as_its_lines_are() -> None:
         "fire_alarm": 0.4,
         "out_of_service": 0.4,
         "agv_mode": 0.4,
-        "door": 0.03,
+        "door": 0.1,
         "floor": 0.08,
     }
 
