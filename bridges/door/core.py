@@ -23,7 +23,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bridges.decision import Decision, Fault, IoFailed, OperatorReset, RivalSeen, Sampled
+from bridges.decision import (
+    Decision,
+    Fault,
+    IoFailed,
+    OperatorReset,
+    RivalSeen,
+    Sampled,
+    WriteFailed,
+)
 from bridges.door.sensing import NEVER, Senses, View, look, miss, take
 from bridges.door.settings import DoorLimits, Pulse
 from bridges.door.signals import DoorOutputs, DoorSample
@@ -119,6 +127,9 @@ def _hear(
         case Sampled(sample):
             senses = take(memory.senses, sample, now, limits)
             return replace(memory, senses=senses, io_failure=""), ""
+        case WriteFailed(reason):
+            senses = replace(memory.senses, linked_since=None)
+            return replace(memory, senses=senses, io_failure=reason), ""
         case IoFailed(reason):
             return replace(memory, senses=miss(memory.senses), io_failure=reason), ""
         case RivalSeen():
@@ -165,13 +176,16 @@ def _hold(memory: DoorMemory, view: View, now: float, limits: DoorLimits) -> Doo
     """Is the hold on? And what has to be remembered to decide it next time."""
     if _released_by_fire(view, limits):
         memory = replace(memory, latched_at=None, close_at=None)
-    held = view.fresh and not _rivalled(memory, now) and _wanted(memory, view, limits)
+    able = view.fresh and not _rivalled(memory, now)
+    wanted = able and _wanted(memory, view, limits)
     shut = view.seen and view.closed and not view.lost
+    closing = (memory.closing or (memory.held and not wanted)) and not shut
+    held = wanted or (able and closing and view.obstructed and not view.fire)
     return replace(
         memory,
         held=held,
         held_since=now if held != memory.held else memory.held_since,
-        closing=(memory.closing or (memory.held and not held)) and not shut,
+        closing=closing,
         between_since=_since(
             memory.between_since, view.seen and not (view.opened or view.closed or view.lost), now
         ),
@@ -182,7 +196,7 @@ def _hold(memory: DoorMemory, view: View, now: float, limits: DoorLimits) -> Doo
 def _wanted(memory: DoorMemory, view: View, limits: DoorLimits) -> bool:
     if view.fire:
         return limits.on_fire == "open"
-    return memory.latched_at is not None or (memory.closing and view.obstructed)
+    return memory.latched_at is not None
 
 
 def _since(before: float | None, is_so: bool, now: float) -> float | None:

@@ -1,0 +1,155 @@
+"""Every state within some steps of the start, and of each stage of a passage: what is true in all."""
+
+from dataclasses import replace
+
+import pytest
+
+from bridges.door.settings import DoorLimits, Pulse
+from tests.door.invariants import check, nothing_changes_before_wake_at
+from tests.door.virtual import DEBOUNCED
+from tests.door.walk import MOVES, Step, World, limits_of, moved, start, waited, walk
+
+SITES = {
+    "fire releases": limits_of(),
+    "fire holds open": limits_of(on_fire="open"),
+    "no contacts": limits_of({"open_delay_s": 4.0}, estimated=True),
+    "pulses": limits_of(pulse=Pulse(on_s=0.5, every_s=3.0)),
+    "debounced": limits_of(debounce=DEBOUNCED),
+}
+PLAIN = SITES["fire releases"]
+
+OPENING = ("between", 1.0, "A opens", 1.0)
+OPEN = (*OPENING, "at open", 1.0)
+LEFT = (*OPEN, "A closes", 4.0)
+STAGES: dict[str, tuple[str | float, ...]] = {
+    "shut": (1.0,),
+    "opening": OPENING,
+    "open": OPEN,
+    "in the grace": (*OPEN, "A closes", 1.0),
+    "let go": LEFT,
+    "somebody in the way": (*LEFT, "between", "obstruction", 1.0),
+    "fire": (*OPEN, "fire", 1.0),
+    "blind": (*OPEN, "bus lost or back", 64.0),
+    "rivalled": (*OPEN, "rival"),
+    "at neither end for long": (*OPENING, 16.0),
+}
+
+
+def unseen(step: Step) -> None:
+    """Not looked at."""
+
+
+def path(*steps: str | float, limits: DoorLimits = PLAIN) -> World:
+    """The state that these moves and waits lead to."""
+    world = start(limits)
+    for step in steps:
+        if isinstance(step, str):
+            world = moved(world, MOVES[step], limits, unseen)
+        else:
+            world = waited(world, step, limits, unseen)
+    return world
+
+
+class Scan:
+    """What one more scan says of a state: its last decision, checked."""
+
+    def __init__(self, world: World, limits: DoorLimits) -> None:
+        self._steps: list[Step] = []
+        moved(world, MOVES["reset"], limits, self._note)
+        report = self._steps[0].decision.report
+        self.mode = report.mode.name.removeprefix("MODE_")
+        self.hold = report.hold
+        self.codes = tuple(fault.code for fault in report.faults)
+
+    def _note(self, step: Step) -> None:
+        check(step)
+        self._steps.append(step)
+
+
+def test_the_stages_of_a_passage_are_what_they_are_called() -> None:
+    scans = {name: Scan(path(*steps), PLAIN) for name, steps in STAGES.items()}
+    assert {name: (scan.mode, scan.hold, *scan.codes) for name, scan in scans.items()} == {
+        "shut": ("CLOSED", False),
+        "opening": ("MOVING", True),
+        "open": ("OPEN", True),
+        "in the grace": ("OPEN", True),
+        "let go": ("OPEN", False),
+        "somebody in the way": ("MOVING", True, "DOOR_OBSTRUCTED"),
+        "fire": ("UNKNOWN", False, "FIRE_ALARM"),
+        "blind": ("OFFLINE", False, "COMMUNICATION_LOST", "DOOR_OPEN_TOO_LONG"),
+        "rivalled": ("OFFLINE", False, "TWO_NODES_FOR_ONE_DEVICE"),
+        "at neither end for long": (
+            "UNKNOWN",
+            True,
+            "DOOR_TRAVEL_TIMEOUT",
+            "DOOR_OPENING_FAULT",
+        ),
+    }
+
+
+def all_is_true_within(depth: int, roots: list[World], limits: DoorLimits) -> int:
+    """Checks every step and state; how many states."""
+    found = walk(roots, depth, limits, check)
+    for world in found:
+        nothing_changes_before_wake_at(world, limits)
+    return len(found)
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_every_state_within_three_steps_of_the_start(site: str) -> None:
+    limits = SITES[site]
+    assert all_is_true_within(3, [start(limits)], limits) > 500
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_every_state_within_three_steps_of_a_stage_of_a_passage(stage: str) -> None:
+    assert all_is_true_within(3, [path(*STAGES[stage])], PLAIN) > 500
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_every_state_within_two_steps_of_all_stages_at_each_kind_of_site(site: str) -> None:
+    limits = SITES[site]
+    roots = [path(*steps, limits=limits) for steps in STAGES.values()]
+    assert all_is_true_within(2, roots, limits) > 800
+
+
+def calm(world: World, limits: DoorLimits) -> World:
+    """The building mends itself: the door is shut, nobody is in it, nothing burns, all answer."""
+    world = replace(world, sample=start(limits).sample, readable=True, writable=True)
+    return waited(world, 6.0, limits, check)
+
+
+def then(world: World, limits: DoorLimits, *steps: str | float) -> World:
+    """After these moves and waits, each step of them checked."""
+    for step in steps:
+        if isinstance(step, str):
+            world = moved(world, MOVES[step], limits, check)
+        else:
+            world = waited(world, step, limits, check)
+    return world
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_from_every_state_a_sound_door_opens_when_asked_and_is_let_go_when_asked(
+    site: str,
+) -> None:
+    limits = SITES[site]
+    for world in walk([path(*steps, limits=limits) for steps in STAGES.values()], 1, limits, check):
+        sound = calm(world, limits)
+        wanted = then(sound, limits, "A opens", "at open", 5.0)
+        assert (Scan(wanted, limits).mode, Scan(wanted, limits).hold) == ("OPEN", True)
+        asked = then(wanted, limits, "A closes", 2.0)
+        assert Scan(asked, limits).hold
+        assert not Scan(then(asked, limits, 1.0), limits).hold
+        shut = then(asked, limits, 1.0, "at closed", 16.0)
+        assert (Scan(shut, limits).mode, Scan(shut, limits).hold) == ("CLOSED", False)
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_from_every_state_silence_never_lets_go_of_a_door_that_is_wanted_open(site: str) -> None:
+    limits = SITES[site]
+    for world in walk([path(*steps, limits=limits) for steps in STAGES.values()], 1, limits, check):
+        wanted = then(calm(world, limits), limits, "A opens", "at open", 200.0)
+        scan = Scan(wanted, limits)
+        assert (scan.mode, scan.hold) == ("OPEN", True)
+        assert scan.codes == ("DOOR_OPEN_TOO_LONG",)
