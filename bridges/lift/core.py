@@ -228,7 +228,7 @@ def _refresh(session: Session, asked: Asked, now: float) -> Session:
     """A repeat only says that RMF is still there; another destination or mode is a new request."""
     if (asked.agv, asked.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
-    return replace(_grant(asked, now, session.boarded), agv_seen=session.agv_seen)
+    return _grant(asked, now, session.boarded)
 
 
 def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tuple[Memory, str]:
@@ -238,7 +238,7 @@ def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tup
     if held.id != session_id:
         return memory, f"held by {held.id}"
     grace = None
-    if (memory.relays.agv.on or held.boarded) and limits.t.release_grace_s > 0:
+    if memory.relays.agv.on or held.boarded:
         grace = Grace(held, now + limits.t.release_grace_s)
     return replace(memory, session=None, grace=grace), ""
 
@@ -248,13 +248,13 @@ def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
     session = memory.session
     if session and session.fault:
         session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
-    view = look(memory.senses, now, limits)
-    may_burn = not view.fresh or Hazard.FIRE in view.hazards
+    # What is seen to burn latches again in this same decision; what cannot be seen may burn.
+    unseen = not look(memory.senses, now, limits).fresh
     return replace(
         memory,
         session=session,
-        fire_latched=may_burn and memory.fire_latched,
-        alarmed=may_burn and memory.alarmed,
+        fire_latched=unseen and memory.fire_latched,
+        alarmed=unseen and memory.alarmed,
         senses=trust(memory.senses),
     )
 

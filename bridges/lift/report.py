@@ -93,10 +93,9 @@ def _door(
     """The door to show, and whether it rests on an estimate."""
     if not view.fresh:
         return LiftDoor.DOOR_MOVING, False
-    sides = [view.front, view.rear] if view.rear else [view.front]
+    seen = [side for side in (view.front, view.rear) if side]
     if session and floor:
-        sides = [view.door(limits.side(floor))]
-    seen = [side for side in sides if side is not None]
+        seen = [view.door(limits.side(floor))]
     opened = [side for side in seen if side.open]
     if not opened:
         closed = all(side.closed for side in seen)

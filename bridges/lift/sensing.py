@@ -235,12 +235,12 @@ def _wired(seen: Settled[Door | None] | None) -> bool:
 
 def _door(seen: Settled[Door | None] | None, now: float, limits: LiftLimits) -> DoorSeen:
     value = seen.value if seen else None
-    if seen is None or value in (None, Door.BETWEEN, Door.BOTH):
-        return DoorSeen(open=False, closed=False)
     if value in (Door.OPEN, Door.CLOSED):
         return DoorSeen(open=value is Door.OPEN, closed=value is Door.CLOSED)
+    if seen is None or value not in (Door.NOT_OPEN, Door.NOT_CLOSED):
+        return DoorSeen(open=False, closed=False)
     there_at = seen.since + limits.t.door_travel_s
-    if seen.candidate != value or now < there_at:
+    if now < there_at:
         return DoorSeen(open=False, closed=False, settles_at=there_at)
     return DoorSeen(open=value is Door.NOT_CLOSED, closed=value is Door.NOT_OPEN, estimated=True)
 

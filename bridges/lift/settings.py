@@ -24,7 +24,8 @@ class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations and counts of a lift.
 
-    `stale_after_s`: without a good reading for this long the lift is OFFLINE and its outputs off.
+    `stale_after_s`: without a good reading, or without a good write, for this long the lift is
+    OFFLINE and its outputs off.
     `release_grace_s`: how long AGV mode and the door are still held after END, for the same session.
     `agv_timeout_s`, `floor_timeout_s`, `door_timeout_s`: AGV mode not granted, floor not reached,
     door not open: outputs off and a fault; tried again after 10, 30 and 60 s, then latched.
@@ -34,7 +35,7 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     `door_travel_s`: with one door contact, how long the door may take to its other end.
     `floor_travel_min_s`: the least time from one floor to the next; a faster jump is no position.
     `call_pulse_s`: a call is pulsed for so long; held until arrival when absent.
-    `dead_time_s`: between a call and a door command, and between two calls.
+    `dead_time_s`: between two calls, two doors' commands, and a call and a door command.
     `min_off_s`, `max_cycles_per_min`: spare the relays; they delay switching on, never off.
     """
 

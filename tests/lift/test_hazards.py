@@ -137,13 +137,40 @@ def test_a_hazard_that_only_flickers_is_none_and_one_that_flickers_off_stays() -
     assert story.outputs == HELD
     story.building.hazard(Hazard.FIRE)
     story.run(5.0)
-    for _ in range(3):
+    for _ in range(6):
         story.building.hazard()
         story.run(story.now + 0.9)
         story.building.hazard(Hazard.FIRE)
         story.run(story.now + 0.1)
     assert len(story.edges) == 4
-    assert story.state == "FIRE, closed at L1, A to L1"
+    assert (story.state, story.faults) == ("FIRE, closed at L1, A to L1", ["FIRE"])
+
+
+@pytest.mark.parametrize(("debounce_s", "clear_s"), [(0.05, 10.0), (10.0, 1.0)])
+def test_a_hazard_clears_after_the_longer_of_its_two_times(
+    debounce_s: float, clear_s: float
+) -> None:
+    building = Building(CLOSED_AT_L1)
+    building.hazard(Hazard.FIRE)
+    debounce: dict[str, float] = {Hazard.FIRE: debounce_s}
+    story = Story(building, debounce=debounce, hazard_clear_s=clear_s)
+    story.run(20.0)
+    building.hazard()
+    story.run(29.9)
+    assert story.faults == ["FIRE"]
+    story.run(30.1)
+    assert story.faults == []
+
+
+def test_a_reset_while_nothing_can_be_seen_makes_no_fire() -> None:
+    story = waiting(fire_reset="manual", alarm="fire_alarm_trigger")
+    story.building.unreadable = "no answer"
+    story.run(5.0)
+    story.resets()
+    assert story.faults == ["INPUTS_NOT_FRESH"]
+    story.building.unreadable = ""
+    story.run(7.0)
+    assert (story.faults, story.alarms) == ([], [])
 
 
 def test_fire_comes_before_every_other_mode() -> None:

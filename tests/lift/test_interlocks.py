@@ -143,6 +143,19 @@ def test_a_burst_of_changing_requests_wears_no_relay() -> None:
     assert 0 < len(ons) <= 5
 
 
+def test_a_reset_gives_no_second_pulse_where_nothing_was_wrong() -> None:
+    story = Story(Controller(), call_pulse_s=0.5)
+    story.run(1.0)
+    story.asks("A", "L4")
+    story.run(3.0)
+    story.resets()
+    story.run(5.0)
+    assert [edge for edge in story.edges if edge[1] == "call"] == [
+        (1.55, "call", "L4"),
+        (2.05, "call", None),
+    ]
+
+
 @pytest.mark.parametrize("pulse_s", [0.3, 1.0])
 def test_a_pulse_has_its_whole_width(pulse_s: float) -> None:
     story = Story(Controller(), call_pulse_s=pulse_s)

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from bridges.decision import Fault, Sampled
+from bridges.lift.core import Asked, Memory, decide
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.rmf.definitions import LiftMotion
 from bridges.rmf.stamps import in_seconds
@@ -121,7 +123,9 @@ def test_a_code_that_jumps_over_a_floor_is_no_position_until_it_comes_back() -> 
     story.building.set(level="L3")
     story.run(5.0)
     assert story.state == "AGV, moving at ?, A to L1"
-    assert story.faults == ["POSITION_LOST"]
+    assert story.node.status()["faults"] == [
+        {"code": "POSITION_LOST", "detail": "L3 cannot follow L1 like this"}
+    ]
     assert story.outputs == LiftOutputs(agv_request=True)
     story.building.set(level="L1")
     story.run(6.0)
@@ -136,6 +140,52 @@ def test_a_code_that_changes_while_the_car_stands_is_no_position() -> None:
     story.run(6.0)
     assert story.state == "AGV, moving at ?, A to L1"
     assert story.faults == ["POSITION_LOST"]
+
+
+def test_a_code_that_cannot_be_is_not_washed_clean_by_a_while_between_floors() -> None:
+    story = boarding()
+    story.building.set(level="L3")
+    story.run(3.0)
+    story.building.set(level=None, motion=Motion.UP)
+    story.run(6.0)
+    story.building.set(level="L3", motion=Motion.STOPPED)
+    story.run(7.0)
+    assert story.faults == ["POSITION_LOST"]
+
+
+def test_a_floor_once_doubted_is_believed_when_the_car_really_goes_there() -> None:
+    story = boarding()
+    story.building.set(level="L3")
+    story.run(3.0)
+    story.building.set(level="L1")
+    story.run(5.0)
+    story.building.set(level=None, motion=Motion.UP)
+    story.run(8.0)
+    story.building.set(level="L3", motion=Motion.STOPPED)
+    story.run(9.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
+
+
+def test_a_code_that_changes_long_after_the_car_has_stopped_is_no_position() -> None:
+    story = boarding()
+    story.building.set(motion=Motion.UP)
+    story.run(3.0)
+    story.building.set(motion=Motion.STOPPED)
+    story.run(5.5)
+    story.building.set(level="L2")
+    story.run(6.0)
+    assert story.faults == ["POSITION_LOST"]
+
+
+def test_a_slowly_debounced_code_still_belongs_to_the_movement_before_it() -> None:
+    building = Building(OPEN_AT_L1)
+    story = Story(building, debounce={"floor": 3.0})
+    story.run(5.0)
+    building.set(motion=Motion.UP)
+    story.run(6.0)
+    building.set(level="L2", motion=Motion.STOPPED)
+    story.run(12.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L2")
 
 
 def test_an_operator_who_resets_says_that_the_code_is_right() -> None:
@@ -268,6 +318,7 @@ def test_a_code_that_cannot_be_right_does_not_become_right_by_a_loss_of_readings
     story.run(3.0)
     story.building.unreadable = "no answer"
     story.run(6.0)
+    assert story.faults == ["INPUTS_NOT_FRESH"]
     story.building.unreadable = ""
     story.run(8.0)
     assert story.faults == ["POSITION_LOST"]
@@ -380,6 +431,32 @@ def test_one_contact_that_proves_closed_lets_an_open_door_be_estimated_and_marke
     assert story.node.status()["door"] == "open (estimated)"
 
 
+@pytest.mark.parametrize(
+    ("front", "rear", "shown"),
+    [
+        (Door.CLOSED, Door.CLOSED, "closed"),
+        (Door.CLOSED, Door.NOT_OPEN, "closed (estimated)"),
+        (Door.BETWEEN, Door.NOT_OPEN, "moving"),
+        (Door.OPEN, Door.NOT_OPEN, "open"),
+        (Door.OPEN, Door.NOT_CLOSED, "open"),
+        (Door.CLOSED, Door.NOT_CLOSED, "open (estimated)"),
+    ],
+)
+def test_of_two_doors_only_what_rests_on_an_estimate_is_marked(
+    front: Door, rear: Door, shown: str
+) -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=front, rear_door=rear)))
+    story.run(9.0)
+    assert story.node.status()["door"] == shown
+
+
+def test_an_estimated_door_that_is_not_offered_is_a_moving_one() -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_CLOSED, agv=False)))
+    story.run(9.0)
+    story.asks("A", "L1")
+    assert story.node.status()["door"] == "moving"
+
+
 def test_an_estimated_door_that_stirs_is_not_there() -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_CLOSED)), door_travel_s=4.0)
     story.run(6.0)
@@ -387,3 +464,26 @@ def test_an_estimated_door_that_stirs_is_not_there() -> None:
     story.building.set(door=Door.CLOSED)
     story._scan()
     assert story.node.status()["door"] == "moving"
+
+
+def test_the_core_says_when_an_input_that_was_seen_for_the_first_time_will_count() -> None:
+    rules = Story(Building(OPEN_AT_L1)).limits
+    before = decide(Memory(), Asked("A", True, "L1"), 0.0, rules)
+    assert [fault.detail for fault in before.report.faults] == ["not read yet"]
+    first = decide(before.memory, Sampled(OPEN_AT_L1), 10.0, rules)
+    assert first.wake_at == 10.0 + rules.debounce_s("door")
+
+
+def test_the_core_says_when_either_door_is_estimated_to_be_there() -> None:
+    rules = Story(Building(OPEN_AT_L1), debounce={}, door_travel_s=0.7).limits
+    for front, rear in ((Door.NOT_OPEN, Door.OPEN), (Door.OPEN, Door.NOT_CLOSED)):
+        sample = LiftSample("L1", front, rear_door=rear)
+        assert decide(Memory(), Sampled(sample), 10.0, rules).wake_at == 10.7
+
+
+def test_a_fault_is_news_and_its_words_are_not() -> None:
+    rules = Story(Building(OPEN_AT_L1), debounce={}).limits
+    first = decide(Memory(), Sampled(OPEN_AT_L1), 0.0, rules).report
+    lost = [replace(first, faults=(Fault("INPUTS_NOT_FRESH", f"timeout {i}"),)) for i in (1, 2)]
+    assert lost[0].news() == lost[1].news() != first.news()
+    assert replace(first, read_at=9.0).news() == first.news()

@@ -3,6 +3,7 @@
 import pytest
 
 from bridges.lift import KIND
+from bridges.lift.core import Asked, decide
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.rmf.definitions import LiftRequest, LiftState
 from tests.lift.story import HUMAN, Building, Controller, Story
@@ -82,6 +83,16 @@ def test_within_the_grace_nobody_else_is_granted_and_afterwards_anybody() -> Non
         (7.5, "agv_request", True),
         (7.5, "call", "L2"),
     ]
+
+
+def test_the_grace_ends_at_its_time_even_for_a_request_that_comes_before_the_scan() -> None:
+    story = boarded()
+    story.ends("A")
+    story.run(6.9)
+    memory, rules = story.node._memory, story.limits
+    assert decide(memory, Asked("B", True, "L2"), 6.99, rules).refused
+    granted = decide(memory, Asked("B", True, "L2"), 7.0, rules)
+    assert (granted.report.session, granted.memory.grace) == ("B", None)
 
 
 def test_a_second_end_does_not_prolong_the_grace() -> None:

@@ -1,0 +1,224 @@
+"""What a mutation run found that no story had told: texts, wake times, names, the edge of an age."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from bridges.decision import Fault, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.lift.core import Asked, Ended, Memory, decide
+from bridges.lift.limits import LiftLimits
+from bridges.lift.settings import Floor, LiftSettings, Limits
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+
+DEBOUNCE = {"floor": 0.08, "door": 0.03, "rear_door": 0.04, "agv_mode": 0.05, Hazard.FIRE: 0.06}
+AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+ASKED = Asked("A", True, "L1")
+
+
+class Told:
+    """A core alone, told one event after the other; `decision`: the last."""
+
+    def __init__(self, debounce: dict[str, float] | None = None, **limits: Any) -> None:
+        floors = {"L1": Floor(), "L2": Floor(side=Side.REAR), "L3": Floor()}
+        settings = LiftSettings(floors=floors, limits=Limits(**limits), fire_reset="manual")
+        self.limits = LiftLimits.of(settings, debounce or {})
+        self.memory = Memory()
+
+    def __call__(self, now: float, *events: Any) -> "Told":
+        for event in events:
+            event = Sampled(event) if isinstance(event, LiftSample) else event
+            self.decision = decide(self.memory, event, now, self.limits)
+            self.memory = self.decision.memory
+        return self
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        return self.decision.report.faults
+
+
+CLOSED = replace(AT_L1, door=Door.CLOSED)
+FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
+    "a fire that was": (
+        [(0.0, replace(AT_L1, hazards=frozenset({Hazard.FIRE}))), (0.5, AT_L1), (1.6, AT_L1)],
+        Fault("FIRE_LATCHED", "rmf-bridge reset when it is safe"),
+    ),
+    "another node": (
+        [(0.0, AT_L1), (0.1, RivalSeen())],
+        Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes this lift's states"),
+    ),
+    "a floor too far": (
+        [(0.0, AT_L1), (0.1, replace(AT_L1, level="L3"))],
+        Fault("POSITION_LOST", "L3 cannot follow L1 like this"),
+    ),
+    "a door that is both": (
+        [(0.0, replace(AT_L1, door=Door.BOTH))],
+        Fault("DOOR_CONTACTS_CONTRADICT", "door reads open and closed"),
+    ),
+    "a rear door that is both": (
+        [(0.0, replace(AT_L1, rear_door=Door.BOTH))],
+        Fault("DOOR_CONTACTS_CONTRADICT", "rear door reads open and closed"),
+    ),
+    "up and down at once": (
+        [(0.0, replace(AT_L1, motion=Motion.CONTRADICTORY))],
+        Fault("MOTION_CONTRADICTORY", "the motion lines cannot all be true"),
+    ),
+    "AGV mode that ends": (
+        [(0.0, AT_L1), (0.1, ASKED), (0.2, AT_L1), (0.3, replace(AT_L1, agv=False))],
+        Fault("AGV_MODE_LOST", "AGV mode ended during the ride"),
+    ),
+    "AGV mode that does not come": (
+        [(0.0, replace(AT_L1, agv=False)), (0.1, ASKED), (0.7, replace(AT_L1, agv=False))],
+        Fault("AGV_MODE_NOT_GRANTED", "no AGV mode status after 0.5 s"),
+    ),
+    "a car that does not come": (
+        [(0.0, AT_L1), (0.1, Asked("A", True, "L3")), (0.8, AT_L1)],
+        Fault("RUNTIME_LIMIT_EXCEEDED", "not at L3 after 0.6 s"),
+    ),
+    "a door that does not open": (
+        [(0.0, CLOSED), (0.1, ASKED), (0.9, CLOSED)],
+        Fault("DOOR_OPENING_FAULT", "not open at L1 after 0.7 s"),
+    ),
+    "too much in the car": (
+        [(0.0, replace(AT_L1, hazards=frozenset({Hazard.OVERLOAD})))],
+        Fault("OVERLOAD", "waits until the car is lighter"),
+    ),
+    "RMF that is silent": (
+        [(0.0, AT_L1), (0.1, ASKED), (30.2, AT_L1)],
+        Fault("RMF_SILENT", "no request from A"),
+    ),
+    "nothing read yet": ([(0.0, ASKED)], Fault("INPUTS_NOT_FRESH", "not read yet")),
+    "inputs that never keep still": (
+        [(0.1 * i, replace(AT_L1, agv=bool(i % 2), rear_door=(Door.OPEN, Door.CLOSED)[i % 2]))
+         for i in range(2, 30)],
+        Fault("INPUTS_NOT_FRESH", "not steady: rear_door, agv_mode"),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_a_fault_says_what_is_wrong(what: str) -> None:
+    happenings, fault = FAULTS[what]
+    debounce = {"rear_door": 0.5, "agv_mode": 0.5} if "still" in what else {}
+    told = Told(debounce, agv_timeout_s=0.5, floor_timeout_s=0.6, door_timeout_s=0.7)
+    if debounce:
+        settled = replace(AT_L1, rear_door=Door.CLOSED)
+        told(-0.5, settled)(0.0, settled)
+    for now, event in happenings:
+        told(now, event)
+    assert told.faults == (fault,)
+
+
+@pytest.mark.parametrize("event", [Ended("A"), IoFailed("timeout"), OperatorReset(), RivalSeen()])
+def test_what_is_no_request_is_not_refused(event: Any) -> None:
+    assert Told()(0.0, AT_L1, event).decision.refused == ""
+
+
+def test_at_the_very_end_of_its_age_a_reading_says_nothing_more() -> None:
+    burning = replace(AT_L1, door=Door.BOTH, hazards=frozenset({Hazard.EMERGENCY}))
+    told = Told(stale_after_s=2.0)(0.0, burning)(2.0, IoFailed("timeout"))
+    assert told.faults == (Fault("INPUTS_NOT_FRESH", "timeout"),)
+
+
+def test_each_input_has_its_own_debounce_and_the_core_wakes_when_it_is_over() -> None:
+    settled = replace(AT_L1, rear_door=Door.CLOSED)
+    for change, due_s in (
+        ({"level": "L2"}, 0.08),
+        ({"door": Door.CLOSED}, 0.03),
+        ({"rear_door": Door.OPEN}, 0.04),
+        ({"agv": False}, 0.05),
+        ({"hazards": frozenset({Hazard.FIRE})}, 0.06),
+    ):
+        told = Told(DEBOUNCE)(0.0, settled)(1.0 - 0.5, settled)(1.0, replace(settled, **change))
+        assert told.decision.wake_at == 1.0 + due_s
+
+
+def test_a_hazard_that_goes_wakes_the_core_when_it_is_gone() -> None:
+    burning = replace(AT_L1, hazards=frozenset({Hazard.EMERGENCY}))
+    told = Told(hazard_clear_s=0.7)(0.0, burning)(0.5, AT_L1)
+    assert told.decision.wake_at == 0.5 + 0.7
+
+
+@pytest.mark.parametrize("where", ["door", "rear_door"])
+def test_a_door_with_one_contact_wakes_the_core_when_it_has_come_to_its_other_end(
+    where: str,
+) -> None:
+    sample = replace(AT_L1, door=Door.CLOSED, rear_door=Door.CLOSED)
+    told = Told(door_travel_s=3.0, stale_after_s=60.0)(0.0, sample)
+    told(1.0, replace(sample, **{where: Door.NOT_CLOSED}))  # type: ignore[arg-type]
+    assert told.decision.wake_at == 4.0
+
+
+def test_rmfs_silence_and_the_next_try_wake_the_core() -> None:
+    told = Told(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED)
+    assert told.decision.wake_at == 31.0
+    told = Told(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
+    told(0.0, CLOSED)(1.0, ASKED)(5.0, CLOSED)
+    assert told.decision.outputs == LiftOutputs()
+    assert told.decision.wake_at == 15.0
+
+
+def test_a_short_grace_is_one_too() -> None:
+    told = Told(release_grace_s=0.5)(0.0, AT_L1)(0.1, ASKED)(1.0, AT_L1, Ended("A"))
+    assert told.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
+    assert told(1.5, AT_L1).decision.outputs == LiftOutputs()
+
+
+def test_in_the_instant_in_which_the_grace_ends_the_lift_is_anybodys() -> None:
+    told = Told(release_grace_s=2.0)(0.0, AT_L1)(0.1, ASKED)(1.0, Ended("A"))
+    told(2.9, AT_L1)
+    told(3.0, Asked("B", True, "L1"))
+    assert told.decision.refused == ""
+    assert told.decision.report.session == "B"
+
+
+def test_a_reset_believes_the_floor_that_is_shown_at_once() -> None:
+    told = Told()(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))
+    assert (told.decision.report.floor, told(0.1, OperatorReset()).decision.report.floor) == (
+        "",
+        "L3",
+    )
+
+
+def test_a_door_that_is_not_shown_open_is_no_estimate() -> None:
+    sample = replace(AT_L1, door=Door.NOT_CLOSED, motion=Motion.UP)
+    told = Told(door_travel_s=1.0, stale_after_s=60.0)(0.0, sample)(2.0, sample)
+    shown = told.decision.report
+    assert (shown.door.name, shown.estimated) == ("DOOR_MOVING", False)
+
+
+def test_a_floor_may_come_its_own_debounce_after_the_cars_last_movement() -> None:
+    moving = replace(AT_L1, motion=Motion.UP)
+    told = Told({"floor": 0.5}, stale_after_s=60.0)(0.0, moving)(1.0, moving)
+    told(1.1, AT_L1)(2.9, replace(AT_L1, level="L2"))(3.45, replace(AT_L1, level="L2"))
+    assert (told.decision.report.floor, told.faults) == ("L2", ())
+
+
+def test_a_request_that_finds_unwritten_outputs_is_judged_by_their_age() -> None:
+    told = Told(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
+    assert told(1.0, ASKED).decision.refused == ""
+    told = Told(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
+    told(1.9, AT_L1, WriteFailed("timeout"))
+    assert told(2.0, ASKED).decision.refused == "OUTPUTS_NOT_WRITTEN"
+
+
+def test_the_core_wakes_when_another_node_has_gone() -> None:
+    told = Told(stale_after_s=60.0)(0.0, AT_L1)(1.0, RivalSeen())
+    assert told.decision.wake_at == 6.0
+
+
+def test_the_core_wakes_when_its_first_reading_has_settled() -> None:
+    assert Told(DEBOUNCE)(1.0, AT_L1).decision.wake_at == 1.03
+
+
+def test_a_floor_that_was_no_position_once_is_one_when_the_car_really_goes_there() -> None:
+    told = Told(stale_after_s=60.0)(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))(0.2, AT_L1)
+    moving = replace(AT_L1, motion=Motion.UP)
+    for now, level in ((1.0, None), (2.0, "L2"), (3.0, None), (4.0, "L3")):
+        told(now, replace(moving, level=level))
+    assert (told.decision.report.floor, told.faults) == ("L3", ())
+
+
+def test_a_reading_in_the_instant_in_which_the_last_one_is_too_old_starts_afresh() -> None:
+    told = Told(DEBOUNCE)(0.0, AT_L1)(0.5, AT_L1)(1.5, AT_L1)
+    assert [fault.code for fault in told.faults] == ["INPUTS_NOT_FRESH"]
