@@ -4,15 +4,16 @@ Pure and in samples: no vendor option does this for us (gpiozero's own drops edg
 none), and the same rule serves GPIO pins and polled Modbus inputs.
 """
 
-from dataclasses import dataclass, replace
 from typing import Generic, TypeVar, cast
+
+import msgspec
+from msgspec.structs import replace
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 
 
-@dataclass(frozen=True, slots=True)
-class Settled(Generic[T_co]):
+class Settled(msgspec.Struct, Generic[T_co], frozen=True):
     """`value` is believed, and `candidate` has been seen since `since` (s).
 
     `steady_at`: when `value` last came to be believed; None: nothing is yet. `torn_since`: since

@@ -6,8 +6,9 @@ whole report afresh, so a repeated, lost or reordered event cannot leave a relay
 not be.
 """
 
-from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
+
+import msgspec
 
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
@@ -18,8 +19,7 @@ O = TypeVar("O")  # noqa: E741
 R = TypeVar("R", bound="Report")
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
+class Fault(msgspec.Struct, frozen=True):
     """One thing that is wrong, by a name that an engineer knows; `detail` says which and why."""
 
     code: str
@@ -29,32 +29,27 @@ class Fault:
         return f"{self.code}: {self.detail}" if self.detail else self.code
 
 
-@dataclass(frozen=True, slots=True)
-class Sampled(Generic[S]):
+class Sampled(msgspec.Struct, Generic[S], frozen=True):
     """The driver has read every input once; the reading is as old as `now` when it is decided."""
 
     sample: S
 
 
-@dataclass(frozen=True, slots=True)
-class IoFailed:
+class IoFailed(msgspec.Struct, frozen=True):
     """A read or a write did not succeed: the outputs are unknown and the inputs not fresh."""
 
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class WriteFailed(IoFailed):
+class WriteFailed(IoFailed, frozen=True):
     """The inputs were read, but not every output could be written. The next scan tries again."""
 
 
-@dataclass(frozen=True, slots=True)
-class RivalSeen:
+class RivalSeen(msgspec.Struct, frozen=True):
     """Somebody else publishes states under this device's name."""
 
 
-@dataclass(frozen=True, slots=True)
-class OperatorReset:
+class OperatorReset(msgspec.Struct, frozen=True):
     """`rmf-bridge reset`: latched faults may clear if their cause is gone."""
 
 
@@ -73,8 +68,7 @@ class Report(Protocol):
         """The part whose change is worth publishing at once: the report without its age."""
 
 
-@dataclass(frozen=True, slots=True)
-class Decision(Generic[M, O, R]):
+class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     """The result of one scan.
 
     `outputs`: the whole set, to be written as it is. `wake_at`: decide again by then at the latest

@@ -21,8 +21,10 @@ Rules, in the order in which they are applied:
 """
 
 import math
-from dataclasses import dataclass, replace
 from typing import Any
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.decision import (
     Decision,
@@ -58,8 +60,7 @@ NOT_RMFS = frozenset(
 """Hazards that take the lift away; overload only delays it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
+class Asked(msgspec.Struct, frozen=True):
     """A LiftRequest for AGV or HUMAN mode that is ours, well formed and for a floor we serve."""
 
     session_id: str
@@ -67,15 +68,13 @@ class Asked:
     destination: str
 
 
-@dataclass(frozen=True, slots=True)
-class Ended:
+class Ended(msgspec.Struct, frozen=True):
     """A LiftRequest for END_SESSION, whatever its other fields say."""
 
     session_id: str
 
 
-@dataclass(frozen=True, slots=True)
-class Memory:
+class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives a scan.
 
     `io_fault`: what reading or writing said that has just failed. `unwritten_since`: since when

@@ -18,8 +18,10 @@ Rules:
 """
 
 import math
-from dataclasses import dataclass, replace
 from typing import Generic, Literal, TypeVar
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.decision import Fault
 from bridges.lift.limits import LiftLimits
@@ -32,8 +34,7 @@ RETRY_AFTER_S = (10.0, 30.0, 60.0)
 Waiting = Literal["agv", "floor", "door"]
 
 
-@dataclass(frozen=True, slots=True)
-class Session:
+class Session(msgspec.Struct, frozen=True):
     """Who holds the lift, what they asked, and how far we are with it.
 
     `boarded`: an open door at the destination has been published for this session: a robot may be
@@ -57,16 +58,14 @@ class Session:
     fault: Fault | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Grace:
+class Grace(msgspec.Struct, frozen=True):
     """After END: whose return is awaited, with what may stay on meanwhile, until when."""
 
     session: Session
     until: float
 
 
-@dataclass(frozen=True, slots=True)
-class Channel(Generic[T]):
+class Channel(msgspec.Struct, Generic[T], frozen=True):
     """One output or one group of exclusive ones: what is on, since when off, recent switchings on."""
 
     on: T | None = None
@@ -95,8 +94,7 @@ class Channel(Generic[T]):
         return max(self.off_at + limits.t.min_off_s, ready_at, rested_at)
 
 
-@dataclass(frozen=True, slots=True)
-class Relays:
+class Relays(msgspec.Struct, frozen=True):
     """Every output with its history. A call and a door command exclude each other in time."""
 
     agv: Channel[bool] = Channel()

@@ -1,20 +1,20 @@
 """A lift's fixed facts as its core needs them: floors, doors, durations."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Literal
+
+import msgspec
 
 from bridges.lift.settings import LiftSettings, Limits
 from bridges.lift.signals import Side, Stop
 
 
-@dataclass(frozen=True, slots=True)
-class LiftLimits:
+class LiftLimits(msgspec.Struct, frozen=True):
     """`stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations."""
 
     stops: Mapping[str, Stop]
     t: Limits = Limits()
-    debounce: Mapping[str, float] = field(default_factory=dict)
+    debounce: Mapping[str, float] = {}
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
 

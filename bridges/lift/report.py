@@ -1,7 +1,8 @@
 """What RMF is told about a lift: LiftState's content, from what is believed and who holds it."""
 
-from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from bridges.decision import Fault
 from bridges.lift.drive import Session
@@ -14,8 +15,7 @@ OFFLINE = frozenset({"INPUTS_NOT_FRESH", "OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_O
 """Faults with which we can no longer speak for the lift."""
 
 
-@dataclass(frozen=True, slots=True)
-class LiftReport:
+class LiftReport(msgspec.Struct, frozen=True):
     """LiftState without its name, floors and stamp, and what the status file says beside it.
 
     `floor`: RMF's name, "" when unknown. `read_at`: monotonic seconds, None before the first reading.

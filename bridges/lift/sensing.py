@@ -15,8 +15,10 @@ Rules:
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.debounce import Settled, forget, settle
 from bridges.decision import Fault
@@ -33,8 +35,7 @@ RESTLESS_S = 2.0
 """An input that does not keep still for its debounce within this time is broken or torn about."""
 
 
-@dataclass(frozen=True, slots=True)
-class Position:
+class Position(msgspec.Struct, frozen=True):
     """`trusted`: the last floor that can be true, seen last at `seen_at`; `suspect`: one that can't.
 
     `moved_at`: when the car was last not seen standing.
@@ -46,8 +47,7 @@ class Position:
     moved_at: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Senses:
+class Senses(msgspec.Struct, frozen=True):
     """Every input with its debounce, since when it has been so, and when all were last read."""
 
     read_at: float | None = None
@@ -55,12 +55,11 @@ class Senses:
     doors: tuple[Settled[Door | None] | None, Settled[Door | None] | None] = (None, None)
     motion: Settled[Motion | None] | None = None
     agv: Settled[bool | None] | None = None
-    hazards: dict[Hazard, Settled[bool]] = field(default_factory=dict)
+    hazards: dict[Hazard, Settled[bool]] = {}
     position: Position = Position()
 
 
-@dataclass(frozen=True, slots=True)
-class DoorSeen:
+class DoorSeen(msgspec.Struct, frozen=True):
     """One door: is it open, is it closed (neither: moving), and is that an estimate?"""
 
     open: bool
@@ -69,8 +68,7 @@ class DoorSeen:
     settles_at: float = NEVER
 
 
-@dataclass(frozen=True, slots=True)
-class View:
+class View(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
     `blind`: why nothing can be believed, "" when all is fresh. `level`: the landing, None when
@@ -245,8 +243,7 @@ def _door(seen: Settled[Door | None] | None, now: float, limits: LiftLimits) -> 
     return DoorSeen(open=value is Door.NOT_CLOSED, closed=value is Door.NOT_OPEN, estimated=True)
 
 
-@dataclass(frozen=True, slots=True)
-class Unsettled:
+class Unsettled(msgspec.Struct, frozen=True):
     """An input that is just changing, or has never settled. Both times are s, -inf for long ago."""
 
     name: str

@@ -1,7 +1,8 @@
 """What a lift's driver tells its core, and what the core tells its driver: one scan's image."""
 
-from dataclasses import dataclass
 from enum import Enum, StrEnum
+
+import msgspec
 
 
 class Door(Enum):
@@ -41,8 +42,7 @@ class Hazard(StrEnum):
     OVERLOAD = "overload"
 
 
-@dataclass(frozen=True, slots=True)
-class LiftSample:
+class LiftSample(msgspec.Struct, frozen=True):
     """Every input of one lift, decoded but not debounced.
 
     `level`: the landing that the floor code names, None for no code (between floors).
@@ -66,16 +66,14 @@ class Side(Enum):
     REAR = "rear"
 
 
-@dataclass(frozen=True, slots=True)
-class Stop:
+class Stop(msgspec.Struct, frozen=True):
     """One of RMF's floors of this lift: the landing that the floor code names, and the car's door."""
 
     level: str
     side: Side = Side.FRONT
 
 
-@dataclass(frozen=True, slots=True)
-class LiftOutputs:
+class LiftOutputs(msgspec.Struct, frozen=True):
     """Every output of one lift. The default is all off.
 
     `call`: the level (landing) whose call is asserted. `hold_door`: the door whose open command is.

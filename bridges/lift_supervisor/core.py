@@ -23,8 +23,9 @@ until the lift's states show that it has been obeyed. Rules:
 """
 
 import math
-from dataclasses import replace
 from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.decision import Decision
 from bridges.graph_kind import MaySpeak

@@ -14,7 +14,9 @@ requester's clock, which need not be ours:
 """
 
 import math
-from dataclasses import dataclass, replace
+
+import msgspec
+from msgspec.structs import replace
 
 REPLAY_S = 1.0
 """A replay comes in a burst; a live requester repeats itself at 1 Hz."""
@@ -23,8 +25,7 @@ FUTURE_S = 2.0
 NEVER = -math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Rules:
+class Rules(msgspec.Struct, frozen=True):
     """`most_s`: how old a request may be by its stamp. `known_clocks`: a requester heard before may
     be by its own clock. `future_s`: how far ahead of us a stamp may be."""
 
@@ -33,8 +34,7 @@ class Rules:
     future_s: float = math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Voice:
+class Voice(msgspec.Struct, frozen=True):
     """What has been heard of one requester; stamps in seconds by its clock.
 
     `newest`, `newest_end`: of what counted. `doubted`: of what did not, of late, without a break since

@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Final
+
+import msgspec
 
 from bridges.graph_kind import MaySpeak, Woken
 from bridges.lift_supervisor.freshness import Voice
@@ -17,8 +18,7 @@ NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.M
 """Modes in which a lift is not RMF's to send robots to."""
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
+class Limits(msgspec.Struct, frozen=True):
     """The durations (s) that the site has set, and whether its clocks agree."""
 
     silent_after_s: float = 10.0
@@ -29,8 +29,7 @@ class Limits:
     max_request_age_s: float = 10.0
 
 
-@dataclass(frozen=True, slots=True)
-class Wish:
+class Wish(msgspec.Struct, frozen=True):
     """What a session asks of the lift, as LiftRequest has it."""
 
     request_type: int
@@ -38,8 +37,7 @@ class Wish:
     door: int
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
+class Asked(msgspec.Struct, frozen=True):
     """An adapter's request for AGV or HUMAN mode; `stamp` is its own (s), `age_s` by our clock."""
 
     session: str
@@ -48,8 +46,7 @@ class Asked:
     age_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Ended:
+class Ended(msgspec.Struct, frozen=True):
     """An adapter's, or an operator's, END_SESSION, whatever its other fields say."""
 
     session: str
@@ -57,8 +54,7 @@ class Ended:
     age_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Shown:
+class Shown(msgspec.Struct, frozen=True):
     """A LiftState."""
 
     session: str
@@ -81,8 +77,7 @@ class Shown:
 Event = Asked | Ended | Shown | MaySpeak | Woken
 
 
-@dataclass(frozen=True, slots=True)
-class Claim:
+class Claim(msgspec.Struct, frozen=True):
     """A session that wants the lift: what it last asked, since when it asks, and when it last did."""
 
     session: str
@@ -91,8 +86,7 @@ class Claim:
     heard_at: float
 
 
-@dataclass(frozen=True, slots=True)
-class Turn:
+class Turn(msgspec.Struct, frozen=True):
     """Whom we speak for. `ends`: its END is what we send. `seen`: the lift has shown the session."""
 
     session: str
@@ -101,8 +95,7 @@ class Turn:
     seen: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Memory:
+class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
     `claims`: in the order of first requests, the holder's among them. `heard_at`: when an adapter was
@@ -121,7 +114,7 @@ class Memory:
     session_since: float = -NEVER
     flowing_since: float = -NEVER
     heard_at: float = -NEVER
-    voices: Mapping[str, Voice] = field(default_factory=dict)
+    voices: Mapping[str, Voice] = {}
     sent: LiftRequest | None = None
     sent_at: float = -NEVER
     prompted: bool = False

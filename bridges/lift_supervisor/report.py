@@ -1,8 +1,9 @@
 """What the log and the status file are told of one lift: who has it, who waits, what is wrong."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Final
+
+import msgspec
 
 from bridges.decision import Fault
 from bridges.lift_supervisor.memory import FLOWING_S, Limits, Memory
@@ -11,8 +12,7 @@ OVERDUE_S: Final = 30.0
 """What the lift has not done by then is worth a fault."""
 
 
-@dataclass(frozen=True, slots=True)
-class SupervisorReport:
+class SupervisorReport(msgspec.Struct, frozen=True):
     """One lift, for the log and the status file. Times are monotonic seconds.
 
     `holder`: whom we speak for, `since` when; `ending`: by sending END. `waiting`: the queue, with

@@ -6,8 +6,9 @@ are lists of (s, what), so that a test can assert all that happened with ==.
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
+
+from msgspec.structs import replace
 
 from bridges.decision import OperatorReset
 from bridges.kind import Kind

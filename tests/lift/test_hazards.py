@@ -1,8 +1,7 @@
 """What takes the lift away from RMF, and how it comes back."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.lift.messages import alarm_topics
 from bridges.lift.settings import LiftSettings

@@ -1,8 +1,7 @@
 """Relays: what may never be on together, what rests between what, and that off never waits."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.lift.drive import Channel, Relays
 from bridges.lift.limits import LiftLimits

@@ -1,9 +1,9 @@
 """What a mutation run found that no story had told: texts, wake times, names, the edge of an age."""
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.decision import Fault, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from bridges.lift.core import Asked, Ended, Memory, decide
@@ -145,7 +145,7 @@ def test_a_door_with_one_contact_wakes_the_core_when_it_has_come_to_its_other_en
 ) -> None:
     sample = replace(AT_L1, door=Door.CLOSED, rear_door=Door.CLOSED)
     told = Told(door_travel_s=3.0, stale_after_s=60.0)(0.0, sample)
-    told(1.0, replace(sample, **{where: Door.NOT_CLOSED}))  # type: ignore[arg-type]
+    told(1.0, replace(sample, **{where: Door.NOT_CLOSED}))
     assert told.decision.wake_at == 4.0
 
 

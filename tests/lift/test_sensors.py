@@ -1,8 +1,7 @@
 """What is believed of the inputs: broken, contradictory, glitching, stale, restless, moving."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.decision import Fault, Sampled
 from bridges.lift.core import Asked, Memory, decide
@@ -16,7 +15,7 @@ OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
 
 def boarding(**inputs: object) -> Story:
     """A waits at L1, where the lift stands open, but for these inputs."""
-    story = Story(Building(replace(OPEN_AT_L1, **inputs)))  # type: ignore[arg-type]
+    story = Story(Building(replace(OPEN_AT_L1, **inputs)))
     story.run(1.0)
     story.asks("A", "L1")
     story.run(2.0)

@@ -1,7 +1,8 @@
 """The shipped wiring has no motion lines: its debounce alone must tell a glitch from a door."""
 
-from dataclasses import replace
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from bridges.lift.signals import Door
 from bridges.settings import load

@@ -1,10 +1,10 @@
 """Every state within some steps of the start, and of each stage of a ride: what is true in all."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import inf
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.lift.limits import LiftLimits
 from bridges.lift.signals import Door, LiftOutputs, Motion

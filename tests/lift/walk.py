@@ -5,9 +5,11 @@ are beyond every limit are made equal, so that states that cannot behave differe
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.debounce import Settled
 from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
@@ -32,8 +34,7 @@ def limits_of(debounce: dict[str, float] | None = None, **changes: Any) -> LiftL
     return LiftLimits.of(settings, debounce or {})
 
 
-@dataclass(frozen=True, slots=True)
-class World:
+class World(msgspec.Struct, frozen=True):
     """Memory at time 0, and the building: its inputs; whether it can be read, and written to."""
 
     memory: Memory
@@ -123,8 +124,7 @@ TIMES = (0.05, 1.0, 4.0, 15.0, 700.0)
 Seen = Callable[["Step"], None]
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(msgspec.Struct, frozen=True):
     """One decision, at time `now` after the state began. `exact`: no input is debounced."""
 
     before: Memory

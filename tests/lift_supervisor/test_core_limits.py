@@ -1,8 +1,7 @@
 """What holds the supervisor back: hazards, a quiet start, another supervisor, stale requests."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.graph_kind import MaySpeak
 from bridges.lift_supervisor import core
