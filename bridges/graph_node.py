@@ -280,6 +280,8 @@ class GraphNode:
 
     def _keep_and_tell(self, now: float) -> None:
         """Keep what must outlive us, then tell of all subjects together."""
+        if self._kind.persist is None and self._kind.together is None:
+            return
         memories = {name: subject.memory for name, subject in self.subjects.items()}
         self._keep(memories)
         if self._kind.together is None or not self.may_speak:
@@ -337,7 +339,7 @@ class GraphNode:
         for topic, message in publish:
             self._publish(topic, message)
         if refused:
-            self._refuse(refused, f"{subject.name}: {event}")
+            self._refuse(refused, subject.name, event)
 
     def _publish(self, topic: Topic[Any], message: Message) -> None:
         now = stamp(self._clock.wall())
@@ -346,11 +348,11 @@ class GraphNode:
         except TransportError as error:
             log.error(pairs("not_published", topic=topic.name, reason=error))
 
-    def _refuse(self, kind: str, detail: str) -> None:
+    def _refuse(self, kind: str, *detail: object) -> None:
         """Count it, and log the first of each kind."""
         self.refused[kind] += 1
         if self.refused[kind] == 1:
-            log.warning(pairs("refused", kind=kind, detail=detail))
+            log.warning(pairs("refused", kind=kind, detail=": ".join(map(str, detail))))
 
 
 def _ignore(message: Any) -> None:

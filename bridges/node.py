@@ -172,11 +172,11 @@ class Node:
         for topic, message in self._decision.publish:
             self._publish(topic, message)
         if self._decision.refused:
-            self._refuse(self._decision.refused, str(event))
+            self._refuse(self._decision.refused, event)
         if before is not None and before.outputs != self._decision.outputs:
             log.info(pairs("outputs", device=self.name, outputs=self._decision.outputs))
 
-    def _refuse(self, kind: str, detail: str) -> None:
+    def _refuse(self, kind: str, detail: object) -> None:
         """Count it, and log the first of each kind."""
         with self._counting:
             self.refused[kind] += 1

@@ -73,15 +73,16 @@ def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
     memory, refused = _take(memory, event, now, limits)
     memory = _forget_silent(memory, now, limits)
     memory = _take_turns(memory, now, limits)
-    due = now >= _due_at(memory)
     message = wanted(memory)
+    due = now >= _due_at(memory, message)
     if due:
         memory = replace(memory, sent=message, sent_at=now, prompted=False)
+    may_come = tuple(alarms(memory, now, limits))
     return Decision(
         memory,
         None,
-        report(memory, now, limits),
-        _wake_at(memory, now, limits),
+        report(memory, [fault for at, fault in may_come if now >= at]),
+        _wake_at(memory, [_due_at(memory, message), *(at for at, _ in may_come)], now, limits),
         refused,
         ((LIFT_REQUESTS, message),) if due and message else (),
     )
@@ -273,9 +274,9 @@ def wanted(memory: Memory) -> LiftRequest | None:
     )
 
 
-def _due_at(memory: Memory) -> float:
+def _due_at(memory: Memory, message: LiftRequest | None) -> float:
     """When to send it: at once if it is new, later if it is only worth repeating."""
-    message, sent = wanted(memory), memory.sent
+    sent = memory.sent
     if message is None:
         return NEVER
     if sent is None or (message != sent and message.request_type != END):
@@ -283,12 +284,11 @@ def _due_at(memory: Memory) -> float:
     return memory.sent_at + REPEAT_S if memory.prompted else NEVER
 
 
-def _wake_at(memory: Memory, now: float, limits: Limits) -> float:
-    """When time alone may change something."""
-    due = [_due_at(memory), *(at for at, _ in alarms(memory, now, limits))]
+def _wake_at(memory: Memory, due: list[float], now: float, limits: Limits) -> float:
+    """When time alone may change something: what is `due`, or the end of somebody's silence."""
     if memory.shown is not None and memory.flows(now):
         due.append(math.nextafter(memory.shown_at + FLOWING_S, NEVER))
     for claim in memory.claims:
         due.append(memory.gone_at(claim, now, limits.silent_after_s))
         due.append(memory.gone_at(claim, now, limits.holder_ttl_s))
-    return min((at for at in due if at > now), default=NEVER)
+    return min([at for at in due if at > now], default=NEVER)

@@ -121,7 +121,10 @@ class Memory(msgspec.Struct, frozen=True):
 
     def claim(self, session: str) -> Claim | None:
         """This session's."""
-        return next((claim for claim in self.claims if claim.session == session), None)
+        for claim in self.claims:
+            if claim.session == session:
+                return claim
+        return None
 
     @property
     def session_shown(self) -> str:

@@ -1,6 +1,6 @@
 """What the log and the status file are told of one lift: who has it, who waits, what is wrong."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 import msgspec
@@ -32,8 +32,8 @@ class SupervisorReport(msgspec.Struct, frozen=True):
         return self.shown, self.holder, self.ending, tuple(session for session, _ in self.waiting)
 
 
-def report(memory: Memory, now: float, limits: Limits) -> SupervisorReport:
-    """As it is now."""
+def report(memory: Memory, faults: Iterable[Fault]) -> SupervisorReport:
+    """As it is now, with what is wrong."""
     turn = memory.turn
     waiting = tuple(
         (claim.session, claim.since)
@@ -47,7 +47,7 @@ def report(memory: Memory, now: float, limits: Limits) -> SupervisorReport:
         since=turn.since if turn else 0.0,
         ending=bool(turn and turn.ends),
         waiting=waiting,
-        faults=tuple(fault for at, fault in alarms(memory, now, limits) if now >= at),
+        faults=tuple(faults),
     )
 
 

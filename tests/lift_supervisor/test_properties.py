@@ -117,12 +117,14 @@ class Watched:
         self.memory = memory
         self.now = now
         self.limits = limits
+        self.wake_at = float("inf")
 
     def hears(self, event: Any) -> str:
         """One decision; what was sent, or ""."""
         before = self.memory
         decided = core.decide(before, event, self.now, self.limits)
         self.memory = memory = decided.memory
+        self.wake_at = decided.wake_at
         assert decided.wake_at > self.now
         assert len(decided.publish) <= 1
         assert len({claim.session for claim in memory.claims}) == len(memory.claims)
@@ -212,19 +214,13 @@ def histories(draw: st.DrawFn) -> list[tuple[float, int]]:
 @example([(0.0, 8), (0.0, 0), (0.05, 2), (0.0, 4), (0.1, 1)])
 def test_long_histories_keep_the_rules_too(history: list[tuple[float, int]]) -> None:
     desk = Watched(core.initial("Lift1", 0.0), 0.0)
-    wake_at = desk.now
     for gap, number in history:
         until = desk.now + gap
-        while (wake_at := _wake_at(desk)) <= until:
-            desk.now = wake_at
+        while desk.wake_at <= until:
+            desk.now = desk.wake_at
             desk.hears(Woken())
         desk.now = until
         desk.hears(events_at(desk.now)[number])
-
-
-def _wake_at(desk: Watched) -> float:
-    """As the core said it last; asked again, for it is a function of its memory."""
-    return core._wake_at(desk.memory, desk.now, desk.limits)
 
 
 @settings(derandomize=True, max_examples=100, deadline=None)

@@ -102,9 +102,9 @@ class World:
 
     def run(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
         """Everything that happens until then, or until it is done."""
+        wakes = {name: party.wake_at() for name, party in self.parties.items()}
         while not done():
-            waker = min(self.parties.values(), key=lambda party: party.wake_at())
-            at = waker.wake_at()
+            at = min(wakes.values())
             if self._post and self._post[0][0] <= at:
                 at, _, receiver, topic, message = self._post[0]
                 if at > until:
@@ -113,11 +113,14 @@ class World:
                 self.now = max(self.now, at)
                 if receiver in self.parties:
                     self.parties[receiver].hear(topic, message)
+                    wakes[receiver] = self.parties[receiver].wake_at()
                 continue
             if at > until:
                 break
             self.now = max(self.now, at)
-            waker.wake()
+            next(party for name, party in self.parties.items() if wakes[name] == at).wake()
+            # Who wakes may be the hand that restarts, adds or removes others.
+            wakes = {name: party.wake_at() for name, party in self.parties.items()}
         else:
             return
         self.now = until
