@@ -20,8 +20,10 @@ none for an operator to reset.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import Any
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.decision import (
     Decision,
@@ -41,15 +43,13 @@ RIVAL_QUIET_S = 5.0
 """How long no rival must have been heard before the door is ours again."""
 
 
-@dataclass(frozen=True, slots=True)
-class OpenDoor:
+class OpenDoor(msgspec.Struct, frozen=True):
     """Somebody wants the door open. Who, is for the log only."""
 
     requester_id: str
 
 
-@dataclass(frozen=True, slots=True)
-class CloseDoor:
+class CloseDoor(msgspec.Struct, frozen=True):
     """Nobody wants the door open any longer, says this requester."""
 
     requester_id: str
@@ -58,8 +58,7 @@ class CloseDoor:
 Event = Sampled[DoorSample] | IoFailed | RivalSeen | OperatorReset | OpenDoor | CloseDoor
 
 
-@dataclass(frozen=True, slots=True)
-class DoorMemory:
+class DoorMemory(msgspec.Struct, frozen=True):
     """Everything that the next decision needs to know of the past. Times are monotonic seconds.
 
     `latched_at`: RMF wants the door open since then. `close_at`: when a CLOSE becomes true.
@@ -80,8 +79,7 @@ class DoorMemory:
     io_failure: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class DoorReport:
+class DoorReport(msgspec.Struct, frozen=True):
     """What RMF and the status file are told. `hold`: we hold the door open (pulses included).
 
     `estimated`: no contact proves `mode`.

@@ -11,7 +11,9 @@ Rules:
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.debounce import Settled, forget, settle
 from bridges.door.settings import DoorLimits
@@ -25,8 +27,7 @@ Contact = Settled[bool | None]
 """One input with its debounce. Where it is not wired, both value and candidate are None."""
 
 
-@dataclass(frozen=True, slots=True)
-class Senses:
+class Senses(msgspec.Struct, frozen=True):
     """Each contact (None: not read yet); when all were last read, and since when without a miss.
 
     `lost`, `errors`: the last reading's (`DoorSample`).
@@ -42,8 +43,7 @@ class Senses:
     errors: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class View:
+class View(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
     `fresh`: they were read lately. `seen`: and each has lasted for its debounce, so that something

@@ -1,7 +1,6 @@
 """The part of a door's YAML that does not depend on how it is wired, and its core's limits."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import msgspec
@@ -82,12 +81,11 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
             yield ("limits", "open_delay_s"), "must not be longer than travel_s"
 
 
-@dataclass(frozen=True, slots=True)
-class DoorLimits:
+class DoorLimits(msgspec.Struct, frozen=True):
     """A door's fixed facts as its core needs them. `t`: the durations; `debounce`: s by signal."""
 
     t: Limits = Limits()
-    debounce: Mapping[str, float] = field(default_factory=dict)
+    debounce: Mapping[str, float] = {}
     estimated: bool = False
     on_fire: Literal["open", "release"] = "release"
     pulse: Pulse | None = None

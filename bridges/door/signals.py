@@ -1,10 +1,9 @@
 """What a door's driver tells its core, and what the core tells its driver: one scan's image."""
 
-from dataclasses import dataclass
+import msgspec
 
 
-@dataclass(frozen=True, slots=True)
-class DoorSample:
+class DoorSample(msgspec.Struct, frozen=True):
     """Every input of one door, polarity resolved but not debounced; None where not wired.
 
     `opened`, `closed`: the limit contacts of the fully open and the fully closed door.
@@ -21,8 +20,7 @@ class DoorSample:
     errors: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class DoorOutputs:
+class DoorOutputs(msgspec.Struct, frozen=True):
     """Every output of one door. There is no command to close: that is the operator's own doing."""
 
     hold_open: bool = False

@@ -20,8 +20,10 @@ Who holds the doors is told by the heartbeat, and kept through a restart (`table
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
 from typing import Any, Final
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.decision import Decision, Fault
 from bridges.door_supervisor.voice import Voice
@@ -47,31 +49,27 @@ MOVING: Final = DoorModeValue.MODE_MOVING
 OPEN: Final = DoorModeValue.MODE_OPEN
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
+class Limits(msgspec.Struct, frozen=True):
     """The duration (s) that the site has set."""
 
     open_alarm_s: float = 600.0
 
 
-@dataclass(frozen=True, slots=True)
-class Opens:
+class Opens(msgspec.Struct, frozen=True):
     """A requester's OPEN; `stamp` is its own (ns)."""
 
     requester: str
     stamp: int
 
 
-@dataclass(frozen=True, slots=True)
-class Closes:
+class Closes(msgspec.Struct, frozen=True):
     """A requester's CLOSE; `stamp` is its own (ns)."""
 
     requester: str
     stamp: int
 
 
-@dataclass(frozen=True, slots=True)
-class Shown:
+class Shown(msgspec.Struct, frozen=True):
     """A DoorState."""
 
     mode: DoorModeValue
@@ -80,8 +78,7 @@ class Shown:
 Event = Opens | Closes | Shown | MaySpeak | Woken
 
 
-@dataclass(frozen=True, slots=True)
-class Holder:
+class Holder(msgspec.Struct, frozen=True):
     """Who holds the door open: since when by our clock, and the `stamp` of its latest OPEN.
 
     `asked_at`: when that came. `visit`: the stamp of the first OPEN of its present visit, which does
@@ -100,8 +97,7 @@ class Holder:
         return replace(self, asked_at=now, stamp=stamp, visit=stamp if again else self.visit)
 
 
-@dataclass(frozen=True, slots=True)
-class Memory:
+class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
     `holders`: in the order in which they came. `voices`: what was heard of each requester of late.
@@ -111,7 +107,7 @@ class Memory:
     door: str
     may_speak: bool = False
     holders: tuple[Holder, ...] = ()
-    voices: Mapping[str, Voice] = field(default_factory=dict)
+    voices: Mapping[str, Voice] = {}
     mode: DoorModeValue | None = None
     shown_at: float = -NEVER
     sent: DoorModeValue | None = None
@@ -138,8 +134,7 @@ class Memory:
         return next((h for h in self.holders if h.requester == requester), None)
 
 
-@dataclass(frozen=True, slots=True)
-class DoorHoldReport:
+class DoorHoldReport(msgspec.Struct, frozen=True):
     """One door, for the log and the status file. Times are monotonic seconds.
 
     `holders`: each requester and since when. `mode`: of the door's last state, at `read_at`.

@@ -9,7 +9,9 @@ retained: an old request is one that was late, or came twice. Rules, for one req
 """
 
 import math
-from dataclasses import dataclass, replace
+
+import msgspec
+from msgspec.structs import replace
 
 BACK_S = 10.0
 BROKEN_OFF_S = 3.0
@@ -17,8 +19,7 @@ BROKEN_OFF_S = 3.0
 AGES_AGO = -math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Voice:
+class Voice(msgspec.Struct, frozen=True):
     """What has been heard of one requester; stamps in ns by its clock, times in s by ours.
 
     `newest`: of what counted, last at `heard_at`. `doubted`: the newest of what did not, of late,

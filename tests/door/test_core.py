@@ -1,7 +1,8 @@
 """The door's core, decision by decision, in virtual time."""
 
 import math
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from bridges.decision import Fault, IoFailed, OperatorReset, RivalSeen
 from bridges.door.core import CloseDoor, DoorReport, OpenDoor

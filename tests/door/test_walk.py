@@ -1,8 +1,7 @@
 """Every state within some steps of the start, and of each stage of a passage: what is true in all."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.door.settings import DoorLimits, Pulse
 from tests.door.invariants import check, nothing_changes_before_wake_at

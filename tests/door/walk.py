@@ -6,8 +6,10 @@ that cannot behave differently are one. All durations are sums of powers of two:
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 from typing import Any
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.debounce import Settled
 from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
@@ -28,8 +30,7 @@ def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLi
     return DoorLimits(t=Limits(**{**DURATIONS, **(durations or {})}), **facts)
 
 
-@dataclass(frozen=True, slots=True)
-class Ledger:
+class Ledger(msgspec.Struct, frozen=True):
     """What has happened, without the core's conclusions. Times are relative to the state's.
 
     `wanted`: RMF has asked for it open; `ends_at`: when its CLOSE comes true. `let_go`: what held it
@@ -53,8 +54,7 @@ class Ledger:
 UNLIKE = ("opened", "obstruction", "fire")
 
 
-@dataclass(frozen=True, slots=True)
-class World:
+class World(msgspec.Struct, frozen=True):
     """Memory and ledger at time 0, and the building: whether it can be read, and written to."""
 
     memory: DoorMemory
@@ -146,8 +146,7 @@ TIMES = (0.0625, 1.0, 4.0, 16.0, 64.0)
 Seen = Callable[["Step"], None]
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(msgspec.Struct, frozen=True):
     """One decision, at time `now` after the state began. `ledger`: with this step in it."""
 
     before: DoorMemory
