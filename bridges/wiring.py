@@ -56,14 +56,22 @@ class Wiring:
         """Judge a driver's table; it replaces the points that were met on the way to it."""
         self.uses.clear()
         for wire in wires:
-            entry = locate(spot, wire.path)
-            point = below(entry.value, "point")
-            node = point.value if point else entry.where()
-            reason = self._use(wire.point, wire.path or (wire.signal,), node)
-            if reason:
-                self._page.note(node, reason)
-            else:
+            places = [("point", wire.point)]
+            if wire.flash is not None:
+                places.append(("flash", wire.flash.point))
+            stands = [self._stands(wire, key, text, spot) for key, text in places]
+            if all(stands):
                 self._judge(wire, spot)
+
+    def _stands(self, wire: Wire, key: str, text: str, spot: Spot) -> bool:
+        """Note that this wire is on this point, or what is wrong with the point."""
+        entry = locate(spot, wire.path)
+        point = below(entry.value, key)
+        node = point.value if point else entry.where()
+        reason = self._use(text, wire.path or (wire.signal,), node)
+        if reason:
+            self._page.note(node, reason)
+        return reason is None
 
     def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
         """What the device has for itself where there are no wires: (place, path in its YAML)."""

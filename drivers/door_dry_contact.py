@@ -2,6 +2,10 @@
 
 The contacts stand on the GPIO header, or at a Modbus I/O module (coils and discrete inputs). Which
 level means what, and what a cut wire reads as, is `drivers/points.py`; the rules are the core's.
+
+Where the operator is triggered by pulses and the module can time one (`flash`), each pulse is asked of
+the module once. A repeat would prolong it, so one whose reply was lost is not sent again: the next
+pulse is the next try. The module ends the pulse; we switch off when the hold ends before.
 """
 
 from collections.abc import Iterator, Mapping
@@ -12,7 +16,7 @@ import msgspec
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
 from drivers.dry_contact.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
-from drivers.points import Input, Output, Points, PointsBus, Wire
+from drivers.points import Flash, Input, Output, Point, Points, PointsBus, Wire
 
 BUSES: Final = ("gpio", "modbus")
 
@@ -41,13 +45,23 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     fire: Input | None = None
 
 
+class Hold(Output, frozen=True, forbid_unknown_fields=True):
+    """The relay that holds the door open.
+
+    `flash`: where a Modbus module takes a pulse that it times itself, in tenths of a second: `unit 1
+    coil 0x200` for the first relay of a Waveshare Modbus RTU Relay; each `pulse` is asked for there.
+    """
+
+    flash: Point | None = None
+
+
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What we ask of the operator. There is no relay that closes.
 
     `hold_open`: holds the door open while it is on.
     """
 
-    hold_open: Output
+    hold_open: Hold
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -71,7 +85,18 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             )
         if self.on_fire and self.inputs.fire is None:
             yield ("on_fire",), "there is no fire input; wire one under inputs, or leave this out"
+        yield from self._flash_problems()
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
+
+    def _flash_problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        if self.outputs.hold_open.flash is None:
+            return
+        if self.pulse is None:
+            text = "is for pulses: say pulse: {on_s: …, every_s: …}, or leave this out"
+            yield ("outputs", "hold_open", "flash"), text
+        elif abs(self.pulse.on_s * 10 - round(self.pulse.on_s * 10)) > 1e-6:
+            text = f"with flash the module counts tenths of a second: not {self.pulse.on_s:g}"
+            yield ("pulse", "on_s"), text
 
     def _feedback_problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
         missing = [s for s in ("opened", "closed") if getattr(self.inputs, s) is None]
@@ -99,8 +124,11 @@ def wires(settings: Settings) -> list[Wire]:
         if (contact := getattr(settings.inputs, signal)) is not None
     ]
     relay = settings.outputs.hold_open
+    flash = None
+    if relay.flash is not None and settings.pulse is not None:
+        flash = Flash(relay.flash, settings.pulse.on_s)
     path = ("outputs", "hold_open")
-    return [*inputs, Wire("hold_open", "out", relay.point, relay.active, path=path)]
+    return [*inputs, Wire("hold_open", "out", relay.point, relay.active, path=path, flash=flash)]
 
 
 def debounce(settings: Settings) -> Mapping[str, float]:
@@ -124,14 +152,18 @@ def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
 
 def create(name: str, settings: Settings, bus: PointsBus) -> "DryContactDoor":
     """The door on its bus; nothing is touched before `open`."""
-    return DryContactDoor(Points(wires(settings), bus))
+    return DryContactDoor(
+        Points(wires(settings), bus), flashes=settings.outputs.hold_open.flash is not None
+    )
 
 
 class DryContactDoor:
-    """`drivers.Driver` of one door."""
+    """`drivers.Driver` of one door. `flashes`: the module times the pulses of its hold."""
 
-    def __init__(self, points: Points) -> None:
+    def __init__(self, points: Points, flashes: bool = False) -> None:
         self._points = points
+        self._flashes = flashes
+        self._asked = False
 
     def open(self) -> None:
         """Claim the relay, off, and the contacts."""
@@ -143,11 +175,16 @@ class DryContactDoor:
         return DoorSample(read("opened"), read("closed"), read("obstruction"), read("fire"))
 
     def write(self, outputs: DoorOutputs) -> None:
-        """The hold relay to this."""
-        self._points.write({"hold_open": outputs.hold_open})
+        """The hold relay to this; a pulse that the module times is asked for once."""
+        asked, self._asked = self._asked, outputs.hold_open
+        if not self._flashes or not (outputs.hold_open or outputs.between_pulses):
+            self._points.write({"hold_open": outputs.hold_open})
+        elif outputs.hold_open and not asked:
+            self._points.flash("hold_open")
 
     def make_safe(self) -> None:
         """The hold relay off, and seen to be off."""
+        self._asked = False
         self._points.make_safe()
 
     def close(self) -> None:

@@ -7,7 +7,7 @@ discrete inputs of a Modbus I/O module are the same thing here.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Literal, Protocol, runtime_checkable
 
 import msgspec
 
@@ -47,6 +47,14 @@ class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 @dataclass(frozen=True, slots=True)
+class Flash:
+    """A pulse that the module times by itself: where it is asked for, and how long it lasts."""
+
+    point: str
+    on_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Wire:
     """One row of the wiring table: a signal, where it is, and what its level means."""
 
@@ -58,6 +66,7 @@ class Wire:
     debounce_s: float | None = None
     path: tuple[str, ...] = ()
     """Where the YAML names it, from the device downwards: for error messages."""
+    flash: Flash | None = None
 
     def level(self, asserted: bool) -> bool:
         """The electrical level (True is high) for this meaning."""
@@ -96,6 +105,17 @@ class Lines(Protocol):
 
     def close(self) -> None:
         """Outputs to their safe level, and let go. Does not raise."""
+
+
+@runtime_checkable
+class FlashLines(Protocol):
+    """Lines of a bus whose modules can time a pulse."""
+
+    def flash(self, point: str, flash: Flash) -> None:
+        """Have the module switch this output on, and off again by itself; asked once.
+
+        Raises HalError; then it may be on.
+        """
 
 
 class PointsBus(Protocol):
@@ -151,6 +171,17 @@ class Points:
                 self._written = None
                 self._lines.write(levels)
         self._written = wanted
+
+    def flash(self, signal: str) -> None:
+        """Have the module time a pulse of this output; its level is unknown from now on.
+
+        Raises HalError; then there may be a pulse: to ask again would prolong it.
+        """
+        wire, point = self._out[signal]
+        assert wire.flash  # or the driver would not ask
+        assert isinstance(self._lines, FlashLines)  # or `wire_problems` of its bus has said so
+        self._written = None
+        self._lines.flash(point, wire.flash)
 
     def make_safe(self) -> None:
         """Every output off, written whatever was known, and read back where the bus can say."""

@@ -24,6 +24,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from drivers.hal.modbus_points import canonical
 from hal_fakes.modbus_dead_man import DeadMan
+from hal_fakes.modbus_flash import CoilRequest
 from hal_fakes.modbus_rtu import RtuLine
 from hal_fakes.modbus_units import FarSide, Units
 from hal_fakes.plant import Plant
@@ -96,6 +97,7 @@ class ModbusServer:
             _placeholder(),
             address=("127.0.0.1", self._port),
             ignore_missing_devices=True,
+            custom_pdu=[CoilRequest],
             trace_packet=self._send,
         )
         self._server.context = self._units

@@ -33,6 +33,7 @@ from pymodbus.framer import FramerRTU
 from pymodbus.pdu import DecodePDU
 
 from drivers.hal.modbus_places import Serial
+from hal_fakes.modbus_flash import CoilRequest
 from hal_fakes.modbus_units import FarSide, Units
 from hal_fakes.plant import FailureMode
 
@@ -95,6 +96,7 @@ class RtuLine:
         self._busy_until = 0.0
         self._kinds: Iterator[int] = itertools.cycle((0, 1))
         self._decoder = DecodePDU(is_server=True)
+        self._decoder.register(CoilRequest)
         self._framer = FramerRTU(DecodePDU(is_server=False))
         self._loop = asyncio.new_event_loop()
         self._closed = threading.Event()

@@ -49,6 +49,8 @@ class Units:
         self._dead_men: list[DeadMan] = []
         self._plants: dict[int | None, list[Plant]] = {None: []}
         self._coils: dict[Point, bool] = {}
+        self._flashes: dict[Point, Point] = {}
+        self._off_at: dict[Point, float] = {}
         self._before: dict[Point, int] = {}
         for device in devices:
             if isinstance(device, Wiring):
@@ -59,6 +61,7 @@ class Units:
     def _add_wiring(self, wiring: Wiring) -> None:
         points = {parse(name): name for name in (*wiring.inputs, *wiring.outputs)}
         self._at.update({point: (wiring, name) for point, name in points.items()})
+        self._flashes.update({parse(at): parse(name) for at, name in wiring.flashes.items()})
         for unit in (None, *{point.unit for point in points}):
             self._plants.setdefault(unit, []).append(wiring.plant)
 
@@ -72,8 +75,10 @@ class Units:
             self._plants[unit].append(device.plant)
 
     def tick(self) -> None:
-        """Let the modules' watchdogs trip when it is time; called often."""
+        """Let the modules' watchdogs trip, and their pulses end, when it is time; called often."""
         now = time.monotonic()
+        for coil in [coil for coil, at in self._off_at.items() if at <= now]:
+            self._set(coil, False)
         for dead_man in self._dead_men:
             if dead_man.trips(now):
                 for point, (wiring, name) in self._at.items():
@@ -110,6 +115,19 @@ class Units:
                 return refusal
         return None
 
+    async def flash(self, unit: int, address: int, tenths: int) -> ExcCodes | None:
+        """Switch a coil on for so long; exception 3 where no pulse can be asked for."""
+        coil = self._flashes.get(Point(unit, "coil", address))
+        points = await self._points(unit, 5, coil.address if coil else address, 1)
+        if isinstance(points, ExcCodes):
+            return points
+        if coil is None:
+            return ExcCodes.ILLEGAL_VALUE
+        if refusal := self._set(coil, True):
+            return refusal
+        self._off_at[coil] = time.monotonic() + tenths / 10
+        return None
+
     def _set(self, point: Point, value: int) -> ExcCodes | None:
         now = time.monotonic()
         if point in self._cells:
@@ -118,6 +136,7 @@ class Units:
         if any(d.unit == point.unit and d.tripped for d in self._dead_men):
             return ExcCodes.DEVICE_FAILURE
         wiring, name = self._at[point]
+        self._off_at.pop(point, None)
         self._coils[point] = bool(value)
         if name in wiring.outputs:
             wiring.drive(name, bool(value), now)

@@ -22,6 +22,7 @@ class Wiring:
         wires = list(wires)
         self.inputs = {canonical(w.point): w for w in wires if w.direction == "in"}
         self.outputs = {canonical(w.point): w for w in wires if w.direction == "out"}
+        self.flashes = {canonical(w.flash.point): canonical(w.point) for w in wires if w.flash}
 
     def levels(self, now: float) -> dict[str, bool]:
         """Every input's level (True is high) by canonical point, at `now` (monotonic s)."""

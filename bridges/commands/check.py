@@ -103,6 +103,8 @@ def _bus(config: Config, bus: str, devices: Sequence[str]) -> list[str]:
 def _row(device: str, wire: Wire, point: str) -> tuple[str, ...]:
     """One wire. `point`: as the bus describes it; how the YAML spells it is put beside."""
     spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"
+    if wire.flash is not None:
+        spelled += f", {wire.flash.on_s:g} s by the module at {wire.flash.point}"
     is_input = wire.direction == "in"
     return (
         device,

@@ -109,9 +109,10 @@ def decide(
     memory = _let_go(memory, now)
     memory = _hold(memory, _look(memory, now, limits), now, limits)
     view = _look(memory, now, limits)
+    is_on = _pulse_is_on(memory, now, limits.pulse)
     return Decision(
         memory=memory,
-        outputs=DoorOutputs(hold_open=memory.held and _pulse_is_on(memory, now, limits.pulse)),
+        outputs=DoorOutputs(memory.held and is_on, between_pulses=memory.held and not is_on),
         report=_report(memory, view, now, limits),
         wake_at=min((at for at in _wakes(memory, view, now, limits) if at > now), default=NEVER),
         refused=refused,

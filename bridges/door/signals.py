@@ -21,6 +21,11 @@ class DoorSample(msgspec.Struct, frozen=True):
 
 
 class DoorOutputs(msgspec.Struct, frozen=True):
-    """Every output of one door. There is no command to close: that is the operator's own doing."""
+    """Every output of one door. There is no command to close: that is the operator's own doing.
+
+    `hold_open`: the relay is on. `between_pulses`: the relay is off because a pulse has had its time,
+    and the door is still held: the next pulse follows.
+    """
 
     hold_open: bool = False
+    between_pulses: bool = False

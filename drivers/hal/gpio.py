@@ -112,6 +112,8 @@ def wire_problems(wire: Wire) -> Iterable[str]:
             yield f"{name} has a fixed 1.8 kΩ pull-up: write pull: up, or use another pin"
     elif wire.pull is not None:
         yield "an output has no pull"
+    elif wire.flash is not None:
+        yield "flash is for modules that time pulses; a pin's are timed here: leave it out"
     elif name in HAT_EEPROM:
         yield f"{name} belongs to the HAT EEPROM, and the firmware drives it at boot: use another"
 

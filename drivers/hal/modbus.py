@@ -3,7 +3,7 @@
 - A request has `timeout_s` from the lookup of the name to the last byte of the reply, and is tried
   `retries` times more. That a late reply or half a frame is never taken for the answer to another
   question is the work of `modbus_wire.py` (TCP: new connections) and `modbus_rtu.py` (RTU: silence).
-  Only reads and coil writes are sent: a repeat changes nothing.
+  Only reads and coil writes are repeated: a repeat changes nothing.
 - A connection or port that cannot be opened pauses the bus, a unit that fails pauses that unit, from
   0.5 to 30 s; meanwhile calls fail at once with the same text. After a pause there is one try until the
   unit answers again: a dead unit costs the others one `timeout_s` a pause, and no more.
@@ -26,6 +26,7 @@ import msgspec
 from bridges.fields import Period
 from drivers.hal import Bus, HalError
 from drivers.hal.backoff import Backoff
+from drivers.hal.modbus_flash import ask_for
 from drivers.hal.modbus_places import Serial, Tcp
 from drivers.hal.modbus_points import (
     Point,
@@ -37,16 +38,18 @@ from drivers.hal.modbus_points import (
     ranges,
     wire_problems,
 )
+from drivers.hal.modbus_replies import EXCEPTIONS
 from drivers.hal.modbus_rtu import Line
 from drivers.hal.modbus_watchdog import Guard, Watchdog, Watchdogs
 from drivers.hal.modbus_wire import BadReply, Call, Connection, NoReply, Unreachable
-from drivers.points import Pull
+from drivers.points import Flash, Pull
 
 if TYPE_CHECKING:
     from pymodbus.client.mixin import ModbusClientMixin
     from pymodbus.pdu import ModbusPDU
 
 __all__ = [
+    "EXCEPTIONS",
     "ModbusBus",
     "Serial",
     "Settings",
@@ -61,21 +64,6 @@ __all__ = [
 READS: Final = {"coil": 1, "discrete input": 2}
 WRITE_COIL: Final = 5
 ILLEGAL_ADDRESS: Final = 2
-
-EXCEPTIONS: Final = {
-    1: "illegal function: the unit has no such table",
-    2: "illegal data address: the unit has no such address; addresses begin at 0",
-    3: "illegal data value",
-    4: "server device failure: look at the unit",
-    5: "acknowledge: the unit is still busy with the request",
-    6: "server device busy",
-    7: "negative acknowledge",
-    8: "memory parity error: look at the unit",
-    9: "an exception that Modbus does not define",
-    10: "gateway path unavailable: look at the gateway's settings",
-    11: "gateway target device failed to respond: look at the unit's power, cable and id",
-}
-"""Modbus Application Protocol V1.1b3, section 7."""
 
 Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 
@@ -177,10 +165,11 @@ class ModbusBus(Bus):
 
     def write(self, coil: Point, level: bool) -> None:
         """Set this coil. Raises HalError; then it may be set or not."""
+        sent = [0xFF00 if level else 0]
 
         def call(client: "ModbusClientMixin[ModbusPDU]") -> "ModbusPDU":
             reply = client.write_coil(coil.address, level, device_id=coil.unit)
-            if not reply.isError() and (reply.address, reply.bits) != (coil.address, [level]):
+            if not reply.isError() and (reply.address, reply.registers) != (coil.address, sent):
                 raise BadReply("the echo of another write")
             return reply
 
@@ -203,14 +192,16 @@ class ModbusBus(Bus):
         """Hang up."""
         self._connection.close()
 
-    def ask(self, unit: int, function: int, what: str, call: Call) -> "ModbusPDU":
-        """The unit's good answer to one request."""
+    def ask(
+        self, unit: int, function: int, what: str, call: Call, *, once: bool = False
+    ) -> "ModbusPDU":
+        """The unit's good answer to one request. `once`: a repeat would change something."""
         backoff = self._units.setdefault(unit, self._backoff())
         self._link.check()
         backoff.check(not_yet=backoff.probing and self._connection.owes(unit))
         text = f"modbus unit {unit} at {self._where}, {what}: "
         reason = ""
-        tries = 1 if backoff.probing else self._settings.retries + 1
+        tries = 1 if once or backoff.probing else self._settings.retries + 1
         if not backoff.insisting:
             self._connection.begin(unit)
         for _ in range(tries):
@@ -292,6 +283,12 @@ class ModbusLines:
             self._bus.write(coil, level)
         self._set.update(wanted)
         self._verify(self._read_all(ranges(wanted)))
+
+    def flash(self, point: str, flash: Flash) -> None:
+        """Ask the module for this pulse. Its coil reads 1, then 0 by itself: it is not compared."""
+        self._touched = True
+        self._set.pop(self._coils[point], None)
+        ask_for(self._bus, parse(flash.point), flash.on_s)
 
     def outputs(self) -> dict[str, bool]:
         """The coils, read now."""

@@ -92,6 +92,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
         yield "pull is for GPIO pins; the module has its own: leave it out"
     if wire.direction == "in":
         return
+    yield from _flash_problems(wire, point)
     if point.table != "coil":
         yield f"an output is a coil, and a {point.table} can only be read"
     if wire.active == "low":
@@ -99,6 +100,16 @@ def wire_problems(wire: Wire) -> Iterable[str]:
             "active: low would switch it on whenever the module restarts with its coils at 0:"
             " use the relay's normally open contact and write active: high"
         )
+
+
+def _flash_problems(wire: Wire, output: Point) -> Iterable[str]:
+    if wire.flash is None:
+        return
+    flash = parse(wire.flash.point)
+    if flash.table != "coil":
+        yield f"flash is asked for with a write to a coil, not to a {flash.table}"
+    if flash.unit != output.unit:
+        yield f"flash is at unit {flash.unit}, and the relay at unit {output.unit}: one is wrong"
 
 
 def ranges(points: Iterable[Point], gap: int = GAP_MAX) -> list[Range]:

@@ -128,9 +128,10 @@ def strict_replies() -> tuple[Any, ...]:
 
     class Echo(WriteSingleCoilResponse):
         def decode(self, data: bytes) -> None:
-            if len(data) != 4 or data[2:] not in (b"\xff\x00", b"\x00\x00"):
+            if len(data) != 4:
                 raise ValueError("it is no coil's value")
             super().decode(data)
+            self.registers = [int.from_bytes(data[2:], "big")]  # `bits` would take any for 1
 
     class Inputs(Bits):
         function_code = 2

@@ -20,15 +20,19 @@ from tests.modbus.module import Time
 TIMEOUT_S = 0.2
 
 
-def dry(points: tuple[str, str, str], **pull: str) -> door_dry_contact.Settings:
+def dry(
+    points: tuple[str, str, str], flash: dict[str, str] | None = None, **pull: str
+) -> door_dry_contact.Settings:
     """A door on contacts at these points: opened, closed, hold."""
     opened, closed, hold = points
+    pulse = {"pulse": {"on_s": 300.0, "every_s": 600.0}} if flash else {}
     plain = {
         "inputs": {
             "opened": {"point": opened, "active": "high", **pull},
             "closed": {"point": closed, "active": "high", **pull},
         },
-        "outputs": {"hold_open": {"point": hold, "active": "high"}},
+        "outputs": {"hold_open": {"point": hold, "active": "high", **(flash or {})}},
+        **pulse,
     }
     return msgspec.convert(plain, door_dry_contact.Settings)
 
@@ -50,14 +54,21 @@ def served(
 
 
 class TestDryContactsOnModbus(WiredDoorContract):
+    flash: ClassVar[dict[str, str]] = {}
+
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = dry(("unit 1 discrete input 0", "unit 1 discrete input 1", "unit 1 coil 0"))
+        points = ("unit 1 discrete input 0", "unit 1 discrete input 1", "unit 1 coil 0")
+        settings = dry(points, self.flash)
         wires = door_dry_contact.wires(settings)
         world = RealTime({"door": quick("door", wires)})
         wiring = Wiring(world.plants["door"], wires, modbus.canonical)
         with served([wiring], world, door_dry_contact.create, settings) as bench:
             yield bench
+
+
+class TestAPulseThatTheModuleTimes(TestDryContactsOnModbus):
+    flash: ClassVar = {"flash": "unit 1 coil 0x200"}
 
 
 class TestDryContactsOnGpio(DoorContract):

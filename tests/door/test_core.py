@@ -347,7 +347,7 @@ def test_between_two_pulses_the_door_is_still_held() -> None:
     core = CoreAlone(DoorLimits(debounce=DEBOUNCED, pulse=Pulse(on_s=0.5, every_s=3.0)))
     core.hears(OPENS)
     decided = core.sees(OPEN, until=2.0)
-    assert (decided.outputs, decided.report.hold) == (DoorOutputs(hold_open=False), True)
+    assert (decided.outputs, decided.report.hold) == (DoorOutputs(between_pulses=True), True)
 
 
 def test_without_contacts_a_door_is_open_by_the_clock_and_says_that_it_guesses() -> None:

@@ -9,13 +9,14 @@ from bridges.door.settings import DoorLimits, Limits, Pulse
 from bridges.door.signals import DoorOutputs, DoorSample
 from bridges.settings import load
 from drivers.door_dry_contact import create, debounce, warnings, wires
-from drivers.points import HalError, Wire
+from drivers.points import Flash, HalError, Wire
 from hal_fakes.door_plant import build
 from hal_fakes.wiring import Wiring
 from tests.door.virtual import FIRE, OBSTRUCTION, Door, MemoryBus, settings
 
 CONFIG = Path(__file__).parents[2] / "config"
 NONE: dict[str, Any] = {}
+FLASHED = {"point": "unit 1 coil 0", "active": "high", "flash": "unit 1 coil 0x200"}
 
 
 def gpio(point: str, active: str, pull: str) -> dict[str, Any]:
@@ -83,6 +84,16 @@ def test_the_shipped_door_is_sound() -> None:
             {"on_fire": "open"},
             "on_fire",
             "there is no fire input; wire one under inputs, or leave this out",
+        ),
+        (
+            {"outputs": {"hold_open": FLASHED}},
+            "outputs.hold_open.flash",
+            "is for pulses: say pulse: {on_s: …, every_s: …}, or leave this out",
+        ),
+        (
+            {"outputs": {"hold_open": FLASHED}, "pulse": {"on_s": 0.75, "every_s": 3.0}},
+            "pulse.on_s",
+            "with flash the module counts tenths of a second: not 0.75",
         ),
     ],
 )
@@ -183,6 +194,19 @@ def test_the_wiring_table_has_every_point_with_its_debounce() -> None:
         Wire("hold_open", "out", "unit 1 coil 0", "high", path=("outputs", "hold_open")),
     ]
     assert debounce(door) == {"opened": 0.0625, "closed": 0.05, "obstruction": 0.0625}
+
+
+def test_a_relay_whose_pulses_the_module_times_has_them_in_the_wiring_table() -> None:
+    door = settings(outputs={"hold_open": FLASHED}, pulse={"on_s": 0.7, "every_s": 3.0})
+    assert list(door.problems()) == list(warnings(door)) == []
+    assert wires(door)[-1] == Wire(
+        "hold_open",
+        "out",
+        "unit 1 coil 0",
+        "high",
+        path=("outputs", "hold_open"),
+        flash=Flash("unit 1 coil 0x200", 0.7),
+    )
 
 
 def test_the_cores_limits_are_those_of_the_yaml() -> None:

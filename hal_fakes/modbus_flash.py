@@ -1,0 +1,40 @@
+"""The far side of a pulse that a module times: pymodbus's server takes any value for a coil's 1."""
+
+import struct
+from typing import Any, Final
+
+from pymodbus.pdu import ExceptionResponse, ModbusPDU
+from pymodbus.pdu.bit_message import WriteSingleCoilRequest
+
+COIL_VALUES: Final = (0xFF00, 0)
+
+
+class CoilRequest(WriteSingleCoilRequest):
+    """Function 5 with its value as it was sent; one that is no coil's asks `Units` for a flash."""
+
+    def decode(self, data: bytes) -> None:
+        """Keep the value."""
+        super().decode(data)
+        self.registers = [int.from_bytes(data[2:4], "big")]
+
+    async def datastore_update(self, context: Any, device_id: int) -> ModbusPDU:
+        """Do it; a flash is answered by its echo."""
+        if self.registers[0] in COIL_VALUES:
+            return await super().datastore_update(context, device_id)
+        refusal = await context.flash(device_id, self.address, self.registers[0])
+        if refusal is not None:
+            return ExceptionResponse(self.function_code, refusal)
+        return FlashEcho(
+            address=self.address,
+            registers=self.registers,
+            dev_id=self.dev_id,
+            transaction_id=self.transaction_id,
+        )
+
+
+class FlashEcho(WriteSingleCoilRequest):
+    """The reply."""
+
+    def encode(self) -> bytes:
+        """What came."""
+        return struct.pack(">HH", self.address, *self.registers)
