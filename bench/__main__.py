@@ -1,7 +1,7 @@
 """`make bench`: latency and memory of the daemons beside a bare transport node, in one run.
 
-Everything runs on loopback, on fake hardware, in processes of its own. The table goes to stdout, the
-figures to bench/results/bench.json.
+Everything runs on loopback, on fake hardware, in processes of its own. The tables go to stdout, the
+figures to bench/results/bench.json. Some of it: `python -m bench idle doors`.
 """
 
 import json
@@ -12,28 +12,31 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench import doors, idle, latency, lifts
+from bench import doors, idle, latency, lifts, many_doors
 
 RESULTS = Path(__file__).parent / "results"
 
 
-def main() -> int:
+SECTIONS = {
+    "latency": latency,
+    "idle": idle,
+    "lifts": lifts,
+    "doors": doors,
+    "many_doors": many_doors,
+}
+
+
+def main(chosen: list[str]) -> int:
     """Measure, print, write."""
-    with tempfile.TemporaryDirectory(prefix="rmf-bench-") as scratch:
-        figures: dict[str, Any] = {
-            "machine": _machine(),
-            "latency": latency.measure(Path(scratch)),
-            "idle": idle.measure(Path(scratch)),
-            "lifts": lifts.measure(Path(scratch)),
-            "doors": doors.measure(Path(scratch)),
-        }
+    figures: dict[str, Any] = {"machine": _machine()}
+    print(figures["machine"], end="\n\n", flush=True)
+    for name in chosen or SECTIONS:
+        with tempfile.TemporaryDirectory(prefix="rmf-bench-") as scratch:
+            figures[name] = SECTIONS[name].measure(Path(scratch))
+        SECTIONS[name].show(figures[name])
+        sys.stdout.flush()
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "bench.json").write_text(json.dumps(figures, indent=2) + "\n")
-    print(f"\n{figures['machine']}\n")
-    latency.show(figures["latency"])
-    idle.show(figures["idle"])
-    lifts.show(figures["lifts"])
-    doors.show(figures["doors"])
     print(f"\nwritten to {RESULTS / 'bench.json'}")
     return 0
 
@@ -53,4 +56,4 @@ def _machine() -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))
