@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from bridges.decision import Fault, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from bridges.lift.core import Asked, Ended, Memory, decide
 from bridges.lift.limits import LiftLimits
+from bridges.lift.sensing import MOTION_MEMORY_S
 from bridges.lift.settings import Floor, LiftSettings, Limits
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 
@@ -50,6 +51,10 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     "a floor too far": (
         [(0.0, AT_L1), (0.1, replace(AT_L1, level="L3"))],
         Fault("POSITION_LOST", "L3 cannot follow L1 like this"),
+    ),
+    "a floor code that cannot be": (
+        [(0.0, replace(AT_L1, level=None, code_fault="two lines at once"))],
+        Fault("FLOOR_CODE_ILLEGAL", "two lines at once"),
     ),
     "a door that is both": (
         [(0.0, replace(AT_L1, door=Door.BOTH))],
@@ -158,6 +163,30 @@ def test_rmfs_silence_and_the_next_try_wake_the_core() -> None:
     assert told.decision.wake_at == 15.0
 
 
+def test_the_end_of_a_wait_for_the_lift_wakes_the_core() -> None:
+    told = Told(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
+    told(0.0, CLOSED)(1.0, ASKED)
+    assert told.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
+    assert told.decision.wake_at == 5.0
+
+
+def test_a_pulsed_call_that_a_hazard_cut_short_is_given_again_when_it_is_over() -> None:
+    told = Told(stale_after_s=900.0, call_pulse_s=2.0, hazard_clear_s=1.0)
+    told(0.0, CLOSED)(1.0, Asked("A", True, "L3"))
+    assert told.decision.outputs.call == "L3"
+    told(2.0, replace(CLOSED, hazards=frozenset({Hazard.EMERGENCY})))
+    assert told.decision.outputs == LiftOutputs()
+    told(10.0, CLOSED)(11.0, CLOSED)
+    assert told.decision.outputs.call == "L3"
+
+
+def test_nothing_is_refused_that_is_only_taken_note_of() -> None:
+    told = Told(release_grace_s=2.0)(0.0, AT_L1)(0.1, WriteFailed("timeout"))
+    assert told.decision.refused == ""
+    told(0.2, AT_L1, ASKED)(1.0, AT_L1, Ended("A"))(1.5, ASKED)
+    assert (told.decision.refused, told.decision.report.session) == ("", "A")
+
+
 def test_a_short_grace_is_one_too() -> None:
     told = Told(release_grace_s=0.5)(0.0, AT_L1)(0.1, ASKED)(1.0, AT_L1, Ended("A"))
     assert told.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
@@ -192,6 +221,19 @@ def test_a_floor_may_come_its_own_debounce_after_the_cars_last_movement() -> Non
     told = Told({"floor": 0.5}, stale_after_s=60.0)(0.0, moving)(1.0, moving)
     told(1.1, AT_L1)(2.9, replace(AT_L1, level="L2"))(3.45, replace(AT_L1, level="L2"))
     assert (told.decision.report.floor, told.faults) == ("L2", ())
+
+
+def test_in_the_last_instant_of_a_movements_memory_the_next_floor_is_believed() -> None:
+    told = Told(stale_after_s=60.0)(0.0, AT_L1)(1.0, replace(AT_L1, motion=Motion.UP))
+    told(1.0 + MOTION_MEMORY_S, replace(AT_L1, level="L2"))
+    assert (told.decision.report.floor, told.faults) == ("L2", ())
+
+
+def test_a_car_may_pass_a_floor_unseen_in_exactly_its_least_time() -> None:
+    moving = replace(AT_L1, motion=Motion.UP)
+    told = Told(stale_after_s=60.0, floor_travel_min_s=2.0)(0.0, moving)
+    told(2.0, replace(moving, level="L3"))
+    assert (told.decision.report.floor, told.faults) == ("L3", ())
 
 
 def test_a_request_that_finds_unwritten_outputs_is_judged_by_their_age() -> None:
