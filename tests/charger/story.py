@@ -2,15 +2,25 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from bridges.charger import core
 from bridges.charger.core import Cancelled, Requested
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import Limits
+from bridges.charger.settings import ChargerLimits, Limits, robot
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
-LIMITS = Limits(misses=3, start_timeout_s=60.0, released_s=2.0)
+DURATIONS = Limits(misses=3, start_timeout_s=60.0, released_s=2.0)
+LIMITS = ChargerLimits(DURATIONS, can_stop=False)
+"""A station that can only be observed."""
+RECEIVERS = {"rx-1": robot("tiny/AMR01"), "rx-2": robot("tiny/AMR02")}
+
+
+def observed(**durations: Any) -> ChargerLimits:
+    """Such a station with these durations, and the defaults."""
+    return ChargerLimits(Limits(**durations), can_stop=False)
+
 
 A = Activity
 IDLE = Sampled(ChargerSample(A.IDLE, 0))
@@ -43,7 +53,7 @@ CANCEL_1 = Cancelled("req-1")
 class Story:
     """A core with its memory. `told`: (time, state, request id or error) whenever the news differ."""
 
-    limits: Limits = LIMITS
+    limits: ChargerLimits = LIMITS
     now: float = 0.0
     memory: core.Memory = field(default_factory=lambda: core.initial(LIMITS, 0.0))
     told: list[tuple[float, str, str]] = field(default_factory=list)

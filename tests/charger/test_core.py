@@ -5,7 +5,6 @@ import pytest
 from bridges.charger import core
 from bridges.charger.core import Cancelled, Requested
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import Limits
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.decision import Fault, Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
@@ -21,6 +20,7 @@ from tests.charger.story import (
     SILENT,
     Story,
     measured,
+    observed,
 )
 
 
@@ -340,7 +340,7 @@ def test_a_reset_with_no_error_to_clear_is_refused() -> None:
 
 
 def test_errors_are_cleared_by_themselves_at_the_configured_rate() -> None:
-    story = Story(Limits(clear_errors_per_h=4))
+    story = Story(observed(clear_errors_per_h=4))
     cleared_at = []
     for second in range(7200):
         before = story.outputs.clear_errors
@@ -351,7 +351,7 @@ def test_errors_are_cleared_by_themselves_at_the_configured_rate() -> None:
 
 
 def test_a_reset_counts_against_the_rate() -> None:
-    story = Story(Limits(clear_errors_per_h=1)).polls("idle 1, hot 1")
+    story = Story(observed(clear_errors_per_h=1)).polls("idle 1, hot 1")
     story.now = 3000.0
     story.event(RESET)
     assert story.outputs.clear_errors == 2
@@ -360,7 +360,7 @@ def test_a_reset_counts_against_the_rate() -> None:
 
 
 def test_an_unknown_state_is_not_cleared() -> None:
-    story = Story(Limits(clear_errors_per_h=60)).polls("odd 100")
+    story = Story(observed(clear_errors_per_h=60)).polls("odd 100")
     assert story.outputs.clear_errors == 0
 
 
@@ -477,7 +477,7 @@ def test_a_second_node_for_the_same_charger_stops_everything_until_it_is_silent_
 
 
 def test_two_nodes_do_not_both_clear_an_error() -> None:
-    story = Story(Limits(clear_errors_per_h=60)).event(RIVAL).polls("hot 4")
+    story = Story(observed(clear_errors_per_h=60)).event(RIVAL).polls("hot 4")
     assert story.outputs.clear_errors == 0
     assert [fault.split(":")[0] for fault in story.faults] == [
         "TWO_NODES_FOR_ONE_DEVICE",

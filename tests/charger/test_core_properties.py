@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 from bridges.charger import core
 from bridges.charger.core import Event, Memory
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import Limits
 from bridges.charger.signals import Activity, ChargerOutputs
 from bridges.decision import Decision, IoFailed, Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from tests.charger import story as s
 
-LIMITS = Limits(misses=2, start_timeout_s=4.0, released_s=2.0, clear_errors_per_h=60)
+LIMITS = s.observed(misses=2, start_timeout_s=4.0, released_s=2.0, clear_errors_per_h=60)
 EVENTS: tuple[Event, ...] = (
     *s.SCANS.values(),
     s.RIVAL,
@@ -96,7 +95,7 @@ def play(history: Iterable[tuple[Event, float]]) -> Memory:
 def test_errors_are_never_cleared_faster_than_the_rate(
     history: list[tuple[Event, float]], per_hour: int
 ) -> None:
-    limits = Limits(clear_errors_per_h=per_hour)
+    limits = s.observed(clear_errors_per_h=per_hour)
     memory, now, cleared = Memory(), 0.0, []
     for event, later in history:
         now += later

@@ -7,7 +7,7 @@ import pytest
 from bridges.charger import KIND
 from bridges.charger.core import Cancelled, Requested
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import ChargerSettings, Limits
+from bridges.charger.settings import ChargerLimits, ChargerSettings, Limits
 from bridges.charger.signals import Measured
 from bridges.decision import RequestRefused
 from bridges.rmf.definitions import (
@@ -108,7 +108,7 @@ def test_the_kind_finds_the_charger_in_each_of_its_messages() -> None:
 
 
 def test_the_limits_are_those_of_the_settings() -> None:
-    assert KIND.limits(SETTINGS, {}) == Limits(misses=5)
+    assert KIND.limits(SETTINGS, {}) == ChargerLimits(Limits(misses=5))
 
 
 def test_the_summary_says_that_a_robot_is_not_verified() -> None:
@@ -123,6 +123,7 @@ def test_the_summary_says_that_a_robot_is_not_verified() -> None:
         "r1",
         "tiny",
         "AMR01",
+        verified=True,
         measured=Measured(receiver_id="17", volts=48.25),
     )
     assert [KIND.summary(report) for report in (idle, lost, seen)] == [
