@@ -183,14 +183,11 @@ def _request(
         return memory, "charger in error"
     if holder is None:
         return _granted(memory, asked, on_pad, now, limits)
-    if on_pad and not holder.request.request_id and holder.request.who == asked.who:
-        if not holder.over:
-            holder = session.taken_over(holder, asked, now, limits)
-            return replace(memory, holder=holder), ""
-    if on_pad and told.state(memory) is told.RELEASED:
-        if session.shown_released(holder, now, limits):
-            memory = _held(memory, None)
-            return replace(memory, holder=session.granted(asked, now, limits)), ""
+    if on_pad and not holder.request.request_id and not holder.over:
+        return replace(memory, holder=session.taken_over(holder, asked, now, limits)), ""
+    if on_pad and session.shown_released(holder, now, limits):
+        again = session.granted(asked, now, limits)
+        return replace(_held(memory, None), holder=again), ""
     return memory, "charger occupied"
 
 

@@ -7,7 +7,7 @@ Where it has some, a station that does not say whom it sees charges nobody.
 from dataclasses import dataclass
 from typing import Literal
 
-from bridges.charger.memory import Holder, Memory
+from bridges.charger.memory import Memory
 from bridges.charger.settings import ChargerLimits, Robot
 from bridges.charger.signals import CURRENT_FLOWS, ChargerSample
 from bridges.decision import Fault
@@ -51,25 +51,21 @@ def seen(sample: ChargerSample | None, limits: ChargerLimits) -> Pad:
 def misplaced(memory: Memory, limits: ChargerLimits) -> Fault | None:
     """Why the station must not energise for what stands there; None where nothing forbids it."""
     pad, holder = seen(memory.sample, limits), memory.holder
+    expected = holder.request.who if holder and not holder.over else None
     if pad.sort == "mute":
         what = "receivers are given, and the charger does not say which one it sees"
         return Fault("RECEIVER_NOT_TOLD", what)
     if pad.sort == "stranger":
-        expected = f", {holder.request.who} is expected" if _waits(holder) else ""
-        return Fault("UNKNOWN_RECEIVER", f"unknown receiver {pad.receiver}{expected}")
+        told = f", {expected} is expected" if expected else ""
+        return Fault("UNKNOWN_RECEIVER", f"unknown receiver {pad.receiver}{told}")
     if pad.robot is None or (holder and holder.request.who == pad.robot):
         return None
-    if _waits(holder):
-        assert holder
-        what = f"wrong docking: {pad.robot} stands here, {holder.request.who} is expected"
+    if expected:
+        what = f"wrong docking: {pad.robot} stands here, {expected} is expected"
         return Fault(WRONG_DOCKING, what)
     if memory.adopted:
         return None
     return Fault(WRONG_DOCKING, f"wrong docking: {pad.robot} is not assigned here")
-
-
-def _waits(holder: Holder | None) -> bool:
-    return holder is not None and not holder.over
 
 
 def left_alone(memory: Memory, limits: ChargerLimits) -> bool:

@@ -46,7 +46,7 @@ def follow(
         there = limits.receivers and on_pad.robot == holder.request.who
         gone = shown_released(holder, now, limits) and not there
         return None if gone and sample.activity is not Activity.RELEASED else holder
-    return _pending(holder, sample.activity, now)
+    return _pending(holder, sample.activity, on_pad, now)
 
 
 def shown_released(holder: Holder, now: float, limits: ChargerLimits) -> bool:
@@ -83,7 +83,9 @@ def _sought_again(holder: Holder, now: float, limits: ChargerLimits) -> Holder:
     return replace(holder, started=False, start_by=by, checked_at=None)
 
 
-def _pending(holder: Holder, activity: Activity, now: float) -> Holder:
+def _pending(holder: Holder, activity: Activity, on_pad: pad.Pad, now: float) -> Holder:
+    if not holder.request.request_id and on_pad.sort == "empty":
+        return replace(holder, ended=holder.ended or "left", released_at=now)
     if holder.started or (holder.failed and activity is not Activity.HANDSHAKE):
         return replace(holder, released_at=now)
     if now >= holder.start_by:

@@ -53,12 +53,12 @@ class Measured:
 class ChargerSample:
     """One reading of one station.
 
-    `code`: the vendor's number, for texts only. `error_text`: the station's own words, printable and
-    bounded. `side`: whose fault the error is.
+    `code`: the vendor's number or word, for texts only. `error_text`: the station's own words,
+    printable and bounded. `side`: whose fault the error is.
     """
 
     activity: Activity
-    code: int
+    code: int | str
     error_text: str = ""
     measured: Measured = Measured()
     side: Side = ""

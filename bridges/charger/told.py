@@ -80,7 +80,8 @@ def errors(memory: Memory, now: float, limits: ChargerLimits) -> list[Fault]:
 def error_text(sample: ChargerSample) -> str:
     """A station's error in its own words, with the side that is at fault before them."""
     text = sample.error_text or f"the charger reports an error (vendor state {sample.code})"
-    return f"{sample.side}: {text}" if sample.side else text
+    side = f"{sample.side}: " if sample.side else ""
+    return text if text.startswith(side) else side + text
 
 
 def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> list[Fault]:

@@ -15,7 +15,8 @@ from bridges.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from bridges.settings import load
 from drivers import DriverError
-from drivers.charger_http import BUSES, Codes, Settings, create, describe, warnings, wires
+from drivers.state_codes import Codes
+from drivers.charger_http import BUSES, Settings, create, describe, warnings, wires
 from drivers.hal import HalError
 from drivers.hal import http as bus_file
 
@@ -36,8 +37,8 @@ class Station:
         self.calls.append(f"GET {path}")
         return self.answer  # type: ignore[no-any-return]
 
-    def post(self, path: str) -> None:
-        self.calls.append(f"POST {path}")
+    def send(self, path: str, method: str = "POST", body: str | None = None) -> None:
+        self.calls.append(f"{method} {path}" + (f" {body}" if body else ""))
         if self.fails:
             raise HalError("the answer is lost")
 

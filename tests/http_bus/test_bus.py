@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.hal import HalError
-from drivers.hal.http import HttpBus, Settings, open_bus
+from drivers.hal.http import HttpBus, Settings, open_bus, warnings
 from tests.http_bus.far_end import (
     Caller,
     Conversation,
@@ -163,7 +163,7 @@ def test_a_server_that_hangs_up_at_once_is_not_dialled_twice() -> None:
 def test_a_post_succeeds_with_any_2xx(status: str) -> None:
     with FarEnd(once(answer(status=status))) as far:
         bus = bus_to(far.port)
-        bus.post("/clear_error")
+        bus.send("/clear_error")
         bus.close()
     assert [r.split(b"\r\n")[0] for r in far.requests] == [b"POST /clear_error HTTP/1.1"]
 
@@ -173,7 +173,7 @@ def test_a_post_whose_answer_is_lost_fails_and_is_never_sent_again() -> None:
         bus = bus_to(far.port)
         bus.get_json("/state")
         with pytest.raises(HalError, match="no whole HTTP answer"):
-            bus.post("/clear_error")
+            bus.send("/clear_error")
         assert bus.get_json("/state") == {"state": 0}
         bus.close()
     assert [r.split(b" ")[0] for r in far.requests] == [b"GET", b"POST", b"GET"]
@@ -183,7 +183,7 @@ def test_a_post_does_not_trust_a_kept_connection() -> None:
     with FarEnd(hangs_up_at_the_second_request, always(answer())) as far:
         bus = bus_to(far.port)
         bus.get_json("/state")
-        bus.post("/clear_error")
+        bus.send("/clear_error")
         bus.close()
     assert (far.connections, len(far.requests)) == (2, 2)
 
@@ -193,7 +193,7 @@ def test_a_post_with_another_status_fails(status: str) -> None:
     with FarEnd(once(answer(status=status))) as far:
         bus = bus_to(far.port)
         with pytest.raises(HalError, match=f"answered status {status[:3]}"):
-            bus.post("/clear_error")
+            bus.send("/clear_error")
         bus.close()
 
 
@@ -331,7 +331,7 @@ def test_a_post_is_bounded_too(talk: Conversation) -> None:
     with FarEnd(talk) as far:
         bus = bus_to(far.port, TIMEOUT_S)
         with pytest.raises(HalError, match=r"no complete answer within 0[.]3 s"):
-            bus.post("/clear_error")
+            bus.send("/clear_error")
         bus.close()
 
 
@@ -427,6 +427,25 @@ def test_the_second_address_is_tried_when_the_first_is_dead() -> None:
         bus.close()
 
 
+def test_a_lookup_that_has_answered_does_not_keep_the_next_call_waiting() -> None:
+    ended = threading.Event()
+
+    class Lingering(list[Any]):
+        """What a lookup has found; its thread lives on until the test ends."""
+
+    def resolve(*_: Any, **__: Any) -> Any:
+        return []
+
+    bus = named(resolve)
+    dialler = bus._dialler
+    look_up = dialler._look_up
+    dialler._look_up = lambda answer: (look_up(answer), ended.wait())  # type: ignore[method-assign,assignment]
+    for _ in range(2):
+        with pytest.raises(HalError, match="the name has no address"):
+            bus.get_json("/state")
+    ended.set()
+
+
 def test_an_address_that_is_silent_leaves_time_for_the_next() -> None:
     with full_server() as silent, FarEnd(always(answer())) as far:
         bus = named(lambda *_, **__: [tcp(*silent), tcp("127.0.0.1", far.port)], 2.0)
@@ -507,6 +526,7 @@ def test_after_a_failure_calls_fail_at_once_until_it_is_time_again() -> None:
 
 def test_a_token_is_read_from_its_file_for_each_call(tmp_path: Path) -> None:
     file = tmp_path / "token"
+    file.touch(mode=0o600)
     with FarEnd(always(answer())) as far:
         bus = HttpBus(Settings(api_base=f"127.0.0.1:{far.port}", token_file=str(file)), Clock())
         for token in ("first", "second"):
@@ -523,11 +543,34 @@ def test_a_token_file_that_holds_none_is_an_error_that_does_not_show_it(
 ) -> None:
     file = tmp_path / "token"
     if held is not None:
+        file.touch(mode=0o600)
         file.write_bytes(held)
     bus = HttpBus(Settings(api_base="127.0.0.1:1", token_file=str(file)), Clock())
     with pytest.raises(HalError, match="token_file") as caught:
         bus.get_json("/state")
     assert "words" not in str(caught.value)
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o620, 0o644])
+def test_a_token_file_that_others_can_read_or_write_is_refused_and_not_sent(
+    tmp_path: Path, mode: int
+) -> None:
+    file = tmp_path / "token"
+    file.write_text("secret\n")
+    file.chmod(mode)
+    with FarEnd(always(answer())) as far:
+        bus = HttpBus(Settings(api_base=f"127.0.0.1:{far.port}", token_file=str(file)), Clock())
+        with pytest.raises(HalError) as caught:
+            bus.get_json("/state")
+        bus.close()
+    assert str(caught.value) == f"token_file {file} is open to other users: chmod 600 {file}"
+    assert far.requests == []
+
+
+def test_a_token_over_plain_http_is_worth_a_warning() -> None:
+    assert list(warnings(Settings(api_base="tpu"))) == []
+    [(path, text)] = warnings(Settings(api_base="tpu", token_file="/etc/rmf-bridge/tpu.token"))
+    assert (path, "unencrypted" in text) == (("token_file",), True)
 
 
 def test_a_bus_is_opened_without_sending_anything_and_may_be_closed_twice() -> None:
