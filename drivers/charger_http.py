@@ -25,10 +25,10 @@ from bridges.charger.signals import (
     Side,
 )
 from drivers import json_fields
-from drivers.state_codes import CODE_MAX, Code, Codes
 from drivers.hal import http
 from drivers.json_fields import Field
 from drivers.points import Wire
+from drivers.state_codes import CODE_MAX, Code, Codes
 
 BUSES = ("http",)
 
@@ -133,15 +133,12 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
         """What the fields cannot say one by one."""
         yield from super().problems()
         if self.receivers and self.fields.receiver_id is None:
-            yield ("receivers",), "needs fields: {receiver_id: …}: where does the station say it?"
-        known = self.codes.meanings()
-        for word, code in self.state_words.items():
-            if code not in known:
-                yield ("state_words", word), f"{code} stands nowhere in codes"
+            text = "receivers needs it: where does the station say whose receiver it sees?"
+            yield ("fields", "receiver_id"), text
         if self.start and not self.stop:
             yield ("start",), "needs stop as well: nobody starts what cannot be stopped"
         if self.range_check and self.fields.in_range is None:
-            yield ("range_check",), "needs fields: {in_range: …}: where is its result?"
+            yield ("fields", "in_range"), "range_check needs it: where is its result?"
         if self.on_death == "keep" and self.stop is None:
             yield ("on_death",), "this station cannot be stopped: leave this out"
 
@@ -212,6 +209,11 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
     if not settings.codes.error:
         yield ("codes",), "no code means error: each of them will be shown as an unknown state"
 
+    known = settings.codes.meanings()
+    for word, code in settings.state_words.items():
+        if code not in known:
+            yield ("state_words", word), f"{code} stands nowhere in codes: an unknown state"
+
 
 def _lacks(settings: Settings, what: str) -> bool:
     return (settings.stop if what == "stop" else settings.fields.receiver_id) is None
@@ -232,7 +234,7 @@ class HttpCharger:
     def __init__(self, settings: Settings, bus: Calls) -> None:
         self._settings = settings
         self._bus = bus
-        self._meaning: dict[int | str, tuple[Activity, Side]] = {**settings.codes.meanings()}
+        self._meaning = settings.codes.meanings()
         self._activity = Activity.UNKNOWN
         self._power: bool | None = None
         self._cleared = 0

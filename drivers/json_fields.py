@@ -18,7 +18,7 @@ ABSENT: Final = object()
 Field = Annotated[
     str,
     msgspec.Meta(
-        pattern=r"^[A-Za-z0-9_$@-]+(\.[A-Za-z0-9_$@-]+)*$(?!\n)",
+        pattern=r"^[A-Za-z_$@][A-Za-z0-9_$@-]*(\.[A-Za-z0-9_$@-]+)*$(?!\n)",
         max_length=128,
         extra={"pattern": "names with dots between them (status.code)"},
     ),

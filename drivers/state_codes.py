@@ -44,9 +44,9 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
                     yield (name, str(n)), f"state {code} is already {seen[code]}: give it once"
                 seen[code] = name
 
-    def meanings(self) -> Mapping[int, tuple[Activity, Side]]:
+    def meanings(self) -> dict[int | str, tuple[Activity, Side]]:
         """By the maker's state: what the station does, and whose fault an error is."""
-        made: dict[int, tuple[Activity, Side]] = {
+        made: dict[int | str, tuple[Activity, Side]] = {
             code: (activity, "") for activity, codes in self.lists().items() for code in codes
         }
         return made | dict.fromkeys(self.robot_error, ROBOT_ERROR)

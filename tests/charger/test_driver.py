@@ -15,10 +15,10 @@ from bridges.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from bridges.settings import load
 from drivers import DriverError
-from drivers.state_codes import Codes
 from drivers.charger_http import BUSES, Settings, create, describe, warnings, wires
 from drivers.hal import HalError
 from drivers.hal import http as bus_file
+from drivers.state_codes import Codes
 
 CODES = Codes(idle=[0], handshake=[1, 2], charging=[5], stopping=[11], released=[7], error=[238])
 SETTINGS = Settings(codes=CODES)

@@ -13,9 +13,9 @@ import pytest
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.settings import Config, load
 from drivers import DriverError
-from drivers.state_codes import Codes
 from drivers.charger_http import HttpCharger, create
 from drivers.hal.http import HttpBus
+from drivers.state_codes import Codes
 from hal_fakes.charger_plant import Reading, build
 from hal_fakes.http import HttpServer, Station, serve
 from hal_fakes.plant import FailureMode

@@ -220,7 +220,7 @@ def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file:
                 assert at(node).partition(":")[0] in {s.partition(":")[0] for s in spots(found)}
             elif found and trap not in NAMES:
                 assert at(node) in spots(found), (trap, found)
-    assert accepted < 40
+    assert accepted < 40, accepted
 
 
 def test_every_shipped_file_is_judged_when_cut_anywhere(config: Path, file: Path) -> None:
