@@ -21,7 +21,9 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from bridges.charger.signals import CURRENT_FLOWS, Activity
+from drivers import charger_can_frames, charger_canopen
 from hal_fakes.machine import Machine
+from hal_fakes.pad_plant import PadPlant
 from hal_fakes.plant import FailureMode
 
 HANDSHAKE_S: Final = 2.0
@@ -44,10 +46,15 @@ CAUSES: Final = {
 PARTS: Final = ("receiver", "server", "headers", "body")
 
 
-def build(name: str, settings: Any) -> "ChargerPlant":
-    """A station with its robots; its code table is the wire's business (`hal_fakes/http.py`)."""
+def build(name: str, settings: Any) -> Machine:
+    """A station with its robots; its code table is the wire's business (`hal_fakes/http.py`).
+
+    On CAN it is one whose receiver is switched, with a pad that moves (`hal_fakes/pad_plant.py`).
+    """
     if settings is None:
         return ChargerPlant(name)
+    if isinstance(settings, charger_canopen.Settings | charger_can_frames.Settings):
+        return PadPlant(name)
     asked = getattr(settings, "range_check", None) is not None
     return ChargerPlant(name, settings.receivers, settings.can_stop(), asked)
 

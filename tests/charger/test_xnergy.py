@@ -63,7 +63,8 @@ def test_a_reading_is_state_volts_amps_and_range() -> None:
             0x8010,
             0x10,
             "robot",
-            "handshake timeout; a fan of the receiver is stuck; a temperature sensor of the receiver has failed",
+            "handshake timeout; a fan of the receiver is stuck;"
+            " a temperature sensor of the receiver has failed",
         ),
     ],
 )
