@@ -213,10 +213,11 @@ def _cancel(memory: Memory, cancelled: Cancelled, now: float) -> tuple[Memory, s
     if holder is None or holder.request.request_id != cancelled.request_id:
         known = cancelled.request_id in memory.over
         return memory, "" if known else "request not assigned here"
-    if holder.released_at is not None:
-        return memory, ""
-    released_at = None if holder.started else now
-    return replace(memory, holder=replace(holder, ended="cancelled", released_at=released_at)), ""
+    at = holder.released_at
+    if at is None and not holder.started:
+        at = now
+    ended = holder.ended or "cancelled"
+    return replace(memory, holder=replace(holder, ended=ended, released_at=at)), ""
 
 
 def _reset(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, str]:

@@ -30,14 +30,15 @@ def follow(
 ) -> Holder | None:
     """The request after one reading; None when it is over and the station free."""
     on_pad = pad.seen(sample, limits)
-    if on_pad.is_another(holder.request.who):
+    another = on_pad.is_another(holder.request.who)
+    if sample.activity in AT_FAULT and not (another and sample.side == "robot"):
+        return replace(holder, failed=True)
+    if another:
         return _beside_another(holder, now, limits)
     holder = _resumed(holder, now)
     match sample.activity:
         case Activity.CHARGING | Activity.STOPPING:
             return _flowing(holder, sample, limits)
-        case Activity.ERROR | Activity.UNKNOWN:
-            return replace(holder, failed=True)
         case Activity.HANDSHAKE if holder.started and not holder.ended:
             holder = _sought_again(holder, now, limits)
         case _:

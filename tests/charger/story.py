@@ -17,6 +17,10 @@ LIMITS = ChargerLimits(DURATIONS, can_stop=False)
 RECEIVERS = {"rx-1": robot("tiny/AMR01"), "rx-2": robot("tiny/AMR02")}
 
 
+FULL = ChargerLimits(DURATIONS, RECEIVERS)
+"""A station that sees who stands on its pad, and can be stopped."""
+
+
 def observed(**durations: Any) -> ChargerLimits:
     """Such a station with these durations, and the defaults."""
     return ChargerLimits(Limits(**durations), can_stop=False)
@@ -51,7 +55,10 @@ CANCEL_1 = Cancelled("req-1")
 
 @dataclass
 class Story:
-    """A core with its memory. `told`: (time, state, request id or error) whenever the news differ."""
+    """A core with its memory. `told`: (time, state, request id or error) whenever the news differ.
+
+    `powered`: what each poll by `sees` decided about the power.
+    """
 
     limits: ChargerLimits = LIMITS
     now: float = 0.0
@@ -61,6 +68,7 @@ class Story:
     faults: list[str] = field(default_factory=list)
     report: ChargerReport | None = None
     outputs: ChargerOutputs = field(default_factory=ChargerOutputs)
+    powered: list[bool | None] = field(default_factory=list)
 
     def event(self, event: core.Event) -> "Story":
         """Something happens now."""
@@ -84,6 +92,16 @@ class Story:
             word, count = part.split()
             for _ in range(int(count)):
                 self.event(SCANS[word])
+                self.now += 1.0
+        return self
+
+    def sees(self, *readings: tuple[Activity, str, int], **known: Any) -> "Story":
+        """`(activity, receiver, polls)` of a station that knows who is on its pad."""
+        for activity, receiver, count in readings:
+            sample = ChargerSample(activity, 0, measured=Measured(receiver_id=receiver, **known))
+            for _ in range(count):
+                self.event(Sampled(sample))
+                self.powered.append(self.outputs.power)
                 self.now += 1.0
         return self
 

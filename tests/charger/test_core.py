@@ -195,12 +195,14 @@ def test_a_cancel_while_charging_takes_the_power_and_shows_charging_until_it_sto
     assert story.faults == ["STILL_CHARGING: req-1: cancelled"]
 
 
-def test_a_cancel_during_the_restart_delay_changes_nothing() -> None:
+def test_a_cancel_during_the_restart_delay_changes_nothing_but_that_no_power_comes_back() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 1, released 1")
-    before = story.memory
+    before = story.report, story.outputs
     story.event(CANCEL_1)
-    assert story.memory == before
+    assert (story.report, story.outputs) == before
     assert story.refused == []
+    story.polls("charging 1")
+    assert story.outputs.power is False
 
 
 def test_a_second_cancel_changes_nothing_before_and_after_the_end() -> None:
