@@ -21,11 +21,12 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from bridges.charger.signals import CURRENT_FLOWS, Activity
-from drivers import charger_can_frames, charger_canopen
+from drivers import charger_can_frames, charger_canopen, charger_modbus
 from hal_fakes.machine import Machine
 from hal_fakes.pad_plant import PadPlant
 from hal_fakes.plant import FailureMode
 
+SWITCHED: Final = (charger_canopen.Settings, charger_can_frames.Settings, charger_modbus.Settings)
 HANDSHAKE_S: Final = 2.0
 SLOWNESS: Final = 10.0
 FILL_S: Final = 60.0
@@ -49,11 +50,12 @@ PARTS: Final = ("receiver", "server", "headers", "body")
 def build(name: str, settings: Any) -> Machine:
     """A station with its robots; its code table is the wire's business (`hal_fakes/http.py`).
 
-    On CAN it is one whose receiver is switched, with a pad that moves (`hal_fakes/pad_plant.py`).
+    On CAN and Modbus it is one whose receiver is switched, with a pad that moves
+    (`hal_fakes/pad_plant.py`).
     """
     if settings is None:
         return ChargerPlant(name)
-    if isinstance(settings, charger_canopen.Settings | charger_can_frames.Settings):
+    if isinstance(settings, SWITCHED):
         return PadPlant(name)
     asked = getattr(settings, "range_check", None) is not None
     return ChargerPlant(name, settings.receivers, settings.can_stop(), asked)
@@ -82,7 +84,7 @@ class ChargerPlant(Machine):
     """`battery`: 0-1, of the robot on the pad; nobody's when there is none.
 
     `receivers`: id -> robot. `commanded`: it charges only while `power` is on. `asked`: it knows
-    whether a robot is in range only by a range check.
+    whether a robot is in range only by a range check. `pace`: how many times as fast it is.
     """
 
     def __init__(
@@ -91,8 +93,10 @@ class ChargerPlant(Machine):
         receivers: Mapping[str, str] = MappingProxyType({}),
         commanded: bool = False,
         asked: bool = False,
+        pace: float = 1.0,
     ) -> None:
         super().__init__(name, parts=PARTS)
+        self._pace = pace
         self.activity = Activity.IDLE
         self.error_text = ""
         self.battery = 0.0
@@ -144,7 +148,7 @@ class ChargerPlant(Machine):
     def _battery(self) -> float:
         if self.activity is not Activity.CHARGING or self._until == NEVER:
             return self.battery
-        return min(1.0, 1.0 - (self._until - self.now) / FILL_S)
+        return min(1.0, 1.0 - (self._until - self.now) * self._pace / FILL_S)
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
         """A command reaches the station. `clear_error`: it looks again whether the cause has gone."""
@@ -156,7 +160,7 @@ class ChargerPlant(Machine):
         if signal == "power":
             self.power = asserted
         elif signal == "range_check":
-            self._checked_at = self.now + RANGE_CHECK_S
+            self._checked_at = self.now + RANGE_CHECK_S / self._pace
         elif self.activity is Activity.ERROR and not any(self._pressed[c] for c in CAUSES):
             self.error_text = ""
             self._enter(Activity.IDLE)
@@ -203,7 +207,7 @@ class ChargerPlant(Machine):
             self._shake_hands()
 
     def _enter(self, activity: Activity, lasts_s: float = NEVER) -> None:
-        self._since, self._until = self.now, self.now + lasts_s
+        self._since, self._until = self.now, self.now + lasts_s / self._pace
         if activity is not self.activity:
             self.activity = activity
             self.note("sensor", "state", str(activity))

@@ -56,7 +56,9 @@ TRIP_C: Final = 95.0
 WARMS_IN_S: Final = 20.0
 FULL_V, EMPTY_V, CURRENT_A = 29.2, 24.0, 30.0
 
-PARTS: Final = ("pad", "receiver", "fan", "battery", "thermometer", "node", "heartbeat", "bus")
+LINKS: Final = ("node", "heartbeat", "bus", "unit", "server")
+"""Parts of the wire, on CAN and on Modbus: its far side has those."""
+PARTS: Final = ("pad", "receiver", "fan", "battery", "thermometer", *LINKS)
 PRESSED: Final = ("robot", "misparked", "foreign_object", "transmitter_fault")
 STATION_CAUSES: Final = ("foreign_object", "transmitter_fault")
 

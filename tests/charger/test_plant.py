@@ -13,7 +13,7 @@ def states(plant: ChargerPlant) -> list[tuple[float, bool | int | str | float]]:
 
 def parked(*failures: tuple[str, FailureMode]) -> ChargerPlant:
     """A station onto whose pad a robot comes at 1 s."""
-    plant = build("a", None)
+    plant = ChargerPlant("a")
     for part, mode in failures:
         plant.fail(part, mode)
     plant.press("robot", True, 1.0)
@@ -89,7 +89,7 @@ def test_an_error_stays_until_it_is_cleared_after_its_cause_has_gone(cause: str,
 
 
 def test_a_clearing_without_an_error_and_a_cause_without_a_robot_change_nothing() -> None:
-    plant = build("a", None)
+    plant = ChargerPlant("a")
     plant.press("foreign_object", True, 1.0)
     plant.drive("clear_error", True, 2.0)
     plant.advance(100.0)
