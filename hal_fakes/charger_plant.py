@@ -18,8 +18,9 @@ takes ten times as long for it, `wrong` fails it, `garbage` loses contact while 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, overload
 
+from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import CURRENT_FLOWS, Activity
 from drivers import charger_can_frames, charger_canopen, charger_modbus
 from hal_fakes.machine import Machine
@@ -45,6 +46,14 @@ CAUSES: Final = {
     "over_temperature": "over temperature",
 }
 PARTS: Final = ("receiver", "server", "headers", "body")
+
+
+@overload
+def build(name: str, settings: None) -> "ChargerPlant": ...
+
+
+@overload
+def build(name: str, settings: ChargerSettings) -> Machine: ...
 
 
 def build(name: str, settings: Any) -> Machine:
