@@ -112,4 +112,8 @@ def summary(shown: ChargerReport) -> Mapping[str, str]:
         "battery_percent": measured.battery_percent,
         "time_to_full_s": measured.time_to_full_s,
     }
-    return told | {key: str(value) for key, value in optional.items() if value is not None}
+    return told | {key: _short(value) for key, value in optional.items() if value is not None}
+
+
+def _short(value: str | float) -> str:
+    return value if isinstance(value, str) else str(round(value, 2))
