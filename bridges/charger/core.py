@@ -24,7 +24,7 @@
 9. Errors are cleared when an operator says so, or at most `clear_errors_per_h` times an hour.
 """
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.charger import pad, session, told
 from bridges.charger.memory import (

@@ -1,7 +1,8 @@
 """What the charger's core remembers, and what can happen to it."""
 
-from dataclasses import dataclass
 from typing import Literal
+
+import msgspec
 
 from bridges.charger.settings import ChargerLimits, Robot
 from bridges.charger.signals import ChargerSample
@@ -12,8 +13,7 @@ RIVAL_GONE_S = 5.0
 NEVER = float("-inf")
 
 
-@dataclass(frozen=True, slots=True)
-class Requested:
+class Requested(msgspec.Struct, frozen=True):
     """A ChargerRequest that is ours and well formed; `start_timeout_s` 0 is the configured default.
 
     A robot that is served though nobody asked has one without a `request_id`.
@@ -30,15 +30,13 @@ class Requested:
         return Robot(self.fleet, self.robot)
 
 
-@dataclass(frozen=True, slots=True)
-class Cancelled:
+class Cancelled(msgspec.Struct, frozen=True):
     """A ChargerCancel; without a `request_id`, of what nobody asked for."""
 
     request_id: str
 
 
-@dataclass(frozen=True, slots=True)
-class Holder:
+class Holder(msgspec.Struct, frozen=True):
     """The request that occupies the station.
 
     `start_by`: charging must have started (monotonic s). `paused_at`: since when another robot on the
@@ -62,8 +60,7 @@ class Holder:
         return self.failed or bool(self.ended) or self.released_at is not None
 
 
-@dataclass(frozen=True, slots=True)
-class Memory:
+class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives a scan. `sample`: the last good reading, of `read_at`.
 
     `write_misses`: scans in a row whose commands failed, `write_failed` among them this one.

@@ -4,8 +4,9 @@ Where the YAML has no `receivers`, nobody is verified and every robot counts as 
 Where it has some, a station that does not say whom it sees charges nobody.
 """
 
-from dataclasses import dataclass
 from typing import Literal
+
+import msgspec
 
 from bridges.charger.memory import Memory
 from bridges.charger.settings import ChargerLimits, Robot
@@ -15,8 +16,7 @@ from bridges.decision import Fault
 WRONG_DOCKING = "WRONG_DOCKING"
 
 
-@dataclass(frozen=True, slots=True)
-class Pad:
+class Pad(msgspec.Struct, frozen=True):
     """`unverified`: the YAML knows no receivers. `mute`: the station does not say whom it sees.
 
     `receiver`: the id that it sees; `robot`: whose that is, None for a stranger's.

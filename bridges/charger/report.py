@@ -1,15 +1,16 @@
 """What RMF is told about a charger: ChargerState's content, and what the status file says beside it."""
 
-from dataclasses import dataclass, replace
 from typing import Any
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.charger.signals import Measured
 from bridges.decision import Fault
 from bridges.rmf.definitions import ChargerStateValue
 
 
-@dataclass(frozen=True, slots=True)
-class ChargerReport:
+class ChargerReport(msgspec.Struct, frozen=True):
     """ChargerState without its name and stamp.
 
     `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:

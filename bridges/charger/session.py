@@ -1,6 +1,6 @@
 """A request from its grant to its end, reading by reading."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.charger import pad
 from bridges.charger.memory import Holder, Memory, Requested

@@ -1,7 +1,6 @@
 """The part of a charger's YAML that does not depend on how it is reached."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from typing import Annotated, Literal, NamedTuple
 
 import msgspec
@@ -97,15 +96,14 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
             yield ("unrequested",), "serve_known needs receivers: whom does the station know?"
 
 
-@dataclass(frozen=True, slots=True)
-class ChargerLimits:
+class ChargerLimits(msgspec.Struct, frozen=True):
     """A charger's fixed facts as its core needs them. `t`: durations and counts.
 
     `receivers`: empty where nobody is verified. `can_stop`: `power` is obeyed.
     """
 
     t: Limits = Limits()
-    receivers: Mapping[str, Robot] = field(default_factory=dict)
+    receivers: Mapping[str, Robot] = {}
     unrequested: Unrequested = "refuse"
     can_stop: bool = True
 

@@ -4,9 +4,10 @@ A station that answers HTTP as the first contract does fills in the activity and
 Richer controllers (CANopen, Modbus, another make's JSON) fill in `measured` and obey `power`.
 """
 
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
+
+import msgspec
 
 
 class Activity(StrEnum):
@@ -32,8 +33,7 @@ Side = Literal["", "station", "robot"]
 """Whose fault an error is, by the controller's own diagnosis; "" where it does not say."""
 
 
-@dataclass(frozen=True, slots=True)
-class Measured:
+class Measured(msgspec.Struct, frozen=True):
     """What a richer controller knows beside its state; None where it does not say.
 
     `receiver_id`: who is on the pad, "" for nobody. `in_range`: is the robot's coil where it can be
@@ -49,8 +49,7 @@ class Measured:
     time_to_full_s: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ChargerSample:
+class ChargerSample(msgspec.Struct, frozen=True):
     """One reading of one station.
 
     `code`: the vendor's number or word, for texts only. `error_text`: the station's own words,
@@ -64,8 +63,7 @@ class ChargerSample:
     side: Side = ""
 
 
-@dataclass(frozen=True, slots=True)
-class ChargerOutputs:
+class ChargerOutputs(msgspec.Struct, frozen=True):
     """Everything that a station is told.
 
     `power`: whether it may energise; None leaves it as it is (a charge that we have not started, and

@@ -1,8 +1,10 @@
 """Stories for the charger's core: a station that is polled once a second, in virtual time."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
+
+from msgspec.structs import replace
 
 from bridges.charger import core
 from bridges.charger.core import Cancelled, Requested

@@ -1,9 +1,8 @@
 """A station that sees who stands on its pad and obeys: the five situations of a shared charger, its own
 side of each, in virtual time, one poll a second."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.charger.core import Cancelled, Requested
 from bridges.charger.report import ChargerReport

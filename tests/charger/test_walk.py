@@ -1,8 +1,7 @@
 """Every state within some steps of the start, and of each stage of a charge: what is true in all."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.charger.core import Requested
 from bridges.charger.settings import ChargerLimits

@@ -6,8 +6,10 @@ out, so that states that cannot behave differently are one.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 from typing import Any
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.charger.core import Cancelled, Event, Memory, Requested, decide
 from bridges.charger.report import ChargerReport
@@ -33,8 +35,7 @@ SITES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Ledger:
+class Ledger(msgspec.Struct, frozen=True):
     """What has happened, without the core's conclusions. Times are relative to the state's.
 
     `granted`: the request that was accepted last and has not been seen to end; `robot`: whose.
@@ -54,8 +55,7 @@ class Ledger:
     adopted: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class World:
+class World(msgspec.Struct, frozen=True):
     """Memory and ledger at time 0, the station, and whether it can be read and commanded."""
 
     memory: Memory = Memory()
@@ -66,8 +66,7 @@ class World:
     writable: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(msgspec.Struct, frozen=True):
     """One decision and all around it. `ledger`: after it."""
 
     before: World
