@@ -9,6 +9,7 @@ import can
 
 from drivers import DriverError
 from drivers.hal.can import CanBus, Settings
+from tests.modbus.module import Time
 
 _numbers = itertools.count()
 
@@ -18,14 +19,11 @@ def channel() -> str:
     return f"test-{next(_numbers)}"
 
 
-class Clock:
-    """Real time that can be made to jump ahead."""
-
-    def __init__(self) -> None:
-        self.ahead_s = 0.0
+class Clock(Time):
+    """Real time that can be made to jump ahead: `now` is by how much."""
 
     def __call__(self) -> float:
-        return time.monotonic() + self.ahead_s
+        return time.monotonic() + self.now
 
 
 class FarEnd:

@@ -73,7 +73,7 @@ def test_a_silent_bus_is_told_from_one_on_which_others_speak(ends: Ends) -> None
     bus.take()
     told = "the bus works, and others are heard: 0x70B, 0x18FF50E5"
     assert bus.silence() == told
-    clock.ahead_s += 10
+    clock.now += 10
     assert bus.silence() == SILENT
 
 
@@ -90,7 +90,7 @@ def test_what_has_come_while_we_hung_is_of_unknown_age_and_thrown_away(ends: End
     bus, far, clock = ends
     heard = heard_by(bus, Wanted(1))
     far.send(1, "01")
-    clock.ahead_s += 5
+    clock.now += 5
     bus.take()
     assert heard == []
     far.send(1, "02")
@@ -121,7 +121,7 @@ def test_a_bus_off_is_named_and_pauses_the_bus(ends: Ends) -> None:
     assert failure(bus.take) == BUS_OFF_TEXT
     assert failure(bus.take) == BUS_OFF_TEXT
     assert failure(lambda: bus.send(Frame(1, b""))) == BUS_OFF_TEXT
-    clock.ahead_s += 0.5
+    clock.now += 0.5
     assert failure(bus.take) == ""
     assert bus.silence() == "the bus has trouble: bus-off"
 
@@ -131,7 +131,7 @@ def test_a_bus_off_is_over_when_a_frame_is_heard_again(ends: Ends) -> None:
     heard = heard_by(bus, Wanted(1))
     far.trouble(0x40)
     failure(bus.take)
-    clock.ahead_s += 0.5
+    clock.now += 0.5
     bus.take()
     far.send(1, "01")
     bus.take()
@@ -142,7 +142,7 @@ def test_a_bus_off_is_over_when_the_controller_says_that_it_restarts(ends: Ends)
     bus, far, clock = ends
     far.trouble(0x40)
     failure(bus.take)
-    clock.ahead_s += 0.5
+    clock.now += 0.5
     bus.take()
     far.trouble(0x100)
     bus.take()
@@ -158,7 +158,7 @@ def test_pauses_grow_while_the_bus_stays_off_and_are_short_again_after_a_frame(e
         assert failure(bus.take)
         begun_at = clock()
         while failure(bus.take):
-            clock.ahead_s += 0.25
+            clock.now += 0.25
         return round((clock() - begun_at) * 4) / 4
 
     assert [pause(), pause(), pause()] == [0.5, 1.0, 2.0]
@@ -183,7 +183,7 @@ def test_lesser_troubles_of_the_controller_are_told_where_somebody_is_silent(
     far.trouble(error_id)
     bus.take()
     assert bus.silence() == f"the bus has trouble: {text}"
-    clock.ahead_s += 10
+    clock.now += 10
     assert bus.silence() == SILENT
 
 
@@ -246,7 +246,7 @@ def test_an_interface_that_fails_is_named_with_what_to_do_and_paused(
     assert text in first
     assert failure(use) == first
     assert len(opened) == 1
-    clock.ahead_s += 0.6
+    clock.now += 0.6
     failure(use)
     assert len(opened) == 2
     bus.insist()
@@ -269,7 +269,7 @@ def test_an_interface_that_is_not_there_is_found_when_it_comes() -> None:
     assert failure(bus.take)
     there = True
     assert failure(bus.take)
-    clock.ahead_s += 0.6
+    clock.now += 0.6
     assert failure(bus.take) == ""
     bus.close()
 

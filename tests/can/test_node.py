@@ -104,7 +104,7 @@ def test_no_answer_is_no_number_and_pauses_the_node(side: Side) -> None:
     assert [failure(lambda: ours.read(*STATE)) for _ in range(3)] == [text] * 3
     assert len(node.asked) == 1
     node.answer = lambda request: [value(request, 7)]
-    clock.ahead_s += 0.6
+    clock.now += 0.6
     assert ours.read(*STATE) == 7
 
 
@@ -125,7 +125,7 @@ def test_a_reply_of_another_length_or_about_another_object_is_named_and_never_ta
     assert failure(lambda: ours.read(*STATE)) == (
         f"{NAME}, read 0x2002:0A: no reply within 0.05 s, but {text}"
     )
-    clock.ahead_s += 1
+    clock.now += 1
     node.answer = lambda request: [odd(request), value(request, 9), odd(request)]
     assert ours.read(*STATE) == 9
 
@@ -150,7 +150,7 @@ def test_a_late_answer_is_never_the_answer_to_the_next_question(side: Side) -> N
     ours, node, far, _, clock = side
     node.answer = lambda request: []
     assert failure(lambda: ours.read(*STATE))
-    clock.ahead_s += 0.6
+    clock.now += 0.6
     far.send(0x580 + NODE, "4b02200a05000000")  # state 5, of before
     node.answer = lambda request: [value(request, 238)]
     assert ours.read(*STATE) == 238
@@ -163,7 +163,7 @@ def test_a_node_that_owes_an_answer_is_asked_nothing(side: Side) -> None:
     ours._sdo_pause.mended()  # no pause keeps us from asking
     assert failure(lambda: ours.read(*STATE)) == (f"{NAME}, read 0x2002:0A: no reply within 0.05 s")
     assert len(node.asked) == 1
-    clock.ahead_s += 0.2
+    clock.now += 0.2
     node.answer = lambda request: [value(request, 1)]
     assert ours.read(*STATE) == 1
 
@@ -194,7 +194,7 @@ def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side
     ours, _, far, _, clock = side
     far.send(0x70A, "05")
     ours.alive()
-    clock.ahead_s += 0.55
+    clock.now += 0.55
     assert failure(ours.alive) == (
         f"{NAME}: no heartbeat within 0.5 s: nothing else is heard on the bus either: power,"
         " cable, termination, bitrate?"

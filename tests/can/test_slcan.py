@@ -52,7 +52,7 @@ class Desk:
 
     def passes(self) -> bool:
         """Does a frame come back?"""
-        self.clock.ahead_s += 60
+        self.clock.now += 60
         self.heard.clear()
         if failure(self.bus.take) or failure(lambda: self.bus.send(Frame(0x123, b"\1"))):
             return False
@@ -101,7 +101,7 @@ def test_an_adapter_that_is_pulled_is_a_failure_and_is_found_again_when_it_is_ba
     assert desk.passes()
     desk.echo.plant.fail("bus", "off")
     wait_until(lambda: desk.text() != "", "it is missed")
-    desk.clock.ahead_s += 60
+    desk.clock.now += 60
     wait_until(lambda: "the adapter is not there; is it plugged in?" in desk.text(), "it is named")
     desk.echo.plant.fail("bus", None)
     wait_until(desk.passes, "it passes frames again")
@@ -179,7 +179,7 @@ def test_whatever_an_adapter_says_is_a_frame_or_a_failure_and_never_breaks_us(
     os.write(leader, junk)
 
     def again() -> bool:
-        clock.ahead_s += 60
+        clock.now += 60
         failure(bus.take)
         os.write(leader, b"\rt32110A\r")
         failure(lambda: bus.wait(lambda: bool(heard), 0.05))

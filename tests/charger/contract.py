@@ -69,6 +69,10 @@ class ChargerContract(ABC):
 
     link: ClassVar[str]
     """The part of the plant that is the wire."""
+    cut: ClassVar[str] = ""
+    """The part whose `off` leaves the station alone, where that is another one."""
+    foreign_object: ClassVar[str] = "foreign object"
+    """How the station calls it."""
 
     @abstractmethod
     def benches(self) -> contextlib.AbstractContextManager[Bench]:
@@ -142,7 +146,7 @@ class ChargerContract(ABC):
         bench.until(Activity.CHARGING, ON)
         bench.press("foreign_object")
         bench.until(Activity.ERROR, OFF)
-        assert "foreign object" in bench.driver.read().error_text
+        assert self.foreign_object in bench.driver.read().error_text
         assert bench.switched()[-1] is False
 
     def test_a_check_of_the_range_is_sent_once_for_a_rise(self, bench: Bench) -> None:
@@ -177,9 +181,9 @@ class ChargerContract(ABC):
         bench.driver.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
-        bench.plant.fail(self.link, "off")
+        bench.plant.fail(self.cut or self.link, "off")
         wait_until(lambda: not isinstance(bench.patiently(), Activity), "gone")
-        bench.plant.fail(self.link, None)
+        bench.plant.fail(self.cut or self.link, None)
         wait_until(lambda: bench.patiently() is Activity.CHARGING, "back")
         bench.scan(ON)
         assert bench.switched() == [True]
