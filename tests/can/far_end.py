@@ -2,6 +2,7 @@
 
 import itertools
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -82,6 +83,33 @@ def two_ends(timeout_s: float = 0.05) -> Iterator[tuple[CanBus, FarEnd, Clock]]:
     finally:
         bus.close()
         far.close()
+
+
+class Reactive(can.BusABC):
+    """A bus in virtual time: who is on it answers at once, and waiting is only a number."""
+
+    def __init__(self) -> None:
+        super().__init__("reactive")
+        self.now = 0.0
+        self.react: Callable[[can.Message], list[can.Message]] = lambda message: []
+        self.coming: deque[can.Message] = deque()
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        if self.coming:
+            return self.coming.popleft()
+        self.now += (timeout or 0.0) + 1e-6
+        return None
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self.coming.extend(self.react(msg))
+
+    def bus(self) -> CanBus:
+        place = Settings(socketcan="can0", timeout_s=0.05, scan_s=0.05)
+        return CanBus(place, lambda: self.now, lambda: 0.0, lambda: self)
+
+    def shutdown(self) -> None:
+        """It stays, and the next opening finds it again."""
+        self._is_shutdown = True
 
 
 def failure(call: Callable[[], object]) -> str:

@@ -1,6 +1,5 @@
 """Whatever frames come, a driver raises a DriverError or nothing, and sees no charge in noise."""
 
-from collections import deque
 from collections.abc import Callable
 
 import can
@@ -10,38 +9,11 @@ from hypothesis import strategies as st
 
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from drivers import DriverError, charger_can_frames, charger_canopen
-from drivers.hal.can import CanBus, Settings
+from tests.can.far_end import Reactive
 
 OFF, ON, LEFT = (ChargerOutputs(power, range_checks=1) for power in (False, True, None))
 STATUS = 0x18FF50E5
 SERIAL = 0x1FFD0001
-
-
-class Reactive(can.BusABC):
-    """A bus in virtual time: who is on it answers at once, and waiting is only a number."""
-
-    def __init__(self) -> None:
-        super().__init__("reactive")
-        self.now = 0.0
-        self.react: Callable[[can.Message], list[can.Message]] = lambda message: []
-        self.coming: deque[can.Message] = deque()
-
-    def recv(self, timeout: float | None = None) -> can.Message | None:
-        if self.coming:
-            return self.coming.popleft()
-        self.now += (timeout or 0.0) + 1e-6
-        return None
-
-    def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        self.coming.extend(self.react(msg))
-
-    def bus(self) -> CanBus:
-        place = Settings(socketcan="can0", timeout_s=0.05, scan_s=0.05)
-        return CanBus(place, lambda: self.now, lambda: 0.0, lambda: self)
-
-    def shutdown(self) -> None:
-        """It stays, and the next opening finds it again."""
-        self._is_shutdown = True
 
 
 def attempt(far: Reactive, step: Callable[[], object]) -> object:

@@ -181,7 +181,7 @@ class CanContract(ChargerContract):
         for part in self.parts:
             for mode in ("off", "stuck", "slow", "garbage", "wrong"):
                 pad.plant.fail(part, mode)
-                assert not {pad.patiently() for _ in range(3)} & CURRENT_FLOWS
+                assert not {pad.patiently() for _ in range(2)} & CURRENT_FLOWS
             pad.plant.fail(part, None)
         wait_until(lambda: pad.patiently() is Activity.IDLE, "back")
 
