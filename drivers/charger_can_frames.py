@@ -20,6 +20,7 @@ from bridges.charger.signals import (
     Side,
 )
 from bridges.fields import Name
+from bridges.yaml_nodes import unknown
 from drivers import DriverError, dbc
 from drivers.can_map import PROFILE, FrameMap, Problems, Sent
 from drivers.hal import can
@@ -71,10 +72,7 @@ def _setpoint_problems(settings: Settings) -> Problems:
     for name in sorted(wanted - given):
         yield ("setpoints",), f"needs '{name}', which the charger is told while it charges"
     for name in sorted(given - wanted):
-        yield (
-            ("setpoints", name),
-            f"the map takes no '{name}': it takes {', '.join(sorted(wanted))}",
-        )
+        yield ("setpoints", name), unknown("setpoint", name, sorted(wanted))
     if wanted == given:
         for sent in found.send:
             for on in (True, False):
@@ -294,7 +292,7 @@ class FrameDriver:
         """Every signal of frames that are fresh, by Frame.Signal. Raises DriverError."""
         values: dict[str, float] = {}
         for frame, (payload, at) in self._heard.items():
-            if self._bus.now() - at < max(self._map.state_timeout_s, self._map.others_timeout_s):
+            if self._bus.now() - at < self._needed.get(frame, self._map.others_timeout_s):
                 found = self._dbc.decode(frame, payload)
                 values |= {f"{frame}.{signal}": value for signal, value in found.items()}
         return values

@@ -54,7 +54,7 @@ class Station(Protocol):
     plant: Plant
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """A frame from the daemon."""
+        """A frame from the daemon. What is sent goes out at its `timestamp` (monotonic s), if later."""
 
     def tick(self, now: float, send: Send) -> None:
         """Send what is due; called often."""

@@ -38,6 +38,7 @@ __all__ = ["EXTENDED", "CanBus", "Frame", "Settings", "Slcan", "Wanted", "named"
 FRAMES_AT_ONCE: Final = 20_000
 """A reading takes no more: a bus at 1 Mbit/s has 8,000 a second."""
 HANG_S: Final = 1.0
+"""A reading that comes so much later than it should shows that we hung."""
 ROUTES_MAX: Final = 4096
 RECENT_S: Final = 5.0
 OTHERS_MAX: Final = 64
@@ -164,7 +165,7 @@ class CanBus(Bus):
 
         After a hang nobody knows how old what has come is: it is thrown away.
         """
-        self._deaf = self.now() - self._taken_at > HANG_S
+        self._deaf = self.now() - self._taken_at > HANG_S + self.settings.scan_s
         for _ in range(FRAMES_AT_ONCE):
             if not self._step(0.0):
                 break

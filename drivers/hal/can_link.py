@@ -13,6 +13,7 @@ python-can opens, reads and sends; what its interfaces leave open is settled her
 
 import errno
 import functools
+import logging
 import os
 import select
 from collections.abc import Callable
@@ -143,6 +144,7 @@ class Link:
         """Have it open. Raises LinkDown."""
         if self._bus is not None:
             return
+        logging.getLogger("can").setLevel(logging.CRITICAL)  # our texts say it all
         try:
             self._bus = self._vendor()
         except _failures() as error:

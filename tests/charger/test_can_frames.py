@@ -259,7 +259,7 @@ def test_setpoints_are_those_that_the_map_takes() -> None:
     [(path, text)] = problems(setpoints=SETPOINTS | {"ampere": 1.0})
     assert (path, text) == (
         ("setpoints", "ampere"),
-        "the map takes no 'ampere': it takes amps, max_volts, volts",
+        "unknown setpoint 'ampere': did you mean 'amps'? known here: amps, max_volts, volts",
     )
 
 

@@ -162,7 +162,7 @@ def test_every_misspelt_key_is_found_where_it_stands(config: Path, file: Path) -
     root = composed(text)
     names = own_names(config)
     for place in places(root, root):
-        if is_own(place.key.value, names):
+        if is_own(place.key.value, names) or place.parent.value == "setpoints":
             continue
         start = place.key.start_mark.index
         wrong = text[:start] + "z" + text[start:]
