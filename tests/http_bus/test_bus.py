@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.hal import HalError
-from drivers.hal.http import HttpBus, Settings, open_bus, warnings
+from drivers.hal.http import HttpBus, Settings, open_bus
 from tests.http_bus.far_end import (
     Caller,
     Conversation,
@@ -107,6 +107,24 @@ def test_the_environments_proxies_and_passwords_are_not_used(
         assert bus.get_json("/state") == {"state": 0}
         bus.close()
     assert b"Authorization" not in far.requests[0]
+
+
+def test_a_command_carries_its_method_and_its_body_as_json() -> None:
+    bodies = []
+
+    def talk(caller: Caller) -> None:
+        while caller.request():
+            bodies.append(caller._sock.recv(64))
+            caller.send(answer(status="204 No Content", body=b""))
+
+    with FarEnd(talk) as far:
+        bus = bus_to(far.port)
+        bus.send("/output", "PUT", '{"enabled": true}')
+        bus.close()
+    lines = far.requests[0].decode().split("\r\n")
+    assert lines[0] == "PUT /output HTTP/1.1"
+    assert {"Content-Type: application/json", "Content-Length: 17"} <= set(lines)
+    assert bodies == [b'{"enabled": true}']
 
 
 def test_cookies_are_not_kept() -> None:
@@ -521,56 +539,17 @@ def test_after_a_failure_calls_fail_at_once_until_it_is_time_again() -> None:
         bus.close()
 
 
-# ---- token
-
-
-def test_a_token_is_read_from_its_file_for_each_call(tmp_path: Path) -> None:
-    file = tmp_path / "token"
-    file.touch(mode=0o600)
-    with FarEnd(always(answer())) as far:
-        bus = HttpBus(Settings(api_base=f"127.0.0.1:{far.port}", token_file=str(file)), Clock())
-        for token in ("first", "second"):
-            file.write_text(f"{token}\n")
-            bus.get_json("/state")
+def test_who_insists_is_not_held_back_by_the_pause_after_a_failure() -> None:
+    with FarEnd(once(b"?"), always(answer())) as far:
+        bus = bus_to(far.port, clock=lambda: 0.0)
+        for _ in range(2):
+            with pytest.raises(HalError, match="no whole HTTP answer"):
+                bus.send("/stop")
+        assert far.connections == 1
+        bus.insist()
+        bus.send("/stop")
+        assert far.connections == 2
         bus.close()
-    sent = [line for r in far.requests for line in r.split(b"\r\n") if b"Auth" in line]
-    assert sent == [b"Authorization: Bearer first", b"Authorization: Bearer second"]
-
-
-@pytest.mark.parametrize("held", [None, b"", b"two words", b"two\nlines", b"\xff"])
-def test_a_token_file_that_holds_none_is_an_error_that_does_not_show_it(
-    tmp_path: Path, held: bytes | None
-) -> None:
-    file = tmp_path / "token"
-    if held is not None:
-        file.touch(mode=0o600)
-        file.write_bytes(held)
-    bus = HttpBus(Settings(api_base="127.0.0.1:1", token_file=str(file)), Clock())
-    with pytest.raises(HalError, match="token_file") as caught:
-        bus.get_json("/state")
-    assert "words" not in str(caught.value)
-
-
-@pytest.mark.parametrize("mode", [0o640, 0o604, 0o620, 0o644])
-def test_a_token_file_that_others_can_read_or_write_is_refused_and_not_sent(
-    tmp_path: Path, mode: int
-) -> None:
-    file = tmp_path / "token"
-    file.write_text("secret\n")
-    file.chmod(mode)
-    with FarEnd(always(answer())) as far:
-        bus = HttpBus(Settings(api_base=f"127.0.0.1:{far.port}", token_file=str(file)), Clock())
-        with pytest.raises(HalError) as caught:
-            bus.get_json("/state")
-        bus.close()
-    assert str(caught.value) == f"token_file {file} is open to other users: chmod 600 {file}"
-    assert far.requests == []
-
-
-def test_a_token_over_plain_http_is_worth_a_warning() -> None:
-    assert list(warnings(Settings(api_base="tpu"))) == []
-    [(path, text)] = warnings(Settings(api_base="tpu", token_file="/etc/rmf-bridge/tpu.token"))
-    assert (path, "unencrypted" in text) == (("token_file",), True)
 
 
 def test_a_bus_is_opened_without_sending_anything_and_may_be_closed_twice() -> None:
