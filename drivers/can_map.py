@@ -8,7 +8,7 @@ from typing import Annotated, Final
 
 import msgspec
 
-from bridges.fields import Name, Period, Seconds
+from bridges.fields import Name, Period
 from bridges.yaml_nodes import unknown
 from drivers import dbc
 from drivers.profile import Profile
@@ -91,8 +91,6 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     `out_of_range`: not 0 while the robot stands where it cannot be charged.
     `errors`: what is wrong.
     `send`: what must be sent, and how often.
-    `stops_unfed_s`: after how long without these frames the charger stops by itself; not known when
-    absent.
     """
 
     dbc: Name
@@ -106,7 +104,6 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     out_of_range: Signal | None = None
     errors: Errors = Errors()
     send: Annotated[list[Sent], msgspec.Meta(min_length=1)]
-    stops_unfed_s: Seconds | None = None
 
     def problems(self) -> Problems:
         """A DBC file that is none, or that lacks what is spoken of."""

@@ -120,8 +120,8 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
             values = sent.values(on, settings.setpoints)
             said = "nothing" if values is None else _said(values)
             rows.append((f"sent, power {'on' if on else 'off'}", f"{_where(frames, sent)}: {said}"))
-    stops = found.stops_unfed_s
-    after = f"{stops:g} s" if stops else "a time that the maker knows"
+    stops_s = settings.limits.peer_internal_timeout_s
+    after = "a time that the maker knows" if stops_s is None else f"{stops_s:g} s"
     rows.append(("end of the daemon", f"power off is sent; unfed it stops after {after}"))
     return [*rows, *found.state.codes.rows()]
 
@@ -144,9 +144,9 @@ def warnings(settings: Settings) -> Problems:
     found = frame_map(settings)
     if found.receiver is None and settings.receivers:
         yield ("receivers",), "the map has no receiver: the robot is not verified"
-    if found.stops_unfed_s is None and settings.limits.peer_internal_timeout_s is None:
+    if settings.limits.peer_internal_timeout_s is None:
         text = "ask the maker after how long without frames it stops, and pull the plug to see it"
-        yield (), text
+        yield (), f"{text}; write it down as limits: {{peer_internal_timeout_s: …}}"
 
 
 def create(name: str, settings: Settings, bus: can.CanBus) -> "FrameDriver":

@@ -26,6 +26,8 @@ STATUS_S: Final = 0.1
 SLOW_S: Final = 2.0
 PERIODS: Final = 3
 RECEIVER: Final = 4711
+STRANGER: Final = 815
+"""The receivers of `robot` (the first of the YAML's `receivers`, if there are any) and `stranger`."""
 FLAGS: Final = {
     "authentication": "CommTimeout",
     "contact_lost": "CommTimeout",
@@ -47,6 +49,8 @@ class FrameCharger:
         self._map: FrameMap = frame_map(settings)
         self._dbc = dbc.load(self._map.dbc)
         self._setpoints: Mapping[str, float] = settings.setpoints
+        known = (int(receiver) for receiver in settings.receivers if receiver.isdecimal())
+        self._receiver = next(known, RECEIVER)
         self._wanted = {self._dbc.id(sent.frame): sent for sent in self._map.send}
         self._fed_at: dict[str, float] = {}
         self._status_at = float("-inf")
@@ -109,7 +113,7 @@ class FrameCharger:
         for signal, value in (
             (known.volts, reading.volts),
             (known.amps, reading.amps),
-            (known.receiver, float(RECEIVER if reading.robot else 0)),
+            (known.receiver, float(self._seen(reading))),
         ):
             if signal:
                 values[signal] = round(value, 1)
@@ -119,6 +123,10 @@ class FrameCharger:
         if known.out_of_range:
             values[known.out_of_range] = float(reading.robot and not reading.in_range)
         return values
+
+    def _seen(self, reading: PadReading) -> int:
+        """Whose receiver it is; 0 where nobody stands there."""
+        return STRANGER if reading.stranger else self._receiver if reading.robot else 0
 
     def _code(self, reading: PadReading) -> int:
         """The first number of what the plant does, or of what comes nearest to it."""

@@ -1,8 +1,8 @@
 """A wireless charger with a receiver that is switched: its pad, the robot on it, battery and heat.
 
-To press: `robot` (one stands on the pad), `misparked` (beside the middle), `foreign_object`
-(something lies on the pad), `transmitter_fault`. To drive: `enable` (may it charge?), `check_range`,
-`clear_error`.
+To press: `robot` (one stands on the pad), or a `stranger` with a receiver of its own, `misparked`
+(beside the middle), `foreign_object` (something lies on the pad), `transmitter_fault`. To drive:
+`enable` (may it charge?), `check_range`, `clear_error`.
 
 A robot comes with its battery 40 % full. The pad rises to it; where gap and position are right and it
 is enabled, the two shake hands and charge until the battery is full. Current warms the coil, and a fan
@@ -59,7 +59,8 @@ FULL_V, EMPTY_V, CURRENT_A = 29.2, 24.0, 30.0
 LINKS: Final = ("node", "heartbeat", "bus", "unit", "server")
 """Parts of the wire, on CAN and on Modbus: its far side has those."""
 PARTS: Final = ("pad", "receiver", "fan", "battery", "thermometer", *LINKS)
-PRESSED: Final = ("robot", "misparked", "foreign_object", "transmitter_fault")
+ROBOTS: Final = ("robot", "stranger")
+PRESSED: Final = (*ROBOTS, "misparked", "foreign_object", "transmitter_fault")
 STATION_CAUSES: Final = ("foreign_object", "transmitter_fault")
 
 
@@ -74,6 +75,7 @@ class PadReading:
     progress: float
     faults: frozenset[str]
     robot: bool
+    stranger: bool
     gap_mm: float
     offset_mm: float
     in_range: bool
@@ -120,13 +122,14 @@ class PadPlant(Machine):
             activity=self.activity,
             progress=progress,
             faults=self.faults,
-            robot=self._pressed["robot"],
+            robot=self._there(),
+            stranger=self._pressed["stranger"],
             gap_mm=CLEARANCE_MM - self.height_mm,
             offset_mm=OFFSET_MM[self._pressed["misparked"]],
             in_range=self.in_range(),
             range_result=self._range,
             enabled=self.enabled,
-            volts=EMPTY_V + (FULL_V - EMPTY_V) * self._filled() if self._pressed["robot"] else 0.0,
+            volts=EMPTY_V + (FULL_V - EMPTY_V) * self._filled() if self._there() else 0.0,
             amps=CURRENT_A if draws else 0.0,
             battery=self._filled(),
             coil_c=self._warmth(),
@@ -153,7 +156,7 @@ class PadPlant(Machine):
         """Can the two coils couple?"""
         gap = CLEARANCE_MM - self.height_mm
         near = OFFSET_MM[self._pressed["misparked"]] <= OFFSET_MAX_MM
-        return self._pressed["robot"] and near and GAP_MM[0] <= gap <= GAP_MM[1]
+        return self._there() and near and GAP_MM[0] <= gap <= GAP_MM[1]
 
     # ---- physics
 
@@ -173,11 +176,15 @@ class PadPlant(Machine):
         if signal not in self._pressed:
             known = ", ".join(sorted(self._pressed))
             raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
-        if signal == "robot" and asserted != self._pressed["robot"]:
+        before = self._there()
+        self._pressed[signal] = asserted
+        if self._there() != before:
             full = self.failures.get("battery") == "wrong"
             self.battery = (1.0 if full else ARRIVES_WITH) if asserted else 0.0
             self._move(asserted)
-        self._pressed[signal] = asserted
+
+    def _there(self) -> bool:
+        return any(self._pressed[robot] for robot in ROBOTS)
 
     def run(self) -> None:
         """What is due ends, and what the pad, the heat and the causes demand begins."""
@@ -199,7 +206,7 @@ class PadPlant(Machine):
         causes = self._causes()
         if busy and causes:
             self._fault(causes)
-        elif busy and not self._pressed["robot"]:
+        elif busy and not self._there():
             self._enter(Activity.RELEASED, RESTART_DELAY_S / self._pace)
         elif self.activity in (Activity.CHARGING, Activity.HANDSHAKE) and not self.enabled:
             self._stop()
@@ -210,7 +217,7 @@ class PadPlant(Machine):
             self._enter(Activity.HANDSHAKE, HANDSHAKE_S / self._pace * (SLOWNESS if slow else 1.0))
 
     def _wants(self) -> bool:
-        there = self._pressed["robot"] and self.failures.get("receiver") != "off"
+        there = self._there() and self.failures.get("receiver") != "off"
         return there and self.enabled and self._filled() < 1.0 and not self._causes()
 
     def _causes(self) -> frozenset[str]:

@@ -363,8 +363,9 @@ def test_check_prints_frames_bytes_and_meanings() -> None:
 
 
 def test_a_map_without_a_receiver_verifies_nobody() -> None:
-    plain = msgspec.to_builtins(PROFILE.load("wiferion")) | {"receiver": None, "stops_unfed_s": 2}
-    made = {"map": plain, "setpoints": SETPOINTS, "receivers": {"7": "tiny/r1"}}
+    plain = msgspec.to_builtins(PROFILE.load("wiferion")) | {"receiver": None}
+    limits = {"peer_internal_timeout_s": 2}
+    made = {"map": plain, "setpoints": SETPOINTS, "receivers": {"7": "tiny/r1"}, "limits": limits}
     assert [path for path, _ in warnings(msgspec.convert(made, Settings))] == [("receivers",)]
 
 

@@ -266,6 +266,18 @@ class Frames(CanContract):
         bench.until(Activity.IDLE, OFF)
         assert bench.switched() == [True, False]
 
+    def test_whose_receiver_it_is_is_read_and_nobody_is_nobody(self, pad: PadBench) -> None:
+        def sees(receiver: str) -> bool:
+            sample = pad.sample(OFF)
+            return sample is not None and sample.measured.receiver_id == receiver
+
+        wait_until(lambda: sees(""), "nobody")
+        pad.press("robot")
+        wait_until(lambda: sees("4711"), "the robot")
+        pad.press("robot", False)
+        pad.press("stranger")
+        wait_until(lambda: sees("815"), "a stranger")
+
     def test_a_daemon_that_falls_silent_stops_the_charge(self, pad: PadBench) -> None:
         pad.press("robot")
         pad.until(Activity.CHARGING, ON)

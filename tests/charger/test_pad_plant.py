@@ -173,5 +173,5 @@ def test_a_robot_that_leaves_while_it_charges_is_released() -> None:
 
 
 def test_what_cannot_be_pressed_is_named() -> None:
-    with pytest.raises(ValueError, match="there are foreign_object, misparked, robot"):
+    with pytest.raises(ValueError, match="there are foreign_object, misparked, robot, stranger"):
         PadPlant("a").press("door", True, 0.0)
