@@ -166,7 +166,7 @@ class FrameDriver:
         self._pause = bus.backoff()
         self._needed = _needed(self._map)
         self._heard: dict[str, tuple[bytes, float]] = {}
-        self._odd = ""
+        self._odd: dict[str, str] = {}
         self._power: bool | None = None
         self._seen = False
         self._sent_at: dict[str, float] = {}
@@ -248,7 +248,7 @@ class FrameDriver:
                 self._heard[frame] = (heard.payload, at)
             else:
                 size = f"{len(heard.payload)} bytes, where the map has {length}"
-                self._odd = f"{frame} ({can.named(heard.id)}) of {size}"
+                self._odd[frame] = f"one ({can.named(heard.id)}) of {size}"
 
         return hear
 
@@ -256,7 +256,7 @@ class FrameDriver:
         """Have what is needed, and fresh; wait for it where it may come in time. Raises HalError."""
         if self._fresh():
             self._pause.mended()
-            self._odd = ""
+            self._odd.clear()
             return
         self._pause.check()
         if not self._bus.wait(self._fresh, self._bus.settings.timeout_s):
@@ -283,7 +283,7 @@ class FrameDriver:
         frame = self._missing()
         place = can.named(self._dbc.id(frame))
         text = f"no {frame} ({place}) at {self._bus.where} within {self._needed[frame]:g} s"
-        odd, self._odd = self._odd, ""
+        odd = self._odd.pop(frame, "")
         return (
             f"{text}, but {odd}: is it another make?" if odd else f"{text}: {self._bus.silence()}"
         )

@@ -211,8 +211,9 @@ def test_without_its_receiver_there_is_no_reading(charger: Charger) -> None:
 def test_frames_of_another_length_are_named_and_never_read(charger: Charger) -> None:
     charger.says(0x1FFD0101, "0000126700000000")
     charger.says(0x18FF50E5, "000000000005")
+    charger.says(0x1FFD0104, "00")
     assert failure(charger.driver.read) == (
-        "no ChargerStatus (0x18FF50E5) at can0 within 1 s, but ChargerStatus (0x18FF50E5) of"
+        "no ChargerStatus (0x18FF50E5) at can0 within 1 s, but one (0x18FF50E5) of"
         " 6 bytes, where the map has 8: is it another make?"
     )
 
