@@ -37,9 +37,9 @@ class Pad(msgspec.Struct, frozen=True):
 
 def seen(sample: ChargerSample | None, limits: ChargerLimits) -> Pad:
     """The pad as one reading shows it."""
-    receiver = sample.measured.receiver_id if sample else None
     if not limits.receivers:
-        return Pad("unverified", receiver or "")
+        return Pad("unverified")
+    receiver = sample.measured.receiver_id if sample else None
     if receiver is None:
         return Pad("mute")
     if not receiver:

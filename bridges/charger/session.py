@@ -5,7 +5,7 @@ from msgspec.structs import replace
 from bridges.charger import pad
 from bridges.charger.memory import Holder, Memory, Requested
 from bridges.charger.settings import ChargerLimits
-from bridges.charger.signals import AT_FAULT, Activity, ChargerSample
+from bridges.charger.signals import AT_FAULT, CURRENT_FLOWS, Activity, ChargerSample
 
 RANGE_EVERY_S = 5.0
 """A receiver is not asked for its position more often (Xnergy RCU: wait 5 s between two checks)."""
@@ -36,13 +36,10 @@ def follow(
     if another:
         return _beside_another(holder, now, limits)
     holder = _resumed(holder, now)
-    match sample.activity:
-        case Activity.CHARGING | Activity.STOPPING:
-            return _flowing(holder, sample, limits)
-        case Activity.HANDSHAKE if holder.started and not holder.ended:
-            holder = _sought_again(holder, now, limits)
-        case _:
-            pass
+    if sample.activity in CURRENT_FLOWS:
+        return _flowing(holder, sample, limits)
+    if sample.activity is Activity.HANDSHAKE and holder.started and not holder.ended:
+        holder = _sought_again(holder, now, limits)
     if holder.released_at is not None:
         there = limits.receivers and on_pad.robot == holder.request.who
         gone = shown_released(holder, now, limits) and not there

@@ -307,6 +307,7 @@ def test_an_unknown_vendor_state_is_an_error_with_its_number() -> None:
         (0.0, "ERROR", "unknown vendor state 99"),
         (1.0, "ERROR", "unknown vendor state 99: ?"),
     ]
+    assert story.faults[0] == "UNKNOWN_VENDOR_STATE: unknown vendor state 99"
 
 
 def test_an_error_without_a_text_names_the_vendors_number() -> None:

@@ -187,6 +187,8 @@ def test_who_is_served_without_a_request_may_ask_may_be_cancelled_and_may_leave(
         (2.0, "ASSIGNED", "req-1"),
         [(2.0, "charger occupied")],
     )
+    late = asks.sees((A.IDLE, ONE, 61))
+    assert late.told[-1] == (62.0, "RELEASED", "req-1")
     cancelled = story(serves).sees((A.CHARGING, ONE, 1)).event(Cancelled(""))
     assert (cancelled.outputs.power, cancelled.refused) == (False, [])
     left = story(serves).sees((A.IDLE, ONE, 1), (A.IDLE, NOBODY, 3))
@@ -301,6 +303,24 @@ def test_a_station_that_does_not_say_whom_it_sees_charges_nobody_where_receivers
     assert it.outputs.power is False
 
 
+def test_a_stranger_pauses_the_start_timeout_too_and_ends_a_charge_that_it_replaces() -> None:
+    waits = story().event(AMR1).sees((A.IDLE, "4711", 100), (A.IDLE, NOBODY, 1))
+    assert waits.told[-1] == (101.0, "ASSIGNED", "req-1")
+    charged = docked().sees((A.CHARGING, "4711", 4), (A.IDLE, NOBODY, 1))
+    assert charged.told[-1] == (9.0, "IDLE", "")
+
+
+def test_each_refusal_has_its_own_fault() -> None:
+    stranger = story().sees((A.IDLE, "4711", 1))
+    other = story().event(AMR1).sees((A.IDLE, TWO, 1))
+    mute = Story(FULL).polls("idle 1")
+    assert [it.faults[-1].partition(":")[0] for it in (stranger, other, mute)] == [
+        "UNKNOWN_RECEIVER",
+        "WRONG_DOCKING",
+        "RECEIVER_NOT_TOLD",
+    ]
+
+
 # ---- failure: the station's side, the robot's side
 
 
@@ -338,6 +358,32 @@ def test_a_fault_of_the_robots_side_leaves_the_station_in_service() -> None:
     it.sees((A.IDLE, ONE, 3), (A.IDLE, NOBODY, 1))
     assert it.told[3:] == [(3.0, "RELEASED", "req-1"), (6.0, "IDLE", "")]
     assert it.event(AMR2).told[-1] == (7.0, "ASSIGNED", "req-2")
+
+
+def test_an_intruders_own_fault_does_not_end_the_request_that_waits_but_the_stations_does() -> None:
+    theirs = story().event(AMR1).event(at_fault("handshake timeout", "robot", TWO))
+    theirs.sees((A.IDLE, NOBODY, 1))
+    assert theirs.told[-1] == (1.0, "ASSIGNED", "req-1")
+    ours = story().event(AMR1).event(at_fault("fan stuck", "station", TWO)).event(RESET)
+    ours.sees((A.IDLE, NOBODY, 3))
+    assert ours.told[-2:] == [(1.0, "RELEASED", "req-1"), (3.0, "IDLE", "")]
+
+
+def test_a_side_that_the_stations_own_words_name_is_not_named_twice() -> None:
+    it = story().event(at_fault("station: fan stuck", "station"))
+    assert it.told[-1] == (1.0, "ERROR", "station: fan stuck")
+    assert it.faults == [
+        "CHARGER_ERROR: station: fan stuck",
+        "PROTECTION: out of service after: station: fan stuck",
+        "WRONG_DOCKING: wrong docking: tiny/AMR01 is not assigned here",
+    ]
+
+
+def test_one_clearing_puts_a_station_back_into_service_once() -> None:
+    it = story().event(at_fault("fan stuck")).event(RESET).sees((A.IDLE, NOBODY, 5))
+    assert (it.told[-1], it.refused) == ((1.0, "IDLE", ""), [])
+    it.event(at_fault("fan stuck")).sees((A.IDLE, NOBODY, 5))
+    assert it.told[-1] == (6.0, "ERROR", "out of service after: fan stuck")
 
 
 def test_a_clearing_that_did_not_help_does_not_count_later() -> None:
@@ -389,6 +435,8 @@ def test_commands_that_fail_again_and_again_are_an_error() -> None:
     for _ in range(3):
         it.sees((A.CHARGING, ONE, 1)).event(WriteFailed("status 500"))
     assert it.told[-1] == (8.0, "ERROR", "Charger takes no commands")
+    assert it.faults[-1] == "CHARGER_NOT_COMMANDED: status 500"
+    assert it.refused == []
     it.sees((A.CHARGING, ONE, 1))
     assert it.told[-1] == (8.0, "ERROR", "Charger takes no commands")
     it.sees((A.STOPPING, ONE, 1))
@@ -458,6 +506,23 @@ def test_charging_that_begins_under_our_eyes_and_nobody_asked_for_is_stopped() -
 def test_a_charge_that_ran_while_the_station_was_lost_is_adopted_too() -> None:
     it = story().all([SILENT] * 3).sees((A.CHARGING, ONE, 1))
     assert it.powered[-1] is None
+
+
+def test_an_adopted_charge_that_is_asked_for_or_served_goes_on_whatever_its_range_says() -> None:
+    asked = Story(FULL).sees((A.CHARGING, ONE, 1), in_range=False).event(AMR1)
+    assert (asked.outputs.power, asked.memory.adopted) == (True, False)
+    serves = replace(FULL, unrequested="serve_known")
+    served = Story(serves).sees((A.CHARGING, ONE, 1), in_range=False)
+    assert (served.outputs.power, served.memory.adopted) == (True, False)
+
+
+def test_the_robot_of_an_adopted_charge_is_not_shown_while_the_station_is_lost() -> None:
+    it = Story(FULL).sees((A.CHARGING, ONE, 1)).all([SILENT] * 3)
+    assert it.report is not None
+    assert (it.report.robot, it.report.verified) == ("", False)
+    held = docked().all([SILENT] * 3)
+    assert held.report is not None
+    assert (held.report.robot, held.report.verified) == ("AMR01", False)
 
 
 def test_receivers_are_whose_the_yaml_says() -> None:
