@@ -101,9 +101,9 @@ def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) 
 
 
 def _who(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> Robot | None:
-    """Whom the station is for; where it is for nobody, who stands there."""
+    """Whom it is for; where it is for nobody, who stands there, or was charged when last seen."""
     if memory.holder:
         return memory.holder.request.who
-    if shown is IDLE or unreachable(memory, limits):
+    if shown is IDLE or (unreachable(memory, limits) and not memory.adopted):
         return None
     return pad.seen(memory.sample, limits).robot

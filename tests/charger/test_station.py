@@ -516,13 +516,13 @@ def test_an_adopted_charge_that_is_asked_for_or_served_goes_on_whatever_its_rang
     assert (served.outputs.power, served.memory.adopted) == (True, False)
 
 
-def test_the_robot_of_an_adopted_charge_is_not_shown_while_the_station_is_lost() -> None:
-    it = Story(FULL).sees((A.CHARGING, ONE, 1)).all([SILENT] * 3)
-    assert it.report is not None
-    assert (it.report.robot, it.report.verified) == ("", False)
-    held = docked().all([SILENT] * 3)
-    assert held.report is not None
-    assert (held.report.robot, held.report.verified) == ("AMR01", False)
+def test_a_station_that_is_lost_shows_the_robot_it_charged_last_and_no_other() -> None:
+    adopted = Story(FULL).sees((A.CHARGING, ONE, 1))
+    refused = story().sees((A.IDLE, ONE, 1))
+    for it, robot in ((docked(), "AMR01"), (adopted, "AMR01"), (refused, "")):
+        it.all([SILENT] * 3)
+        assert it.report is not None
+        assert (it.report.robot, it.report.verified) == (robot, False)
 
 
 def test_receivers_are_whose_the_yaml_says() -> None:
