@@ -31,7 +31,7 @@ def trickles(caller: Caller) -> None:
 
 @contextmanager
 def daemon(file: Path, **stations: Conversation) -> Iterator[list[ChargerState]]:
-    """A daemon for these stations, each on a bus of its own; the states that it publishes. `b` is bad."""
+    """A daemon for these stations, `b` a bad one, each on its own bus; the states that it tells."""
     buses, chargers = {}, {}
     with ExitStack() as open_:
         for name, talk in stations.items():
