@@ -11,6 +11,7 @@ import msgspec
 from bridges.fields import Name, Period
 from bridges.yaml_nodes import unknown
 from drivers import dbc
+from drivers.hal.can import named
 from drivers.profile import Profile
 from drivers.state_codes import Codes
 
@@ -149,3 +150,20 @@ def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") 
         yield path, unknown("frame", frame, found.frames())
     elif signal and signal not in found.signals(frame):
         yield path, unknown(f"signal of {frame}", signal, found.signals(frame))
+
+
+def rows(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """For `check`: what is read where, and what is sent how often: (what, meaning)."""
+    frames = dbc.load(found.dbc)
+    yield "frames", str(dbc.path(found.dbc))
+    for path, signal in found.signals():
+        at = named(frames.id(signal.split(".")[0]))
+        text = getattr(found.errors, path[1])[signal] if path[0] == "errors" else ""
+        what = f"{path[1]}'s error" if text else path[0]
+        yield what, f"{signal} ({at}){f': {text}' if text else ''}"
+    for sent in found.send:
+        where = f"{sent.frame} ({named(frames.id(sent.frame))}) every {sent.every_s:g} s"
+        for on in (True, False):
+            values = sent.values(on, setpoints)
+            said = (f"{signal} {value:g}" for signal, value in (values or {}).items())
+            yield f"sent, power {'on' if on else 'off'}", f"{where}: {', '.join(said) or 'nothing'}"

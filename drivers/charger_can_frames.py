@@ -22,7 +22,7 @@ from bridges.charger.signals import (
 from bridges.fields import Name
 from bridges.yaml_nodes import unknown
 from drivers import DriverError, dbc
-from drivers.can_map import PROFILE, FrameMap, Problems, Sent
+from drivers.can_map import PROFILE, FrameMap, Problems, Sent, rows
 from drivers.hal import can
 from drivers.points import Wire
 from drivers.profile import profile_problems
@@ -108,30 +108,14 @@ def wires(settings: Settings) -> list[Wire]:
 def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, str]]:
     """What `check` prints in place of a wiring table: (what, meaning)."""
     found = frame_map(settings)
-    frames = dbc.load(found.dbc)
-    rows = [("bus", can.describe(bus_settings)), ("frames", str(dbc.path(found.dbc)))]
-    for path, signal in found.signals():
-        at = can.named(frames.id(signal.split(".")[0]))
-        text = getattr(found.errors, path[1])[signal] if path[0] == "errors" else ""
-        what = f"{path[1]}'s error" if text else path[0]
-        rows.append((what, f"{signal} ({at}){f': {text}' if text else ''}"))
-    for sent in found.send:
-        for on in (True, False):
-            values = sent.values(on, settings.setpoints)
-            said = "nothing" if values is None else _said(values)
-            rows.append((f"sent, power {'on' if on else 'off'}", f"{_where(frames, sent)}: {said}"))
     stops_s = settings.limits.peer_internal_timeout_s
     after = "a time that the maker knows" if stops_s is None else f"{stops_s:g} s"
-    rows.append(("end of the daemon", f"power off is sent; unfed it stops after {after}"))
-    return [*rows, *found.state.codes.rows()]
-
-
-def _where(frames: dbc.Dbc, sent: Sent) -> str:
-    return f"{sent.frame} ({can.named(frames.id(sent.frame))}) every {sent.every_s:g} s"
-
-
-def _said(values: dict[str, float]) -> str:
-    return ", ".join(f"{signal} {value:g}" for signal, value in values.items())
+    return [
+        ("bus", can.describe(bus_settings)),
+        *rows(found, settings.setpoints),
+        ("end of the daemon", f"power off is sent; unfed it stops after {after}"),
+        *found.state.codes.rows(),
+    ]
 
 
 def warnings(settings: Settings) -> Problems:
@@ -167,6 +151,7 @@ class FrameDriver:
         self._needed = _needed(self._map)
         self._heard: dict[str, tuple[bytes, float]] = {}
         self._odd: dict[str, str] = {}
+        self._in_error = False
         self._power: bool | None = None
         self._seen = False
         self._sent_at: dict[str, float] = {}
@@ -193,6 +178,8 @@ class FrameDriver:
         values = self._values()
         code = int(values.get(self._map.state.at, -1))
         activity, side = self._meanings.get(code, UNKNOWN)
+        if self._undiagnosed(activity, values):
+            values = self._values()
         found = self._errors(values)
         self._seen = True
         return ChargerSample(
@@ -275,6 +262,24 @@ class FrameDriver:
             ),
             "",
         )
+
+    def _undiagnosed(self, activity: Activity, values: dict[str, float]) -> bool:
+        """An error's signals may come a moment after its state: wait for them, once for an error.
+
+        An error of no side counts as the station's, and takes it out of service. True when waited.
+        """
+        before, self._in_error = self._in_error, activity is Activity.ERROR
+        if before or not self._in_error or self._errors(values):
+            return False
+        since = self._heard[self._map.frames()[0]][1]
+        texts = (*self._map.errors.station, *self._map.errors.robot)
+        frames = {signal.split(".")[0] for signal in texts}
+
+        def told() -> bool:
+            return all(self._heard.get(frame, (b"", since))[1] > since for frame in frames)
+
+        self._bus.wait(told, self._bus.settings.timeout_s)
+        return True
 
     def _fresh(self) -> bool:
         return not self._missing()

@@ -166,10 +166,12 @@ class CanBus(Bus):
         After a hang nobody knows how old what has come is: it is thrown away.
         """
         self._deaf = self.now() - self._taken_at > HANG_S + self.settings.scan_s
-        for _ in range(FRAMES_AT_ONCE):
-            if not self._step(0.0):
-                break
-        self._deaf, self._taken_at = False, self.now()
+        try:
+            for _ in range(FRAMES_AT_ONCE):
+                if not self._step(0.0):
+                    break
+        finally:
+            self._deaf, self._taken_at = False, self.now()
 
     def wait(self, heard: Callable[[], bool], within_s: float) -> bool:
         """Take what comes until this is so, or for so long. Raises HalError."""

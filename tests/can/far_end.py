@@ -86,17 +86,23 @@ def two_ends(timeout_s: float = 0.05) -> Iterator[tuple[CanBus, FarEnd, Clock]]:
 
 
 class Reactive(can.BusABC):
-    """A bus in virtual time: who is on it answers at once, and waiting is only a number."""
+    """A bus in virtual time: who is on it answers at once, and waiting is only a number.
+
+    `later`: what comes only when it is waited for.
+    """
 
     def __init__(self) -> None:
         super().__init__("reactive")
         self.now = 0.0
         self.react: Callable[[can.Message], list[can.Message]] = lambda message: []
         self.coming: deque[can.Message] = deque()
+        self.later: list[can.Message] = []
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         if self.coming:
             return self.coming.popleft()
+        if timeout and self.later:
+            return self.later.pop(0)
         self.now += (timeout or 0.0) + 1e-6
         return None
 

@@ -128,6 +128,27 @@ def test_published_error_bits_name_what_is_wrong_and_whose_it_is(
     assert (sample.activity, sample.side, sample.error_text) == (Activity.ERROR, side, text)
 
 
+def test_an_error_whose_signals_come_after_its_state_has_its_side_from_the_first(
+    charger: Charger,
+) -> None:
+    charger.says(0x1FFD2304, "0000000000000000")
+    charger.status(8)
+    charger.far.later = [
+        can.Message(arbitration_id=0x1FFD2304, data=bytes.fromhex("0008000000000000"))
+    ]
+    sample = charger.driver.read()
+    assert (sample.side, sample.error_text) == ("robot", "the receiver is too hot")
+
+
+def test_an_error_without_a_sign_is_waited_for_once(charger: Charger) -> None:
+    charger.says(0x1FFD2304, "0000000000000000")
+    for waits in (True, False, False):
+        charger.status(8)
+        begun_at = charger.far.now
+        assert charger.driver.read().side == ""
+        assert (charger.far.now - begun_at > 0.04) == waits
+
+
 def test_bad_positioning_is_out_of_range(charger: Charger) -> None:
     charger.status()
     charger.says(0x1FFD2304, "0000000000004000")
