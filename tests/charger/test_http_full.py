@@ -12,7 +12,7 @@ from bridges.charger.settings import robot
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings import SettingsError, load
 from drivers import DriverError, json_fields
-from drivers.charger_http import Call, InRange, Settings, create, warnings
+from drivers.charger_http import Call, InRange, Settings, create, describe, warnings
 from drivers.hal import HalError
 from drivers.state_codes import Codes
 from tests.charger.test_driver import Station
@@ -318,6 +318,39 @@ def test_a_whole_profile_has_no_warning_and_each_gap_has_its_own() -> None:
     assert [text for _, text in warnings(only_stop)] == [
         "without receiver_id, the robot on the pad is not verified, a robot at the wrong station is"
         " not refused"
+    ]
+
+
+def test_check_prints_every_place_word_and_receiver() -> None:
+    fields = msgspec.structs.replace(
+        FULL.fields, in_range=InRange(field="pad.aligned", when=[1, 3])
+    )
+    made = msgspec.structs.replace(FULL, fields=fields)
+    assert describe(made, load(EXAMPLE).buses["tpu"])[:14] == [
+        ("state", "GET http://192.168.1.61:8080/api/v2/status every 0.5 s"),
+        ("start", 'PUT http://192.168.1.61:8080/api/v2/output {"enabled": true}'),
+        ("stop", "POST http://192.168.1.61:8080/api/v2/output/off"),
+        ("range check", "POST http://192.168.1.61:8080/api/v2/pad/check"),
+        (
+            "clear error",
+            "POST http://192.168.1.61:8080/api/v2/fault/clear, when an operator resets",
+        ),
+        ("field state", "charger.state"),
+        ("field error_text", "charger.fault.text"),
+        ("field receiver_id", "pad.receiver"),
+        ("field in_range", "pad.aligned is 1, 3"),
+        ("field volts", "battery.millivolts x 0.001"),
+        ("field amps", "battery.amps"),
+        ("field battery_percent", "battery.percent"),
+        ("field time_to_full_s", "battery.minutes_left x 60"),
+        ("word READY", "0"),
+    ]
+    assert describe(made, load(EXAMPLE).buses["tpu"])[-5:] == [
+        ("robot's error", "6"),
+        ("any other state", "error, with its number"),
+        ("receiver A41F", "tiny/AMR01"),
+        ("receiver A420", "tiny/AMR02"),
+        ("on death", "stop"),
     ]
 
 

@@ -58,6 +58,16 @@ def test_a_malformed_request_is_refused_by_name(changes: dict[str, object], kind
     assert refusal.value.kind == kind
 
 
+def test_what_nobody_asked_for_is_cancelled_by_the_id_under_which_it_is_published() -> None:
+    accept = KIND.requests[CHARGER_CANCELS]
+    ours = ChargerCancel("charger_a", "unrequested/charger_a")
+    theirs = ChargerCancel("charger_a", "unrequested/charger_b")
+    assert [accept(cancel, SETTINGS) for cancel in (ours, theirs)] == [
+        Cancelled(""),
+        Cancelled("unrequested/charger_b"),
+    ]
+
+
 def test_a_cancel_without_a_request_id_is_refused_by_name() -> None:
     with pytest.raises(RequestRefused) as refusal:
         KIND.requests[CHARGER_CANCELS](ChargerCancel("charger_a", ""), SETTINGS)
