@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench import doors, idle, latency, lifts, many_doors
+from bench import can, chargers, doors, idle, latency, lifts, many_doors
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -23,6 +23,8 @@ SECTIONS = {
     "lifts": lifts,
     "doors": doors,
     "many_doors": many_doors,
+    "chargers": chargers,
+    "can": can,
 }
 
 

@@ -1,7 +1,8 @@
 """The far side of an `http` bus: a real HTTP server on 127.0.0.1 in front of charging stations.
 
-`GET state_path` answers what the station does in the maker's numbers, `POST clear_error_path` clears.
-How the wire fails, by part and mode (`hal_fakes.plant.FAILURE_MODES`):
+`GET state_path` answers what the station does in the maker's numbers or words and fields; clearing,
+start, stop and range check do what they are called. How the wire fails, by part and mode
+(`hal_fakes.plant.FAILURE_MODES`):
 
 |         | off              | stuck           | slow               | garbage        | wrong         |
 | server  | hangs up at once | the last answer | answers too late   | an HTML page   | state as text |
@@ -57,6 +58,7 @@ class Station:
         self.plant = plant
         self.settings = settings
         self._lists: Mapping[Activity, list[int]] = settings.codes.lists()
+        self._words = {code: word for word, code in settings.state_words.items()}
         self._last: bytes | None = None
 
     def reading(self) -> Reading:
@@ -64,9 +66,22 @@ class Station:
         self.plant.advance(time.monotonic())
         return cast(Reading, self.plant.sense("reading"))
 
-    def clear_error(self) -> None:
+    def commands(self) -> dict[tuple[str, str], tuple[str, bool]]:
+        """Method and path of each command -> what it does to the plant."""
+        found = {("POST", self.settings.clear_error_path): ("clear_error", True)}
+        does = {
+            "start": ("power", True),
+            "stop": ("power", False),
+            "range_check": ("range_check", True),
+        }
+        for name, action in does.items():
+            if call := getattr(self.settings, name):
+                found[call.method, call.path] = action
+        return found
+
+    def obey(self, signal: str, asserted: bool) -> None:
         """Somebody has asked for it."""
-        self.plant.drive("clear_error", True, time.monotonic())
+        self.plant.drive(signal, asserted, time.monotonic())
 
     def body(self, reading: Reading) -> bytes:
         """The answer to `GET state_path`; wrong where the server is told to be."""
@@ -76,8 +91,25 @@ class Station:
         code: int | str = self._unknown() if body == "wrong" else self._code(reading)
         if server == "wrong":
             code = str(code)
-        self._last = json.dumps({"state": code, "error_msg": reading.error_text}).encode()
+        self._last = json.dumps(self._answer(code, reading)).encode()
         return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
+
+    def _answer(self, code: int | str, reading: Reading) -> dict[str, Any]:
+        """Everything where the YAML says that it is."""
+        fields, answer = self.settings.fields, dict[str, Any]()
+        _put(answer, fields.state, self._words.get(code, code))
+        _put(answer, fields.error_text, reading.error_text)
+        if fields.receiver_id:
+            _put(answer, fields.receiver_id, reading.receiver or None)
+        if where := fields.in_range:
+            yes = where.when[0] if where.when else True
+            no = next(n for n in range(256) if n not in where.when) if where.when else False
+            _put(answer, where.field, yes if reading.in_range else no)
+        percent = None if reading.battery is None else 100 * reading.battery
+        for name, value in (("battery_percent", percent), *_numbers(reading)):
+            if number := getattr(fields, name):
+                _put(answer, number.field, None if value is None else value / number.scale)
+        return answer
 
     def _code(self, reading: Reading) -> int:
         nearest = NEAREST.get(reading.activity, Activity.ERROR)
@@ -87,6 +119,19 @@ class Station:
     def _unknown(self) -> int:
         known = {code for codes in self._lists.values() for code in codes}
         return next(code for code in range(100, 65536) if code not in known)
+
+
+def _numbers(reading: Reading) -> list[tuple[str, float | None]]:
+    names = ("volts", "amps", "time_to_full_s")
+    return [(name, getattr(reading, name)) for name in names]
+
+
+def _put(answer: dict[str, Any], field: str, value: Any) -> None:
+    """A value at its place; list items have no place here."""
+    *above, last = field.split(".")
+    for name in above:
+        answer = answer.setdefault(name, {})
+    answer[last] = value
 
 
 class HttpServer:
@@ -117,7 +162,11 @@ class _Listener(ThreadingHTTPServer):
 
     def __init__(self, stations: list[Station], path: str, timeout_s: float) -> None:
         self.get = {path + s.settings.state_path: s for s in stations}
-        self.post = {path + s.settings.clear_error_path: s for s in stations}
+        self.commands = {
+            (method, path + below): (s, *does)
+            for s in stations
+            for (method, below), does in s.commands().items()
+        }
         self.timeout_s = timeout_s
         self._callers: set[socket.socket] = set()
         self._lock = threading.Lock()
@@ -168,15 +217,17 @@ class _Call(BaseHTTPRequestHandler):
         self._answer(200, station.body(reading), reading.failures)
 
     def do_POST(self) -> None:
-        station = self.server.post.get(self.path)
         self.rfile.read(int(self.headers.get("Content-Length", "0")))
-        if station is None:
+        if (self.command, self.path) not in self.server.commands:
             self._answer(404, b"{}")
             return
+        station, signal, asserted = self.server.commands[self.command, self.path]
         reading = station.reading()
         if reading.failures.get("server") is None:
-            station.clear_error()
+            station.obey(signal, asserted)
         self._answer(200, b"{}", reading.failures)
+
+    do_PUT = do_POST
 
     def _answer(
         self, status: int, body: bytes, failures: Failures = NONE, sort: str = "application/json"

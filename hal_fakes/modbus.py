@@ -30,7 +30,10 @@ from hal_fakes.modbus_units import FarSide, Units
 from hal_fakes.plant import Plant
 from hal_fakes.register_door import RegisterDoor
 from hal_fakes.wiring import devices_on, wirings
+from hal_fakes.xnergy_rcu import ModbusRcu
 
+CELLS: Final = {("door", "register"): RegisterDoor, ("charger", "modbus"): ModbusRcu}
+"""What a unit consists of that has more than contacts, by kind and driver."""
 LOOK_S: Final = 0.02
 """How soon a server that is told to be off is off."""
 READY_S: Final = 10.0
@@ -53,9 +56,10 @@ def far_sides(
     """What the units of this bus consist of."""
     dog = settings.module_watchdog
     dead_men = [DeadMan(unit) for unit in dog.units] if dog else []
-    if config.driver == "register":
+    made: Any = CELLS.get((config.kind, config.driver))
+    if made:
         on_bus = devices_on(config, bus_name).items()
-        return [*dead_men, *(RegisterDoor(plants[name], one) for name, one in on_bus)]
+        return [*dead_men, *(made(plants[name], one) for name, one in on_bus)]
     return [*dead_men, *wirings(config, bus_name, plants, canonical)]
 
 

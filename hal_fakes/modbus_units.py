@@ -17,10 +17,12 @@ from hal_fakes.modbus_dead_man import DeadMan
 from hal_fakes.plant import FailureMode, Plant
 from hal_fakes.register_door import RegisterDoor
 from hal_fakes.wiring import Wiring
+from hal_fakes.xnergy_rcu import ModbusRcu
 
 Part = Literal["unit", "server"]
 
-FarSide: TypeAlias = Wiring | RegisterDoor | DeadMan
+Cells: TypeAlias = RegisterDoor | ModbusRcu | DeadMan
+FarSide: TypeAlias = Wiring | Cells
 """What units can consist of."""
 
 TABLES: Final[dict[int, Table]] = {
@@ -45,7 +47,7 @@ class Units:
     def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
         self._slow_s = slow_s
         self._at: dict[Point, tuple[Wiring, str]] = {}
-        self._cells: dict[Point, RegisterDoor | DeadMan] = {}
+        self._cells: dict[Point, Cells] = {}
         self._dead_men: list[DeadMan] = []
         self._plants: dict[int | None, list[Plant]] = {None: []}
         self._coils: dict[Point, bool] = {}
@@ -65,7 +67,7 @@ class Units:
         for unit in (None, *{point.unit for point in points}):
             self._plants.setdefault(unit, []).append(wiring.plant)
 
-    def _add_cells(self, device: RegisterDoor | DeadMan) -> None:
+    def _add_cells(self, device: Cells) -> None:
         self._cells.update(dict.fromkeys(device.points, device))
         self._plants.setdefault(device.unit, [])
         if isinstance(device, DeadMan):

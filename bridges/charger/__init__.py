@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 
 from bridges.charger import core, messages
-from bridges.charger.settings import ChargerSettings, Limits
+from bridges.charger.settings import ChargerLimits, ChargerSettings
 from bridges.kind import Kind
 from bridges.rmf.topics import CHARGER_CANCELS, CHARGER_REQUESTS, CHARGER_STATES
 
 
-def limits(settings: ChargerSettings, debounce_s: Mapping[str, float]) -> Limits:
-    """The core's durations: a charger has no contacts to debounce."""
-    return settings.limits
+def limits(settings: ChargerSettings, debounce_s: Mapping[str, float]) -> ChargerLimits:
+    """The core's facts: a charger has no contacts to debounce."""
+    return ChargerLimits.of(settings)
 
 
 KIND = Kind(

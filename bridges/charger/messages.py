@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from bridges.charger.core import Cancelled, Requested
+from bridges.charger.memory import Cancelled, Requested
 from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerSettings
 from bridges.decision import RequestRefused
@@ -43,8 +43,13 @@ def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Reques
 
 
 def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled:
-    """The event that a ChargerCancel is. Raises RequestRefused for what is not one."""
+    """The event that a ChargerCancel is. Raises RequestRefused for what is not one.
+
+    What nobody asked for is cancelled by the request id under which its state is published.
+    """
     _check("request_id", cancel.request_id)
+    if cancel.request_id == UNREQUESTED + cancel.charger_name:
+        return Cancelled("")
     return Cancelled(cancel.request_id)
 
 
@@ -93,7 +98,7 @@ def summary(shown: ChargerReport) -> Mapping[str, str]:
     station has seen its receiver.
     """
     measured = shown.measured
-    seen = "" if measured.receiver_id else " (unverified)"
+    seen = "" if shown.verified else " (unverified)"
     told = {
         "state": shown.state.name.removeprefix("CHARGER_"),
         "request": shown.request_id or "-",
@@ -104,6 +109,11 @@ def summary(shown: ChargerReport) -> Mapping[str, str]:
         "receiver": measured.receiver_id,
         "volts": measured.volts,
         "amps": measured.amps,
+        "battery_percent": measured.battery_percent,
         "time_to_full_s": measured.time_to_full_s,
     }
-    return told | {key: str(value) for key, value in optional.items() if value is not None}
+    return told | {key: _short(value) for key, value in optional.items() if value is not None}
+
+
+def _short(value: str | float) -> str:
+    return value if isinstance(value, str) else str(round(value, 2))

@@ -1,20 +1,22 @@
 """What RMF is told about a charger: ChargerState's content, and what the status file says beside it."""
 
-from dataclasses import dataclass, replace
 from typing import Any
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.charger.signals import Measured
 from bridges.decision import Fault
 from bridges.rmf.definitions import ChargerStateValue
 
 
-@dataclass(frozen=True, slots=True)
-class ChargerReport:
+class ChargerReport(msgspec.Struct, frozen=True):
     """ChargerState without its name and stamp.
 
     `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:
-    blank unless `state` is CHARGER_ERROR. `request_id`, `fleet`, `robot`: blank while no request
-    holds the station. Where `measured.receiver_id` is None, the robot is only the one that asked.
+    blank unless `state` is CHARGER_ERROR. `request_id`: blank while no request holds the station.
+    `fleet`, `robot`: whom it is for, else who is seen on the pad of a station that is not idle.
+    `verified`: the station sees that robot's receiver; otherwise it is only the one that asked.
     """
 
     read_at: float | None
@@ -23,6 +25,7 @@ class ChargerReport:
     request_id: str = ""
     fleet: str = ""
     robot: str = ""
+    verified: bool = False
     faults: tuple[Fault, ...] = ()
     measured: Measured = Measured()
 

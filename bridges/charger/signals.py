@@ -4,8 +4,10 @@ A station that answers HTTP as the first contract does fills in the activity and
 Richer controllers (CANopen, Modbus, another make's JSON) fill in `measured` and obey `power`.
 """
 
-from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal
+
+import msgspec
 
 
 class Activity(StrEnum):
@@ -25,46 +27,53 @@ class Activity(StrEnum):
 
 
 CURRENT_FLOWS = frozenset({Activity.CHARGING, Activity.STOPPING})
+AT_FAULT = frozenset({Activity.ERROR, Activity.UNKNOWN})
+
+Side = Literal["", "station", "robot"]
+"""Whose fault an error is, by the controller's own diagnosis; "" where it does not say."""
 
 
-@dataclass(frozen=True, slots=True)
-class Measured:
+class Measured(msgspec.Struct, frozen=True):
     """What a richer controller knows beside its state; None where it does not say.
 
-    `receiver_id`: who is on the pad. `volts`, `amps`: at the battery.
+    `receiver_id`: who is on the pad, "" for nobody. `in_range`: is the robot's coil where it can be
+    charged; False too while that is being found out. `volts`, `amps`: at the battery.
+    `battery_percent`: how full it is.
     """
 
     receiver_id: str | None = None
     in_range: bool | None = None
     volts: float | None = None
     amps: float | None = None
+    battery_percent: float | None = None
     time_to_full_s: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ChargerSample:
+class ChargerSample(msgspec.Struct, frozen=True):
     """One reading of one station.
 
-    `code`: the vendor's number, for texts only. `error_text`: the station's own words, printable and
-    bounded.
+    `code`: the vendor's number or word, for texts only. `error_text`: the station's own words,
+    printable and bounded. `side`: whose fault the error is.
     """
 
     activity: Activity
-    code: int
+    code: int | str
     error_text: str = ""
     measured: Measured = Measured()
+    side: Side = ""
 
 
-@dataclass(frozen=True, slots=True)
-class ChargerOutputs:
+class ChargerOutputs(msgspec.Struct, frozen=True):
     """Everything that a station is told.
 
     `power`: whether it may energise; None leaves it as it is (a charge that we have not started, and
     a station that does not answer, are neither started nor stopped blindly).
-    `clear_errors`: how many clearings of its errors were asked for since the daemon started. A driver
-    sends one for a rise and never sends it again, whatever became of it: clearing is not idempotent,
-    and as a count it may be written any number of times.
+    `clear_errors`, `range_checks`: how many clearings of its errors, and checks of the robot's
+    position, were asked for since the daemon started. A driver sends one for a rise and never sends
+    it again, whatever became of it: they are not idempotent, and as counts they may be written any
+    number of times. A station that always knows the position has no use for `range_checks`.
     """
 
     power: bool | None = None
     clear_errors: int = 0
+    range_checks: int = 0

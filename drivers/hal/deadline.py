@@ -113,6 +113,7 @@ class Dialler:
             found = answer.get(timeout=self.deadline.left())
         except queue.Empty:
             raise TimeoutError("the name's lookup takes too long") from None
+        self._lookup = None  # it has answered; its thread may need a moment more to end
         if isinstance(found, OSError):
             raise found
         return found

@@ -2,19 +2,20 @@
 
 Every call has one deadline from the lookup of the name to the last byte of the body
 (`drivers/hal/deadline.py`). The body is capped; proxies, redirects and compression are off. A kept
-connection that the server has closed is dialled again for a GET; a POST is sent on a new connection,
+connection that the server has closed is dialled again for a GET; a command is sent on a new connection,
 and once, whatever becomes of it.
 """
 
 import http.client
 import json
+import os
 import re
 import socket
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import msgspec
 
@@ -29,7 +30,11 @@ BODY_MAX = 64 * 1024
 BACKOFF_FIRST_S = 0.5
 BACKOFF_MAX_S = 30.0
 HEADERS = {"Accept": "application/json", "Accept-Encoding": "identity", "User-Agent": "rmf-bridges"}
+JSON = {"Content-Type": "application/json"}
+OTHERS = 0o077
+TOKEN_MAX = 4096
 
+Method = Literal["POST", "PUT"]
 Timeout = Annotated[float, msgspec.Meta(ge=0.1, le=30, extra={"unit": "s"})]
 
 _BASE = re.compile(
@@ -102,6 +107,15 @@ class Settings(
             yield ("api_base",), str(error)
 
 
+def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+    """What is legal but worth a look: (path, text)."""
+    if settings.token_file:
+        text = (
+            "the token goes over the network unencrypted: keep chargers on a network of their own"
+        )
+        yield ("token_file",), text
+
+
 def open_bus(settings: Settings) -> "HttpBus":
     """The way to this controller; nothing is sent yet."""
     return HttpBus(settings)
@@ -134,15 +148,22 @@ class HttpBus(Bus):
         with self._attempt():
             return _json_object(url, *self._get(url))
 
-    def post(self, path: str) -> None:
-        """POST without a body; any 2xx is success. Sent at most once, also when the answer is lost."""
+    def send(self, path: str, method: Method = "POST", body: str | None = None) -> None:
+        """A command, with `body` (JSON) if any; any 2xx is success.
+
+        Sent at most once, also when the answer is lost.
+        """
         url = self._base.url(path)
         with self._attempt():
-            self._adapter.close()  # a kept connection might be dead, and a POST has no second try
-            self._call("POST", url)
+            self._adapter.close()  # a kept connection might be dead, and there is no second try
+            self._call(method, url, body)
 
     def on_edge(self, wake: Callable[[], None]) -> None:
         """A polled bus has no edges."""
+
+    def insist(self) -> None:
+        """Try at once what is asked next, whatever the backoff."""
+        self._retry_at = float("-inf")
 
     def close(self) -> None:
         """Hang up."""
@@ -174,17 +195,18 @@ class HttpBus(Bus):
         self._adapter.close()  # it was a kept connection: once more, in the time that is left
         return self._call("GET", url)
 
-    def _call(self, method: str, url: str) -> tuple[str, bytes]:
-        """Content type and body of a good answer; a POST's body is not looked at."""
+    def _call(self, method: str, url: str, sent: str | None = None) -> tuple[str, bytes]:
+        """Content type and body of a good answer; what answers a command is not looked at."""
         import requests
         import urllib3
 
         self._dialler.failure = None
-        request = requests.Request(method, url, HEADERS | self._authorization()).prepare()
+        headers = HEADERS | self._authorization() | (JSON if sent else {})
+        request = requests.Request(method, url, headers, data=sent and sent.encode()).prepare()
         try:
             with self._adapter.send(request, stream=True) as answer:
                 _check_status(url, method, answer.status_code)
-                if method == "POST":
+                if method != "GET":
                     return "", b""
                 body = _capped(answer.raw)
         except (
@@ -206,12 +228,16 @@ class HttpBus(Bus):
         if file is None:
             return {}
         try:
-            token = Path(file).read_text("ascii").strip()
-        except (OSError, UnicodeDecodeError) as error:
-            raise HalError(f"token_file {file} cannot be read: {error}") from None
-        if not re.fullmatch(r"[!-~]{1,4096}", token):
+            with Path(file).open("rb") as opened:
+                mode = os.fstat(opened.fileno()).st_mode
+                token = opened.read(TOKEN_MAX + 1).strip()
+        except OSError as error:
+            raise HalError(f"token_file {file} cannot be read: {error.strerror}") from None
+        if mode & OTHERS:
+            raise HalError(f"token_file {file} is open to other users: chmod 600 {file}")
+        if not re.fullmatch(rb"[!-~]{1,%d}" % TOKEN_MAX, token):
             raise HalError(f"token_file {file} does not hold one token on one line")
-        return {"Authorization": f"Bearer {token}"}
+        return {"Authorization": f"Bearer {token.decode()}"}
 
     def _explained(self, url: str, error: BaseException) -> HalError:
         failure = self._dialler.failure
@@ -259,7 +285,7 @@ def _adapter(dialler: Dialler) -> "HTTPAdapter":
 
 
 def _check_status(url: str, method: str, status: int) -> None:
-    if status == 200 or (method == "POST" and 200 <= status < 300):
+    if status == 200 or (method != "GET" and 200 <= status < 300):
         return
     hint = _HINTS.get(status // 100, "200 is expected")
     raise HalError(f"{url} answered status {status}: {hint}")

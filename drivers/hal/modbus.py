@@ -125,7 +125,7 @@ class ModbusRefused(HalError):
 class ModbusBus(Bus):
     """One TCP connection or serial line, and the units there (also a `drivers.points.PointsBus`).
 
-    `clock` and `jitter` are a test's in place of the real ones.
+    `clock` and `jitter` are a test's in place of the real ones; `now` is that clock.
     """
 
     canonical = staticmethod(canonical)
@@ -136,6 +136,7 @@ class ModbusBus(Bus):
         clock: Callable[[], float] = time.monotonic,
         jitter: Callable[[], float] = random.random,
     ) -> None:
+        self.now = clock
         self._settings = settings
         self._connection, self._where = _way(settings)
         self._backoff = functools.partial(Backoff, clock, jitter)

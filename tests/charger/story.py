@@ -1,16 +1,32 @@
 """Stories for the charger's core: a station that is polled once a second, in virtual time."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import Any
+
+from msgspec.structs import replace
 
 from bridges.charger import core
 from bridges.charger.core import Cancelled, Requested
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import Limits
+from bridges.charger.settings import ChargerLimits, Limits, robot
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
-LIMITS = Limits(misses=3, start_timeout_s=60.0, released_s=2.0)
+DURATIONS = Limits(misses=3, start_timeout_s=60.0, released_s=2.0)
+LIMITS = ChargerLimits(DURATIONS, can_stop=False)
+"""A station that can only be observed."""
+RECEIVERS = {"rx-1": robot("tiny/AMR01"), "rx-2": robot("tiny/AMR02")}
+
+
+FULL = ChargerLimits(DURATIONS, RECEIVERS)
+"""A station that sees who stands on its pad, and can be stopped."""
+
+
+def observed(**durations: Any) -> ChargerLimits:
+    """Such a station with these durations, and the defaults."""
+    return ChargerLimits(Limits(**durations), can_stop=False)
+
 
 A = Activity
 IDLE = Sampled(ChargerSample(A.IDLE, 0))
@@ -41,9 +57,12 @@ CANCEL_1 = Cancelled("req-1")
 
 @dataclass
 class Story:
-    """A core with its memory. `told`: (time, state, request id or error) whenever the news differ."""
+    """A core with its memory. `told`: (time, state, request id or error) whenever the news differ.
 
-    limits: Limits = LIMITS
+    `powered`: what each poll by `sees` decided about the power.
+    """
+
+    limits: ChargerLimits = LIMITS
     now: float = 0.0
     memory: core.Memory = field(default_factory=lambda: core.initial(LIMITS, 0.0))
     told: list[tuple[float, str, str]] = field(default_factory=list)
@@ -51,6 +70,7 @@ class Story:
     faults: list[str] = field(default_factory=list)
     report: ChargerReport | None = None
     outputs: ChargerOutputs = field(default_factory=ChargerOutputs)
+    powered: list[bool | None] = field(default_factory=list)
 
     def event(self, event: core.Event) -> "Story":
         """Something happens now."""
@@ -74,6 +94,16 @@ class Story:
             word, count = part.split()
             for _ in range(int(count)):
                 self.event(SCANS[word])
+                self.now += 1.0
+        return self
+
+    def sees(self, *readings: tuple[Activity, str, int], **known: Any) -> "Story":
+        """`(activity, receiver, polls)` of a station that knows who is on its pad."""
+        for activity, receiver, count in readings:
+            sample = ChargerSample(activity, 0, measured=Measured(receiver_id=receiver, **known))
+            for _ in range(count):
+                self.event(Sampled(sample))
+                self.powered.append(self.outputs.power)
                 self.now += 1.0
         return self
 

@@ -5,7 +5,6 @@ import pytest
 from bridges.charger import core
 from bridges.charger.core import Cancelled, Requested
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import Limits
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.decision import Fault, Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
@@ -21,6 +20,7 @@ from tests.charger.story import (
     SILENT,
     Story,
     measured,
+    observed,
 )
 
 
@@ -195,12 +195,14 @@ def test_a_cancel_while_charging_takes_the_power_and_shows_charging_until_it_sto
     assert story.faults == ["STILL_CHARGING: req-1: cancelled"]
 
 
-def test_a_cancel_during_the_restart_delay_changes_nothing() -> None:
+def test_a_cancel_during_the_restart_delay_changes_nothing_but_that_no_power_comes_back() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 1, released 1")
-    before = story.memory
+    before = story.report, story.outputs
     story.event(CANCEL_1)
-    assert story.memory == before
+    assert (story.report, story.outputs) == before
     assert story.refused == []
+    story.polls("charging 1")
+    assert story.outputs.power is False
 
 
 def test_a_second_cancel_changes_nothing_before_and_after_the_end() -> None:
@@ -305,6 +307,7 @@ def test_an_unknown_vendor_state_is_an_error_with_its_number() -> None:
         (0.0, "ERROR", "unknown vendor state 99"),
         (1.0, "ERROR", "unknown vendor state 99: ?"),
     ]
+    assert story.faults[0] == "UNKNOWN_VENDOR_STATE: unknown vendor state 99"
 
 
 def test_an_error_without_a_text_names_the_vendors_number() -> None:
@@ -340,7 +343,7 @@ def test_a_reset_with_no_error_to_clear_is_refused() -> None:
 
 
 def test_errors_are_cleared_by_themselves_at_the_configured_rate() -> None:
-    story = Story(Limits(clear_errors_per_h=4))
+    story = Story(observed(clear_errors_per_h=4))
     cleared_at = []
     for second in range(7200):
         before = story.outputs.clear_errors
@@ -351,7 +354,7 @@ def test_errors_are_cleared_by_themselves_at_the_configured_rate() -> None:
 
 
 def test_a_reset_counts_against_the_rate() -> None:
-    story = Story(Limits(clear_errors_per_h=1)).polls("idle 1, hot 1")
+    story = Story(observed(clear_errors_per_h=1)).polls("idle 1, hot 1")
     story.now = 3000.0
     story.event(RESET)
     assert story.outputs.clear_errors == 2
@@ -360,7 +363,7 @@ def test_a_reset_counts_against_the_rate() -> None:
 
 
 def test_an_unknown_state_is_not_cleared() -> None:
-    story = Story(Limits(clear_errors_per_h=60)).polls("odd 100")
+    story = Story(observed(clear_errors_per_h=60)).polls("odd 100")
     assert story.outputs.clear_errors == 0
 
 
@@ -477,7 +480,7 @@ def test_a_second_node_for_the_same_charger_stops_everything_until_it_is_silent_
 
 
 def test_two_nodes_do_not_both_clear_an_error() -> None:
-    story = Story(Limits(clear_errors_per_h=60)).event(RIVAL).polls("hot 4")
+    story = Story(observed(clear_errors_per_h=60)).event(RIVAL).polls("hot 4")
     assert story.outputs.clear_errors == 0
     assert [fault.split(":")[0] for fault in story.faults] == [
         "TWO_NODES_FOR_ONE_DEVICE",

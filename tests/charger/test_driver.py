@@ -9,14 +9,16 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridges.charger import core
+from bridges.charger.settings import ChargerLimits
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from bridges.settings import load
 from drivers import DriverError
-from drivers.charger_http import BUSES, Codes, Settings, create, describe, warnings, wires
+from drivers.charger_http import BUSES, Settings, create, describe, warnings, wires
 from drivers.hal import HalError
 from drivers.hal import http as bus_file
+from drivers.state_codes import Codes
 
 CODES = Codes(idle=[0], handshake=[1, 2], charging=[5], stopping=[11], released=[7], error=[238])
 SETTINGS = Settings(codes=CODES)
@@ -35,8 +37,8 @@ class Station:
         self.calls.append(f"GET {path}")
         return self.answer  # type: ignore[no-any-return]
 
-    def post(self, path: str) -> None:
-        self.calls.append(f"POST {path}")
+    def send(self, path: str, method: str = "POST", body: str | None = None) -> None:
+        self.calls.append(f"{method} {path}" + (f" {body}" if body else ""))
         if self.fails:
             raise HalError("the answer is lost")
 
@@ -74,7 +76,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf_and_none_is_passed_on_raw() -> 
     states: dict[State, set[int]] = {state: set() for state in State}
     for code in range(256):
         sample = create("a", made, Station({"state": code, "error_msg": ""})).read()
-        shown = core.decide(core.Memory(), Sampled(sample), 0.0, made.limits).report
+        shown = core.decide(core.Memory(), Sampled(sample), 0.0, ChargerLimits.of(made)).report
         states[shown.state].add(code)
         assert ("unknown vendor state" in shown.error_message) == (
             sample.activity is Activity.UNKNOWN

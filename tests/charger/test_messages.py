@@ -7,7 +7,7 @@ import pytest
 from bridges.charger import KIND
 from bridges.charger.core import Cancelled, Requested
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import ChargerSettings, Limits
+from bridges.charger.settings import ChargerLimits, ChargerSettings, Limits
 from bridges.charger.signals import Measured
 from bridges.decision import RequestRefused
 from bridges.rmf.definitions import (
@@ -56,6 +56,16 @@ def test_a_malformed_request_is_refused_by_name(changes: dict[str, object], kind
     with pytest.raises(RequestRefused) as refusal:
         asked(**changes)
     assert refusal.value.kind == kind
+
+
+def test_what_nobody_asked_for_is_cancelled_by_the_id_under_which_it_is_published() -> None:
+    accept = KIND.requests[CHARGER_CANCELS]
+    ours = ChargerCancel("charger_a", "unrequested/charger_a")
+    theirs = ChargerCancel("charger_a", "unrequested/charger_b")
+    assert [accept(cancel, SETTINGS) for cancel in (ours, theirs)] == [
+        Cancelled(""),
+        Cancelled("unrequested/charger_b"),
+    ]
 
 
 def test_a_cancel_without_a_request_id_is_refused_by_name() -> None:
@@ -108,7 +118,7 @@ def test_the_kind_finds_the_charger_in_each_of_its_messages() -> None:
 
 
 def test_the_limits_are_those_of_the_settings() -> None:
-    assert KIND.limits(SETTINGS, {}) == Limits(misses=5)
+    assert KIND.limits(SETTINGS, {}) == ChargerLimits(Limits(misses=5))
 
 
 def test_the_summary_says_that_a_robot_is_not_verified() -> None:
@@ -123,6 +133,7 @@ def test_the_summary_says_that_a_robot_is_not_verified() -> None:
         "r1",
         "tiny",
         "AMR01",
+        verified=True,
         measured=Measured(receiver_id="17", volts=48.25),
     )
     assert [KIND.summary(report) for report in (idle, lost, seen)] == [

@@ -13,7 +13,7 @@ def states(plant: ChargerPlant) -> list[tuple[float, bool | int | str | float]]:
 
 def parked(*failures: tuple[str, FailureMode]) -> ChargerPlant:
     """A station onto whose pad a robot comes at 1 s."""
-    plant = build("a", None)
+    plant = ChargerPlant("a")
     for part, mode in failures:
         plant.fail(part, mode)
     plant.press("robot", True, 1.0)
@@ -89,7 +89,7 @@ def test_an_error_stays_until_it_is_cleared_after_its_cause_has_gone(cause: str,
 
 
 def test_a_clearing_without_an_error_and_a_cause_without_a_robot_change_nothing() -> None:
-    plant = build("a", None)
+    plant = ChargerPlant("a")
     plant.press("foreign_object", True, 1.0)
     plant.drive("clear_error", True, 2.0)
     plant.advance(100.0)
@@ -125,11 +125,105 @@ def test_a_handshake_that_hangs_shows_no_progress_and_a_mended_receiver_is_recog
     assert states(silent) == [(50.0, "handshake"), (52.0, "charging")]
 
 
+def commanded(asked: bool = False) -> ChargerPlant:
+    """A station that charges only when it is told to, and knows two robots."""
+    return ChargerPlant("a", {"7": "tiny/AMR01", "8": "tiny/AMR02"}, commanded=True, asked=asked)
+
+
+def test_a_station_that_is_commanded_charges_while_it_is_told_to() -> None:
+    plant = commanded()
+    plant.press("tiny/AMR02", True, 1.0)
+    plant.advance(5.0)
+    assert states(plant) == []
+    plant.drive("power", True, 5.0)
+    plant.drive("power", True, 6.0)
+    plant.drive("power", False, 10.0)
+    plant.advance(20.0)
+    assert states(plant) == [
+        (5.0, "handshake"),
+        (7.0, "charging"),
+        (10.0, "stopping"),
+        (11.0, "released"),
+        (12.5, "idle"),
+    ]
+    assert [(e.at, e.value) for e in plant.edges if e.signal == "power"] == [
+        (5.0, True),
+        (10.0, False),
+    ]
+
+
+def test_power_taken_in_the_handshake_ends_it() -> None:
+    plant = commanded()
+    plant.press("robot", True, 1.0)
+    plant.drive("power", True, 2.0)
+    plant.drive("power", False, 3.0)
+    plant.advance(20.0)
+    assert states(plant) == [(2.0, "handshake"), (3.0, "idle")]
+
+
+def test_the_station_sees_the_receiver_of_who_came_last_and_nobodys_when_it_is_silent() -> None:
+    plant = commanded()
+    seen = []
+    for robot, here in (
+        ("robot", True),
+        ("tiny/AMR02", True),
+        ("stranger", True),
+        ("stranger", False),
+        ("tiny/AMR02", False),
+        ("robot", False),
+    ):
+        plant.press(robot, here, 1.0)
+        seen.append(plant.sense("reading").receiver)
+    assert seen == ["7", "8", "9999", "8", "7", ""]
+    plant.press("robot", True, 2.0)
+    plant.fail("receiver", "off")
+    assert plant.sense("reading").receiver == ""
+
+
+def test_a_battery_fills_and_the_station_says_how_long_it_takes() -> None:
+    plant = parked()
+    readings = []
+    for at in (2.0, 3.0, 21.0, 39.5):
+        plant.advance(at)
+        reading = plant.sense("reading")
+        left_s = reading.time_to_full_s
+        whole = left_s if left_s is None else round(left_s)
+        readings.append((reading.battery, reading.volts, reading.amps, whole))
+    assert readings == [
+        (0.4, 48.0, 0.0, None),
+        (0.4, 48.0, 12.0, 36),
+        (0.7, 51.0, 12.0, 18),
+        (1.0, 54.0, 12.0, 0),
+    ]
+
+
+def test_a_robot_out_of_range_is_seen_so_and_cannot_be_charged() -> None:
+    plant = parked()
+    assert plant.sense("reading").in_range is True
+    plant.press("out_of_range", True, 2.0)
+    assert plant.sense("reading").in_range is False
+    plant.advance(4.0)
+    assert plant.sense("reading").error_text == "the gap is too wide"
+
+
+def test_a_range_check_takes_a_moment() -> None:
+    plant = commanded(asked=True)
+    plant.press("robot", True, 1.0)
+    seen = [plant.sense("reading").in_range]
+    plant.drive("range_check", True, 2.0)
+    for at in (2.2, 2.4):
+        plant.advance(at)
+        seen.append(plant.sense("reading").in_range)
+    assert seen == [None, None, True]
+
+
 def test_what_does_not_exist_cannot_be_pressed_driven_or_broken() -> None:
     plant = build("a", None)
-    with pytest.raises(ValueError, match="there are foreign_object, over_temperature, robot"):
+    with pytest.raises(
+        ValueError, match=r"there are foreign_object, out_of_range, over_temp.*, robot, str"
+    ):
         plant.press("door", True, 1.0)
     with pytest.raises(ValueError, match="there are body, headers, receiver, server"):
         plant.fail("car", "off")
     with pytest.raises(KeyError):
-        plant.drive("power", True, 1.0)
+        plant.drive("light", True, 1.0)

@@ -109,6 +109,24 @@ def test_the_environments_proxies_and_passwords_are_not_used(
     assert b"Authorization" not in far.requests[0]
 
 
+def test_a_command_carries_its_method_and_its_body_as_json() -> None:
+    bodies = []
+
+    def talk(caller: Caller) -> None:
+        while caller.request():
+            bodies.append(caller._sock.recv(64))
+            caller.send(answer(status="204 No Content", body=b""))
+
+    with FarEnd(talk) as far:
+        bus = bus_to(far.port)
+        bus.send("/output", "PUT", '{"enabled": true}')
+        bus.close()
+    lines = far.requests[0].decode().split("\r\n")
+    assert lines[0] == "PUT /output HTTP/1.1"
+    assert {"Content-Type: application/json", "Content-Length: 17"} <= set(lines)
+    assert bodies == [b'{"enabled": true}']
+
+
 def test_cookies_are_not_kept() -> None:
     with FarEnd(always(answer(headers="Set-Cookie: a=b\r\n"))) as far:
         bus = bus_to(far.port)
@@ -163,7 +181,7 @@ def test_a_server_that_hangs_up_at_once_is_not_dialled_twice() -> None:
 def test_a_post_succeeds_with_any_2xx(status: str) -> None:
     with FarEnd(once(answer(status=status))) as far:
         bus = bus_to(far.port)
-        bus.post("/clear_error")
+        bus.send("/clear_error")
         bus.close()
     assert [r.split(b"\r\n")[0] for r in far.requests] == [b"POST /clear_error HTTP/1.1"]
 
@@ -173,7 +191,7 @@ def test_a_post_whose_answer_is_lost_fails_and_is_never_sent_again() -> None:
         bus = bus_to(far.port)
         bus.get_json("/state")
         with pytest.raises(HalError, match="no whole HTTP answer"):
-            bus.post("/clear_error")
+            bus.send("/clear_error")
         assert bus.get_json("/state") == {"state": 0}
         bus.close()
     assert [r.split(b" ")[0] for r in far.requests] == [b"GET", b"POST", b"GET"]
@@ -183,7 +201,7 @@ def test_a_post_does_not_trust_a_kept_connection() -> None:
     with FarEnd(hangs_up_at_the_second_request, always(answer())) as far:
         bus = bus_to(far.port)
         bus.get_json("/state")
-        bus.post("/clear_error")
+        bus.send("/clear_error")
         bus.close()
     assert (far.connections, len(far.requests)) == (2, 2)
 
@@ -193,7 +211,7 @@ def test_a_post_with_another_status_fails(status: str) -> None:
     with FarEnd(once(answer(status=status))) as far:
         bus = bus_to(far.port)
         with pytest.raises(HalError, match=f"answered status {status[:3]}"):
-            bus.post("/clear_error")
+            bus.send("/clear_error")
         bus.close()
 
 
@@ -331,7 +349,7 @@ def test_a_post_is_bounded_too(talk: Conversation) -> None:
     with FarEnd(talk) as far:
         bus = bus_to(far.port, TIMEOUT_S)
         with pytest.raises(HalError, match=r"no complete answer within 0[.]3 s"):
-            bus.post("/clear_error")
+            bus.send("/clear_error")
         bus.close()
 
 
@@ -427,6 +445,25 @@ def test_the_second_address_is_tried_when_the_first_is_dead() -> None:
         bus.close()
 
 
+def test_a_lookup_that_has_answered_does_not_keep_the_next_call_waiting() -> None:
+    ended = threading.Event()
+
+    class Lingering(list[Any]):
+        """What a lookup has found; its thread lives on until the test ends."""
+
+    def resolve(*_: Any, **__: Any) -> Any:
+        return []
+
+    bus = named(resolve)
+    dialler = bus._dialler
+    look_up = dialler._look_up
+    dialler._look_up = lambda answer: (look_up(answer), ended.wait())  # type: ignore[method-assign,assignment]
+    for _ in range(2):
+        with pytest.raises(HalError, match="the name has no address"):
+            bus.get_json("/state")
+    ended.set()
+
+
 def test_an_address_that_is_silent_leaves_time_for_the_next() -> None:
     with full_server() as silent, FarEnd(always(answer())) as far:
         bus = named(lambda *_, **__: [tcp(*silent), tcp("127.0.0.1", far.port)], 2.0)
@@ -502,32 +539,17 @@ def test_after_a_failure_calls_fail_at_once_until_it_is_time_again() -> None:
         bus.close()
 
 
-# ---- token
-
-
-def test_a_token_is_read_from_its_file_for_each_call(tmp_path: Path) -> None:
-    file = tmp_path / "token"
-    with FarEnd(always(answer())) as far:
-        bus = HttpBus(Settings(api_base=f"127.0.0.1:{far.port}", token_file=str(file)), Clock())
-        for token in ("first", "second"):
-            file.write_text(f"{token}\n")
-            bus.get_json("/state")
+def test_who_insists_is_not_held_back_by_the_pause_after_a_failure() -> None:
+    with FarEnd(once(b"?"), always(answer())) as far:
+        bus = bus_to(far.port, clock=lambda: 0.0)
+        for _ in range(2):
+            with pytest.raises(HalError, match="no whole HTTP answer"):
+                bus.send("/stop")
+        assert far.connections == 1
+        bus.insist()
+        bus.send("/stop")
+        assert far.connections == 2
         bus.close()
-    sent = [line for r in far.requests for line in r.split(b"\r\n") if b"Auth" in line]
-    assert sent == [b"Authorization: Bearer first", b"Authorization: Bearer second"]
-
-
-@pytest.mark.parametrize("held", [None, b"", b"two words", b"two\nlines", b"\xff"])
-def test_a_token_file_that_holds_none_is_an_error_that_does_not_show_it(
-    tmp_path: Path, held: bytes | None
-) -> None:
-    file = tmp_path / "token"
-    if held is not None:
-        file.write_bytes(held)
-    bus = HttpBus(Settings(api_base="127.0.0.1:1", token_file=str(file)), Clock())
-    with pytest.raises(HalError, match="token_file") as caught:
-        bus.get_json("/state")
-    assert "words" not in str(caught.value)
 
 
 def test_a_bus_is_opened_without_sending_anything_and_may_be_closed_twice() -> None:

@@ -13,8 +13,9 @@ import pytest
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.settings import Config, load
 from drivers import DriverError
-from drivers.charger_http import Codes, HttpCharger, create
+from drivers.charger_http import HttpCharger, create
 from drivers.hal.http import HttpBus
+from drivers.state_codes import Codes
 from hal_fakes.charger_plant import Reading, build
 from hal_fakes.http import HttpServer, Station, serve
 from hal_fakes.plant import FailureMode
@@ -42,9 +43,9 @@ class Fake:
     def press(self, signal: str, asserted: bool) -> None:
         self.plant.press(signal, asserted, time.monotonic())
 
-    def read_until(self, activity: Activity) -> set[int]:
+    def read_until(self, activity: Activity) -> set[int | str]:
         """Poll until the station says that; all the numbers seen on the way."""
-        seen: set[int] = set()
+        seen: set[int | str] = set()
 
         def says_so() -> bool:
             sample = self.driver.read()
@@ -110,7 +111,7 @@ def test_a_path_that_does_not_exist_is_not_found() -> None:
         with pytest.raises(DriverError, match="status 404"):
             it.bus.get_json("/nowhere")
         with pytest.raises(DriverError, match="status 404"):
-            it.bus.post("/nowhere")
+            it.bus.send("/nowhere")
 
 
 ANSWERED = [

@@ -162,7 +162,7 @@ def test_every_misspelt_key_is_found_where_it_stands(config: Path, file: Path) -
     root = composed(text)
     names = own_names(config)
     for place in places(root, root):
-        if is_own(place.key.value, names):
+        if is_own(place.key.value, names) or place.parent.value == "setpoints":
             continue
         start = place.key.start_mark.index
         wrong = text[:start] + "z" + text[start:]
@@ -220,7 +220,7 @@ def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file:
                 assert at(node).partition(":")[0] in {s.partition(":")[0] for s in spots(found)}
             elif found and trap not in NAMES:
                 assert at(node) in spots(found), (trap, found)
-    assert accepted < 40
+    assert accepted < 40, accepted
 
 
 def test_every_shipped_file_is_judged_when_cut_anywhere(config: Path, file: Path) -> None:

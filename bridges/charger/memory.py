@@ -1,0 +1,103 @@
+"""What the charger's core remembers, and what can happen to it."""
+
+from typing import Literal
+
+import msgspec
+
+from bridges.charger.settings import ChargerLimits, Robot
+from bridges.charger.signals import ChargerSample
+from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled
+
+RIVAL_GONE_S = 5.0
+"""A second node for this charger is gone when unheard for so long; states come at 1 Hz."""
+NEVER = float("-inf")
+
+
+class Requested(msgspec.Struct, frozen=True):
+    """A ChargerRequest that is ours and well formed; `start_timeout_s` 0 is the configured default.
+
+    A robot that is served though nobody asked has one without a `request_id`.
+    """
+
+    request_id: str
+    fleet: str
+    robot: str
+    start_timeout_s: float = 0.0
+
+    @property
+    def who(self) -> Robot:
+        """For whom."""
+        return Robot(self.fleet, self.robot)
+
+
+class Cancelled(msgspec.Struct, frozen=True):
+    """A ChargerCancel; without a `request_id`, of what nobody asked for."""
+
+    request_id: str
+
+
+class Holder(msgspec.Struct, frozen=True):
+    """The request that occupies the station.
+
+    `start_by`: charging must have started (monotonic s). `paused_at`: since when another robot on the
+    pad keeps it from starting. `checked_at`: when its position was asked for. `started`: current has
+    flowed for it. `failed`: the station was at fault since, so there is no power for this request any
+    more. `ended`: why it is over; `released_at`: since when it is disconnected.
+    """
+
+    request: Requested
+    start_by: float
+    paused_at: float | None = None
+    checked_at: float | None = None
+    started: bool = False
+    failed: bool = False
+    ended: Literal["", "start timeout", "cancelled", "full", "left"] = ""
+    released_at: float | None = None
+
+    @property
+    def over(self) -> bool:
+        """There is no power for it any more, whatever comes."""
+        return self.failed or bool(self.ended) or self.released_at is not None
+
+
+class Memory(msgspec.Struct, frozen=True):
+    """Everything that outlives a scan. `sample`: the last good reading, of `read_at`.
+
+    `write_misses`: scans in a row whose commands failed, `write_failed` among them this one.
+    `power`: as last decided; `disobeyed_since`: since when the station charges against it.
+    `adopted`: it was charging when we came, so whatever is on the pad stays as it is.
+    `protection`: why the station is out of service, "" while it is not; `clear_by`: until when a good
+    reading shows that a clearing has helped. `over`: the last requests that have ended.
+    """
+
+    sample: ChargerSample | None = None
+    read_at: float | None = None
+    misses: int = 0
+    io_fault: str = ""
+    write_misses: int = 0
+    write_failed: bool = False
+    write_fault: str = ""
+    holder: Holder | None = None
+    over: tuple[str, ...] = ()
+    adopted: bool = False
+    power: bool | None = None
+    disobeyed_since: float | None = None
+    protection: str = ""
+    clear_by: float = NEVER
+    clear_errors: int = 0
+    cleared_at: float = NEVER
+    range_checks: int = 0
+    rival_at: float = NEVER
+
+
+Event = Sampled[ChargerSample] | IoFailed | RivalSeen | OperatorReset | Requested | Cancelled
+
+
+def rivalled(memory: Memory, now: float) -> bool:
+    """Does another node publish this charger's states?"""
+    return now - memory.rival_at < RIVAL_GONE_S
+
+
+def unreachable(memory: Memory, limits: ChargerLimits) -> bool:
+    """Does the last good reading say nothing any more, or was there none?"""
+    return memory.sample is None or memory.misses >= limits.t.misses

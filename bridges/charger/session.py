@@ -1,0 +1,123 @@
+"""A request from its grant to its end, reading by reading."""
+
+from msgspec.structs import replace
+
+from bridges.charger import pad
+from bridges.charger.memory import Holder, Memory, Requested
+from bridges.charger.settings import ChargerLimits
+from bridges.charger.signals import AT_FAULT, CURRENT_FLOWS, Activity, ChargerSample
+
+RANGE_EVERY_S = 5.0
+"""A receiver is not asked for its position more often (Xnergy RCU: wait 5 s between two checks)."""
+
+
+def granted(asked: Requested, now: float, limits: ChargerLimits) -> Holder:
+    """It has the station; `start_timeout` counts from now."""
+    return Holder(asked, now + _patience_s(asked, limits))
+
+
+def taken_over(holder: Holder, asked: Requested, now: float, limits: ChargerLimits) -> Holder:
+    """The same robot, served without a request until now, has one."""
+    return replace(holder, request=asked, start_by=now + _patience_s(asked, limits))
+
+
+def _patience_s(asked: Requested, limits: ChargerLimits) -> float:
+    return asked.start_timeout_s or limits.t.start_timeout_s
+
+
+def follow(
+    holder: Holder, sample: ChargerSample, now: float, limits: ChargerLimits
+) -> Holder | None:
+    """The request after one reading; None when it is over and the station free."""
+    on_pad = pad.seen(sample, limits)
+    another = on_pad.is_another(holder.request.who)
+    if sample.activity in AT_FAULT and not (another and sample.side == "robot"):
+        return replace(holder, failed=True)
+    if another:
+        return _beside_another(holder, now, limits)
+    holder = _resumed(holder, now)
+    if sample.activity in CURRENT_FLOWS:
+        return _flowing(holder, sample, limits)
+    if sample.activity is Activity.HANDSHAKE and holder.started and not holder.ended:
+        holder = _sought_again(holder, now, limits)
+    if holder.released_at is not None:
+        there = limits.receivers and on_pad.robot == holder.request.who
+        gone = shown_released(holder, now, limits) and not there
+        return None if gone and sample.activity is not Activity.RELEASED else holder
+    return _pending(holder, sample.activity, on_pad, now)
+
+
+def shown_released(holder: Holder, now: float, limits: ChargerLimits) -> bool:
+    """Has RELEASED been shown for its time?"""
+    return holder.released_at is not None and now - holder.released_at >= limits.t.released_s
+
+
+def _beside_another(holder: Holder, now: float, limits: ChargerLimits) -> Holder | None:
+    """Another robot stands on the pad: who waits goes on waiting, who was charged has left."""
+    if shown_released(holder, now, limits):
+        return None
+    if holder.released_at is not None:
+        return holder
+    if holder.started or holder.over:
+        return replace(holder, ended=holder.ended or "left", released_at=now)
+    return holder if holder.paused_at is not None else replace(holder, paused_at=now)
+
+
+def _resumed(holder: Holder, now: float) -> Holder:
+    if holder.paused_at is None:
+        return holder
+    return replace(holder, start_by=holder.start_by + now - holder.paused_at, paused_at=None)
+
+
+def _flowing(holder: Holder, sample: ChargerSample, limits: ChargerLimits) -> Holder:
+    percent = sample.measured.battery_percent
+    full = percent is not None and percent >= limits.t.full_percent and not holder.ended
+    return replace(holder, started=True, released_at=None, ended="full" if full else holder.ended)
+
+
+def _sought_again(holder: Holder, now: float, limits: ChargerLimits) -> Holder:
+    """The coupling was lost and is sought again: the same request waits for its start."""
+    by = now + _patience_s(holder.request, limits)
+    return replace(holder, started=False, start_by=by, checked_at=None)
+
+
+def _pending(holder: Holder, activity: Activity, on_pad: pad.Pad, now: float) -> Holder:
+    if not holder.request.request_id and on_pad.sort == "empty":
+        return replace(holder, ended=holder.ended or "left", released_at=now)
+    if holder.started or (holder.failed and activity is not Activity.HANDSHAKE):
+        return replace(holder, released_at=now)
+    if now >= holder.start_by:
+        return replace(holder, ended="start timeout", released_at=now)
+    return holder
+
+
+# ---- may it start?
+
+
+def cleared_to_start(memory: Memory, limits: ChargerLimits) -> bool:
+    """The right robot is on the pad and in range, as far as the station can tell."""
+    holder, sample = memory.holder, memory.sample
+    if holder is None or sample is None or memory.read_at is None:
+        return False
+    if not pad.seen(sample, limits).may_be(holder.request.who):
+        return False
+    if sample.measured.in_range is None:
+        return True
+    asked = holder.checked_at is not None and memory.read_at > holder.checked_at
+    return asked and sample.measured.in_range
+
+
+def range_checked(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
+    """Ask for the robot's position where only that is missing; an old answer does not count."""
+    holder, sample = memory.holder, memory.sample
+    if holder is None or sample is None or holder.started or holder.over:
+        return memory
+    if sample.measured.in_range is None or sample.activity in AT_FAULT:
+        return memory
+    if not pad.seen(sample, limits).may_be(holder.request.who):
+        return memory
+    asked = holder.checked_at
+    if asked is not None and (now - asked < RANGE_EVERY_S or cleared_to_start(memory, limits)):
+        return memory
+    holder = replace(holder, checked_at=now)
+    return replace(memory, holder=holder, range_checks=memory.range_checks + 1)

@@ -1,0 +1,95 @@
+"""Typed values out of one JSON object: a field's place is spelled with dots (`pad.receiver.id`).
+
+Whatever JSON comes, a value is of the sort that is wanted, or DriverError names the field.
+"""
+
+import math
+import reprlib
+from collections.abc import Mapping
+from typing import Annotated, Any, Final
+
+import msgspec
+
+from drivers import DriverError
+
+TEXT_MAX: Final = 200
+ABSENT: Final = object()
+
+Field = Annotated[
+    str,
+    msgspec.Meta(
+        pattern=r"^[A-Za-z_$@][A-Za-z0-9_$@-]*(\.[A-Za-z0-9_$@-]+)*$(?!\n)",
+        max_length=128,
+        extra={"pattern": "names with dots between them (status.code)"},
+    ),
+]
+"""Where a value is: names of objects, and numbers of list items (from 0), with dots between them."""
+
+
+def found(answer: Any, field: str) -> Any:
+    """What stands there, or ABSENT."""
+    for part in field.split("."):
+        if isinstance(answer, dict):
+            answer = answer.get(part, ABSENT)
+        elif isinstance(answer, list) and part.isdecimal() and int(part) < len(answer):
+            answer = answer[int(part)]
+        else:
+            return ABSENT
+    return answer
+
+
+def needed(answer: Mapping[str, Any], field: str) -> Any:
+    """What stands there. Raises DriverError with what there is instead."""
+    value = found(answer, field)
+    if value is ABSENT:
+        names = ", ".join(clean(name) for name in list(answer)[:5]) or "nothing"
+        raise DriverError(f"the answer has no '{field}', but {names}: is state_path right?")
+    return value
+
+
+def text(answer: Mapping[str, Any], field: str) -> str:
+    """A text, on one line and printable; "" where it is absent or null."""
+    value = found(answer, field)
+    if value is ABSENT or value is None:
+        return ""
+    if not isinstance(value, str):
+        raise wrong(field, value, "a text")
+    return clean(value)
+
+
+def number(answer: Mapping[str, Any], field: str, scale: float) -> float | None:
+    """A number times `scale`; None where it is absent or null."""
+    value = found(answer, field)
+    if value is ABSENT or value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise wrong(field, value, "a number")
+    try:
+        scaled = value * scale
+    except OverflowError:
+        scaled = math.inf
+    if not math.isfinite(scaled):
+        raise wrong(field, value, "a number of sensible size")
+    return scaled
+
+
+def name(answer: Mapping[str, Any], field: str) -> str:
+    """An id as text, "" for null; it must be there."""
+    value = needed(answer, field)
+    if value is None:
+        return ""
+    if isinstance(value, bool) or not isinstance(value, int | str):
+        raise wrong(field, value, "a text or a whole number")
+    return clean(str(value), 64)
+
+
+def wrong(field: str, value: Any, wanted: str) -> DriverError:
+    """The error that says what stands there and what is expected."""
+    return DriverError(f"'{field}' is {clean(reprlib.repr(value), 40)}, and {wanted} is expected")
+
+
+def clean(said: str, longest: int = TEXT_MAX) -> str:
+    """On one line, printable, and not long: it goes into a message and into the log."""
+    said = "".join(c if c.isprintable() else " " for c in said[: 4 * longest])
+    said = " ".join(said.split())
+    return said if len(said) <= longest else f"{said[: longest - 1]}…"

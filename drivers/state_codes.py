@@ -1,0 +1,73 @@
+"""What a maker's states of a charger mean: a table that the YAML must give, total by its last rule.
+
+A number that stands in no list is an error, with its number; none is passed on as RMF's.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Annotated
+
+import msgspec
+
+from bridges.charger.signals import Activity, Side
+
+CODE_MAX = 65535
+Code = Annotated[int, msgspec.Meta(ge=0, le=CODE_MAX)]
+ROBOT_ERROR: tuple[Activity, Side] = (Activity.ERROR, "robot")
+
+
+class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the maker's state numbers mean. A number in no list is an error, with its number.
+
+    `idle`: nothing is on the pad, and a robot may come.
+    `charging`: current flows.
+    `handshake`: a robot is being recognised, no current yet.
+    `stopping`: current still flows, ramping down.
+    `released`: disconnected, and not ready for another robot yet.
+    `error`: out of service, manual operation too.
+    `robot_error`: an error of the robot's side: the station itself is well.
+    """
+
+    idle: Annotated[list[Code], msgspec.Meta(min_length=1)]
+    charging: Annotated[list[Code], msgspec.Meta(min_length=1)]
+    handshake: list[Code] = []
+    stopping: list[Code] = []
+    released: list[Code] = []
+    error: list[Code] = []
+    robot_error: list[Code] = []
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """States that stand twice."""
+        seen: dict[int, str] = {}
+        for name in self.__struct_fields__:
+            for n, code in enumerate(getattr(self, name)):
+                if code in seen:
+                    yield (name, str(n)), f"state {code} is already {seen[code]}: give it once"
+                seen[code] = name
+
+    def meanings(self) -> dict[int | str, tuple[Activity, Side]]:
+        """By the maker's state: what the station does, and whose fault an error is."""
+        made: dict[int | str, tuple[Activity, Side]] = {
+            code: (activity, "") for activity, codes in self.lists().items() for code in codes
+        }
+        return made | dict.fromkeys(self.robot_error, ROBOT_ERROR)
+
+    def lists(self) -> Mapping[Activity, list[Code]]:
+        """Each meaning with its states, the errors of the robot's side apart."""
+        return {
+            Activity.IDLE: self.idle,
+            Activity.HANDSHAKE: self.handshake,
+            Activity.CHARGING: self.charging,
+            Activity.STOPPING: self.stopping,
+            Activity.RELEASED: self.released,
+            Activity.ERROR: self.error,
+        }
+
+    def rows(self) -> list[tuple[str, str]]:
+        """For `check`."""
+        rows = [
+            (f"state {meaning}", ", ".join(map(str, codes)) or "no code")
+            for meaning, codes in self.lists().items()
+        ]
+        if self.robot_error:
+            rows.append(("robot's error", ", ".join(map(str, self.robot_error))))
+        return [*rows, ("any other state", "error, with its number")]

@@ -1,0 +1,107 @@
+"""Every state within some steps of the start, and of each stage of a charge: what is true in all."""
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.charger.core import Requested
+from bridges.charger.settings import ChargerLimits
+from tests.charger.invariants import check
+from tests.charger.walk import MOVES, SITES, Step, World, moved, waited, walk
+
+ASSIGNED = (1.0, "A asks")
+CHARGING = (*ASSIGNED, "A docks", 1.0, "handshake", "charging", 1.0)
+STAGES: dict[str, tuple[str | float, ...]] = {
+    "idle": (1.0,),
+    "assigned": ASSIGNED,
+    "on the pad": (*ASSIGNED, "A docks", "in range", 1.0),
+    "charging": CHARGING,
+    "released": (*CHARGING, "idle"),
+    "cancelled": (*CHARGING, "A cancels"),
+    "wrong robot": (*ASSIGNED, "B docks", 1.0),
+    "at fault": (*CHARGING, "error"),
+    "out of service": (*CHARGING, "error", "idle", 1.0),
+    "lost": (*CHARGING, "link lost or back", 5.0),
+    "adopted": ("A docks", "link lost or back", 5.0, "charging", "link lost or back"),
+}
+
+
+def path(limits: ChargerLimits, *steps: str | float) -> World:
+    """The state that these moves and waits lead to."""
+    world = World()
+    for step in steps:
+        if isinstance(step, str):
+            world = moved(world, MOVES[step], limits, check)
+        else:
+            world = waited(world, step, limits, check)
+    return world
+
+
+def shown(world: World, limits: ChargerLimits) -> tuple[str, str, bool | None]:
+    """What one more scan says: state, request, power."""
+    steps: list[Step] = []
+    waited(world, 0.5, limits, steps.append)
+    decision = steps[-1].decision
+    state = decision.report.state.name.removeprefix("CHARGER_")
+    return state, decision.report.request_id, decision.outputs.power
+
+
+def test_the_stages_of_a_charge_are_what_they_are_called() -> None:
+    limits = SITES["refuses"]
+    assert {name: shown(path(limits, *steps), limits) for name, steps in STAGES.items()} == {
+        "idle": ("IDLE", "", False),
+        "assigned": ("ASSIGNED", "req-A", False),
+        "on the pad": ("ASSIGNED", "req-A", True),
+        "charging": ("CHARGING", "req-A", True),
+        "released": ("RELEASED", "req-A", False),
+        "cancelled": ("CHARGING", "req-A", False),
+        "wrong robot": ("ERROR", "req-A", False),
+        "at fault": ("ERROR", "req-A", False),
+        "out of service": ("ERROR", "req-A", False),
+        "lost": ("ERROR", "req-A", None),
+        "adopted": ("CHARGING", "", None),
+    }
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_every_state_within_four_steps_of_the_start(site: str) -> None:
+    assert len(walk([World()], 4, SITES[site], check)) > 5000
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_every_state_within_two_steps_of_each_stage_of_a_charge(site: str) -> None:
+    limits = SITES[site]
+    roots = [path(limits, *steps) for steps in STAGES.values()]
+    assert len(walk(roots, 2, limits, check)) > 1000
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_every_state_within_three_steps_of_a_stage_at_a_verified_station(stage: str) -> None:
+    limits = SITES["refuses"]
+    assert len(walk([path(limits, *STAGES[stage])], 3, limits, check)) > 1000
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_from_every_state_a_sound_station_comes_back_and_charges_who_asks(site: str) -> None:
+    limits = SITES[site]
+    for world in walk([path(limits, *steps) for steps in STAGES.values()], 1, limits, check):
+        sound = _mended(world, limits)
+        assert shown(sound, limits)[:2] == ("IDLE", "")
+        assert shown(_charged(sound, limits), limits)[:2] == ("CHARGING", "req-new")
+
+
+def _mended(world: World, limits: ChargerLimits) -> World:
+    """The pad is clear, all answers, nothing is wrong, and an operator resets what is latched."""
+    world = replace(world, readable=True, writable=True)
+    for step in ("idle", "the pad is clear", "in range", "A cancels", "B cancels"):
+        world = moved(world, MOVES[step], limits, check)
+    world = waited(world, 32.0, limits, check)
+    return waited(moved(world, MOVES["reset"], limits, check), 4.0, limits, check)
+
+
+def _charged(world: World, limits: ChargerLimits) -> World:
+    """The first robot asks, comes and is charged."""
+    asked = Requested("req-new", "tiny", "A")
+    world = moved(world, lambda before: (before, [asked]), limits, check)
+    world = waited(moved(world, MOVES["A docks"], limits, check), 2.0, limits, check)
+    assert shown(world, limits) == ("ASSIGNED", "req-new", True)
+    return moved(world, MOVES["charging"], limits, check)
