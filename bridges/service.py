@@ -102,7 +102,8 @@ class GraphService:
         self._node.subscribe()
 
     def reset(self) -> None:
-        """It latches nothing."""
+        """Its subjects hear of it."""
+        self._node.reset()
 
     def status(self) -> Mapping[str, Any]:
         """For the status file."""
