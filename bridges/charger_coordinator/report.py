@@ -67,5 +67,5 @@ def _shown(memory: Memory, name: str, seen: Seen, site: Site) -> Iterator[Fault]
     stranger = seen.error if seen.error.startswith(UNKNOWN_RECEIVER) else "an unknown robot"
     expected = memory.station_of(who) if who else None
     if who is None or expected != name:
-        belongs = f", it is expected at {expected}" if expected else ""
-        yield Fault("WRONG_STATION", f"{who or stranger} stands at {name}{belongs}")
+        belongs = f"it is expected at {expected}" if expected else "nobody asked for that"
+        yield Fault("WRONG_STATION", f"{who or stranger} stands at {name}, {belongs}")

@@ -1,8 +1,8 @@
 """`definitions.py` against tables typed from the .msg files, which it must not be made from.
 
 Read in open-rmf/rmf_internal_msgs at 3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0), every line
-of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg, rmf_task_msgs/msg/Alert and
-AlertParameter, and in rmf_fleet_msgs/msg of EmergencySignal, FleetState, ChargingAssignments and theirs;
+of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg, rmf_task_msgs/msg/Alert and its
+AlertParameter, and in rmf_fleet_msgs/msg EmergencySignal, FleetState, ChargingAssignments and theirs;
 Time, Duration and Bool from ROS 2 Jazzy's builtin_interfaces and std_msgs.
 """
 
