@@ -283,9 +283,9 @@ def test_a_robot_on_its_way_to_a_station_that_falls_silent_is_sent_to_another() 
         (44.25, "AMR01 -> CHARGE dock_b"),
     ]
     site.chargers["charger_a"].dead = False
-    assert site.run(53.0)[:2] == [
-        (50.25, "charger_a <- cancel"),
-        (50.5, "charger_a: RELEASED AMR01"),
+    assert site.run(53.0) == [
+        (50.25, "charger_a: RELEASED AMR01"),
+        (51.25, "charger_a: IDLE"),
     ]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from bridges.charger import core as charger
 from bridges.charger import messages as charger_messages
 from bridges.charger.settings import ChargerLimits, ChargerSettings, Limits, Robot
-from bridges.charger.signals import Activity, ChargerSample, Measured
+from bridges.charger.signals import Activity, ChargerSample, Measured, Side
 from bridges.charger_coordinator import KIND
 from bridges.charger_coordinator.settings import (
     Fleet as FleetSettings,
@@ -32,6 +32,7 @@ GRAPH = {
     "ward": ("L1", 50.0, 0.0),
 }
 PLACES = {"charger_a": "charger_a", "charger_b": "dock_b"}
+NO_ERROR: tuple[Side, str] = ("", "")
 RECEIVERS = {f"RX-{i}": Robot("tiny", f"AMR0{i}") for i in (1, 2, 3)}
 
 
@@ -75,7 +76,7 @@ class Charger:
         self.broken = self.unplugged = self.dead = False
         self.refuses: set[str] = set()
         self.activity = Activity.IDLE
-        self.error: tuple[Any, str] | None = None
+        self.error: tuple[Side, str] | None = None
         self._since = 0.0
         self._power = False
         self._clears = 0
@@ -87,7 +88,7 @@ class Charger:
         self._run(now)
         if self.unplugged:
             return self.decide(IoFailed("no route to host"), now)
-        side, text = self.error or ("", "")
+        side, text = self.error or NO_ERROR
         full = self.percent if self.activity is Activity.CHARGING else None
         measured = Measured(receiver_id=self.pad, battery_percent=full)
         return self.decide(Sampled(ChargerSample(self.activity, 0, text, measured, side)), now)
@@ -159,7 +160,7 @@ class Yard:
         homes = {f"AMR0{i}": f"wait_{i}" for i in (1, 2, 3)}
         self.fleet = Fleet("tiny", GRAPH, homes, self.drive_s)
         self.states = self.rmf.publisher(topics.CHARGER_STATES)
-        self.fleets = self.rmf.publisher(topics.FLEET_STATES)
+        self.fleets: Any = self.rmf.publisher(topics.FLEET_STATES)
         self.wishes = self.rmf.publisher(topics.ADAPTER_CHARGER_REQUESTS)
         self.withdrawals = self.rmf.publisher(topics.ADAPTER_CHARGER_CANCELS)
         self.rmf.subscribe(topics.CHARGER_REQUESTS, self._request)
