@@ -6,7 +6,7 @@ ChargerRequest and ChargerCancel, which no part of RMF does. Rules:
    SETTLES_S, and as long as it does, or is on its way in the same task. The mode alone would not do:
    RMF's fleet adapter leaves it CHARGING through the tasks that follow (rmf_ros2 9dedd0f,
    RobotContext::current_mode, set by WaitForCharge and DockRobot only). An operator's wish lasts until
-   it is over.
+   it is over, or its robot full.
 2. Wishes are served first come, first served, among the stations that suit (`queue.py`). One station,
    one robot: a station is nobody else's until it shows that it has let go.
 3. A request is repeated until the station shows it. A station that does not take it for TAKEN_S is
@@ -130,7 +130,7 @@ def _sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memo
         memory = replace(memory, served=without(memory.served, who))
     wish = memory.wish(who)
     if wish is not None and wish.by == "operator":
-        return memory
+        return memory.takes_back(who).without_wish(who) if _is_full(memory, who, site) else memory
     wants = not memory.faulty(who) and _wants(memory, standing, wish, now, site)
     if wish is None and wants:
         wish = Wish(who, "fleet", sighting.task_id)
@@ -139,6 +139,13 @@ def _sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memo
     if wish is not None and not wants:
         return memory.takes_back(who).without_wish(who)
     return memory
+
+
+def _is_full(memory: Memory, who: Robot, site: Site) -> bool:
+    """It was being charged, and its fleet says that this is enough."""
+    grant = memory.grants.get(memory.station_of(who) or "")
+    percent = memory.robots[who].sighting.battery_percent
+    return grant is not None and grant.started and percent >= site.full_percent
 
 
 def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standing:

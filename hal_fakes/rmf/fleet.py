@@ -67,6 +67,10 @@ class Fleet:
         robot.task_id = f"work-{self._tasks}"
         self._go(robot, place, now)
 
+    def strays(self, who: str, place: str, now: float) -> None:
+        """It drives there in the task that it has, whatever that wants."""
+        self._go(self.robots[who], place, now)
+
     def hear(self, message: Any, now: float) -> list[Said]:
         """Charging assignments."""
         if message.fleet_name == self.name:
