@@ -45,7 +45,9 @@ class Subject:
         return self._kind.idle(self.memory, now)
 
     def status(self) -> Mapping[str, Any]:
-        """For the status file."""
+        """For the status file; from any thread."""
+        if self._report is None:
+            return {}
         now, read_at = self._clock.monotonic(), self._report.read_at
         return {
             **self._kind.summary(self._report, now),

@@ -107,7 +107,8 @@ class GraphService:
 
     def status(self) -> Mapping[str, Any]:
         """For the status file."""
-        return self._node.status()
+        subjects = {subject.name: subject.status() for subject in self._node.nodes}
+        return {**self._node.status(), "subjects": subjects}
 
 
 class Devices:

@@ -130,14 +130,16 @@ def _sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memo
         memory = replace(memory, served=without(memory.served, who))
     wish = memory.wish(who)
     if wish is not None and wish.by == "operator":
-        return memory.takes_back(who).without_wish(who) if _is_full(memory, who, site) else memory
+        return _fulfilled(memory.takes_back(who), who) if _is_full(memory, who, site) else memory
     wants = not memory.faulty(who) and _wants(memory, standing, wish, now, site)
     if wish is None and wants:
         wish = Wish(who, "fleet", sighting.task_id)
         served = without(memory.served, who)
         return replace(memory, wishes=(*memory.wishes, wish), served=served)
     if wish is not None and not wants:
-        return memory.takes_back(who).without_wish(who)
+        full = _is_full(memory, who, site)
+        memory = memory.takes_back(who)
+        return _fulfilled(memory, who) if full else memory.without_wish(who)
     return memory
 
 
@@ -257,17 +259,21 @@ def _gone(memory: Memory, name: str, grant: Grant, site: Site) -> Memory:
 def _ended(memory: Memory, name: str, grant: Grant, site: Site) -> Memory:
     """A request has come to its end by itself."""
     who, wish = grant.robot, memory.wish(grant.robot)
-    standing = memory.robots.get(who)
     if grant.started:
-        task_id = standing.sighting.task_id if standing else ""
-        served = {**memory.served, who: task_id}
-        memory = replace(memory, served=served, strikes=without(memory.strikes, who))
-        return memory.without_wish(who)
+        return _fulfilled(memory, who)
     place = memory.place_of(who)
     if place == site.places[name]:
         memory = _struck(memory, name, who)
     stays = wish is not None and wish.by == "fleet" and place is not None
     return memory.last_in_queue(who) if stays else memory.without_wish(who)
+
+
+def _fulfilled(memory: Memory, who: Robot) -> Memory:
+    """It was charged, in the task that it has now, and nothing is wrong with it."""
+    standing = memory.robots.get(who)
+    served = {**memory.served, who: standing.sighting.task_id if standing else ""}
+    memory = replace(memory, served=served, strikes=without(memory.strikes, who))
+    return memory.without_wish(who)
 
 
 def _struck(memory: Memory, name: str, who: Robot) -> Memory:

@@ -1,5 +1,6 @@
 """What `check` says of a coordinator's settings."""
 
+import math
 from collections.abc import Iterator
 
 from bridges.charger_coordinator.settings import Settings
@@ -48,7 +49,7 @@ def _near(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
             a = fleet.waypoints[name]
             for other in names[:i]:
                 b = fleet.waypoints[other]
-                apart = max(abs(a.x - b.x), abs(a.y - b.y))
+                apart = math.dist((a.x, a.y), (b.x, b.y))
                 if a.level == b.level and apart < settings.near_m:
                     text = f"'{name}' is less than near_m ({settings.near_m:g} m) from '{other}'"
                     yield ("fleets", fleet_name, "waypoints", name), text

@@ -103,6 +103,9 @@ class Wish(Protocol):
     def about(self, state: words.Stated) -> bool:
         """Does this state tell anything of it?"""
 
+    def met(self, so_far: SoFar) -> bool:
+        """Has the graph been heard, so that a request will be?"""
+
     def unheard(self, names: frozenset[str]) -> str:
         """Why there is no such state, when these devices were heard."""
 
@@ -116,6 +119,10 @@ class ByName:
     def about(self, state: words.Stated) -> bool:
         """It is that device's."""
         return words.device(state) == self.name
+
+    def met(self, so_far: SoFar) -> bool:
+        """The device itself."""
+        return bool(so_far.states)
 
     def unheard(self, names: frozenset[str]) -> str:
         """Another is spelt like it, or none is there at all."""
@@ -135,13 +142,13 @@ def step(wish: Wish, so_far: SoFar, now: float) -> Step:
     if now >= so_far.began_at + so_far.timeout_s:
         return Step(outcome=Failed(reason(wish, so_far, now)))
     hint = _hint(wish, so_far, now)
-    return Step(wish.request(so_far), hint) if _may_send(so_far, now) else Step(hint=hint)
+    return Step(wish.request(so_far), hint) if _may_send(wish, so_far, now) else Step(hint=hint)
 
 
-def _may_send(so_far: SoFar, now: float) -> bool:
+def _may_send(wish: Wish, so_far: SoFar, now: float) -> bool:
     if so_far.last_sent_at is not None:
         return now >= so_far.last_sent_at + REPEAT_S
-    heard_or_late = bool(so_far.states) or now >= so_far.began_at + PATIENCE_S
+    heard_or_late = wish.met(so_far) or now >= so_far.began_at + PATIENCE_S
     return so_far.listeners > 0 and heard_or_late
 
 

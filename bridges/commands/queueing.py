@@ -40,6 +40,10 @@ class Queue:
             (state.robot_fleet, state.robot_name) == (self.fleet, self.robot)
         )
 
+    def met(self, so_far: SoFar) -> bool:
+        """Some charger is heard."""
+        return bool(so_far.names)
+
     def outcome(self, so_far: SoFar) -> Done | None:
         """A charger serves it."""
         answer = so_far.answer()
@@ -83,6 +87,10 @@ class Withdrawal:
     def about(self, state: words.Stated) -> bool:
         """No state tells."""
         return False
+
+    def met(self, so_far: SoFar) -> bool:
+        """Some charger is heard."""
+        return bool(so_far.names)
 
     def outcome(self, so_far: SoFar) -> Done | None:
         """The coordinator was told."""

@@ -6,6 +6,7 @@ from bridges.charger.settings import Robot
 from bridges.decision import OperatorReset
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
+from bridges.service import GraphService
 from tests.charger_coordinator.yard import Yard
 
 
@@ -336,4 +337,5 @@ def test_a_request_sent_to_a_charger_directly_makes_that_robots_place() -> None:
     site.fleet.charge("AMR03", site.now)
     told = [what for _, what in site.run(15.0)]
     assert told == ["AMR02 -> CHARGE dock_b"]
-    assert site.node.nodes[0].status()["queue"] == "tiny/AMR03"
+    status = GraphService(site.node).status()
+    assert (status["passive"], status["subjects"]["site"]["queue"]) == (False, "tiny/AMR03")

@@ -368,9 +368,10 @@ def test_a_wish_for_any_charger_is_done_when_one_of_them_shows_the_robot() -> No
         CHARGER, charger_name="b", state=2, request_id="x", robot_fleet="fleet", robot_name="robot"
     )
     assert [QUEUE.about(state) for state in (CHARGER, OTHERS, given)] == [False, False, True]
-    told = tell(QUEUE, [(2.5, given)])
+    told = tell(QUEUE, [(0.5, OTHERS), (1.2, given)])
     request = d.ChargerRequest("", "fleet", "robot", d.Duration(30), "r1")
-    assert told.sent == [(2.0, request)]
+    assert told.sent == [(0.5, request)]
+    assert told.hints == []
     assert told.outcome == Done("b is ASSIGNED for fleet/robot")
 
 
