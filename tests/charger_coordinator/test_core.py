@@ -243,6 +243,78 @@ def test_who_did_not_come_has_not_failed_and_who_stood_there_has() -> None:
         assert site_.memory.strikes == strikes
 
 
+def test_a_fault_of_the_stations_side_does_not_count_against_the_robot() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.does(A, ERROR, "station: fan")
+    assert site_.run(1) == [(2.0, "charger_a: cancel"), (2.0, "charger_b: AMR01")]
+    assert site_.memory.strikes == {}
+    assert site_.faults == ["STATION_OUT_OF_SERVICE: charger_a: station: fan"]
+
+
+def test_who_did_not_come_keeps_its_wish_only_while_it_stands_at_a_place_of_ours() -> None:
+    for place, queue in ((None, [TWO]), ("wait_1", [TWO, ONE])):
+        site_ = Alone()
+        site_.shows[B] = busy(B)
+        site_.wants(ONE)
+        site_.run(1)
+        site_.wants(TWO)
+        site_.does(A, ASSIGNED)
+        site_.seen[ONE] = replace(site_.seen[ONE], place=place)
+        site_.run(1)
+        site_.does(A, RELEASED)
+        site_.run(1)
+        assert [wish.robot for wish in site_.memory.wishes] == queue
+
+
+def test_a_robot_that_has_a_station_does_not_get_another_by_a_strangers_request() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.does(A, ASSIGNED)
+    site_.shows[B] = Shown(B, ASSIGNED, "somebody-1", ONE)
+    assert site_.run(5) == []
+    assert site_.memory.station_of(ONE) == A
+    assert list(site_.memory.grants) == [A]
+
+
+def test_a_station_whose_pad_another_robot_does_not_leave_is_given_up_after_the_start_timeout() -> (
+    None
+):
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.does(A, ERROR, "wrong docking: tiny/AMR02 stands here, tiny/AMR01 is expected")
+    assert site_.run(60) == []
+    assert site_.faults == ["WRONG_STATION: tiny/AMR02 stands at charger_a, nobody asked for that"]
+    assert site_.run(1) == [(62.0, "charger_a: cancel"), (62.0, "charger_b: AMR01")]
+    assert site_.memory.strikes == {}
+
+
+def test_what_could_not_be_said_beside_a_rival_is_said_anew_and_not_given_up() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.hears(MaySpeak(False))
+    assert site_.run(60) == []
+    site_.said.clear()
+    site_.hears(MaySpeak(True))
+    assert site_.said == [(61.0, "charger_a: AMR01")]
+    assert [text for _, text in site_.run(9)] == ["charger_a: AMR01"] * 9
+    assert site_.faults == []
+
+
+def test_only_a_robot_refused_as_unasked_may_have_the_station_where_it_stands() -> None:
+    for request_id, said in (("unrequested/charger_a", ["charger_a: AMR01"]), ("somebody-1", [])):
+        site_ = Alone()
+        site_.shows[B] = busy(B)
+        text = "wrong docking: tiny/AMR01 is not assigned here"
+        site_.shows[A] = Shown(A, ERROR, request_id, ONE, text)
+        site_.wants(ONE, "charger_a")
+        assert [words for _, words in site_.run(1)] == said
+
+
 @pytest.mark.parametrize(
     ("text", "whose"),
     [
@@ -274,6 +346,24 @@ def test_who_stands_on_a_pad_is_read_from_its_error() -> None:
 
 
 # ---- what is kept
+
+
+def test_a_restart_remembers_who_was_charging_and_whom_a_station_is_to_let_go() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.wants(TWO)
+    site_.run(1)
+    site_.does(A, CHARGING)
+    site_.does(B, CHARGING)
+    site_.run(1)
+    site_.seen[TWO] = replace(site_.seen[TWO], charges=False)
+    site_.run(1)
+    kept = keep.persist({"site": site_.memory})
+    restored = keep.restore(kept, SETTINGS, 50.0)["site"].grants
+    assert {name: (g.robot, g.started, g.over) for name, g in restored.items()} == {
+        A: (ONE, True, False),
+        B: (TWO, True, True),
+    }
 
 
 def test_what_the_yaml_no_longer_has_is_not_restored() -> None:

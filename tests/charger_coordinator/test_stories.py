@@ -37,6 +37,7 @@ def test_scheduled_a_robot_is_called_from_its_place_charged_and_sent_on() -> Non
     site.fleet.works("AMR01", "ward", site.now)
     assert site.run(40.0) == [(30.25, "charger_a: IDLE")]
     assert site.faults == []
+    assert site.assignments == 3, "each change once: every message restarts tasks, and is logged"
 
 
 def test_ad_hoc_an_operator_has_the_robot_charged_that_stands_on_the_pad() -> None:

@@ -168,6 +168,7 @@ class Yard:
         self.rmf.subscribe(topics.CHARGING_ASSIGNMENTS, self._assignments)
         self.rmf.subscribe(topics.ALERT, self._alert)
         self.assigned: dict[str, str] = {}
+        self.assignments = 0
         self.request_ids: dict[str, str] = {}
         self._shown: dict[str, str] = {}
         self.starts()
@@ -263,6 +264,7 @@ class Yard:
         self._publish(station, station.decide(event, self.now))
 
     def _assignments(self, message: Any) -> None:
+        self.assignments += 1
         places = [a.waypoint_name for a in message.assignments]
         assert len(set(places)) == len(places), "two robots sent to one place"
         for a in message.assignments:
