@@ -25,8 +25,9 @@ ChargerRequest and ChargerCancel, which no part of RMF does. Rules:
 """
 
 import math
-from dataclasses import replace
 from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator import voice

@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from typing import Final, Literal, TypeVar
+
+import msgspec
+from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator.diagnosis import Side, side
@@ -28,8 +30,7 @@ RELEASED: Final = ChargerStateValue.CHARGER_RELEASED
 ERROR: Final = ChargerStateValue.CHARGER_ERROR
 
 
-@dataclass(frozen=True, slots=True)
-class Sighting:
+class Sighting(msgspec.Struct, frozen=True):
     """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING. `place`: the waypoint
     of ours at which it stands; None for none."""
 
@@ -40,15 +41,13 @@ class Sighting:
     task_id: str
 
 
-@dataclass(frozen=True, slots=True)
-class FleetSeen:
+class FleetSeen(msgspec.Struct, frozen=True):
     """A FleetState, of the robots that we know."""
 
     robots: tuple[Sighting, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Shown:
+class Shown(msgspec.Struct, frozen=True):
     """A ChargerState. `robot`: None where it names none."""
 
     station: str
@@ -58,8 +57,7 @@ class Shown:
     error: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Wanted:
+class Wanted(msgspec.Struct, frozen=True):
     """An operator wants this robot charged; `station`: there rather than elsewhere, "" anywhere."""
 
     robot: Robot
@@ -68,15 +66,13 @@ class Wanted:
     start_timeout_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Unwanted:
+class Unwanted(msgspec.Struct, frozen=True):
     """An operator's wish is withdrawn."""
 
     request_id: str
 
 
-@dataclass(frozen=True, slots=True)
-class Dedicated:
+class Dedicated(msgspec.Struct, frozen=True):
     """Somebody else's charging assignments: robot -> the station that it is to use."""
 
     stations: tuple[tuple[Robot, str], ...]
@@ -85,8 +81,7 @@ class Dedicated:
 Event = FleetSeen | Shown | Wanted | Unwanted | Dedicated | MaySpeak | OperatorReset | Woken
 
 
-@dataclass(frozen=True, slots=True)
-class Wish:
+class Wish(msgspec.Struct, frozen=True):
     """One robot to be charged. `by`: a fleet's state shows it, or an operator said so.
 
     `task_id`: the robot's task, by a fleet. `station`, `request_id`, `start_timeout_s`: the
@@ -101,8 +96,7 @@ class Wish:
     start_timeout_s: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Grant:
+class Grant(msgspec.Struct, frozen=True):
     """A station given to a robot, since `made_at`, by the request `request_id`.
 
     `shown`: the station says so. `started`: current has flowed. `over`: the robot has it no more,
@@ -119,8 +113,7 @@ class Grant:
     sent_at: float = -NEVER
 
 
-@dataclass(frozen=True, slots=True)
-class Standing:
+class Standing(msgspec.Struct, frozen=True):
     """A robot as its fleet showed it at `at`; so, at this place, `since` then (-inf: ever)."""
 
     sighting: Sighting
@@ -128,8 +121,7 @@ class Standing:
     since: float = -NEVER
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
+class Seen(msgspec.Struct, frozen=True):
     """A station's last state, heard at `at`; it has been so, texts included, `since` then."""
 
     state: ChargerStateValue
@@ -145,8 +137,7 @@ class Seen:
         return side(self.error) if self.state is ERROR else Side.NONE
 
 
-@dataclass(frozen=True, slots=True)
-class Memory:
+class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
     `wishes`: in the order in which they are served. `grants`: station -> to whom. `strikes`: where
@@ -160,15 +151,15 @@ class Memory:
     began_at: float = 0.0
     may_speak: bool = False
     wishes: tuple[Wish, ...] = ()
-    grants: Mapping[str, Grant] = field(default_factory=dict)
-    strikes: Mapping[Robot, tuple[str, ...]] = field(default_factory=dict)
-    served: Mapping[Robot, str] = field(default_factory=dict)
+    grants: Mapping[str, Grant] = msgspec.field(default_factory=dict)
+    strikes: Mapping[Robot, tuple[str, ...]] = msgspec.field(default_factory=dict)
+    served: Mapping[Robot, str] = msgspec.field(default_factory=dict)
     over: tuple[str, ...] = ()
     count: int = 0
-    robots: Mapping[Robot, Standing] = field(default_factory=dict)
-    stations: Mapping[str, Seen] = field(default_factory=dict)
-    shunned: Mapping[str, float] = field(default_factory=dict)
-    preferred: Mapping[Robot, str] = field(default_factory=dict)
+    robots: Mapping[Robot, Standing] = msgspec.field(default_factory=dict)
+    stations: Mapping[str, Seen] = msgspec.field(default_factory=dict)
+    shunned: Mapping[str, float] = msgspec.field(default_factory=dict)
+    preferred: Mapping[Robot, str] = msgspec.field(default_factory=dict)
     told: tuple[ChargingAssignments, ...] = ()
     alerts: frozenset[str] = frozenset()
 

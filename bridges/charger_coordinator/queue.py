@@ -9,8 +9,9 @@ tells whose fault it was.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator.diagnosis import WRONG_DOCKING

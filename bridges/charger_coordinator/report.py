@@ -1,8 +1,9 @@
 """What the status file and the log say of the site."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from bridges.charger_coordinator.diagnosis import UNKNOWN_RECEIVER, Side, on_pad
 from bridges.charger_coordinator.memory import Memory, Seen
@@ -10,8 +11,7 @@ from bridges.charger_coordinator.settings import Site
 from bridges.decision import Fault
 
 
-@dataclass(frozen=True, slots=True)
-class SiteReport:
+class SiteReport(msgspec.Struct, frozen=True):
     """`read_at`: when a station was heard last (monotonic s). `stations`: (station, who has it or
     what it shows). `queue`: the robots that wait, in their order."""
 

@@ -10,8 +10,9 @@
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any, Final
+
+from msgspec.structs import replace
 
 from bridges.charger_coordinator.memory import ASSIGNED, CHARGING, ERROR, NODE, Grant, Memory
 from bridges.charger_coordinator.report import SiteReport

@@ -1,9 +1,10 @@
 """The coordinator's rules one by one: its core alone, told by hand, in virtual time."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator import core, keep

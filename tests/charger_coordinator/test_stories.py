@@ -1,6 +1,6 @@
 """The situations that shared chargers meet, whole: fleet adapter, chargers' own cores, coordinator."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
 from bridges.decision import OperatorReset
