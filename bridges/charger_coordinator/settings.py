@@ -13,12 +13,18 @@ from bridges.fields import Name
 QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
 Near = Annotated[float, Meta(ge=0.1, le=5, extra={"unit": "m"})]
-Percent = Annotated[float, Meta(ge=1, le=100, extra={"unit": "%"})]
+Full = Annotated[float, Meta(ge=50, le=100, extra={"unit": "%"})]
+Low = Annotated[float, Meta(ge=1, le=100, extra={"unit": "%"})]
 Stations = Annotated[list[Name], Meta(min_length=1)]
 
 
 class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A named vertex of the fleet's navigation graph, where the graph has it."""
+    """A named vertex of the fleet's navigation graph, where the graph has it.
+
+    `level`: its level's name.
+    `x`: as the graph says.
+    `y`: likewise.
+    """
 
     level: Name
     x: Metres
@@ -51,6 +57,7 @@ class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     `waypoints`: the places of its navigation graph that matter here. RMF's fleet adapter crashes on
     a name that its graph does not have, so no other name is ever sent to it.
+    `robots`: those that charge here, by the adapter's names.
     """
 
     waypoints: dict[Name, Waypoint]
@@ -60,6 +67,8 @@ class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Which robots charge where.
 
+    `stations`: the chargers, by the names under which their daemons publish.
+    `fleets`: the fleets whose robots charge at them.
     `start_timeout_s`: how long a station is kept for a robot that is on its way.
     `near_m`: a robot stands at the nearest waypoint that is not farther away.
     `full_percent`: a robot with so much charge gives its station up.
@@ -71,8 +80,8 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     fleets: dict[Name, Fleet]
     start_timeout_s: StartTimeout = 300.0
     near_m: Near = 1.0
-    full_percent: Percent = 100.0
-    again_percent: Percent = 90.0
+    full_percent: Full = 100.0
+    again_percent: Low = 90.0
     quiet_start_s: QuietStart = 3.0
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
@@ -82,10 +91,17 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 yield (key,), f"'{key}' is empty: there is nothing to coordinate"
         if self.again_percent > self.full_percent:
             yield ("again_percent",), "is above full_percent: a full robot would come back at once"
+        for name, place in self.places().items():
+            if not self._graphs_with(place):
+                text = f"stands at '{place}', which is in no fleet's waypoints"
+                yield ("stations", name, "waypoint"), text
         for name, fleet in self.fleets.items():
             for path, text in self._of_fleet(fleet):
                 yield ("fleets", name, *path), text
         yield from self._doubles()
+
+    def _graphs_with(self, place: str) -> list[str]:
+        return [name for name, fleet in self.fleets.items() if place in fleet.waypoints]
 
     def _of_fleet(self, fleet: Fleet) -> Iterator[tuple[tuple[str, ...], str]]:
         known = ", ".join(fleet.waypoints) or "none"
@@ -100,8 +116,9 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 path = ("robots", name, "stations", str(i))
                 if station not in self.stations:
                     yield path, f"no station '{station}'; there are {', '.join(self.stations)}"
-                elif self.places()[station] not in fleet.waypoints:
-                    place = self.places()[station]
+                elif (place := self.places()[station]) not in fleet.waypoints:
+                    if not self._graphs_with(place):
+                        continue
                     yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
 
     def _doubles(self) -> Iterator[tuple[tuple[str, ...], str]]:

@@ -111,7 +111,7 @@ def test_an_alert_is_sent_once_under_its_id_and_its_time() -> None:
         ("waits_at: wait_1", "waits_at: wait_9", "no waypoint 'wait_9' in this fleet's list"),
         ("waits_at: wait_1", "waits_at: wait_2", "'wait_2' is tiny/AMR01's already"),
         ("waits_at: wait_1", "waits_at: dock_b", "'dock_b' is a charger's place"),
-        ("waypoint: dock_b", "waypoint: dock_x", "'charger_b' is at 'dock_x', not in this"),
+        ("waypoint: dock_b", "waypoint: dock_x", "stands at 'dock_x', which is in no fleet's"),
         ("waypoint: dock_b", "waypoint: charger_a", "stands at 'charger_a', as 'charger_a' does"),
         ("[charger_b], waits", "[charger_c], waits", "no station 'charger_c'; there are"),
         ("[RX-0002]", "[RX-0001]", "'RX-0001' is tiny/AMR01's already"),
@@ -129,6 +129,20 @@ def test_a_file_that_would_lead_robots_astray_is_refused_where_it_is_wrong(
     with pytest.raises(SettingsError) as refused:
         load(file)
     assert problem in "\n".join(map(str, refused.value.problems))
+
+
+def test_a_charger_that_another_fleets_graph_alone_has_suits_no_robot_of_this_one(
+    tmp_path: Path,
+) -> None:
+    other = """    other:
+      waypoints: {dock_x: {level: L1, x: 1, y: 1}, wait_9: {level: L1, x: 9, y: 9}}
+      robots: {R1: {stations: [charger_b], waits_at: wait_9}}
+"""
+    text = CONFIG.read_text().replace("waypoint: dock_b", "waypoint: dock_x")
+    file = tmp_path / "site.yaml"
+    file.write_text(text.replace("  fleets:\n", "  fleets:\n" + other))
+    with pytest.raises(SettingsError, match="'charger_b' is at 'dock_x', not in this fleet's list"):
+        load(file)
 
 
 def test_a_file_without_its_section_says_what_is_missing(tmp_path: Path) -> None:

@@ -96,9 +96,18 @@ def spots(problems: list[str]) -> list[str]:
 
 
 def own_names(config: Path) -> set[str]:
-    """The names of a file's buses and devices, which may be anything."""
+    """The names of a file's buses and devices, and those in a section, which may be anything."""
     loaded = load(config)
-    return {*loaded.buses, *loaded.devices}
+    return {*loaded.buses, *loaded.devices, *names_in(loaded.section)}
+
+
+def names_in(value: object) -> set[str]:
+    """The keys of every mapping below a struct."""
+    if isinstance(value, dict):
+        return {*value, *(name for inner in value.values() for name in names_in(inner))}
+    if not isinstance(value, msgspec.Struct):
+        return set()
+    return {name for key in value.__struct_fields__ for name in names_in(getattr(value, key))}
 
 
 def is_own(name: str, names: set[str]) -> bool:
