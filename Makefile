@@ -2,9 +2,10 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: help demo test lint format bench mutate clean
+.PHONY: help demo demo-charging test lint format bench mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
+	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make mutate  break the lift's core in every small way, and list what no test noticed (docs/mutation.md)"
@@ -20,6 +21,9 @@ help:
 
 demo: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo
+
+demo-charging: .venv/ready
+	@$(BIN)/python -m hal_fakes.demo.charging
 
 test: .venv/ready lint
 	$(BIN)/pytest

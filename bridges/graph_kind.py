@@ -5,7 +5,7 @@ that it learns of from messages, with one core memory for each. `bridges/<kind>/
 `KIND`; `bridges/graph_node.py` serves it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,6 +47,9 @@ class GraphKind:
     changed and each second. For one whose memory must outlive the daemon: `persist(memories)`, the
     same bytes while nothing worth keeping has changed, and `restore(kept, settings, now)`, which
     raises ValueError for bytes that are not that. What is kept is kept before it is told together.
+
+    For one whose settings are more than a few numbers: `described(settings)`, as rows for `check`, and
+    `warnings(settings)`, as (path, text) of what is legal but worth a look.
     """
 
     name: str
@@ -66,3 +69,5 @@ class GraphKind:
     together: Callable[[Mapping[str, Any]], tuple[Topic[Any], Message]] | None = None
     persist: Callable[[Mapping[str, Any]], bytes] | None = None
     restore: Callable[[bytes, Any, float], Mapping[str, Any]] | None = None
+    described: Callable[[Any], list[tuple[str, ...]]] | None = None
+    warnings: Callable[[Any], Iterable[tuple[tuple[str, ...], str]]] | None = None

@@ -10,11 +10,12 @@ import math
 import random
 import threading
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from bridges.decision import Fault, RequestRefused
+from bridges.decision import OperatorReset, RequestRefused
 from bridges.graph_kind import GraphKind, MaySpeak, Woken
+from bridges.graph_subject import Subject
 from bridges.log import pairs
 from bridges.loop import LEAST_GAP_S, Inbox
 from bridges.node import Clock
@@ -47,57 +48,6 @@ class Kept(Protocol):
 
 def _same(topic: Topic[Any]) -> Topic[Any]:
     return topic
-
-
-class Subject:
-    """One lift or door that the kind's core looks after."""
-
-    def __init__(
-        self, name: str, kind: GraphKind, limits: Any, started_at: float, clock: Clock
-    ) -> None:
-        self.name = name
-        self._kind = kind
-        self._limits = limits
-        self._clock = clock
-        self.memory = kind.initial(name, started_at)
-        self.wake_at = math.inf
-        self._report: Any = None
-        self._news: Any = None
-        self._faults: tuple[Fault, ...] = ()
-
-    def decide(self, event: Any) -> tuple[Sequence[tuple[Topic[Any], Message]], str]:
-        """One step of the core: what to publish, and why the event was refused."""
-        now = self._clock.monotonic()
-        decision = self._kind.decide(self.memory, event, now, self._limits)
-        self.memory, self.wake_at = decision.memory, decision.wake_at
-        self._report = decision.report
-        self._log_changes(now)
-        return decision.publish, decision.refused
-
-    def idle(self, now: float) -> bool:
-        """It need not be remembered."""
-        return self._kind.idle(self.memory, now)
-
-    def status(self) -> Mapping[str, Any]:
-        """For the status file."""
-        now, read_at = self._clock.monotonic(), self._report.read_at
-        return {
-            **self._kind.summary(self._report, now),
-            "faults": [{"code": f.code, "detail": f.detail} for f in self._report.faults],
-            "input_age_s": None if read_at is None else round(now - read_at, 3),
-        }
-
-    def _log_changes(self, now: float) -> None:
-        faults, before = self._report.faults, self._faults
-        if self._report.news() != self._news:
-            log.info(pairs("state", subject=self.name, **self._kind.summary(self._report, now)))
-        known = {fault.code for fault in before}
-        for fault in faults:
-            if fault.code not in known:
-                log.warning(pairs("fault", subject=self.name, code=fault.code, detail=fault.detail))
-        for code in known - {fault.code for fault in faults}:
-            log.info(pairs("fault_over", subject=self.name, code=code))
-        self._news, self._faults = self._report.news(), faults
 
 
 class GraphNode:
@@ -140,7 +90,7 @@ class GraphNode:
         self._kept_bytes: bytes | None = None
         self._told_together: Message | None = None
         self._told_at = self._tell_at = -math.inf
-        self._stopping = False
+        self._stopping = self._reset = False
         self._restore()
         self._thread = threading.Thread(target=self._run, name=f"graph-{kind.name}", daemon=True)
 
@@ -150,7 +100,15 @@ class GraphNode:
             end = self._transport.subscribe(self._named(topic), _ignore, others_only=True)
             self._rival_ends.append(end)
         for topic in self._kind.requests:
-            self._transport.subscribe(self._named(topic), self._to_inbox(topic))
+            others_only = topic in self._kind.publishes
+            self._transport.subscribe(
+                self._named(topic), self._to_inbox(topic), others_only=others_only
+            )
+
+    def reset(self) -> None:
+        """An operator says that latched faults may clear; from any thread."""
+        self._reset = True
+        self.inbox.wake()
 
     def start(self) -> None:
         """Begin to serve."""
@@ -188,6 +146,9 @@ class GraphNode:
         for name, messages in self.inbox.take().items():
             for topic, message in messages:
                 self._receive(name, topic, message)
+        if self._reset:
+            self._reset = False
+            self._decide_all(OperatorReset())
         now = self._clock.monotonic()
         for subject in list(self.subjects.values()):
             if now >= subject.wake_at:
@@ -259,8 +220,7 @@ class GraphNode:
         else:
             self._withdraw()
         self.may_speak = yes
-        for subject in self.subjects.values():
-            self._decide(subject, MaySpeak(yes))
+        self._decide_all(MaySpeak(yes))
 
     def _restore(self) -> None:
         """What was kept; a file that cannot be right is as good as none, and says so."""
@@ -340,6 +300,10 @@ class GraphNode:
             self._publish(topic, message)
         if refused:
             self._refuse(refused, subject.name, event)
+
+    def _decide_all(self, event: Any) -> None:
+        for subject in self.subjects.values():
+            self._decide(subject, event)
 
     def _publish(self, topic: Topic[Any], message: Message) -> None:
         now = stamp(self._clock.wall())

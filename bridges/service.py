@@ -102,11 +102,13 @@ class GraphService:
         self._node.subscribe()
 
     def reset(self) -> None:
-        """It latches nothing."""
+        """Its subjects hear of it."""
+        self._node.reset()
 
     def status(self) -> Mapping[str, Any]:
         """For the status file."""
-        return self._node.status()
+        subjects = {subject.name: subject.status() for subject in self._node.nodes}
+        return {**self._node.status(), "subjects": subjects}
 
 
 class Devices:

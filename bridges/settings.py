@@ -23,6 +23,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import msgspec
 from msgspec.inspect import LiteralType
 from yaml import MappingNode, Node, ScalarNode
 
@@ -174,8 +175,20 @@ class _Reading:
             self._driver = named.driver_called(self._kind_name, name)
 
     def _read_section(self, entry: Entry | None, kind: GraphKind) -> None:
-        """The settings of a kind without devices; all of them have defaults."""
-        self._section = self._values.make(kind.settings, entry.spot()) if entry else kind.settings()
+        """The settings of a kind without devices; all of them may have defaults."""
+        if entry:
+            self._section = self._values.make(kind.settings, entry.spot())
+            spot = Spot(entry.value, entry.key, entry.spot().label)
+            found = kind.warnings(self._section) if kind.warnings and not self._broken() else ()
+            for path, text in found:
+                self._warn(locate(spot, path).where(), text)
+        elif any(field.required for field in msgspec.structs.fields(kind.settings)):
+            self._page.note(self._top.at, f"the file needs '{kind.devices_key}': {MAPPING}")
+        else:
+            self._section = kind.settings()
+
+    def _broken(self) -> bool:
+        return self._section is BROKEN or bool(self._page.problems)
 
     def _word(self, entry: Entry | None, words: list[str]) -> str | None:
         """One of these words; None where it is none of them, or not there."""

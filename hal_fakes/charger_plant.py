@@ -45,6 +45,7 @@ CAUSES: Final = {
     "foreign_object": "foreign object detected",
     "over_temperature": "over temperature",
 }
+ROBOTS_FAULTS: Final = ("authentication timeout", "communication lost while charging")
 PARTS: Final = ("receiver", "server", "headers", "body")
 
 

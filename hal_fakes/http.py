@@ -24,7 +24,7 @@ from typing import Any, Final, cast
 
 from bridges.charger.signals import Activity
 from drivers.hal.http import base
-from hal_fakes.charger_plant import Reading
+from hal_fakes.charger_plant import ROBOTS_FAULTS, Reading
 from hal_fakes.plant import FailureMode, Plant
 from hal_fakes.wiring import devices_on
 
@@ -112,6 +112,8 @@ class Station:
         return answer
 
     def _code(self, reading: Reading) -> int:
+        if reading.error_text in ROBOTS_FAULTS and self.settings.codes.robot_error:
+            return cast(int, self.settings.codes.robot_error[0])
         nearest = NEAREST.get(reading.activity, Activity.ERROR)
         codes = self._lists[reading.activity] or self._lists[nearest] or [self._unknown()]
         return codes[min(int(reading.progress * len(codes)), len(codes) - 1)]

@@ -9,10 +9,12 @@ import os
 import sys
 import unicodedata
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import msgspec
 
 from bridges import named
+from bridges.graph_kind import GraphKind
 from bridges.settings import Config, Problem, SettingsError, load
 from drivers.points import Wire
 
@@ -70,16 +72,22 @@ def _complain(lines: Iterable[str]) -> None:
 def described(config: Config) -> list[str]:
     """A right file as lines: what it is, and its wiring or what it talks to."""
     if config.section is not None:
-        rows = [
-            (key, "-" if value is None else str(value))
-            for key, value in msgspec.to_builtins(config.section).items()
-        ]
+        kind = named.kind_called(config.kind)
+        assert isinstance(kind, GraphKind)
+        rows = (kind.described or _numbers)(config.section)
         return [f"{config.path}: {config.kind}", "", *aligned(rows), ""]
     lines = [f"{config.path}: {config.kind}, driver {config.driver}"]
     for bus in config.buses:
         devices = [name for name in config.devices if config.bus_of(name) == bus]
         lines += ["", f"bus {bus} ({config.bus_types[bus]})", *_bus(config, bus, devices)]
     return [*lines, ""]
+
+
+def _numbers(section: Any) -> list[tuple[str, ...]]:
+    return [
+        (key, "-" if value is None else str(value))
+        for key, value in msgspec.to_builtins(section).items()
+    ]
 
 
 def _bus(config: Config, bus: str, devices: Sequence[str]) -> list[str]:

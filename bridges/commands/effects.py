@@ -100,6 +100,39 @@ class Wish(Protocol):
     def reason(self, so_far: SoFar) -> str:
         """Why there is no effect, when the device was heard last a moment ago."""
 
+    def about(self, state: words.Stated) -> bool:
+        """Does this state tell anything of it?"""
+
+    def met(self, so_far: SoFar) -> bool:
+        """Has the graph been heard, so that a request will be?"""
+
+    def unheard(self, names: frozenset[str]) -> str:
+        """Why there is no such state, when these devices were heard."""
+
+
+class ByName:
+    """A wish about the device of this `name`."""
+
+    name: str
+    states: Topic[Any]
+
+    def about(self, state: words.Stated) -> bool:
+        """It is that device's."""
+        return words.device(state) == self.name
+
+    def met(self, so_far: SoFar) -> bool:
+        """The device itself."""
+        return bool(so_far.states)
+
+    def unheard(self, names: frozenset[str]) -> str:
+        """Another is spelt like it, or none is there at all."""
+        if not names:
+            topic = self.states.name
+            return f"nothing is heard on {topic}: is the daemon running, in this domain?"
+        there = words.printable(", ".join(sorted(names)))
+        found = f"no {self.name!r} on {self.states.name}; there: {there}"
+        return f"{found}{nearest(self.name, names)}"
+
 
 def step(wish: Wish, so_far: SoFar, now: float) -> Step:
     """What to do now."""
@@ -109,13 +142,13 @@ def step(wish: Wish, so_far: SoFar, now: float) -> Step:
     if now >= so_far.began_at + so_far.timeout_s:
         return Step(outcome=Failed(reason(wish, so_far, now)))
     hint = _hint(wish, so_far, now)
-    return Step(wish.request(so_far), hint) if _may_send(so_far, now) else Step(hint=hint)
+    return Step(wish.request(so_far), hint) if _may_send(wish, so_far, now) else Step(hint=hint)
 
 
-def _may_send(so_far: SoFar, now: float) -> bool:
+def _may_send(wish: Wish, so_far: SoFar, now: float) -> bool:
     if so_far.last_sent_at is not None:
         return now >= so_far.last_sent_at + REPEAT_S
-    heard_or_late = bool(so_far.states) or now >= so_far.began_at + PATIENCE_S
+    heard_or_late = wish.met(so_far) or now >= so_far.began_at + PATIENCE_S
     return so_far.listeners > 0 and heard_or_late
 
 
@@ -124,7 +157,7 @@ def _hint(wish: Wish, so_far: SoFar, now: float) -> str:
         return ""
     if so_far.first_sent_at is None and so_far.listeners == 0:
         return wish.nobody
-    return "" if so_far.states else unheard(wish, so_far.names)
+    return "" if so_far.states else wish.unheard(so_far.names)
 
 
 def reason(wish: Wish, so_far: SoFar, now: float) -> str:
@@ -132,19 +165,11 @@ def reason(wish: Wish, so_far: SoFar, now: float) -> str:
     if so_far.first_sent_at is None and so_far.listeners == 0:
         return wish.nobody
     if not so_far.states:
-        return unheard(wish, so_far.names)
+        return wish.unheard(so_far.names)
     silent_s = now - so_far.states[-1].at
     if silent_s > SILENT_AFTER_S:
         return f"{wish.name} fell silent {silent_s:.0f} s ago: is its daemon still running?"
     return f"{wish.reason(so_far)} (last state: {described(so_far.latest())})"
-
-
-def unheard(wish: Wish, names: frozenset[str]) -> str:
-    """No state of this device: another is spelt like it, or none is there at all."""
-    if not names:
-        return f"nothing is heard on {wish.states.name}: is the daemon running, in this domain?"
-    there = words.printable(", ".join(sorted(names)))
-    return f"no {wish.name!r} on {wish.states.name}; there: {there}{nearest(wish.name, names)}"
 
 
 def nearest(name: str, names: Sequence[str] | frozenset[str]) -> str:

@@ -21,6 +21,7 @@ from bridges.commands.graph import (
     interruptible,
     open_graph,
 )
+from bridges.commands.queueing import Queue, Withdrawal
 from bridges.commands.wishes import Charge, ChargeCancel, DoorMove, LiftEnd, LiftRide
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
@@ -97,6 +98,11 @@ def _charger_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--robot", metavar="FLEET/ROBOT", help="assign the charger to this robot")
     what.add_argument("--cancel", metavar="REQUEST_ID", help="cancel the request of this id")
+    parser.add_argument(
+        "--queue",
+        action="store_true",
+        help="ask the charger coordinator, which may choose another charger; NAME may be `any`",
+    )
     parser.add_argument("--request-id", metavar="ID", help="(a new one)")
     parser.add_argument(
         "--start-timeout",
@@ -135,12 +141,13 @@ def _lift_wish(args: argparse.Namespace) -> Wish:
 
 def _charger_wish(args: argparse.Namespace) -> Wish:
     if args.cancel is not None:
-        return ChargeCancel(args.name, args.cancel)
+        return Withdrawal(args.cancel) if args.queue else ChargeCancel(args.name, args.cancel)
     fleet, slash, robot = args.robot.partition("/")
     if not (fleet and slash and robot):
         args.usage(f"--robot {args.robot!r}: say FLEET/ROBOT")
     request_id = args.request_id or f"{NODE_NAME}-{uuid4().hex[:8]}"
-    return Charge(args.name, fleet, robot, request_id, args.start_timeout)
+    wish = Queue if args.queue else Charge
+    return wish(args.name, fleet, robot, request_id, args.start_timeout)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -199,7 +206,7 @@ class _Errand:
             return
         name = words.device(heard.message)
         self.so_far = replace(self.so_far, names=self.so_far.names | {name})
-        if name != self.wish.name:
+        if not self.wish.about(heard.message):
             return
         self.so_far = replace(self.so_far, states=(*self.so_far.states, heard))
         text = described(heard.message)

@@ -68,6 +68,7 @@ def listen_on(transport: Transport) -> Ears:
         topics.DOOR_STATES,
         topics.CHARGER_STATES,
         topics.DOOR_SUPERVISOR_HEARTBEAT,
+        topics.CHARGING_ASSIGNMENTS,
     )
 
 
@@ -76,7 +77,8 @@ def listen_on(transport: Transport) -> Ears:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One device. `age` is that of the reading; `mark` is "" or why not to trust the row."""
+    """One device, or a robot with its place by the charging assignments. `age` is that of the reading;
+    `mark` is "" or why not to trust the row."""
 
     kind: str
     name: str
@@ -92,6 +94,7 @@ class Board:
     def __init__(self) -> None:
         self._latest: dict[tuple[str, str], Heard] = {}
         self._requesters: dict[str, str] = {}
+        self._places: dict[str, str] = {}
 
     def take(self, heard: Heard) -> None:
         """One message."""
@@ -101,6 +104,11 @@ class Board:
                     door.door_name: " ".join(s.requester_id for s in door.sessions)
                     for door in heard.message.all_sessions
                 }
+            case d.ChargingAssignments(fleet_name=fleet):
+                for one in heard.message.assignments:
+                    mode = words.word(d.ChargingMode, one.mode)
+                    place = words.printable(f"{mode} at {one.waypoint_name}")
+                    self._places[words.printable(f"{fleet}/{one.robot_name}")] = place
             case state:
                 key = (KINDS[type(state)], words.device(state))
                 self._latest[key] = heard
@@ -117,7 +125,7 @@ class Board:
                 _mark(heard, now, wall),
             )
             for (kind, name), heard in sorted(self._latest.items(), key=_order)
-        ]
+        ] + [Row("robot", who, place, "-", "-", "") for who, place in sorted(self._places.items())]
 
     def _holder(self, state: words.Stated) -> str:
         if isinstance(state, d.DoorState):

@@ -6,7 +6,7 @@ Requests are those of RMF's fleet adapters, and so are the conditions that they 
 
 from typing import Any
 
-from bridges.commands.effects import Done, Failed, SoFar, described, nearest, nobody_listens
+from bridges.commands.effects import ByName, Done, Failed, SoFar, described, nearest, nobody_listens
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.stamps import duration
@@ -26,7 +26,7 @@ def _adapter_or_direct(
 SHUT_OUT = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
 
 
-class LiftRide:
+class LiftRide(ByName):
     """The session, and the car at this floor with its door open, as a fleet adapter asks for it."""
 
     states: Topic[Any] = topics.LIFT_STATES
@@ -91,7 +91,7 @@ class LiftRide:
         return f"the car is at {self.floor}, but its door is not seen open"
 
 
-class LiftEnd:
+class LiftEnd(ByName):
     """The session over: `session`, or whoever's the first LiftState shows when it is ""."""
 
     states: Topic[Any] = topics.LIFT_STATES
@@ -135,7 +135,7 @@ class LiftEnd:
 # --- doors -------------------------------------------------------------------------------------
 
 
-class DoorMove:
+class DoorMove(ByName):
     """The door open, or closed.
 
     On the adapter topic also what the phases of a fleet adapter wait for: the supervisor's heartbeat
@@ -198,7 +198,7 @@ SERVING = (
 )
 
 
-class Charge:
+class Charge(ByName):
     """The charger assigned to a robot under our request id."""
 
     states: Topic[Any] = topics.CHARGER_STATES
@@ -238,7 +238,7 @@ class Charge:
         return f"{self.name} did not take the request: its daemon's log says why"
 
 
-class ChargeCancel:
+class ChargeCancel(ByName):
     """The charger no longer assigned to that request."""
 
     states: Topic[Any] = topics.CHARGER_STATES

@@ -5,8 +5,7 @@ their order. A number is aligned to its own size, counted from the end of the he
 length with the closing NUL as uint32, the UTF-8 bytes and the NUL; a sequence is its length as uint32
 and its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and what rmw_cyclonedds and rmw_fastrtps send.
 
-The steps for each type are made once, from the annotations in `definitions.py`. No type there holds
-anything wider than four bytes, so the header does not shift the alignment.
+The steps for each type are made once, from the annotations in `definitions.py`.
 """
 
 import struct
@@ -22,8 +21,8 @@ Get = Callable[[bytes, int], tuple[Any, int]]
 
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 BIG_ENDIAN = b"\x00\x00\x00\x00"
-CODES = {"int32": "i", "uint32": "I"}
-PADDING = (b"", b"\0\0\0", b"\0\0", b"\0")
+HEADER = 4
+CODES = {"int32": "i", "uint32": "I", "uint64": "Q", "float32": "f"}
 
 
 class CdrError(ValueError):
@@ -41,7 +40,7 @@ def encode(message_type: type, message: Any) -> bytes:
     out = bytearray(LITTLE_ENDIAN)
     try:
         _put(kind)(out, message)
-    except (struct.error, TypeError, AttributeError, ValueError) as error:
+    except (struct.error, OverflowError, TypeError, AttributeError, ValueError) as error:
         raise CdrError(f"{message!r} cannot be sent as {kind.__name__}: {error}") from error
     return bytes(out)
 
@@ -99,10 +98,11 @@ def _put_bool(out: bytearray, value: bool) -> None:
 
 
 def _putting_number(code: str) -> Put:
-    pack = struct.Struct("<" + code).pack
+    number = struct.Struct("<" + code)
+    pack, mask = number.pack, number.size - 1
 
-    def put(out: bytearray, value: int) -> None:
-        out += PADDING[len(out) & 3]
+    def put(out: bytearray, value: float) -> None:
+        out += bytes(HEADER - len(out) & mask)
         out += pack(value)
 
     return put
@@ -161,11 +161,12 @@ def _get_bool(sample: bytes, at: int) -> tuple[bool, int]:
 
 
 def _getting_number(code: str) -> Get:
-    unpack = struct.Struct(code).unpack_from
+    number = struct.Struct(code)
+    unpack, size = number.unpack_from, number.size
 
     def get(sample: bytes, at: int) -> tuple[int, int]:
-        at = (at + 3) & ~3
-        return unpack(sample, at)[0], at + 4
+        at += HEADER - at & size - 1
+        return unpack(sample, at)[0], at + size
 
     return get
 

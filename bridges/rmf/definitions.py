@@ -13,7 +13,9 @@ from typing import Annotated, Final
 
 uint8 = Annotated[int, "uint8"]
 uint32 = Annotated[int, "uint32"]
+uint64 = Annotated[int, "uint64"]
 int32 = Annotated[int, "int32"]
+float32 = Annotated[float, "float32"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,18 +194,126 @@ class ChargerState:
     time_to_fully_charged: Duration = Duration()
 
 
-# --- std_msgs, rmf_fleet_msgs ------------------------------------------------------------------
+# --- rmf_fleet_msgs ----------------------------------------------------------------------------
+
+
+class RobotModeValue(IntEnum):
+    """RobotMode.mode."""
+
+    MODE_IDLE = 0
+    MODE_CHARGING = 1
+    MODE_MOVING = 2
+    MODE_PAUSED = 3
+    MODE_WAITING = 4
+    MODE_EMERGENCY = 5
+    MODE_GOING_HOME = 6
+    MODE_DOCKING = 7
+    MODE_ADAPTER_ERROR = 8
+    MODE_CLEANING = 9
+    MODE_PERFORMING_ACTION = 10
+    MODE_ACTION_COMPLETED = 11
+
+
+class ChargingMode(IntEnum):
+    """ChargingAssignment.mode: charge at the waypoint, or wait there for a charger."""
+
+    MODE_CHARGE = 0
+    MODE_WAIT = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Bool:
-    data: bool = False
+class RobotMode:
+    mode: uint32 = 0
+    mode_request_id: uint64 = 0
+    performing_action: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    t: Time = Time()
+    x: float32 = 0.0
+    y: float32 = 0.0
+    yaw: float32 = 0.0
+    obey_approach_speed_limit: bool = False
+    approach_speed_limit: float32 = 0.0
+    level_name: str = ""
+    index: uint64 = 0
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """`battery_percent`: 0-100."""
+
+    name: str = ""
+    model: str = ""
+    task_id: str = ""
+    seq: uint64 = 0
+    mode: RobotMode = RobotMode()
+    battery_percent: float32 = 0.0
+    location: Location = Location()
+    path: tuple[Location, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class FleetState:
+    name: str = ""
+    robots: tuple[RobotState, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ChargingAssignment:
+    robot_name: str = ""
+    waypoint_name: str = ""
+    mode: uint8 = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ChargingAssignments:
+    fleet_name: str = ""
+    assignments: tuple[ChargingAssignment, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class EmergencySignal:
     fleet_names: tuple[str, ...] = ()
     is_emergency: bool = False
+
+
+# --- rmf_task_msgs, std_msgs -------------------------------------------------------------------
+
+
+class AlertTier(IntEnum):
+    """Alert.tier."""
+
+    TIER_INFO = 0
+    TIER_WARNING = 1
+    TIER_ERROR = 2
+
+
+@dataclass(frozen=True, slots=True)
+class AlertParameter:
+    name: str = ""
+    value: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Alert:
+    """What RMF's dashboard shows a person; its `id` is used once."""
+
+    id: str = ""
+    title: str = ""
+    subtitle: str = ""
+    message: str = ""
+    display: bool = True
+    tier: uint8 = 0
+    responses_available: tuple[str, ...] = ()
+    alert_parameters: tuple[AlertParameter, ...] = ()
+    task_id: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Bool:
+    data: bool = False
 
 
 Message = (
@@ -215,6 +325,9 @@ Message = (
     | ChargerRequest
     | ChargerCancel
     | ChargerState
+    | FleetState
+    | ChargingAssignments
+    | Alert
     | Bool
     | EmergencySignal
 )
@@ -233,7 +346,15 @@ PACKAGES: Final[dict[type, str]] = {
     ChargerRequest: "rmf_charger_msgs",
     ChargerCancel: "rmf_charger_msgs",
     ChargerState: "rmf_charger_msgs",
-    Bool: "std_msgs",
+    RobotMode: "rmf_fleet_msgs",
+    Location: "rmf_fleet_msgs",
+    RobotState: "rmf_fleet_msgs",
+    FleetState: "rmf_fleet_msgs",
+    ChargingAssignment: "rmf_fleet_msgs",
+    ChargingAssignments: "rmf_fleet_msgs",
     EmergencySignal: "rmf_fleet_msgs",
+    AlertParameter: "rmf_task_msgs",
+    Alert: "rmf_task_msgs",
+    Bool: "std_msgs",
 }
 """The ROS package that defines each type."""

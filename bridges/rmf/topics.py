@@ -52,6 +52,16 @@ DOOR_SUPERVISOR_HEARTBEAT = Topic("door_supervisor_heartbeat", d.SupervisorHeart
 CHARGER_STATES = Topic("charger_states", d.ChargerState)
 CHARGER_REQUESTS = Topic("charger_requests", d.ChargerRequest)
 CHARGER_CANCELS = Topic("charger_cancels", d.ChargerCancel)
+# Where wishes for any charger go; RMF has no name for it.
+ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
+ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
+FLEET_STATES = Topic("fleet_states", d.FleetState)
+# rmf_charging_schedule publishes it retained, and a fleet adapter that starts later wants it.
+CHARGING_ASSIGNMENTS = Topic(
+    "charging_assignments", d.ChargingAssignments, publish=RETAINED, subscribe=RETAINED
+)
+# rmf-web's api-server hears it transient-local (rmf_io/alerts, QoS of depth 10).
+ALERT = Topic("alert", d.Alert, publish=RETAINED, subscribe=RETAINED)
 # A volatile publisher of these two never matches a fleet adapter (rmf_ros2#341).
 FIRE_ALARM_TRIGGER = Topic("fire_alarm_trigger", d.Bool, publish=RETAINED, subscribe=RETAINED)
 EMERGENCY_SIGNAL = Topic(

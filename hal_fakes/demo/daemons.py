@@ -65,6 +65,11 @@ class Daemon:
         if answer != "ok":
             raise Wrong(f"{line}: {answer or 'no answer'}")
 
+    def reset(self) -> None:
+        """As `rmf-bridge reset` does."""
+        if not self._exited():
+            os.kill(self._process.pid, signal.SIGUSR1)
+
     def tail(self, lines: int = 15) -> str:
         """The end of its log."""
         return "\n".join(self.log.read_text(errors="replace").splitlines()[-lines:])

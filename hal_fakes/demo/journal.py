@@ -10,10 +10,18 @@ from bridges.rmf import words
 from bridges.rmf.words import Requested, Stated
 from hal_fakes.plant import Edge
 
-What = Literal["robot", "request", "relay", "sensor", "state", "demo"]
+What = Literal["robot", "request", "relay", "sensor", "state", "place", "alert", "demo"]
 SETTLES_S = 0.15
 """Events reach us by several ways, each stamped where it happened: lines wait to be sorted."""
-COLOURS = {"request": 36, "relay": 33, "sensor": 35, "state": 32, "robot": 1}
+COLOURS = {
+    "request": 36,
+    "relay": 33,
+    "sensor": 35,
+    "state": 32,
+    "robot": 1,
+    "place": 34,
+    "alert": 31,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +73,8 @@ class Journal:
         text = words.condition(message) + (f", {_held(message)} {holder}" if holder else "")
         self._once(Line(at, "state", words.device(message), text))
 
-    def note(self, what: Literal["robot", "demo"], text: str, at: float, device: str = "") -> None:
-        """What the robot does, or the demo itself."""
+    def note(self, what: What, text: str, at: float, device: str = "") -> None:
+        """What a robot does, where it is sent, what a person is told, or the demo itself."""
         self._add(Line(at, what, device, text))
 
     def flush(self, until: float) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from bridges.commands.effects import Done, Failed, SoFar, Wish, step
 from bridges.commands.graph import Heard
+from bridges.commands.queueing import Queue, Withdrawal
 from bridges.commands.wishes import Charge, ChargeCancel, DoorMove, LiftEnd, LiftRide
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
@@ -70,7 +71,7 @@ def take(so_far: SoFar, wish: Wish, heard: Heard) -> SoFar:
         return replace(so_far, heartbeat=heard)
     name = words.device(heard.message)
     so_far = replace(so_far, names=so_far.names | {name})
-    return replace(so_far, states=(*so_far.states, heard)) if name == wish.name else so_far
+    return replace(so_far, states=(*so_far.states, heard)) if wish.about(heard.message) else so_far
 
 
 def every_second(state: d.Message, until: float = 20.0) -> list[tuple[float, d.Message]]:
@@ -354,3 +355,40 @@ def test_a_cancel_of_an_id_that_the_charger_never_showed_is_a_mistake() -> None:
     held = replace(CHARGER, state=3, request_id="r2")
     told = tell(ChargeCancel("a", "r1"), [(0.5, held), (1.5, held)])
     assert told.outcome == Failed("a does not serve 'r1' (state: CHARGING, held by r2)")
+
+
+# --- the chargers' coordinator -----------------------------------------------------------------
+
+QUEUE = Queue("any", "fleet", "robot", "r1", 30)
+OTHERS = replace(CHARGER, state=3, request_id="r9", robot_fleet="fleet", robot_name="other")
+
+
+def test_a_wish_for_any_charger_is_done_when_one_of_them_shows_the_robot() -> None:
+    given = replace(
+        CHARGER, charger_name="b", state=2, request_id="x", robot_fleet="fleet", robot_name="robot"
+    )
+    assert [QUEUE.about(state) for state in (CHARGER, OTHERS, given)] == [False, False, True]
+    told = tell(QUEUE, [(0.5, OTHERS), (1.2, given)])
+    request = d.ChargerRequest("", "fleet", "robot", d.Duration(30), "r1")
+    assert told.sent == [(0.5, request)]
+    assert told.hints == []
+    assert told.outcome == Done("b is ASSIGNED for fleet/robot")
+
+
+def test_a_robot_that_waits_is_said_to_wait_and_how_to_withdraw_it() -> None:
+    waits = QUEUE.unheard(frozenset({"a"}))
+    assert waits.startswith("no charger serves fleet/robot yet: it waits in the charger coord")
+    assert "`rmf-bridge send charger any --queue --cancel r1` withdraws it" in waits
+
+
+def test_a_charger_of_ones_own_choice_is_named_in_the_wish() -> None:
+    wish = Queue("a", "fleet", "robot", "r1", 30)
+    assert tell(wish, []).sent[0][1] == d.ChargerRequest(
+        "a", "fleet", "robot", d.Duration(30), "r1"
+    )
+
+
+def test_a_withdrawal_is_done_when_it_is_sent() -> None:
+    told = tell(Withdrawal("r1"), [])
+    assert told.sent == [(2.0, d.ChargerCancel("", "r1"))]
+    assert told.outcome == Done("the charger coordinator was told that r1 is withdrawn")

@@ -156,3 +156,14 @@ def test_a_domain_that_cannot_be_is_a_usage_error(domain: str) -> None:
     with pytest.raises(SystemExit) as left:
         parser.parse_args(["--domain-id", domain])
     assert left.value.code == 2
+
+
+def test_robots_are_shown_with_the_place_that_they_are_assigned_to_charge_or_to_wait() -> None:
+    fleet = d.ChargingAssignments(
+        "tiny",
+        (d.ChargingAssignment("AMR02", "wait_2", 1), d.ChargingAssignment("AMR01", "charger_a", 0)),
+    )
+    assert board(fleet).rows(100.0, WALL) == [
+        Row("robot", "tiny/AMR01", "CHARGE at charger_a", "-", "-", ""),
+        Row("robot", "tiny/AMR02", "WAIT at wait_2", "-", "-", ""),
+    ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 from cyclonedds.idl import IdlStruct, annotations
-from cyclonedds.idl.types import int32, sequence, uint8, uint32
+from cyclonedds.idl.types import float32, int32, sequence, uint8, uint32, uint64
 
 # mypy knows nothing of cyclonedds.
 # mypy: disable-error-code="misc, call-arg"
@@ -138,6 +138,83 @@ class Bool(IdlStruct, typename="std_msgs.msg.dds_.Bool_"):
 class EmergencySignal(IdlStruct, typename="rmf_fleet_msgs.msg.dds_.EmergencySignal_"):
     fleet_names: sequence[str]
     is_emergency: bool
+
+
+@annotations.final
+@dataclass
+class RobotMode(IdlStruct, typename="rmf_fleet_msgs.msg.dds_.RobotMode_"):
+    mode: uint32
+    mode_request_id: uint64
+    performing_action: str
+
+
+@annotations.final
+@dataclass
+class Location(IdlStruct, typename="rmf_fleet_msgs.msg.dds_.Location_"):
+    t: Time
+    x: float32
+    y: float32
+    yaw: float32
+    obey_approach_speed_limit: bool
+    approach_speed_limit: float32
+    level_name: str
+    index: uint64
+
+
+@annotations.final
+@dataclass
+class RobotState(IdlStruct, typename="rmf_fleet_msgs.msg.dds_.RobotState_"):
+    name: str
+    model: str
+    task_id: str
+    seq: uint64
+    mode: RobotMode
+    battery_percent: float32
+    location: Location
+    path: sequence[Location]
+
+
+@annotations.final
+@dataclass
+class FleetState(IdlStruct, typename="rmf_fleet_msgs.msg.dds_.FleetState_"):
+    name: str
+    robots: sequence[RobotState]
+
+
+@annotations.final
+@dataclass
+class ChargingAssignment(IdlStruct, typename="rmf_fleet_msgs.msg.dds_.ChargingAssignment_"):
+    robot_name: str
+    waypoint_name: str
+    mode: uint8
+
+
+@annotations.final
+@dataclass
+class ChargingAssignments(IdlStruct, typename="rmf_fleet_msgs.msg.dds_.ChargingAssignments_"):
+    fleet_name: str
+    assignments: sequence[ChargingAssignment]
+
+
+@annotations.final
+@dataclass
+class AlertParameter(IdlStruct, typename="rmf_task_msgs.msg.dds_.AlertParameter_"):
+    name: str
+    value: str
+
+
+@annotations.final
+@dataclass
+class Alert(IdlStruct, typename="rmf_task_msgs.msg.dds_.Alert_"):
+    id: str
+    title: str
+    subtitle: str
+    message: str
+    display: bool
+    tier: uint8
+    responses_available: sequence[str]
+    alert_parameters: sequence[AlertParameter]
+    task_id: str
 
 
 def to_idl(value: Any) -> Any:

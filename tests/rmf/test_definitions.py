@@ -1,7 +1,8 @@
 """`definitions.py` against tables typed from the .msg files, which it must not be made from.
 
 Read in open-rmf/rmf_internal_msgs at 3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0), every line
-of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg and rmf_fleet_msgs/msg/EmergencySignal;
+of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg, rmf_task_msgs/msg/Alert and its
+AlertParameter, and in rmf_fleet_msgs/msg EmergencySignal, FleetState, ChargingAssignments and theirs;
 Time, Duration and Bool from ROS 2 Jazzy's builtin_interfaces and std_msgs.
 """
 
@@ -49,6 +50,22 @@ CONSTANTS = {
         "CHARGER_RELEASED": 4,
         "CHARGER_ERROR": 200,
     },
+    d.RobotModeValue: {
+        "MODE_IDLE": 0,
+        "MODE_CHARGING": 1,
+        "MODE_MOVING": 2,
+        "MODE_PAUSED": 3,
+        "MODE_WAITING": 4,
+        "MODE_EMERGENCY": 5,
+        "MODE_GOING_HOME": 6,
+        "MODE_DOCKING": 7,
+        "MODE_ADAPTER_ERROR": 8,
+        "MODE_CLEANING": 9,
+        "MODE_PERFORMING_ACTION": 10,
+        "MODE_ACTION_COMPLETED": 11,
+    },
+    d.ChargingMode: {"MODE_CHARGE": 0, "MODE_WAIT": 1},
+    d.AlertTier: {"TIER_INFO": 0, "TIER_WARNING": 1, "TIER_ERROR": 2},
 }
 
 FIELDS = {
@@ -86,6 +103,28 @@ FIELDS = {
     ),
     "std_msgs/Bool": "bool data",
     "rmf_fleet_msgs/EmergencySignal": "string[] fleet_names, bool is_emergency",
+    "rmf_fleet_msgs/RobotMode": "uint32 mode, uint64 mode_request_id, string performing_action",
+    "rmf_fleet_msgs/Location": (
+        "builtin_interfaces/Time t, float32 x, float32 y, float32 yaw,"
+        " bool obey_approach_speed_limit, float32 approach_speed_limit, string level_name,"
+        " uint64 index"
+    ),
+    "rmf_fleet_msgs/RobotState": (
+        "string name, string model, string task_id, uint64 seq, rmf_fleet_msgs/RobotMode mode,"
+        " float32 battery_percent, rmf_fleet_msgs/Location location,"
+        " rmf_fleet_msgs/Location[] path"
+    ),
+    "rmf_fleet_msgs/FleetState": "string name, rmf_fleet_msgs/RobotState[] robots",
+    "rmf_fleet_msgs/ChargingAssignment": "string robot_name, string waypoint_name, uint8 mode",
+    "rmf_fleet_msgs/ChargingAssignments": (
+        "string fleet_name, rmf_fleet_msgs/ChargingAssignment[] assignments"
+    ),
+    "rmf_task_msgs/AlertParameter": "string name, string value",
+    "rmf_task_msgs/Alert": (
+        "string id, string title, string subtitle, string message, bool display, uint8 tier,"
+        " string[] responses_available, rmf_task_msgs/AlertParameter[] alert_parameters,"
+        " string task_id"
+    ),
 }
 
 

@@ -25,6 +25,14 @@ COMPUTED_BY_ROSBAGS = {
     d.ChargerRequest: "ead03937294b4a404f80dbd86974208c6ab8ab7f22f12501e90f43c3036fb870",
     d.ChargerCancel: "b439d5d5f2dd726953fb24339764c26d2c1cd21f37f072ecdb4be3530270760b",
     d.EmergencySignal: "2bcead0701ac71c292f12ba705ad9164b796b2660ae48cbf74204515fe5156e0",
+    d.Location: "6136f1fc14b896b572c34746c55dbbfd8862e3c561ad5c957ee8b0c116a0e8df",
+    d.RobotMode: "9cd4cf773031229f5373fd1b942acf16d140664b79e2463b5e476c1ef6933b2d",
+    d.RobotState: "92afab7de71fff5ec992cb0e9809268335c358adefc4a503bf9c3ce075da0c9f",
+    d.FleetState: "9ea5bb9f2c076a587b20c04974581c8d8e2ec7d02300244f9e39e37d7d9192f4",
+    d.ChargingAssignment: "27edadbe78b4d415522ee28a3954a10c19fa7a3a9a541d9b1381ab3556ca9f00",
+    d.ChargingAssignments: "564f81473334b99f91cb3041e4b2f6dee83c755684b84af88e1f10314c126408",
+    d.AlertParameter: "e9a425e5c02657274d36ceeba4f9132e02c309e7796c4f819732cc8f5f4269f3",
+    d.Alert: "3da5029edcd10f458262542961e3ff75e9e20d2d028f0d5235ab672af39ebfbb",
 }
 """From the .msg files at rmf_internal_msgs 3d4df02, by rosbags 0.11's `hash_rihs01`."""
 

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 
 from bridges.rmf import definitions as d
 
-WHOLE_NUMBERS = {
+NUMBERS: dict[str, st.SearchStrategy[Any]] = {
     "uint8": st.integers(0, 2**8 - 1),
     "uint32": st.integers(0, 2**32 - 1),
+    "uint64": st.integers(0, 2**64 - 1),
     "int32": st.integers(-(2**31), 2**31 - 1),
+    "float32": st.floats(width=32, allow_nan=False),
 }
 TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20)
 
@@ -25,7 +27,7 @@ MESSAGE_TYPES: tuple[Any, ...] = typing.get_args(d.Message)
 def values(kind: Any) -> st.SearchStrategy[Any]:
     """Any value of a field's or a message's type."""
     if typing.get_origin(kind) is typing.Annotated:
-        return WHOLE_NUMBERS[kind.__metadata__[0]]
+        return NUMBERS[kind.__metadata__[0]]
     if typing.get_origin(kind) is tuple:
         return st.lists(values(typing.get_args(kind)[0]), max_size=6).map(tuple)
     if kind is str:

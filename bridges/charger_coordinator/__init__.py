@@ -1,0 +1,49 @@
+"""The charger coordinator: which robot charges where, and who waits, for all chargers of a site."""
+
+from bridges.charger_coordinator import core, keep, messages
+from bridges.charger_coordinator.described import described, warnings
+from bridges.charger_coordinator.settings import Settings, site
+from bridges.graph_kind import GraphKind
+from bridges.rmf.topics import (
+    ADAPTER_CHARGER_CANCELS,
+    ADAPTER_CHARGER_REQUESTS,
+    ALERT,
+    CHARGER_CANCELS,
+    CHARGER_REQUESTS,
+    CHARGER_STATES,
+    CHARGING_ASSIGNMENTS,
+    FLEET_STATES,
+)
+
+
+def quiet_s(settings: Settings) -> float:
+    """How long to listen before the first word."""
+    return settings.quiet_start_s
+
+
+KIND = GraphKind(
+    name="charger_coordinator",
+    devices_key="coordinator",
+    settings=Settings,
+    requests={
+        CHARGER_STATES: messages.accept_state,
+        FLEET_STATES: messages.accept_fleet,
+        ADAPTER_CHARGER_REQUESTS: messages.accept_wish,
+        ADAPTER_CHARGER_CANCELS: messages.accept_withdrawal,
+        CHARGING_ASSIGNMENTS: messages.accept_assignments,
+    },
+    publishes=(CHARGER_REQUESTS, CHARGER_CANCELS, CHARGING_ASSIGNMENTS, ALERT),
+    sole=(CHARGING_ASSIGNMENTS,),
+    device_name=messages.subject,
+    quiet_s=quiet_s,
+    limits=site,
+    initial=core.initial,
+    decide=core.decide,
+    stamped=messages.stamped,
+    summary=messages.summary,
+    idle=core.idle,
+    persist=keep.persist,
+    restore=keep.restore,
+    described=described,
+    warnings=warnings,
+)

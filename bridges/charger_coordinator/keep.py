@@ -1,0 +1,120 @@
+"""What a restart must not forget: the queue, who has which station, and who has failed where.
+
+States and sightings come anew within a second. A request that was sent and not kept is known again
+by its id when its station shows it.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Final, Literal
+
+import msgspec
+from msgspec import Meta
+
+from bridges.charger.settings import Robot, robot
+from bridges.charger_coordinator.memory import Grant, Memory, Wish
+from bridges.charger_coordinator.settings import Settings
+
+VERSION: Final = 1
+SITE: Final = "site"
+Text = Annotated[str, Meta(min_length=1)]
+
+
+class KeptWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A Wish; `robot` is FLEET/ROBOT, as everywhere here."""
+
+    robot: Text
+    by: Literal["fleet", "operator"]
+    task_id: str
+    station: str
+    request_id: str
+    start_timeout_s: Annotated[float, Meta(ge=0, le=86400)]
+
+
+class KeptGrant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A Grant, but for what the station will say again."""
+
+    robot: Text
+    request_id: str
+    start_timeout_s: Annotated[float, Meta(ge=0, le=86400)]
+    started: bool
+    over: bool
+
+
+class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The file."""
+
+    version: int
+    count: Annotated[int, Meta(ge=0)]
+    wishes: list[KeptWish]
+    grants: dict[Text, KeptGrant]
+    strikes: dict[Text, list[Text]]
+    served: dict[Text, str]
+    over: list[str]
+    preferred: dict[Text, Text]
+
+
+def persist(memories: Mapping[str, Memory]) -> bytes:
+    """What the next start needs; the same bytes as long as nothing of it changes."""
+    memory = memories.get(SITE, Memory())
+    kept = Kept(
+        VERSION,
+        memory.count,
+        [_wish(wish) for wish in memory.wishes],
+        {name: _grant(grant) for name, grant in sorted(memory.grants.items())},
+        {str(who): list(where) for who, where in sorted(memory.strikes.items())},
+        {str(who): task for who, task in sorted(memory.served.items())},
+        list(memory.over),
+        {str(who): station for who, station in sorted(memory.preferred.items())},
+    )
+    return msgspec.json.encode(kept)
+
+
+def _wish(w: Wish) -> KeptWish:
+    return KeptWish(str(w.robot), w.by, w.task_id, w.station, w.request_id, w.start_timeout_s)
+
+
+def _grant(g: Grant) -> KeptGrant:
+    return KeptGrant(str(g.robot), g.request_id, g.start_timeout_s, g.started, g.over)
+
+
+def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
+    """The memory at start, for the robots and stations that the YAML still has.
+
+    ValueError if the bytes are not what `persist` gave. Durations are counted anew.
+    """
+    try:
+        found = msgspec.json.decode(kept, type=Kept)
+    except msgspec.MsgspecError as error:
+        raise ValueError(f"not a coordinator's memory: {error}") from error
+    if found.version != VERSION:
+        raise ValueError(f"version {found.version} of the memory; this is for {VERSION}")
+    return {SITE: _memory(found, settings, now)}
+
+
+def _memory(found: Kept, settings: Settings, now: float) -> Memory:
+    known, stations = settings.robots(), settings.stations
+
+    def ours(text: str) -> Robot | None:
+        who = robot(text)
+        return who if who in known else None
+
+    wishes: dict[Robot, Wish] = {}
+    for w in found.wishes:
+        if who := ours(w.robot):
+            wish = Wish(who, w.by, w.task_id, w.station, w.request_id, w.start_timeout_s)
+            wishes.setdefault(who, wish)
+    grants = {
+        name: Grant(who, g.request_id, now, g.start_timeout_s, started=g.started, over=g.over)
+        for name, g in found.grants.items()
+        if name in stations and (who := ours(g.robot))
+    }
+    return Memory(
+        began_at=now,
+        wishes=tuple(wishes.values()),
+        grants=grants,
+        strikes={who: tuple(at) for text, at in found.strikes.items() if (who := ours(text))},
+        served={who: task for text, task in found.served.items() if (who := ours(text))},
+        over=tuple(found.over),
+        count=found.count,
+        preferred={who: s for text, s in found.preferred.items() if (who := ours(text))},
+    )

@@ -1,0 +1,224 @@
+"""What the coordinator remembers, and the events that it hears."""
+
+import math
+from collections.abc import Mapping
+from typing import Final, Literal, TypeVar
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.charger.settings import Robot
+from bridges.charger_coordinator.diagnosis import Side, side
+from bridges.decision import OperatorReset
+from bridges.graph_kind import MaySpeak, Woken
+from bridges.rmf.definitions import ChargerStateValue, ChargingAssignments
+
+K = TypeVar("K")
+V = TypeVar("V")
+
+NODE: Final = "charger_coordinator"
+NEVER: Final = math.inf
+SILENT_S: Final = 5.0
+"""A station's states come at 1 Hz; after so long it is silent."""
+STRIKES: Final = 2
+"""A robot that failed so often, at a second station where it has one, is not tried again."""
+
+IDLE: Final = ChargerStateValue.CHARGER_IDLE
+ASSIGNED: Final = ChargerStateValue.CHARGER_ASSIGNED
+CHARGING: Final = ChargerStateValue.CHARGER_CHARGING
+RELEASED: Final = ChargerStateValue.CHARGER_RELEASED
+ERROR: Final = ChargerStateValue.CHARGER_ERROR
+
+
+class Sighting(msgspec.Struct, frozen=True):
+    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING. `place`: the waypoint
+    of ours at which it stands; None for none."""
+
+    who: Robot
+    charges: bool
+    place: str | None
+    battery_percent: float
+    task_id: str
+
+
+class FleetSeen(msgspec.Struct, frozen=True):
+    """A FleetState, of the robots that we know."""
+
+    robots: tuple[Sighting, ...]
+
+
+class Shown(msgspec.Struct, frozen=True):
+    """A ChargerState. `robot`: None where it names none."""
+
+    station: str
+    state: ChargerStateValue
+    request_id: str = ""
+    robot: Robot | None = None
+    error: str = ""
+
+
+class Wanted(msgspec.Struct, frozen=True):
+    """An operator wants this robot charged; `station`: there rather than elsewhere, "" anywhere."""
+
+    robot: Robot
+    station: str
+    request_id: str
+    start_timeout_s: float
+
+
+class Unwanted(msgspec.Struct, frozen=True):
+    """An operator's wish is withdrawn."""
+
+    request_id: str
+
+
+class Dedicated(msgspec.Struct, frozen=True):
+    """Somebody else's charging assignments: robot -> the station that it is to use."""
+
+    stations: tuple[tuple[Robot, str], ...]
+
+
+Event = FleetSeen | Shown | Wanted | Unwanted | Dedicated | MaySpeak | OperatorReset | Woken
+
+
+class Wish(msgspec.Struct, frozen=True):
+    """One robot to be charged. `by`: a fleet's state shows it, or an operator said so.
+
+    `task_id`: the robot's task, by a fleet. `station`, `request_id`, `start_timeout_s`: the
+    operator's.
+    """
+
+    robot: Robot
+    by: Literal["fleet", "operator"]
+    task_id: str = ""
+    station: str = ""
+    request_id: str = ""
+    start_timeout_s: float = 0.0
+
+
+class Grant(msgspec.Struct, frozen=True):
+    """A station given to a robot, since `made_at`, by the request `request_id`.
+
+    `shown`: the station says so. `started`: current has flowed. `over`: the robot has it no more,
+    and the station is to let go; it is nobody else's until it has. `sent_at`: the last word to it.
+    """
+
+    robot: Robot
+    request_id: str
+    made_at: float
+    start_timeout_s: float = 0.0
+    shown: bool = False
+    started: bool = False
+    over: bool = False
+    sent_at: float = -NEVER
+
+
+class Standing(msgspec.Struct, frozen=True):
+    """A robot as its fleet showed it at `at`; so, at this place, `since` then (-inf: ever)."""
+
+    sighting: Sighting
+    at: float
+    since: float = -NEVER
+
+
+class Seen(msgspec.Struct, frozen=True):
+    """A station's last state, heard at `at`; it has been so, texts included, `since` then."""
+
+    state: ChargerStateValue
+    request_id: str
+    robot: Robot | None
+    error: str
+    at: float
+    since: float
+
+    @property
+    def side(self) -> Side:
+        """Whose fault the error is; "" where there is none."""
+        return side(self.error) if self.state is ERROR else Side.NONE
+
+
+class Memory(msgspec.Struct, frozen=True):
+    """Everything that outlives an event.
+
+    `wishes`: in the order in which they are served. `grants`: station -> to whom. `strikes`: where
+    each robot has failed. `served`: robot -> the task in which it was charged. `over`: operators'
+    wishes that are, whose late repeats are still known. `count`: requests made so far.
+    `robots`, `stations`: as last heard, and when. `shunned`: station -> until when it is given to
+    nobody, as it took no request. `preferred`: robot -> the station somebody else dedicated to it.
+    `told`: the assignments last published; `alerts`: which faults a person has been told of.
+    """
+
+    began_at: float = 0.0
+    may_speak: bool = False
+    wishes: tuple[Wish, ...] = ()
+    grants: Mapping[str, Grant] = msgspec.field(default_factory=dict)
+    strikes: Mapping[Robot, tuple[str, ...]] = msgspec.field(default_factory=dict)
+    served: Mapping[Robot, str] = msgspec.field(default_factory=dict)
+    over: tuple[str, ...] = ()
+    count: int = 0
+    robots: Mapping[Robot, Standing] = msgspec.field(default_factory=dict)
+    stations: Mapping[str, Seen] = msgspec.field(default_factory=dict)
+    shunned: Mapping[str, float] = msgspec.field(default_factory=dict)
+    preferred: Mapping[Robot, str] = msgspec.field(default_factory=dict)
+    told: tuple[ChargingAssignments, ...] = ()
+    alerts: frozenset[str] = frozenset()
+
+    def wish(self, robot: Robot) -> Wish | None:
+        """This robot's wish."""
+        return next((wish for wish in self.wishes if wish.robot == robot), None)
+
+    def station_of(self, robot: Robot) -> str | None:
+        """The station that it has; None where it has none."""
+        return next((s for s, g in self.grants.items() if g.robot == robot and not g.over), None)
+
+    def place_of(self, robot: Robot) -> str | None:
+        """The waypoint of ours at which its fleet saw it last."""
+        standing = self.robots.get(robot)
+        return standing.sighting.place if standing else None
+
+    def faulty(self, robot: Robot) -> bool:
+        """It is not tried again until an operator says so."""
+        return len(self.strikes.get(robot, ())) >= STRIKES
+
+    def speaks(self, station: str, now: float) -> bool:
+        """Its states come."""
+        return station in self.stations and now < self.stations[station].at + SILENT_S
+
+    def silent_since(self, station: str) -> float:
+        """When it fell silent, or will if it says nothing more."""
+        seen = self.stations.get(station)
+        return SILENT_S + (self.began_at if seen is None else seen.at)
+
+    # ---- changed copies
+
+    def with_grant(self, station: str, grant: Grant | None) -> "Memory":
+        """The station given so; None: to nobody."""
+        rest = without(self.grants, station)
+        return replace(self, grants=rest | ({} if grant is None else {station: grant}))
+
+    def without_wish(self, robot: Robot) -> "Memory":
+        """This robot wants nothing any more."""
+        wish = self.wish(robot)
+        if wish is None:
+            return self
+        over = (*self.over, wish.request_id)[-8:] if wish.request_id else self.over
+        return replace(self, wishes=tuple(w for w in self.wishes if w is not wish), over=over)
+
+    def last_in_queue(self, robot: Robot) -> "Memory":
+        """This robot's wish goes to the end."""
+        wish = self.wish(robot)
+        if wish is None:
+            return self
+        return replace(self, wishes=(*(w for w in self.wishes if w is not wish), wish))
+
+    def takes_back(self, robot: Robot) -> "Memory":
+        """The robot's station is to let go of it."""
+        station = self.station_of(robot)
+        if station is None:
+            return self
+        return self.with_grant(station, replace(self.grants[station], over=True, sent_at=-NEVER))
+
+
+def without(table: Mapping[K, V], key: K) -> dict[K, V]:
+    """The table but for this key."""
+    return {k: v for k, v in table.items() if k != key}

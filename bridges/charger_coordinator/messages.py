@@ -1,0 +1,128 @@
+"""Fleets, stations, schedules and operators in: is it well formed, and about what is ours?"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from bridges.charger.messages import accept_request as accept_charger_request
+from bridges.charger.settings import ChargerSettings, Robot
+from bridges.charger_coordinator.keep import SITE
+from bridges.charger_coordinator.memory import (
+    Dedicated,
+    FleetSeen,
+    Shown,
+    Sighting,
+    Unwanted,
+    Wanted,
+)
+from bridges.charger_coordinator.report import SiteReport
+from bridges.charger_coordinator.settings import Fleet, Settings
+from bridges.decision import RequestRefused
+from bridges.rmf import definitions as d
+from bridges.rmf.definitions import Time
+
+CHARGES = (d.RobotModeValue.MODE_CHARGING, d.RobotModeValue.MODE_DOCKING)
+
+
+def accept_fleet(state: d.FleetState, settings: Settings, wall: float) -> FleetSeen:
+    """The event that a FleetState is; robots that the YAML does not name are passed over."""
+    fleet = settings.fleets.get(state.name)
+    if fleet is None:
+        raise RequestRefused("fleet not ours", f"{state.name!r}")
+    places = {*settings.places().values(), *(r.waits_at for r in fleet.robots.values())}
+    return FleetSeen(
+        tuple(
+            _sighting(state.name, robot, fleet, places, settings.near_m)
+            for robot in state.robots
+            if robot.name in fleet.robots
+        )
+    )
+
+
+def _sighting(
+    fleet_name: str, robot: d.RobotState, fleet: Fleet, places: set[str], near_m: float
+) -> Sighting:
+    return Sighting(
+        Robot(fleet_name, robot.name),
+        charges=robot.mode.mode in CHARGES,
+        place=_nearest(robot.location, fleet, places, near_m),
+        battery_percent=robot.battery_percent,
+        task_id=robot.task_id,
+    )
+
+
+def _nearest(at: d.Location, fleet: Fleet, places: set[str], near_m: float) -> str | None:
+    """The waypoint at which a robot stands, of those that matter."""
+    away = {
+        name: math.dist((at.x, at.y), (waypoint.x, waypoint.y))
+        for name, waypoint in fleet.waypoints.items()
+        if name in places and waypoint.level == at.level_name
+    }
+    near = {name: metres for name, metres in away.items() if metres <= near_m}
+    return min(near, key=lambda name: near[name], default=None)
+
+
+def accept_state(state: d.ChargerState, settings: Settings, wall: float) -> Shown:
+    """The event that a ChargerState is."""
+    if state.charger_name not in settings.stations:
+        raise RequestRefused("station not ours", f"{state.charger_name!r}")
+    if state.state not in set(d.ChargerStateValue):
+        raise RequestRefused("unknown state", f"{state.charger_name}: {state.state}")
+    named = Robot(state.robot_fleet, state.robot_name)
+    return Shown(
+        state.charger_name,
+        d.ChargerStateValue(state.state),
+        state.request_id,
+        named if named.fleet and named.name else None,
+        state.error_message,
+    )
+
+
+def accept_wish(request: d.ChargerRequest, settings: Settings, wall: float) -> Wanted:
+    """The event that an operator's wish is; an empty charger_name is any that suits."""
+    asked = accept_charger_request(request, ChargerSettings())
+    if asked.who not in settings.robots():
+        raise RequestRefused("robot not ours", f"{asked.who} is in no fleet of the YAML")
+    return Wanted(asked.who, request.charger_name, asked.request_id, asked.start_timeout_s)
+
+
+def accept_withdrawal(cancel: d.ChargerCancel, settings: Settings, wall: float) -> Unwanted:
+    """The event that an operator's cancel is."""
+    if not cancel.request_id:
+        raise RequestRefused("empty request_id", "which wish is withdrawn?")
+    return Unwanted(cancel.request_id)
+
+
+def accept_assignments(
+    message: d.ChargingAssignments, settings: Settings, wall: float
+) -> Dedicated:
+    """The event that another's charging assignments are: whose station is where, as far as we know."""
+    stations = {place: name for name, place in settings.places().items()}
+    known = settings.robots()
+    return Dedicated(
+        tuple(
+            (who, stations[assignment.waypoint_name])
+            for assignment in message.assignments
+            if assignment.mode == d.ChargingMode.MODE_CHARGE
+            and assignment.waypoint_name in stations
+            and (who := Robot(message.fleet_name, assignment.robot_name)) in known
+        )
+    )
+
+
+def subject(message: Any) -> str:
+    """Every message is about the site: the queue spans its stations."""
+    return SITE
+
+
+def stamped(message: d.Message, time: Time) -> d.Message:
+    """As it is sent at this time."""
+    if isinstance(message, d.Alert):
+        return replace(message, id=f"{message.id}/{time.sec}")
+    return message
+
+
+def summary(report: SiteReport, now: float) -> Mapping[str, str]:
+    """The stations and the queue, in a line."""
+    return {**dict(report.stations), "queue": ", ".join(report.queue) or "-"}

@@ -1,0 +1,184 @@
+"""The coordinator's section of its YAML: stations, and each fleet's waypoints and robots."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from bridges.charger.settings import ReceiverId, Robot, StartTimeout
+from bridges.fields import Name
+
+QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
+Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
+Near = Annotated[float, Meta(ge=0.1, le=5, extra={"unit": "m"})]
+Full = Annotated[float, Meta(ge=50, le=100, extra={"unit": "%"})]
+Low = Annotated[float, Meta(ge=1, le=100, extra={"unit": "%"})]
+Stations = Annotated[list[Name], Meta(min_length=1)]
+
+
+class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A named vertex of the fleet's navigation graph, where the graph has it.
+
+    `level`: its level's name.
+    `x`: as the graph says.
+    `y`: likewise.
+    """
+
+    level: Name
+    x: Metres
+    y: Metres
+
+
+class Station(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A charger, under the name that its own daemon publishes.
+
+    `waypoint`: what the navigation graphs call the place; the same name when absent.
+    """
+
+    waypoint: Name | None = None
+
+
+class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is known of a robot.
+
+    `stations`: those that suit it, best first. `waits_at`: the waypoint where it waits for one, and
+    belongs while it wants none; no other robot's. `receivers`: the ids of its receivers.
+    """
+
+    stations: Stations
+    waits_at: Name
+    receivers: list[ReceiverId] = msgspec.field(default_factory=list)
+
+
+class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A fleet by the name of its adapter.
+
+    `waypoints`: the places of its navigation graph that matter here. RMF's fleet adapter crashes on
+    a name that its graph does not have, so no other name is ever sent to it.
+    `robots`: those that charge here, by the adapter's names.
+    """
+
+    waypoints: dict[Name, Waypoint]
+    robots: dict[Name, RobotSettings]
+
+
+class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Which robots charge where.
+
+    `stations`: the chargers, by the names under which their daemons publish.
+    `fleets`: the fleets whose robots charge at them.
+    `start_timeout_s`: how long a station is kept for a robot that is on its way.
+    `near_m`: a robot stands at the nearest waypoint that is not farther away.
+    `full_percent`: a robot with so much charge gives its station up.
+    `again_percent`: a robot that was charged comes back within the same task only below this.
+    `quiet_start_s`: how long it only listens at first.
+    """
+
+    stations: dict[Name, Station]
+    fleets: dict[Name, Fleet]
+    start_timeout_s: StartTimeout = 300.0
+    near_m: Near = 1.0
+    full_percent: Full = 100.0
+    again_percent: Low = 90.0
+    quiet_start_s: QuietStart = 3.0
+
+    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Names that lead nowhere, places given twice."""
+        for key in ("stations", "fleets"):
+            if not getattr(self, key):
+                yield (key,), f"'{key}' is empty: there is nothing to coordinate"
+        if self.again_percent > self.full_percent:
+            yield ("again_percent",), "is above full_percent: a full robot would come back at once"
+        for name, place in self.places().items():
+            if not self._graphs_with(place):
+                text = f"stands at '{place}', which is in no fleet's waypoints"
+                yield ("stations", name, "waypoint"), text
+        for name, fleet in self.fleets.items():
+            for path, text in self._of_fleet(fleet):
+                yield ("fleets", name, *path), text
+        yield from self._doubles()
+
+    def _graphs_with(self, place: str) -> list[str]:
+        return [name for name, fleet in self.fleets.items() if place in fleet.waypoints]
+
+    def _of_fleet(self, fleet: Fleet) -> Iterator[tuple[tuple[str, ...], str]]:
+        known = ", ".join(fleet.waypoints) or "none"
+        for name, robot in fleet.robots.items():
+            if robot.waits_at not in fleet.waypoints:
+                text = f"no waypoint '{robot.waits_at}' in this fleet's list ({known})"
+                yield ("robots", name, "waits_at"), text
+            elif robot.waits_at in self.places().values():
+                text = f"'{robot.waits_at}' is a charger's place: a robot waits somewhere else"
+                yield ("robots", name, "waits_at"), text
+            for i, station in enumerate(robot.stations):
+                path = ("robots", name, "stations", str(i))
+                if station not in self.stations:
+                    yield path, f"no station '{station}'; there are {', '.join(self.stations)}"
+                elif (place := self.places()[station]) not in fleet.waypoints:
+                    if not self._graphs_with(place):
+                        continue
+                    yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
+
+    def _doubles(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """One place, one robot; one receiver, one robot."""
+        taken: dict[tuple[str, str], str] = {}
+        for station, place in self.places().items():
+            owner = taken.setdefault(("place", place), station)
+            if owner != station:
+                yield ("stations", station), f"stands at '{place}', as '{owner}' does"
+        for who, robot in self.robots().items():
+            path = ("fleets", who.fleet, "robots", who.name)
+            things = [("waits_at", robot.waits_at), *(("receivers", r) for r in robot.receivers)]
+            for key, thing in things:
+                owner = taken.setdefault((key, thing), str(who))
+                if owner != str(who):
+                    yield (*path, key), f"'{thing}' is {owner}'s already: it can be one robot's"
+
+    def robots(self) -> dict[Robot, RobotSettings]:
+        """Every robot, by fleet and name."""
+        return {
+            Robot(fleet_name, name): robot
+            for fleet_name, fleet in self.fleets.items()
+            for name, robot in fleet.robots.items()
+        }
+
+    def places(self) -> dict[str, str]:
+        """Station -> the waypoint where it is."""
+        return {name: station.waypoint or name for name, station in self.stations.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """The same as the core needs it.
+
+    `robots`: stations that suit each, best first. `waits_at`: each robot's own waypoint. `places`:
+    station -> waypoint. `receivers`: id -> robot.
+    """
+
+    robots: Mapping[Robot, tuple[str, ...]]
+    waits_at: Mapping[Robot, str]
+    places: Mapping[str, str]
+    receivers: Mapping[str, Robot]
+    start_timeout_s: float
+    full_percent: float
+    again_percent: float
+
+    def station_at(self, place: str | None) -> str | None:
+        """Which station is at this waypoint; None for none."""
+        return next((name for name, at in self.places.items() if at == place), None)
+
+
+def site(settings: Settings) -> Site:
+    """From the YAML."""
+    robots = settings.robots()
+    return Site(
+        robots={who: tuple(robot.stations) for who, robot in robots.items()},
+        waits_at={who: robot.waits_at for who, robot in robots.items()},
+        places=settings.places(),
+        receivers={r: who for who, robot in robots.items() for r in robot.receivers},
+        start_timeout_s=settings.start_timeout_s,
+        full_percent=settings.full_percent,
+        again_percent=settings.again_percent,
+    )

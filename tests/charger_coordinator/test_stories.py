@@ -1,0 +1,342 @@
+"""The situations that shared chargers meet, whole: fleet adapter, chargers' own cores, coordinator."""
+
+from msgspec.structs import replace
+
+from bridges.charger.settings import Robot
+from bridges.decision import OperatorReset
+from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from bridges.service import GraphService
+from tests.charger_coordinator.yard import Yard
+
+
+def yard(**changes: object) -> Yard:
+    """Everybody is up, and nobody wants anything yet."""
+    found = Yard(**changes)  # type: ignore[arg-type]
+    assert found.run(5.0) == [
+        (0.25, "charger_a: IDLE"),
+        (0.25, "charger_b: IDLE"),
+        (3.25, "AMR01 -> WAIT wait_1"),
+        (3.25, "AMR02 -> WAIT wait_2"),
+        (3.25, "AMR03 -> WAIT wait_3"),
+    ]
+    return found
+
+
+def test_scheduled_a_robot_is_called_from_its_place_charged_and_sent_on() -> None:
+    site = yard()
+    site.fleet.charge("AMR01", site.now)
+    assert site.run(30.0) == [
+        (7.25, "charger_a <- charge AMR01"),
+        (7.25, "charger_a: ASSIGNED AMR01"),
+        (7.25, "AMR01 -> CHARGE charger_a"),
+        (13.25, "charger_a: CHARGING AMR01"),
+        (25.5, "charger_a: RELEASED AMR01"),
+        (25.5, "AMR01 -> WAIT wait_1"),
+    ]
+    site.fleet.works("AMR01", "ward", site.now)
+    assert site.run(40.0) == [(30.25, "charger_a: IDLE")]
+    assert site.faults == []
+    assert site.assignments == 3, "each change once: every message restarts tasks, and is logged"
+
+
+def test_ad_hoc_an_operator_has_the_robot_charged_that_stands_on_the_pad() -> None:
+    site = yard()
+    robot = site.fleet.robots["AMR01"]
+    robot.place = robot.dedicated = "charger_a"
+    site.run(7.0)
+    site.wants("AMR01")
+    assert site.run(30.0) == [
+        (7.25, "charger_a <- charge AMR01"),
+        (7.25, "charger_a: ASSIGNED AMR01"),
+        (7.25, "AMR01 -> CHARGE charger_a"),
+        (9.25, "charger_a: CHARGING AMR01"),
+        (21.5, "charger_a: RELEASED AMR01"),
+        (21.5, "AMR01 -> WAIT wait_1"),
+    ]
+
+
+def test_stacked_the_second_goes_to_the_other_station_the_third_waits_and_is_called() -> None:
+    site = yard()
+    site.fleet.charge("AMR01", site.now)
+    site.run(6.0)
+    site.fleet.charge("AMR02", site.now)
+    site.run(8.0)
+    site.fleet.charge("AMR03", site.now)
+    assert site.story[5:] == [
+        (7.25, "charger_a <- charge AMR01"),
+        (7.25, "charger_a: ASSIGNED AMR01"),
+        (7.25, "AMR01 -> CHARGE charger_a"),
+    ]
+    assert site.run(34.0) == [
+        (8.25, "charger_b <- charge AMR02"),
+        (8.25, "charger_b: ASSIGNED AMR02"),
+        (8.25, "AMR02 -> CHARGE dock_b"),
+        (13.25, "charger_a: CHARGING AMR01"),
+        (14.25, "charger_b: CHARGING AMR02"),
+        (25.5, "charger_a: RELEASED AMR01"),
+        (25.5, "AMR01 -> WAIT wait_1"),
+        (26.5, "charger_b: RELEASED AMR02"),
+        (26.5, "AMR02 -> WAIT wait_2"),
+    ]
+    site.fleet.works("AMR02", "ward", site.now)
+    assert site.run(42.0) == [
+        (34.25, "charger_b: IDLE"),
+        (34.25, "charger_b <- charge AMR03"),
+        (34.25, "charger_b: ASSIGNED AMR03"),
+        (34.25, "AMR03 -> CHARGE dock_b"),
+        (40.25, "charger_b: CHARGING AMR03"),
+    ]
+
+
+def test_wrong_station_refuses_names_robot_and_place_and_the_right_one_waits() -> None:
+    site = yard()
+    site.fleet.charge("AMR01", site.now)
+    site.run(8.5)
+    site.fleet.robots["AMR01"].goes_to = "dock_b"
+    assert site.run(30.0) == [
+        (11.25, "charger_b: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)"),
+        (
+            11.25,
+            "ALERT WRONG_STATION: tiny/AMR01 stands at charger_b, it is expected at charger_a",
+        ),
+    ]
+    assert site.mode("charger_a") == "ASSIGNED"
+    site.fleet.works("AMR01", "charger_a", site.now)
+    site.fleet.robots["AMR01"].task_id = "charge-1"
+    assert site.run(40.0) == [(30.25, "charger_b: IDLE"), (36.0, "charger_a: CHARGING AMR01")]
+    assert site.faults == []
+
+
+def test_wrong_station_when_its_time_is_up_a_robot_may_stay_where_it_is() -> None:
+    site = yard()
+    site.fleet.charge("AMR01", site.now)
+    site.run(8.5)
+    site.fleet.robots["AMR01"].goes_to = "dock_b"
+    site.run(12.0)
+    assert site.run(70.0) == [
+        (67.25, "charger_a: RELEASED AMR01"),
+        (67.25, "charger_b <- charge AMR01"),
+        (67.25, "charger_b: ASSIGNED AMR01"),
+        (67.25, "AMR01 -> CHARGE dock_b"),
+        (68.25, "charger_a: IDLE"),
+        (69.25, "charger_b: CHARGING AMR01"),
+    ]
+
+
+def test_failure_of_a_station_it_is_out_of_service_until_cleared_and_the_robot_goes_elsewhere() -> (
+    None
+):
+    site = yard()
+    a = site.chargers["charger_a"]
+    a.broken = True
+    site.fleet.charge("AMR01", site.now)
+    assert site.run(30.0) == [
+        (7.25, "charger_a <- charge AMR01"),
+        (7.25, "charger_a: ASSIGNED AMR01"),
+        (7.25, "AMR01 -> CHARGE charger_a"),
+        (13.5, "charger_a: ERROR AMR01 (station: over temperature)"),
+        (13.5, "charger_a <- cancel"),
+        (13.5, "charger_b <- charge AMR01"),
+        (13.5, "charger_b: ASSIGNED AMR01"),
+        (13.5, "AMR01 -> CHARGE dock_b"),
+        (13.5, "ALERT STATION_OUT_OF_SERVICE: charger_a: station: over temperature"),
+        (19.5, "charger_b: CHARGING AMR01"),
+    ]
+    site.fleet.charge("AMR02", site.now)
+    assert site.run(31.0) == []
+    assert site.run(50.0) == [
+        (31.75, "charger_b: RELEASED AMR01"),
+        (31.75, "AMR01 -> WAIT wait_1"),
+    ]
+    a.broken = False
+    a.decide(OperatorReset(), site.now)
+    assert site.run(60.0) == [
+        (50.25, "charger_a: IDLE"),
+        (50.25, "charger_a <- charge AMR02"),
+        (50.25, "charger_a: ASSIGNED AMR02"),
+        (50.25, "AMR02 -> CHARGE charger_a"),
+        (56.25, "charger_a: CHARGING AMR02"),
+    ]
+    assert site.faults == []
+
+
+def test_failure_of_a_robot_a_second_station_tells_and_there_is_no_third_try() -> None:
+    site = yard()
+    for station in site.chargers.values():
+        station.refuses = {"RX-1"}
+    site.fleet.charge("AMR01", site.now)
+    faulty = "ROBOT_FAULTY: tiny/AMR01 failed at charger_a and at charger_b: not tried again"
+    assert site.run(60.0) == [
+        (7.25, "charger_a <- charge AMR01"),
+        (7.25, "charger_a: ASSIGNED AMR01"),
+        (7.25, "AMR01 -> CHARGE charger_a"),
+        (13.5, "charger_a: ERROR AMR01 (robot: authentication timeout)"),
+        (13.5, "charger_a <- cancel"),
+        (13.5, "charger_b <- charge AMR01"),
+        (13.5, "charger_b: ASSIGNED AMR01"),
+        (13.5, "AMR01 -> CHARGE dock_b"),
+        (13.75, "charger_a: RELEASED AMR01"),
+        (14.5, "charger_a: IDLE"),
+        (19.75, "charger_b: ERROR AMR01 (robot: authentication timeout)"),
+        (19.75, "charger_b <- cancel"),
+        (19.75, "AMR01 -> WAIT wait_1"),
+        (19.75, f"ALERT {faulty}"),
+        (20.0, "charger_b: RELEASED AMR01"),
+        (20.75, "charger_b: IDLE"),
+    ]
+    assert site.faults == [faulty]
+    site.chargers["charger_a"].refuses = set()
+    site.node.reset()
+    assert site.run(75.0) == [
+        (61.25, "charger_a <- charge AMR01"),
+        (61.25, "charger_a: ASSIGNED AMR01"),
+        (61.25, "AMR01 -> CHARGE charger_a"),
+        (67.25, "charger_a: CHARGING AMR01"),
+    ]
+    assert site.faults == []
+
+
+# ---- restarts and rivals
+
+
+def test_a_restart_keeps_the_queue_and_touches_no_charge_under_way() -> None:
+    site = yard(fills=1.0)
+    for who in ("AMR01", "AMR02", "AMR03"):
+        site.fleet.charge(who, site.now)
+    site.run(14.0)
+    site.dies()
+    site.run(40.0)
+    site.starts()
+    assert site.run(70.0) == []
+    assert [site.mode(name) for name in site.chargers] == ["CHARGING", "CHARGING"]
+    site.fleet.works("AMR02", "ward", site.now)
+    assert site.run(72.0) == [
+        (70.25, "charger_b: RELEASED AMR02"),
+        (70.25, "charger_b <- cancel"),
+        (70.25, "AMR02 -> WAIT wait_2"),
+        (71.25, "charger_b: IDLE"),
+        (71.25, "charger_b <- charge AMR03"),
+        (71.25, "charger_b: ASSIGNED AMR03"),
+        (71.25, "AMR03 -> CHARGE dock_b"),
+    ]
+
+
+def test_a_coordinator_that_has_lost_its_memory_takes_over_what_the_stations_show() -> None:
+    site = yard(fills=1.0)
+    site.fleet.charge("AMR01", site.now)
+    site.run(14.0)
+    site.dies()
+    site.kept.kept = None
+    site.starts()
+    assert site.run(40.0) == []
+    assert site.assigned == {
+        "AMR01": "CHARGE charger_a",
+        "AMR02": "WAIT wait_2",
+        "AMR03": "WAIT wait_3",
+    }
+
+
+def test_beside_a_charging_schedule_nothing_is_said_and_its_choice_is_remembered() -> None:
+    site = yard()
+    schedule = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
+    dedicated = d.ChargingAssignment("AMR01", "dock_b", int(d.ChargingMode.MODE_CHARGE))
+    schedule.publish(d.ChargingAssignments("tiny", (dedicated,)))
+    site.fleet.robots["AMR01"].dedicated = "wait_1"
+    site.run(6.0)
+    site.fleet.charge("AMR01", site.now)
+    assert site.run(20.0) == []
+    assert site.node.status()["passive"] is True
+    schedule.close()
+    told = [what for _, what in site.run(40.0)]
+    assert told == [
+        "charger_b <- charge AMR01",
+        "charger_b: ASSIGNED AMR01",
+        "charger_b: CHARGING AMR01",
+    ]
+
+
+# ---- what is not reached
+
+
+def test_a_charge_goes_on_while_its_station_is_not_reached() -> None:
+    site = yard(fills=1.0)
+    site.fleet.charge("AMR01", site.now)
+    site.run(20.0)
+    site.chargers["charger_a"].unplugged = True
+    assert site.run(60.0) == [
+        (20.75, "charger_a: ERROR AMR01 (Charger unreachable)"),
+        (20.75, "ALERT STATION_OUT_OF_SERVICE: charger_a: Charger unreachable"),
+    ]
+    site.chargers["charger_a"].unplugged = False
+    assert site.run(70.0) == [(60.25, "charger_a: CHARGING AMR01")]
+
+
+def test_a_robot_on_its_way_to_a_station_that_falls_silent_is_sent_to_another() -> None:
+    site = yard(drive_s=50.0)
+    site.fleet.charge("AMR01", site.now)
+    site.run(10.0)
+    site.chargers["charger_a"].dead = True
+    assert site.run(50.0) == [
+        (14.25, "ALERT STATION_SILENT: charger_a: no ChargerState comes"),
+        (44.25, "charger_a <- cancel"),
+        (44.25, "charger_b <- charge AMR01"),
+        (44.25, "charger_b: ASSIGNED AMR01"),
+        (44.25, "AMR01 -> CHARGE dock_b"),
+    ]
+    site.chargers["charger_a"].dead = False
+    assert site.run(53.0) == [
+        (50.25, "charger_a: RELEASED AMR01"),
+        (51.25, "charger_a: IDLE"),
+    ]
+
+
+def test_a_station_whose_daemon_takes_no_request_is_passed_over() -> None:
+    site = yard(drive_s=20.0)
+    a = site.chargers["charger_a"]
+    a.limits = replace(a.limits, receivers={"RX-9": Robot("other", "robot")})
+    site.fleet.charge("AMR01", site.now)
+    assert site.run(18.0) == [
+        (7.25, "charger_a <- charge AMR01"),
+        (7.25, "AMR01 -> CHARGE charger_a"),
+        (17.25, "charger_b <- charge AMR01"),
+        (17.25, "charger_b: ASSIGNED AMR01"),
+        (17.25, "AMR01 -> CHARGE dock_b"),
+        (17.25, "ALERT REQUEST_NOT_TAKEN: charger_a: its daemon's log says why"),
+    ]
+
+
+# ---- operators
+
+
+def test_an_operators_wish_is_withdrawn_by_its_id_and_its_repeats_start_nothing() -> None:
+    site = yard()
+    site.wants("AMR01", "charger_b")
+    site.wants("AMR01", "charger_b")
+    assert site.run(8.0) == [
+        (5.25, "charger_b <- charge AMR01"),
+        (5.25, "charger_b: ASSIGNED AMR01"),
+        (5.25, "AMR01 -> CHARGE dock_b"),
+    ]
+    site.withdrawals.publish(d.ChargerCancel("", "op-1"))
+    told = [what for _, what in site.run(12.0)]
+    assert told == [
+        "charger_b <- cancel",
+        "charger_b: RELEASED AMR01",
+        "AMR01 -> WAIT wait_1",
+        "charger_b: IDLE",
+    ]
+    site.wants("AMR01", "charger_b")
+    assert site.run(15.0) == []
+    assert site.node.refused == {"request is over": 1}
+
+
+def test_a_request_sent_to_a_charger_directly_makes_that_robots_place() -> None:
+    site = yard()
+    request = d.ChargerRequest("charger_b", "tiny", "AMR02", d.Duration(60, 0), "somebody-1")
+    site.rmf.publisher(topics.CHARGER_REQUESTS).publish(request)
+    site.fleet.charge("AMR03", site.now)
+    told = [what for _, what in site.run(15.0)]
+    assert told == ["AMR02 -> CHARGE dock_b"]
+    status = GraphService(site.node).status()
+    assert (status["passive"], status["subjects"]["site"]["queue"]) == (False, "tiny/AMR03")
