@@ -2,12 +2,13 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: help demo demo-charging test lint format bench mutate clean
+.PHONY: help demo demo-charging test lint format bench soak mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
 	@echo "make bench   latency and memory, beside a bare transport node"
+	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again"
 	@echo "make mutate  break the lift's core in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make format  rewrite the sources as the linter wants them"
 	@echo "make clean   remove the virtual environment and everything generated"
@@ -40,6 +41,10 @@ format: .venv/ready
 
 bench: .venv/ready
 	$(BIN)/python -m bench
+
+# Without SEED one is drawn, and printed.
+soak: .venv/ready
+	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED))
 
 # Mutants live in a copy; stopped and started again, only what is not known yet is run. Some of it:
 # make mutate ONLY='bridges.lift.drive.*'; everything afresh: rm -rf the directory first.

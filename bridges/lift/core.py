@@ -17,7 +17,8 @@ Rules, in the order in which they are applied:
    session is held and no open door at its destination has been published for it yet (the robot is
    outside), AGV mode must be on too and nothing may be wrong: RMF's robots look at session, floor
    and door only, and must not board a lift in a fire. Once it has been published, a robot may be
-   inside, and the true door is shown in any mode, so that it gets out.
+   inside, and the true door is shown in any mode, so that it gets out. Neither goes through a door
+   that is about to be held and is not yet: its relay may have to rest while the door closes.
 """
 
 import math
@@ -112,12 +113,13 @@ def decide(
     allowed = not obstacles(memory, view, now, limits)
     memory, outputs = _drive(memory, view, allowed, now, limits)
     driven = memory.relays.outputs()
+    awaited = outputs.hold_door is not None and driven.hold_door is None
     faults = _faults(memory, view, now, limits)
     read_at = memory.senses.read_at
     return Decision(
         memory,
         driven,
-        report(memory.session, view, read_at, faults, driven.agv_request, limits),
+        report(memory.session, view, read_at, faults, driven.agv_request, awaited, limits),
         _wake_at(memory, view, outputs, now, limits),
         refused,
         _alarms(alarmed_before, memory, limits),

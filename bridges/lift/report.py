@@ -48,13 +48,19 @@ def report(
     read_at: float | None,
     faults: tuple[Fault, ...],
     agv_requested: bool,
+    hold_awaited: bool,
     limits: LiftLimits,
 ) -> LiftReport:
-    """The state as it is shown now. `agv_requested` stands in where no AGV status is wired."""
+    """The state as it is shown now. `agv_requested` stands in where no AGV status is wired.
+
+    `hold_awaited`: the door is to be held, and the relay for it still rests. It may stand open for
+    its own dwell time, and would then close on the robot that was told that it is open.
+    """
     destination = session.destination if session else ""
     floor = limits.floor_name(view.level, destination) if view.fresh and view.level else ""
     mode = _mode(view, faults, agv_requested)
-    door, estimated = _door(session, view, floor, mode, bool(faults), limits)
+    sound = mode is LiftMode.MODE_AGV and not faults
+    door, estimated = _door(session, view, floor, sound, hold_awaited, limits)
     return LiftReport(
         read_at=read_at,
         floor=floor,
@@ -86,8 +92,8 @@ def _door(
     session: Session | None,
     view: View,
     floor: str,
-    mode: LiftMode,
-    faulty: bool,
+    sound: bool,
+    hold_awaited: bool,
     limits: LiftLimits,
 ) -> tuple[LiftDoor, bool]:
     """The door to show, and whether it rests on an estimate."""
@@ -102,7 +108,7 @@ def _door(
         estimated = closed and any(side.estimated for side in seen)
         return (LiftDoor.DOOR_CLOSED if closed else LiftDoor.DOOR_MOVING), estimated
     boarding = session is not None and not session.boarded
-    ready = not boarding or (mode is LiftMode.MODE_AGV and not faulty)
+    ready = not hold_awaited and (not boarding or sound)
     if view.stopped and floor and ready:
         return LiftDoor.DOOR_OPEN, all(side.estimated for side in opened)
     return LiftDoor.DOOR_MOVING, False

@@ -99,6 +99,8 @@ def open_is_the_truth(step: Step) -> None:
     if session and not session.boarded:
         assert shown.faults == ()
         assert shown.mode.name == "MODE_AGV"
+        elsewhere = shown.floor != shown.destination
+        assert step.decision.outputs.hold_door or elsewhere or not session.agv
         if _sampled(step):
             assert sample.agv is not False
             assert not sample.hazards

@@ -142,6 +142,28 @@ def test_a_burst_of_changing_requests_wears_no_relay() -> None:
     assert 0 < len(ons) <= 5
 
 
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_door_that_is_open_for_its_own_time_only_lets_nobody_in_or_out(inside: bool) -> None:
+    closed = replace(AT_L1, door=Door.CLOSED)
+    story = Story(Building(closed), max_cycles_per_min=2, request_timeout_s=99)
+    story.run(1.0)
+    story.asks("A", "L1")
+    if inside:
+        story.building.set(door=Door.OPEN)
+        story.until(lambda: story.state == "AGV, open at L1, A to L1")
+        story.building.set(door=Door.CLOSED)
+    for motion in (Motion.UP, Motion.STOPPED) * 2:  # a loose contact: the hold's relay must rest
+        story.run(story.now + 1.0)
+        story.building.set(motion=motion)
+    story.run(8.0)
+    assert story.outputs == LiftOutputs(agv_request=True)
+    story.building.set(door=Door.OPEN)
+    story.run(9.0)
+    assert (story.faults, story.state) == ([], "AGV, moving at L1, A to L1")
+    story.until(lambda: story.outputs.hold_door)
+    assert story.state == "AGV, open at L1, A to L1"
+
+
 def test_a_reset_gives_no_second_pulse_where_nothing_was_wrong() -> None:
     story = Story(Controller(), call_pulse_s=0.5)
     story.run(1.0)

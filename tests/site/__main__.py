@@ -1,0 +1,59 @@
+"""`python -m tests.site --seed 7 --hours 24`: play one day.
+
+Exit code 1, and what to type to play it again, when a law is broken or something grows.
+"""
+
+import argparse
+import secrets
+import sys
+import time
+from collections.abc import Sequence
+
+from tests.site.day import Site
+from tests.site.growth import growth
+from tests.site.laws import Broken
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Play one day."""
+    parser = argparse.ArgumentParser(prog="python -m tests.site", description=__doc__)
+    parser.add_argument("--seed", type=int, help="of the day; one is drawn and printed if left out")
+    parser.add_argument("--hours", type=float, default=24.0, help="simulated, 0.5 at the least")
+    parser.add_argument("--log", type=int, default=60, help="so many last lines of a failed day")
+    options = parser.parse_args(argv)
+    seed = secrets.randbelow(10**6) if options.seed is None else options.seed
+    if options.hours < 0.3:
+        parser.error("less than 0.3 hours is no day")
+    _print(f"seed {seed}, {options.hours:g} hours")
+    began, site = time.perf_counter(), Site(seed)
+    try:
+        site.run(options.hours, told=lambda look: _print(str(look)))
+    except Broken as broken:
+        return _failed(site, str(broken), options)
+    took_s = time.perf_counter() - began
+    _print(", ".join(f"{count} {what}" for what, count in site.counts().items()))
+    _print("trouble: " + ", ".join(f"{n} {w}" for w, n in sorted(site.trouble.counts.items())))
+    _print(f"{took_s:.1f} s")
+    grown = growth(site.looks)
+    if grown:
+        return _failed(site, "it grows: " + ", ".join(grown), options)
+    _print("every law held, nobody waited for ever, nothing grew")
+    return 0
+
+
+def _failed(site: Site, why: str, options: argparse.Namespace) -> int:
+    for at, line in list(site.laws.log)[-options.log :]:
+        _print(f"{at:12.3f}  {line}")
+    _print(f"wrong now: {', '.join(site.ills.all()) or 'nothing'}")
+    _print(f"BROKEN {why}")
+    _print(f"again: make soak SEED={site.seed} HOURS={options.hours:g}")
+    return 1
+
+
+def _print(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,185 @@
+"""The site's devices: how each is wired, with which driver, and the plant behind it.
+
+Two lifts (one on the GPIO header with one door contact, no motion line and a binary floor code with
+parity; one at a Modbus module with two door contacts, a motion line, a one-hot code, pulsed calls and a
+fire that an operator must reset), five doors (header, module, module in pulses, two maps of registers)
+and three charging stations.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from bridges.charger import KIND as CHARGER
+from bridges.door import KIND as DOOR
+from bridges.kind import Kind
+from bridges.lift import KIND as LIFT
+from bridges.settings import load
+from drivers import Driver, charger_http, door_dry_contact, door_register, lift_dry_contact
+from hal_fakes import charger_plant, door_plant, lift_plant
+from hal_fakes.machine import Machine
+from hal_fakes.register_door import RegisterDoor
+from tests.lift_driver.wirings import alarm, coil, line
+from tests.site.timeline import Timeline
+from tests.site.wires import Far, HttpFar, PointsFar, RegisterFar
+
+CONFIG = Path(__file__).parents[2] / "config"
+FLOORS = ["L1", "L2", "L3", "L4"]
+LIFTS = ("Lift1", "Lift2")
+DOORS = ("ward", "lab", "store", "gate", "icu")
+CHARGERS = ("bay1", "bay2", "bay3")
+POLL_S = {"gpio": 0.0, "modbus": 0.05, "http": 0.5}
+"""How long after it has happened a change is seen: an edge at once, a poll when it is due."""
+
+
+@dataclass(frozen=True)
+class Device:
+    """One device from its settings to its plant. `driver()`: a new one, as a new daemon has it."""
+
+    name: str
+    kind: Kind
+    settings: Any
+    plant: Machine
+    far: Far
+    driver: Callable[[], Driver[Any, Any]]
+    debounce: Mapping[str, float]
+    poll_s: float
+
+
+def devices(timeline: Timeline) -> dict[str, Device]:
+    """All of them, by name."""
+    found = [_lift(timeline, "Lift1", _shipped("lift_dry_contact", "Lift1"), "gpio")]
+    found += [_lift(timeline, "Lift2", _convert(lift_dry_contact, _lift2()), "modbus")]
+    for name, content, bus in _dry_doors():
+        found.append(_dry_door(timeline, name, _convert(door_dry_contact, content), bus))
+    for name, shipped in (("gate", "ward_door"), ("icu", "lab_door")):
+        found.append(_register_door(timeline, name, _shipped("door_register", shipped)))
+    for number, name in enumerate(CHARGERS):
+        found.append(_charger(timeline, name, clear_errors_per_h=60 if number == 0 else 0))
+    return {device.name: device for device in found}
+
+
+def _lift(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
+    plant = lift_plant.build(name, settings)
+    far = PointsFar(timeline, plant, lift_dry_contact.wires(settings))
+    return Device(
+        name,
+        LIFT,
+        settings,
+        plant,
+        far,
+        lambda: lift_dry_contact.create(name, settings, far),
+        lift_dry_contact.debounce(settings),
+        POLL_S[bus],
+    )
+
+
+def _dry_door(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
+    plant = door_plant.build(name, settings)
+    far = PointsFar(timeline, plant, door_dry_contact.wires(settings))
+    return Device(
+        name,
+        DOOR,
+        settings,
+        plant,
+        far,
+        lambda: door_dry_contact.create(name, settings, far),
+        door_dry_contact.debounce(settings),
+        POLL_S[bus],
+    )
+
+
+def _register_door(timeline: Timeline, name: str, settings: Any) -> Device:
+    plant = door_plant.build(name, settings)
+    far = RegisterFar(timeline, RegisterDoor(plant, settings))
+    return Device(
+        name,
+        DOOR,
+        settings,
+        plant,
+        far,
+        lambda: door_register.create(name, settings, far),  # type: ignore[arg-type]
+        {},
+        POLL_S["modbus"],
+    )
+
+
+def _charger(timeline: Timeline, name: str, clear_errors_per_h: int) -> Device:
+    shipped = _shipped("charger_http", "charger_a")
+    limits = msgspec.structs.replace(
+        shipped.limits, start_timeout_s=45.0, clear_errors_per_h=clear_errors_per_h
+    )
+    settings = msgspec.structs.replace(shipped, limits=limits)
+    plant = charger_plant.build(name, settings)
+    far = HttpFar(timeline, plant, settings)
+    return Device(
+        name,
+        CHARGER,
+        settings,
+        plant,
+        far,
+        lambda: charger_http.create(name, settings, far),
+        {},
+        POLL_S["http"],
+    )
+
+
+def _shipped(file: str, name: str) -> Any:
+    return load(CONFIG / f"{file}.yaml").devices[name]
+
+
+def _convert(driver: Any, content: dict[str, Any]) -> Any:
+    return msgspec.convert(content, driver.Settings)
+
+
+def _lift2() -> dict[str, Any]:
+    return {
+        "floors": FLOORS,
+        "fire_reset": "manual",
+        "limits": {"call_pulse_s": 1.0},
+        "inputs": {
+            "fire_alarm": alarm(0),
+            "manual_mode": alarm(1),
+            "earthquake": alarm(2),
+            "overload": line(3),
+            "agv_mode": line(4),
+            "door_opened": line(5),
+            "door_closed": line(6),
+            "stopped": line(7),
+        },
+        "floor_code": {
+            "encoding": "one_hot",
+            "lines": {f: line(10 + i) for i, f in enumerate(FLOORS)},
+        },
+        "outputs": {"agv_mode_request": coil(0), "door_open": coil(1)},
+        "calls": {f: coil(10 + i) for i, f in enumerate(FLOORS)},
+    }
+
+
+def _dry_doors() -> list[tuple[str, dict[str, Any], str]]:
+    limits = {"opened": line(0), "closed": line(1)}
+    pins = {
+        signal: {"point": f"BCM{pin}", "active": active, "pull": "down"}
+        for signal, pin, active in (
+            ("opened", 5, "high"),
+            ("closed", 6, "high"),
+            ("obstruction", 12, "low"),
+            ("fire", 13, "low"),
+        )
+    }
+    hold = {"hold_open": coil(0)}
+    header = {"hold_open": {"point": "BCM18", "active": "high"}}
+    store = {
+        "inputs": {**limits, "obstruction": alarm(2)},
+        "outputs": hold,
+        "pulse": {"on_s": 1.0, "every_s": 4.0},
+    }
+    lab = {"inputs": {**limits, "fire": alarm(2)}, "outputs": hold, "on_fire": "release"}
+    return [
+        ("ward", {"inputs": pins, "outputs": header, "on_fire": "open"}, "gpio"),
+        ("lab", lab, "modbus"),
+        ("store", store, "modbus"),
+    ]

@@ -1,0 +1,223 @@
+"""The daemons of the site: a node for each device, and the supervisors. Each can die and come back.
+
+A device is scanned at each request, at its core's `wake_at`, when a contact of its plant changes (on a
+polled bus one poll later), and every SCAN_S. Between those instants no input changes and no time runs
+out, so a scan there would decide what the last one did: that is why the day need not be scanned at the
+20 Hz of the real loop. (The cores' own tests prove that nothing changes before `wake_at`.)
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from bridges.decision import OperatorReset
+from bridges.graph_kind import GraphKind
+from bridges.graph_node import GraphNode
+from bridges.node import Clock, Node
+from bridges.rmf.definitions import Message
+from bridges.rmf.topics import LIFT_REQUESTS, Topic
+from bridges.rmf.transport import Publisher
+from hal_fakes.plant import Edge
+from hal_fakes.rmf.supervisors import LiftSupervisor
+from tests.site.building import Device
+from tests.site.network import Air, Place
+from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
+
+SCAN_S = 0.9
+"""Less than a state may be old (1 s); states go out at 1 Hz, which `wake_at` sees to."""
+LEAST_GAP_S = 0.001
+
+
+class DeviceDaemon:
+    """Serves one device. `wall_step_s`: of its wall clock.
+
+    `looks` is called with each time until which the plant was as it is, `scanned` after each scan,
+    `relayed` with each edge of a relay.
+    """
+
+    def __init__(self, timeline: Timeline, air: Air, device: Device) -> None:
+        self.name = device.name
+        self.device = device
+        self.alive = False
+        self.scans = 0
+        self.refused: Counter[str] = Counter()
+        self.wall_step_s = 0.0
+        self.looks: Callable[[DeviceDaemon, float], None] = lambda daemon, at: None
+        self.scanned: Callable[[DeviceDaemon], None] = lambda daemon: None
+        self.relayed: Callable[[Edge], None] = lambda edge: None
+        self._changed = False
+        device.plant.on_edge = self._edge
+        self._timeline = timeline
+        self._air = air
+        self._alarm = Alarm(timeline, self.scan)
+        self._publishers: dict[str, Publisher[Any]] = {}
+        self._node: Node
+        self._place: Place
+
+    def start(self) -> None:
+        """A new one: nothing remembered."""
+        device, kind = self.device, self.device.kind
+        self._place = Place(self._air, self.name, lambda: None)
+        topics = [kind.states, *kind.alarm_topics(device.settings)]
+        self._publishers = {topic.name: self._place.publisher(topic) for topic in topics}
+        limits = kind.limits(device.settings, device.debounce)
+        clock = Clock(
+            lambda: self._timeline.now, lambda: EPOCH + self._timeline.now + self.wall_step_s
+        )
+        self._node = Node(
+            self.name, kind, device.settings, limits, device.driver(), self._publish, clock
+        )
+        self.alive = True
+        for topic in kind.requests:
+            self._place.subscribe(topic, partial(self._hear, topic))
+        self._place.subscribe(kind.states, partial(self._hear, kind.states), others_only=True)
+        self.scan()
+
+    def kill(self) -> None:
+        """It dies; its outputs are switched off, by itself or by `rmf-bridge outputs-off`."""
+        self.alive = False
+        self._alarm.set(NEVER)
+        self._node.make_safe()
+        self._place.close()
+        self.refused.update(self._node.refused)
+
+    def reset(self) -> None:
+        """`rmf-bridge reset`."""
+        if self.alive:
+            self.scan(OperatorReset())
+
+    def scan(self, *events: Any) -> None:
+        """One scan, with these events."""
+        if not self.alive:
+            return
+        now = self._timeline.now
+        self.advance()
+        self._changed = False
+        self._node.scan(events)
+        self.scans += 1
+        self.scanned(self)
+        changes_at = (now if self._changed else self.device.plant.next_at()) + self.device.poll_s
+        due = min(self._node.wake_at, changes_at, now + SCAN_S)
+        self._alarm.set(max(due, now + LEAST_GAP_S))
+
+    def advance(self) -> None:
+        """Let the plant's own time pass, from event to event."""
+        plant, now = self.device.plant, self._timeline.now
+        while (at := plant.next_at()) < now:
+            self.looks(self, at)
+            plant.advance(at)
+        self.looks(self, now)
+        plant.advance(now)
+        self.looks(self, now)
+
+    def look(self) -> None:
+        """Something has happened to the plant: see it, at once or at the next poll."""
+        self._timeline.after(self.device.poll_s, self.scan)
+
+    def faults(self) -> list[str]:
+        """What it says is wrong."""
+        return [fault["code"] for fault in self._node.status()["faults"]] if self.alive else []
+
+    def _edge(self, edge: Edge) -> None:
+        """Of the plant, whose own record is not needed."""
+        self.device.plant.edges.clear()
+        if edge.what == "relay":
+            self.relayed(edge)
+        else:
+            self._changed = True
+
+    def _hear(self, topic: Topic[Any], message: Any) -> None:
+        if self.device.kind.device_name(message) != self.name:
+            return
+        event = self._node.event(topic, message)
+        if event is not None:
+            self.scan(event)
+
+    def _publish(self, topic: Topic[Any], message: Message) -> None:
+        self._publishers[topic.name].publish(message)
+
+
+class Disk:
+    """The state directory of a supervisor. It outlives it."""
+
+    def __init__(self) -> None:
+        self._kept: bytes | None = None
+
+    def read(self) -> bytes | None:
+        return self._kept
+
+    def write(self, kept: bytes) -> None:
+        self._kept = kept
+
+
+RIVAL = "rmf_lift_supervisor"
+
+
+class RmfsSupervisor:
+    """The stand-in for RMF's own lift supervisor, beside ours: somebody has started both."""
+
+    name = RIVAL
+
+    def __init__(self, timeline: Timeline, air: Air) -> None:
+        self._timeline = timeline
+        self._air = air
+        self._place: Place
+
+    def start(self) -> None:
+        """It knows nothing, and hears all that is retained."""
+        self._place = Place(self._air, self.name, lambda: None)
+        self._party = LiftSupervisor()
+        self._mouth = self._place.publisher(LIFT_REQUESTS)
+        for topic in self._party.subscribes:
+            self._place.subscribe(topic, self._hear)
+
+    def kill(self) -> None:
+        """It is stopped."""
+        self._place.close()
+
+    def _hear(self, message: Any) -> None:
+        for _, said in self._party.hear(message, EPOCH + self._timeline.now):
+            self._mouth.publish(said)
+
+
+class GraphDaemon:
+    """Serves a kind that lives on the graph alone. `wall_skew`: its clock is ahead (s)."""
+
+    def __init__(
+        self, timeline: Timeline, air: Air, name: str, kind: GraphKind, wall_skew: float = 0.0
+    ) -> None:
+        self.name = name
+        self.kind = kind
+        self.alive = False
+        self._timeline = timeline
+        self._air = air
+        self._disk = Disk()
+        self._clock = Clock(lambda: timeline.now, lambda: EPOCH + timeline.now + wall_skew)
+        self._alarm = Alarm(timeline, self._round)
+        self._place: Place
+        self.node: GraphNode
+
+    def start(self) -> None:
+        """A new one, which knows what it has kept."""
+        self._place = Place(self._air, self.name, self._round)
+        kept = self._disk if self.kind.persist else None
+        self.node = GraphNode(self.kind, self.kind.settings(), self._place, self._clock, kept=kept)
+        self.alive = True
+        self.node.subscribe()
+        self._round()
+
+    def kill(self) -> None:
+        """It dies."""
+        self.alive = False
+        self._alarm.set(NEVER)
+        self._place.close()
+
+    def summary(self) -> dict[str, Any]:
+        """Each subject's status, as the status file has it."""
+        return {subject.name: subject.status() for subject in self.node.nodes}
+
+    def _round(self) -> None:
+        if self.alive:
+            self.node.round()
+            self._alarm.set(max(self.node.wake_at, self._timeline.now + LEAST_GAP_S))

@@ -1,0 +1,343 @@
+"""A day at the site: everybody, everything that goes wrong, and the laws."""
+
+import logging
+import random as the_random
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from random import Random
+
+from bridges.door_supervisor import KIND as DOOR_SUPERVISOR
+from bridges.lift_supervisor import KIND as LIFT_SUPERVISOR
+from hal_fakes.charger_plant import ChargerPlant
+from hal_fakes.door_plant import DoorPlant
+from hal_fakes.lift_plant import FAILS, LiftPlant
+from tests.site.building import CHARGERS, DOORS, FLOORS, LIFTS, Device, devices
+from tests.site.daemons import RIVAL, DeviceDaemon, GraphDaemon, RmfsSupervisor
+from tests.site.growth import Look, look
+from tests.site.laws import BOUND_S, Laws
+from tests.site.network import CLEAR, Air, Place
+from tests.site.robots import Places, Resident
+from tests.site.timeline import Timeline
+from tests.site.trouble import Ill, Ills, Mortal, Trouble, breakable, pressable
+
+ROBOTS = ("red", "green", "blue", "white", "black")
+WIND_DOWN_S = BOUND_S + 90.0
+"""Before the end: nothing goes wrong any more, and every robot ends its tour."""
+LOOK_EVERY_S = 5.0
+HOUR_S = 3600.0
+
+
+class Site:
+    """One seed's day. `run` raises `laws.Broken` when a law is broken."""
+
+    def __init__(self, seed: int) -> None:
+        self.seed = seed
+        self.random = Random(seed)
+        self.timeline = timeline = Timeline()
+        self.ills = Ills(timeline)
+        self.air = Air(timeline, Random(self.random.random()))
+        self.laws = Laws(timeline, self.ills)
+        self.air.watch = self.laws.heard
+        self.devices = devices(timeline)
+        self.daemons = {n: DeviceDaemon(timeline, self.air, d) for n, d in self.devices.items()}
+        self.supervisors = [
+            GraphDaemon(timeline, self.air, "lift_supervisor", LIFT_SUPERVISOR, wall_skew=1.5),
+            GraphDaemon(timeline, self.air, "lift_standby", LIFT_SUPERVISOR),
+            GraphDaemon(timeline, self.air, "door_supervisor", DOOR_SUPERVISOR),
+        ]
+        self.robots = [self._robot(f"fleet/{name}") for name in ROBOTS]
+        self.trouble = Trouble(
+            timeline, self.ills, Random(self.random.random()), self._draw, self.laws.note
+        )
+        self.looks: list[Look] = []
+        self._people = Random(self.random.random())
+        self._people_at: dict[str, float] = {}
+
+    def run(self, hours: float, told: Callable[[Look], None] = lambda look: None) -> None:
+        """All of it. `told`: each hour's look."""
+        end = hours * HOUR_S
+        the_random.seed(self.seed)  # supervisors that meet a rival draw how long they hold back
+        self._open()
+        self.trouble.begin(until=end - WIND_DOWN_S)
+        self.timeline.at(end - WIND_DOWN_S, self._wind_down)
+        with _silent():
+            hour = 0
+            while (hour := hour + 1) * HOUR_S < end:
+                self.timeline.run(hour * HOUR_S)
+                self._look(hour, told)
+            self.timeline.run(end)
+        self._look(hours, told)
+        self._close()
+
+    def counts(self) -> dict[str, int]:
+        """What was done, for the summary."""
+        done: dict[str, int] = {}
+        for robot in self.robots:
+            for what, count in robot.done.items():
+                done[what] = done.get(what, 0) + count
+        done["scans"] = sum(daemon.scans for daemon in self.daemons.values())
+        return {**done, "checks": self.laws.checks, **self.air.counts}
+
+    # ---- its hours
+
+    def _open(self) -> None:
+        for name, daemon in self.daemons.items():
+            self.laws.add(daemon)
+            self.timeline.after(self.random.uniform(0.0, 2.0), daemon.start)
+            assert name == daemon.name
+        self.laws.speakers = self._speakers
+        parties: list[Mortal] = [*self.supervisors, *self.robots]
+        for party in parties:
+            self.timeline.after(self.random.uniform(2.0, 6.0), party.start)
+        self.timeline.after(LOOK_EVERY_S, self._watch)
+        self.timeline.after(30.0, self._live)
+
+    def _look(self, hour: float, told: Callable[[Look], None]) -> None:
+        self.looks.append(look(hour))
+        told(self.looks[-1])
+
+    def _watch(self) -> None:
+        """Does anybody wait for too long?"""
+        for robot in self.robots:
+            if robot.alive and robot.waits_for:
+                self.laws.waits(robot.name, robot.waits_for, robot.since)
+        self.timeline.after(LOOK_EVERY_S, self._watch)
+
+    def _live(self) -> None:
+        """People use lifts and doors as well; that is no trouble."""
+        people = self._people
+        name = people.choice([*LIFTS, *DOORS])
+        signal = f"hall_{people.choice(FLOORS)}" if name in LIFTS else "push"
+        self._press(name, signal, True)
+        self.timeline.after(people.uniform(0.2, 2.0), lambda: self._press(name, signal, False))
+        if self.timeline.now < self.trouble.over_at:
+            self.timeline.after(people.expovariate(1 / 45.0), self._live)
+
+    def _wind_down(self) -> None:
+        self.air.weather = CLEAR
+        self.laws.note("--- the day ends")
+        for robot in self.robots:
+            robot.homing = True
+
+    def _close(self) -> None:
+        for robot in self.robots:
+            self.laws.require(robot.at_rest, f"{robot.name} is not home: {robot.waits_for}")
+        self.laws.at_rest()
+        for supervisor in self.supervisors:
+            for name, said in supervisor.summary().items():
+                waiting = {k: v for k, v in said.items() if k in ("holder", "waiting", "holders")}
+                empty = all(value == "-" for value in waiting.values())
+                self.laws.require(empty, f"{supervisor.name}: {name} {waiting} at the end")
+
+    def _speakers(self, topic: str) -> int:
+        """How many there are, but for what a rival has just made of it."""
+        speaking = [end.node.name for end in self.air.memory.publishers if end.topic.name == topic]
+        if RIVAL in speaking:
+            return 1
+        return len(speaking)
+
+    # ---- where the robots are (`robots.Ground`)
+
+    def may_enter_lift(self, robot: Resident, lift: str, floor: str) -> bool:
+        return self.laws.lift_is_open(lift, floor)
+
+    def boards(self, robot: Resident, lift: str, floor: str) -> None:
+        self.laws.boards(robot.name, lift, floor)
+
+    def leaves(self, robot: Resident, lift: str, floor: str) -> None:
+        self.laws.leaves(robot.name, lift, floor)
+
+    def crossed(self, robot: Resident) -> None:
+        self.laws.crossed(robot.name)
+        for door in DOORS:
+            if self.devices[door].plant.contact("obstruction") and self._people.random() < 0.2:
+                self._follows(door)  # somebody walks in behind it
+            self._obstruct(door)
+
+    def _follows(self, door: str) -> None:
+        self._people_at[door] = self.timeline.now + self._people.uniform(1.0, 8.0)
+        self.timeline.at(self._people_at[door], lambda: self._obstruct(door))
+
+    def is_out(self, robot: Resident, lift: str) -> None:
+        self.laws.is_out(robot.name, lift)
+
+    def may_enter_door(self, robot: Resident, door: str) -> bool:
+        return self.laws.door_is_open(door)
+
+    def in_doorway(self, robot: Resident, door: str) -> None:
+        self.laws.in_doorway(robot.name, door)
+        self._obstruct(door)
+
+    def on_pad(self, robot: Resident, charger: str) -> None:
+        self.laws.on_pad(robot.name, charger)
+        self._press(charger, "robot", True)
+
+    def off_pad(self, robot: Resident, charger: str) -> None:
+        self.laws.off_pad(robot.name, charger)
+        self._press(charger, "robot", False)
+
+    def charged(self, charger: str) -> bool:
+        self.daemons[charger].advance()
+        plant = self.devices[charger].plant
+        assert isinstance(plant, ChargerPlant)
+        return plant.battery >= 1.0
+
+    def _obstruct(self, door: str) -> None:
+        """The light curtain sees robots, and whatever else is in the way."""
+        there = any(robot.doorway == door for robot in self.robots)
+        there = there or self.ills.has(door, "press obstruction")
+        there = there or self.timeline.now < self._people_at.get(door, 0.0)
+        if there != self.devices[door].plant.contact("obstruction"):
+            if there:
+                self.ills.obstruct(door)
+            self._press(door, "obstruction", there)
+
+    def _press(self, device: str, signal: str, on: bool) -> None:
+        self.daemons[device].advance()
+        self.devices[device].plant.press(signal, on, self.timeline.now)
+        self.daemons[device].look()
+
+    # ---- what may go wrong
+
+    def _robot(self, name: str) -> Resident:
+        self.air.best_effort.add(name)
+        places = Places(FLOORS, [*LIFTS], [*DOORS], [*CHARGERS])
+        own = Random(self.random.random())
+        return Resident(self.timeline, self._join, self, name, own, places)
+
+    def _join(self, name: str) -> Place:
+        return Place(self.air, name, lambda: None)
+
+    def _draw(self, random: Random) -> Ill:
+        sorts = (
+            self._break,
+            self._act,
+            self._lose_bus,
+            self._restart,
+            self._cut,
+            self._rival,
+        )
+        (draw,) = random.choices(sorts, (6, 4, 2, 4, 2, 0.5))
+        return draw(random)
+
+    def _device(self, random: Random) -> Device:
+        return self.devices[random.choice(random.choice((LIFTS, DOORS, CHARGERS)))]
+
+    def _rival(self, random: Random) -> Ill:
+        """RMF's own lift supervisor is started as well, and stopped again."""
+        rival = RmfsSupervisor(self.timeline, self.air)
+
+        def begin() -> None:
+            rival.start()
+            for name in LIFTS:
+                self.ills.begin(name, "rival")
+            for robot in self.robots:
+                self.laws.abandoned(robot.name)
+
+        def end() -> None:
+            rival.kill()
+            for name in LIFTS:
+                self.ills.end(name, "rival")
+
+        return Ill("rival", rival.name, "rival", begin, end, most_s=40.0)
+
+    def _break(self, random: Random) -> Ill:
+        device = self._device(random)
+        wires, parts = breakable(device)
+        part, modes = random.choice(random.choice((wires, parts)) or parts)
+        mode, daemon = random.choice(modes), self.daemons[device.name]
+
+        def fail(how: object) -> None:
+            daemon.advance()
+            device.plant.fail(part, how)  # type: ignore[arg-type]
+            daemon.look()
+
+        return Ill(
+            "part",
+            device.name,
+            part,
+            lambda: fail(mode),
+            lambda: fail(None),
+            mode=mode,
+            reset=daemon.reset,
+            heals_s=90.0 if part in FAILS else 0.0,
+        )
+
+    def _act(self, random: Random) -> Ill:
+        device = self._device(random)
+        signal = random.choice(pressable(device))
+        name = device.name
+        hazard = isinstance(device.plant, LiftPlant) or signal == "fire"
+        what = f"hazard {signal}" if hazard else f"press {signal}"
+        if signal == "obstruction":
+            return Ill("person", name, what, lambda: self._obstruct(name), lambda: None, most_s=40)
+        latches = not isinstance(device.plant, DoorPlant) and name != "Lift1"
+        return Ill(
+            "hazard",
+            name,
+            what,
+            lambda: self._press(name, signal, True),
+            lambda: self._press(name, signal, False),
+            reset=self.daemons[name].reset if latches else None,
+        )
+
+    def _lose_bus(self, random: Random) -> Ill:
+        device = self._device(random)
+        while device.poll_s == 0.0:
+            device = self._device(random)
+        return Ill(
+            "bus",
+            device.name,
+            "bus",
+            lambda: self._bus_down(device),
+            lambda: self._bus_up(device),
+            least_s=0.1,
+        )
+
+    def _bus_down(self, device: Device) -> None:
+        device.far.down = True
+        self.timeline.after(2.0, device.far.watchdog)
+
+    def _bus_up(self, device: Device) -> None:
+        device.far.down = False
+        self.daemons[device.name].look()
+
+    def _restart(self, random: Random) -> Ill:
+        sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.supervisors], [*self.robots]]
+        party = random.choice(random.choice(sorts))
+        skew_s = random.choice((0.0, 0.0, 0.0, 5.0, -5.0, 3600.0, -3600.0))
+
+        def end() -> None:
+            if isinstance(party, Resident):
+                party.skew += skew_s
+            elif isinstance(party, DeviceDaemon):
+                party.wall_step_s = skew_s
+            party.start()
+
+        def begin() -> None:
+            party.kill()
+            if isinstance(party, Resident):
+                self.laws.abandoned(party.name)
+
+        return Ill("restart", party.name, "daemon", begin, end, least_s=0.2, most_s=20.0)
+
+    def _cut(self, random: Random) -> Ill:
+        parties: list[Mortal] = [*self.daemons.values(), *self.supervisors, *self.robots]
+        name = random.choice(parties).name
+        lasts_s = random.choice((random.uniform(0.5, 9.0), random.uniform(11.0, 60.0)))
+
+        def begin() -> None:
+            self.air.cut_off(name, self.timeline.now + lasts_s)
+
+        return Ill("cut", name, "cut off", begin, lambda: None, lasts_s, lasts_s + 0.001)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """The nodes' logs of a day would fill the memory of whoever captures them."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)

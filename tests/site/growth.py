@@ -1,0 +1,56 @@
+"""What a day must not cost: threads, file descriptors, objects and memory, looked at by the hour."""
+
+import gc
+import os
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+PAGE = os.sysconf("SC_PAGE_SIZE")
+WARM_UP = 2
+"""Looks before caches, queues and laws' logs have their size."""
+MOST_OBJECTS = 1.05
+MOST_MB = 4.0
+
+
+@dataclass(frozen=True)
+class Look:
+    """Of this test's process at one simulated hour."""
+
+    hour: float
+    threads: int
+    descriptors: int
+    objects: int
+    rss_mb: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.hour:5.1f} h  {self.threads} threads  {self.descriptors} descriptors"
+            f"  {self.objects} objects  {self.rss_mb:.1f} MB"
+        )
+
+
+def look(hour: float) -> Look:
+    """Now, after everything that can be freed has been."""
+    gc.collect()
+    rss_mb = int(Path("/proc/self/statm").read_text().split()[1]) * PAGE / 1e6
+    descriptors = len(os.listdir("/proc/self/fd"))
+    return Look(hour, threading.active_count(), descriptors, len(gc.get_objects()), rss_mb)
+
+
+def growth(looks: Sequence[Look]) -> list[str]:
+    """What has grown since the warm-up, in words; empty for a day that costs nothing."""
+    if len(looks) <= WARM_UP:
+        return []
+    first, found = looks[WARM_UP - 1], []
+    last = looks[-1]
+    if last.threads > first.threads:
+        found.append(f"threads: {first.threads} to {last.threads}")
+    if last.descriptors > first.descriptors:
+        found.append(f"descriptors: {first.descriptors} to {last.descriptors}")
+    if last.objects > first.objects * MOST_OBJECTS:
+        found.append(f"objects: {first.objects} to {last.objects}")
+    if last.rss_mb > first.rss_mb + MOST_MB:
+        found.append(f"memory: {first.rss_mb:.1f} to {last.rss_mb:.1f} MB")
+    return found

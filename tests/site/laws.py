@@ -1,0 +1,425 @@
+"""What must hold at every moment of the day. Nothing here asks a core's memory or a report.
+
+Judged are the messages as they are published, the relays as they are driven at the terminal block, and
+where car, doors, robots and current really are. What a sensor lies about (a stuck, inverted or noisy
+wire) nobody can know: while it does, and a moment longer, the states that rest on it are not held
+against the node. A cut wire is no excuse.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from bridges.charger.signals import CURRENT_FLOWS
+from bridges.lift.signals import Side
+from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from drivers.dry_contact.lift_table import group
+from hal_fakes.charger_plant import ChargerPlant
+from hal_fakes.door_plant import DoorPlant
+from hal_fakes.lift_plant import LiftPlant
+from hal_fakes.plant import Edge
+from tests.site.daemons import DeviceDaemon
+from tests.site.timeline import NEVER, Timeline
+from tests.site.trouble import Ills
+
+AT_ONCE_S = 0.3
+"""The longest debounce, a poll and a scan."""
+SENSED_S = 0.3
+SETTLES_S = 2.0
+STALE_S = 1.0 + AT_ONCE_S
+DEAD_TIME_S = 0.29
+GRACE_S = 3.0 + AT_ONCE_S
+"""Lift outputs may stay on for so long after the session is gone from the states."""
+BOUND_S = 300.0
+"""Once everything is repaired, nobody waits longer for anything."""
+LATEST_S = 2.1
+LATE_S = 5.0
+"""More than the network ever takes for a message when nobody is cut off."""
+
+ARRIVED_S = 3.5
+"""RMF lets a robot through on a state that is older than its request: that may be on its way still,
+for as long as a late message takes and our supervisor needs to repeat it, while an earlier CLOSE ends.
+"""
+
+SHOWN = ("floor", "door", "motion")
+"""The groups of a lift's lines that an open door rests on."""
+
+
+class Broken(AssertionError):
+    """A law is broken; the text says which, and when."""
+
+
+@dataclass
+class LiftTruth:
+    """Of one lift: when its door was last truly open at each floor, and what was last published.
+
+    `crossing`, `inside`: the robots there, since when. `ended`: when each session was last told to end.
+    """
+
+    open_at: dict[str, float] = field(default_factory=dict)
+    session: str = ""
+    since: float = 0.0
+    offered: bool = False
+    crossing: dict[str, tuple[str, float]] = field(default_factory=dict)
+    inside: dict[str, float] = field(default_factory=dict)
+    ended: dict[str, float] = field(default_factory=dict)
+
+
+class Laws:
+    """`log`: the latest of what was said and done, for the report of a failure."""
+
+    def __init__(self, timeline: Timeline, ills: Ills) -> None:
+        self.log: deque[tuple[float, str]] = deque(maxlen=600)
+        self.checks = 0
+        self._timeline = timeline
+        self._ills = ills
+        self._lifts: dict[str, LiftTruth] = {}
+        self._doors: dict[str, float] = {}
+        self._currents: dict[str, float] = {}
+        self._pads: dict[str, str] = {}
+        self._charged: dict[str, str] = {}
+        self._doorways: dict[str, dict[str, float]] = {}
+        self._daemons: dict[str, DeviceDaemon] = {}
+        self._relays: dict[str, set[str]] = {}
+        self._on_since: dict[str, float] = {}
+        self._off_at: dict[tuple[str, str], float] = {}
+        self._told: dict[str, str] = {}
+        self.speakers: Callable[[str], int] = lambda topic: 1
+
+    def add(self, daemon: DeviceDaemon) -> None:
+        """Watch this device."""
+        name, plant = daemon.name, daemon.device.plant
+        self._daemons[name] = daemon
+        self._relays[name] = set()
+        if isinstance(plant, LiftPlant):
+            self._lifts[name] = LiftTruth()
+        elif isinstance(plant, DoorPlant):
+            self._doors[name] = -NEVER
+            self._doorways[name] = {}
+        else:
+            self._currents[name] = -NEVER
+        daemon.looks, daemon.scanned = self._see, self.scanned
+        daemon.relayed = self._relay
+
+    def note(self, what: str) -> None:
+        """One line for the report of a failure."""
+        self.log.append((self._timeline.now, what))
+
+    def require(self, holds: bool, law: str) -> None:
+        """It is the law."""
+        self.checks += 1
+        if not holds:
+            raise Broken(f"at {self._timeline.now:.3f} s: {law}")
+
+    # ---- what is said
+
+    def heard(self, speaker: str, topic: topics.Topic[Any], message: Any) -> None:
+        """Somebody publishes."""
+        match message:
+            case d.LiftState():
+                self._lift_state(speaker, message)
+            case d.DoorState():
+                self._door_state(speaker, message)
+            case d.ChargerState():
+                self._charger_state(speaker, message)
+            case d.LiftRequest() if topic == topics.LIFT_REQUESTS:
+                self.require(self.speakers(topic.name) == 1, "two opinions on lift_requests")
+                if message.request_type == d.LiftRequestType.REQUEST_END_SESSION:
+                    self._lifts[message.lift_name].ended[message.session_id] = self._timeline.now
+                self._note_request(message.lift_name, f"{speaker}: {_words(message)}")
+            case d.LiftRequest() if message.request_type == d.LiftRequestType.REQUEST_END_SESSION:
+                self._lifts[message.lift_name].inside.pop(message.session_id, None)
+            case d.DoorRequest() if topic == topics.DOOR_REQUESTS:
+                self.require(self.speakers(topic.name) == 1, "two opinions on door_requests")
+                self._note_request(message.door_name, f"{speaker}: {_words(message)}")
+
+    def _note_request(self, name: str, words: str) -> None:
+        if self._told.get(f"to {name}") != words:
+            self._told[f"to {name}"] = words
+            self.note(words)
+
+    def _note_state(self, name: str, words: str) -> None:
+        if self._told.get(name) != words:
+            self._told[name] = words
+            self.note(f"{name} shows {words}")
+
+    def _lift_state(self, name: str, state: d.LiftState) -> None:
+        self._note_state(
+            name,
+            f"{d.LiftMode(state.current_mode).name[5:]} {state.session_id or '-'}"
+            f" to {state.destination_floor or '-'}: {state.current_floor or '?'}"
+            f" {d.LiftDoor(state.door_state).name[5:]}",
+        )
+        self.require(name == state.lift_name, f"{name} speaks for {state.lift_name}")
+        truth, now = self._lifts[name], self._timeline.now
+        before = truth.session
+        handed = before and state.session_id and before != state.session_id
+        ended = truth.ended.get(before, -NEVER) > truth.since - LATE_S
+        self.require(ended or not handed, f"{name} went from {before} to {state.session_id}")
+        if state.session_id != before:
+            truth.session, truth.since, truth.offered = state.session_id, now, False
+        if state.door_state != d.LiftDoor.DOOR_OPEN:
+            return
+        self._open_is_true(name, state)
+        sick = self._hazard_since(name)
+        admits = state.session_id and not truth.offered
+        self.require(
+            not (admits and sick + AT_ONCE_S < now), f"{name} lets a robot in under hazard"
+        )
+        if state.session_id and state.current_floor == state.destination_floor:
+            truth.offered = True
+
+    def _open_is_true(self, name: str, state: d.LiftState) -> None:
+        truth, now = self._lifts[name], self._timeline.now
+        stale = self._ills.since(name, "bus") + STALE_S < now
+        self.require(not stale, f"{name} is OPEN though nobody can see it")
+        lied = any(group(wire) in SHOWN for wire in self._ills.lying(name, SETTLES_S))
+        true_at = truth.open_at.get(state.current_floor, -NEVER)
+        self.require(
+            lied or now - true_at <= SENSED_S,
+            f"{name} is OPEN at {state.current_floor}, which it is not",
+        )
+
+    def _door_state(self, name: str, state: d.DoorState) -> None:
+        mode = d.DoorModeValue(state.current_mode.value)
+        self._note_state(name, mode.name[5:])
+        self.require(name == state.door_name, f"{name} speaks for {state.door_name}")
+        if mode is not d.DoorModeValue.MODE_OPEN:
+            return
+        now = self._timeline.now
+        stale = self._ills.since(name, "bus") + STALE_S < now
+        self.require(not stale, f"{name} is OPEN though nobody can see it")
+        lied = {"opened", "closed"} & set(self._ills.lying(name, SETTLES_S))
+        true = bool(lied) or now - self._doors[name] <= SENSED_S
+        self.require(true, f"{name} is OPEN, which it is not")
+
+    def _charger_state(self, name: str, state: d.ChargerState) -> None:
+        word = d.ChargerStateValue(state.state).name[8:]
+        self._note_state(name, f"{word} {state.request_id} {state.error_message}")
+        self.require(name == state.charger_name, f"{name} speaks for {state.charger_name}")
+        before, self._charged[name] = self._charged.get(name, ""), ""
+        if state.state != d.ChargerStateValue.CHARGER_CHARGING:
+            return
+        self._charged[name] = state.request_id
+        same = before in ("", state.request_id) or state.request_id == f"unrequested/{name}"
+        self.require(same, f"{name} charges {before}, and calls it {state.request_id}")
+        unsure_s = 4.0 if self._ills.any(name) else 1.5
+        lied = {"server", "body"} & set(self._ills.lying(name, SETTLES_S))
+        true = bool(lied) or self._timeline.now - self._currents[name] <= unsure_s
+        self.require(true, f"{name} is CHARGING without current")
+
+    # ---- what is driven, and where things are
+
+    def scanned(self, daemon: DeviceDaemon) -> None:
+        """After each scan of a device."""
+        name = daemon.name
+        self._see(daemon, self._timeline.now)
+        if name in self._lifts:
+            self._lift_outputs(name)
+            self._thresholds(name)
+        elif name in self._doors:
+            self._door_outputs(name)
+            self._doorway(name)
+
+    def _see(self, daemon: DeviceDaemon, at: float) -> None:
+        """Where things are, until then."""
+        name, plant = daemon.name, daemon.device.plant
+        if isinstance(plant, LiftPlant):
+            if plant.car.standing and plant.doors[Side.FRONT].opened:
+                floor = daemon.device.settings.levels()[plant.car.floor]
+                self._lifts[name].open_at[floor] = at
+        elif isinstance(plant, DoorPlant):
+            if plant.contact("opened"):
+                self._doors[name] = at
+        elif isinstance(plant, ChargerPlant) and plant.activity in CURRENT_FLOWS:
+            self._currents[name] = at
+
+    def _relay(self, edge: Edge) -> None:
+        """A relay is driven. (A charger's clearing is a pulse, and no relay.)"""
+        name, now = edge.device, self._timeline.now
+        plant = self._daemons[name].device.plant
+        if isinstance(plant, ChargerPlant):
+            return
+        self.note(f"{name}: {edge.signal} {'on' if edge.value else 'off'}")
+        on = self._relays[name]
+        if edge.value and not on:
+            self._on_since[name] = now
+        (on.add if edge.value else on.discard)(edge.signal)
+        if not edge.value:
+            self._off_at[name, edge.signal] = now
+        if isinstance(plant, LiftPlant):
+            self._lift_relay(name, edge)
+        elif isinstance(plant, DoorPlant) and not edge.value:
+            self._door_lets_go(name, plant)
+
+    def _lift_relay(self, name: str, edge: Edge) -> None:
+        on, calls = self._relays[name], edge.signal.startswith("call_")
+        called = [signal for signal in on if signal.startswith("call_")]
+        self.require(len(called) <= 1, f"{name} is called to two floors")
+        self.require(not (called and "door_open" in on), f"{name} is called while held open")
+        if calls and edge.value:
+            rested_s = self._timeline.now - self._off_at.get((name, "door_open"), -NEVER)
+            self.require(rested_s > DEAD_TIME_S, f"{name} is called as soon as it is let go")
+        if edge.signal == "door_open" and not edge.value:
+            self._lets_nobody_go(name, {r: at for r, (_, at) in self._lifts[name].crossing.items()})
+
+    def _door_lets_go(self, name: str, plant: DoorPlant) -> None:
+        daemon = self._daemons[name]
+        if not daemon.device.settings.pulse:
+            self._lets_nobody_go(name, self._doorways[name])
+            self._not_onto_an_obstruction(name, plant)
+
+    def _lets_nobody_go(self, name: str, crossing: dict[str, float]) -> None:
+        """A door that is well is not let go while a robot is told that it is held."""
+        for robot, since in crossing.items():
+            well = self._ills.well_since(name) + LATE_S <= since
+            just = self._timeline.now - since < ARRIVED_S
+            self.require(just or not well, f"{name} is let go with {robot} in it")
+
+    def _not_onto_an_obstruction(self, name: str, plant: DoorPlant) -> None:
+        if not self._daemons[name].alive or "obstruction" not in plant._sensors:
+            return
+        seen = plant.contact("obstruction") and plant.sense("obstruction")
+        since = max(self._ills.well_since(name), self._ills.obstructed_since(name))
+        if seen and plant.position > 0.0:
+            early = since + AT_ONCE_S > self._timeline.now
+            self.require(early, f"{name} lets go onto an obstruction")
+
+    def _hazard_since(self, name: str) -> float:
+        """Since when a hazard has been there for the node to see; inf: none."""
+        return max(self._ills.hazard_since(name), self._ills.since_over(name, "bus", "daemon"))
+
+    def _lift_outputs(self, name: str) -> None:
+        on, now, truth = self._relays[name], self._timeline.now, self._lifts[name]
+        if not on:
+            return
+        sighted = not self._ills.has(name, "bus")
+        sick = self._hazard_since(name) + AT_ONCE_S < now
+        self.require(not (sighted and sick), f"{name} drives {sorted(on)} under a hazard")
+        # A session may be too short to be shown, and its END be late.
+        ends = [truth.since, *(at + LATEST_S for at in truth.ended.values())]
+        since = max(*ends, self._ills.since_over(name, "bus", "cut off"))
+        over = max(since + GRACE_S, self._on_since[name] + AT_ONCE_S) < now
+        self.require(
+            not (sighted and over and not truth.session), f"{name} drives {sorted(on)} for nobody"
+        )
+        self.require(on == {"agv_mode_request"} or "agv_mode_request" in on, f"{name}: {on}")
+
+    def _door_outputs(self, name: str) -> None:
+        """A fire that releases the door takes the hold away, whoever wants it."""
+        releases = self._daemons[name].device.settings.on_fire == "release"
+        sick = self._hazard_since(name) + AT_ONCE_S < self._timeline.now
+        held = releases and sick and self._relays[name] and not self._ills.has(name, "bus")
+        self.require(not held, f"{name} is held in a fire that releases it")
+
+    # ---- robots
+
+    def boards(self, robot: str, lift: str, floor: str) -> None:
+        """A robot crosses the threshold inwards, told by RMF that it may."""
+        truth = self._lifts[lift]
+        others = sorted(set(truth.inside) - {robot})
+        self.require(not others, f"{robot} is let into {lift}, where {others} is")
+        truth.inside[robot] = self._timeline.now
+        self.note(f"{robot} goes into {lift} at {floor}")
+        truth.crossing[robot] = (floor, self._timeline.now)
+
+    def leaves(self, robot: str, lift: str, floor: str) -> None:
+        """A robot crosses the threshold outwards."""
+        self.note(f"{robot} goes out of {lift} at {floor}")
+        self._lifts[lift].crossing[robot] = (floor, self._timeline.now)
+
+    def in_doorway(self, robot: str, door: str) -> None:
+        """A robot goes through."""
+        self.note(f"{robot} is in the doorway of {door}")
+        self._doorways[door][robot] = self._timeline.now
+
+    def crossed(self, robot: str) -> None:
+        """It is across whatever it was crossing, or nobody can tell any more."""
+        for truth in self._lifts.values():
+            truth.crossing.pop(robot, None)
+        for doorway in self._doorways.values():
+            doorway.pop(robot, None)
+
+    def is_out(self, robot: str, lift: str) -> None:
+        """It is out of the car."""
+        self._lifts[lift].inside.pop(robot, None)
+
+    def abandoned(self, robot: str) -> None:
+        """Its adapter has died, or RMF's own supervisor speaks: what is said for it is not its wish."""
+        self.crossed(robot)
+        for truth in self._lifts.values():
+            truth.inside.pop(robot, None)
+
+    def _thresholds(self, name: str) -> None:
+        """The car stands open for a robot on its threshold, while the lift is well."""
+        truth = self._lifts[name]
+        for robot, (floor, since) in truth.crossing.items():
+            if self._ills.well_since(name) + LATE_S > since:
+                continue
+            open_now = truth.open_at.get(floor) == self._timeline.now
+            self.require(open_now, f"{name} is not open for {robot} on its threshold at {floor}")
+
+    def _doorway(self, name: str) -> None:
+        for robot, since in self._doorways[name].items():
+            if self._ills.well_since(name) + LATE_S > since:
+                continue
+            open_now = self._doors[name] == self._timeline.now
+            self.require(open_now, f"{name} is not open for {robot} in its doorway")
+
+    def lift_is_open(self, lift: str, floor: str) -> bool:
+        """In truth, now."""
+        self._daemons[lift].advance()
+        self._see(self._daemons[lift], self._timeline.now)
+        return self._lifts[lift].open_at.get(floor) == self._timeline.now
+
+    def door_is_open(self, door: str) -> bool:
+        """In truth, now."""
+        self._daemons[door].advance()
+        self._see(self._daemons[door], self._timeline.now)
+        return self._doors[door] == self._timeline.now
+
+    def on_pad(self, robot: str, charger: str) -> None:
+        """A robot has arrived on a pad."""
+        before = self._pads.get(charger)
+        self.require(before is None, f"{robot} drives onto {charger}, where {before} is")
+        self._pads[charger] = robot
+        self.note(f"{robot} is on the pad of {charger}")
+
+    def off_pad(self, robot: str, charger: str) -> None:
+        """It has left."""
+        del self._pads[charger]
+        self.note(f"{robot} has left the pad of {charger}")
+
+    # ---- nobody waits for ever, and the end
+
+    def waits(self, robot: str, what: str, since: float) -> None:
+        """A robot still waits for this."""
+        calm_since = self._ills.calm_since()
+        waited = self._timeline.now - max(since, calm_since)
+        self.require(
+            waited <= BOUND_S,
+            f"{robot} waits for {what} since {since:.0f} s, and"
+            f" everything is well since {calm_since:.0f} s",
+        )
+
+    def at_rest(self) -> None:
+        """The day is over: nothing is driven, shown or held."""
+        for name, on in self._relays.items():
+            self.require(not on, f"{name} drives {sorted(on)} at the end of the day")
+        for name, truth in self._lifts.items():
+            self.require(not truth.session, f"{name} shows {truth.session} at the end of the day")
+        for name in self._doors:
+            closed = self._daemons[name].device.plant.contact("closed")
+            self.require(closed, f"{name} is not closed at the end of the day")
+        for name, daemon in self._daemons.items():
+            self.require(not daemon.faults(), f"{name}: {daemon.faults()} at the end of the day")
+
+
+def _words(request: d.LiftRequest | d.DoorRequest) -> str:
+    if isinstance(request, d.DoorRequest):
+        mode = d.DoorModeValue(request.requested_mode.value).name[5:]
+        return f"{request.door_name} is to be {mode}"
+    word = d.LiftRequestType(request.request_type).name[8:]
+    return f"{request.lift_name}: {word} {request.session_id} to {request.destination_floor or '-'}"

@@ -1,0 +1,164 @@
+"""The site's graph: the `memory` transport, with a network between its ends.
+
+Within what RELIABLE and KEEP_LAST promise: of one writer a reader gets each sample in order, late
+where the network had to repeat it. A reader that is best effort in the field (RMF's own, for states, on
+Fast DDS) loses some; to be harsher than DDS so does everybody, seldom, and a few come twice. A node
+that is cut off for less than a lease gets everything afterwards, in one burst; one that is cut off for
+longer has lost it, and what others retain for it comes once more.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from random import Random
+from typing import Any
+
+from bridges.rmf.definitions import Message
+from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.topics import DOOR_STATES, LIFT_STATES, Topic
+from tests.site.timeline import NEVER, Timeline
+
+LEASE_S = 10.0
+STATES = (LIFT_STATES.name, DOOR_STATES.name)
+RETAINED = "retained"
+"""Who speaks when a late joiner is given what was kept for it."""
+
+Watch = Callable[[str, Topic[Any], Message], None]
+
+
+@dataclass(frozen=True)
+class Weather:
+    """Probabilities: a sample is lost, a state is lost to RMF, it comes late, it comes twice."""
+
+    lost: float = 0.005
+    states_lost: float = 0.02
+    late: float = 0.02
+    twice: float = 0.005
+    latest_s: float = 2.0
+
+
+CLEAR = Weather(0.0, 0.0, 0.0, 0.0)
+
+
+class Air:
+    """Between all nodes. `best_effort`: who hears states as RMF does. `watch` hears all."""
+
+    def __init__(self, timeline: Timeline, random: Random) -> None:
+        self.timeline = timeline
+        self.memory = MemoryNetwork()
+        self.weather = Weather()
+        self.best_effort: set[str] = set()
+        self.watch: Watch = lambda speaker, topic, message: None
+        self.speaker = RETAINED
+        self.counts = dict.fromkeys(("sent", "arrived", "lost", "late", "twice"), 0)
+        self._random = random
+        self._cut: dict[str, float] = {}
+        self._arrived: dict[tuple[str, str, str], float] = {}
+
+    def cut_off(self, name: str, until: float) -> None:
+        """Nothing gets to it or from it until then."""
+        self._cut[name] = until
+        lost = until - self.timeline.now > LEASE_S
+        self.timeline.at(until, partial(self._found_again, name, lost))
+
+    def delays(self, speaker: str, hearer: str, topic: Topic[Any]) -> Sequence[float]:
+        """When a sample arrives (s from now), for each copy of it that does."""
+        weather, random, now = self.weather, self._random.random, self.timeline.now
+        until = max(self._cut.get(speaker, 0.0), self._cut.get(hearer, 0.0))
+        delay = 0.002 + 0.02 * random()
+        if until > now:
+            if until - now > LEASE_S:
+                return ()
+            delay += until - now
+        draw = random()
+        lost = weather.lost
+        if hearer in self.best_effort and topic.name in STATES:
+            lost += weather.states_lost
+        if draw < lost:
+            return ()
+        if draw > 1.0 - weather.late:
+            self.counts["late"] += 1
+            delay += weather.latest_s * random()
+        if random() < weather.twice:
+            self.counts["twice"] += 1
+            return (delay, delay + 0.1 * random())
+        return (delay,)
+
+    def carry(
+        self, hearer: "Place", topic: Topic[Any], received: Callable[[Any], None], message: Any
+    ) -> None:
+        """Take one sample to one subscription."""
+        self.counts["sent"] += 1
+        delays = self.delays(self.speaker, hearer.name, topic)
+        link = (self.speaker, hearer.name, topic.name)
+        for delay in delays:
+            at = max(self.timeline.now + delay, self._arrived.get(link, 0.0))
+            self._arrived[link] = at
+            self.timeline.at(at, partial(hearer.arrive, received, message))
+        if not delays:
+            self.counts["lost"] += 1
+
+    def _found_again(self, name: str, lost: bool) -> None:
+        if not lost or self._cut.get(name, NEVER) > self.timeline.now:
+            return
+        for end in list(self.memory.subscriptions):
+            if end.node.name == name:
+                end.catch_up()
+            else:
+                self._give_again(name, end)
+
+    def _give_again(self, name: str, end: Any) -> None:
+        """What the one who is back has retained for this subscription."""
+        for publisher in self.memory.publishers:
+            if publisher.node.name == name and _wants_retained(end, publisher):
+                for message in list(publisher.retained):
+                    end.received(message)
+
+
+class Place(MemoryTransport):
+    """One node's place on the graph. `heard` is called after each sample that it got."""
+
+    def __init__(self, air: Air, name: str, heard: Callable[[], None]) -> None:
+        super().__init__(air.memory, name)
+        self._air = air
+        self._heard = heard
+
+    def publisher(self, topic: Topic[Any]) -> Any:
+        return _Mouth(self, self._air, super().publisher(topic))
+
+    def subscribe(
+        self, topic: Topic[Any], received: Callable[[Any], None], *, others_only: bool = False
+    ) -> Any:
+        carried = partial(self._air.carry, self, topic, received)
+        return super().subscribe(topic, carried, others_only=others_only)
+
+    def arrive(self, received: Callable[[Any], None], message: Any) -> None:
+        """It is here, if the node still is."""
+        if not self._closed:
+            self._air.counts["arrived"] += 1
+            received(message)
+            self._heard()
+
+
+class _Mouth:
+    def __init__(self, place: Place, air: Air, inner: Any) -> None:
+        self._name = place.name
+        self._air = air
+        self._inner = inner
+
+    def publish(self, message: Any) -> None:
+        self._air.watch(self._name, self._inner.topic, message)
+        self._air.speaker = self._name
+        self._inner.publish(message)
+        self._air.speaker = RETAINED
+
+    def matched(self) -> int:
+        return int(self._inner.matched())
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+def _wants_retained(end: Any, publisher: Any) -> bool:
+    both = end._topic.subscribe.durability, publisher.topic.publish.durability
+    return both == ("transient_local", "transient_local") and bool(end.hears(publisher))

@@ -1,0 +1,230 @@
+"""The same robots in real time, on DDS: each fleet adapter is a node of its own, and so is each daemon.
+
+Whoever is killed here is killed as a process is; what the robots are promised by RMF is held against
+the edges of the plants, which their control sockets tell.
+"""
+
+import signal
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from random import Random
+from typing import Any
+
+from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from bridges.rmf.dds import DdsTransport
+from bridges.rmf.topics import Topic
+from bridges.rmf.transport import Publisher, Subscription
+from hal_fakes.demo.daemons import Daemon, stop_all
+from hal_fakes.plant import Edge
+from tests.site.robots import Places, Resident
+from tests.site.timeline import EPOCH, Timeline
+
+CONFIG = Path(__file__).parents[2] / "config"
+FILES = {
+    "lift": CONFIG / "lift_dry_contact.yaml",
+    "door": CONFIG / "door_modbus.yaml",
+    "lift supervisor": CONFIG / "lift_supervisor.yaml",
+    "door supervisor": CONFIG / "door_supervisor.yaml",
+}
+LIFT, DOOR = "Lift1", "ward_door"
+PLACES = Places(["L1", "L2"], [LIFT], [DOOR])
+PACE = 0.05
+PATIENCE_S = 60.0
+"""Nobody waits for longer, whoever was killed meanwhile."""
+
+
+class RealTime(Timeline):
+    """A timeline that follows the clock, and takes what other threads post."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._began = time.monotonic()
+        self._posted: SimpleQueue[Callable[[], None]] = SimpleQueue()
+
+    def post(self, what: Callable[[], None]) -> None:
+        """From any thread: let this happen now."""
+        self._posted.put(what)
+
+    def until(self, done: Callable[[], bool], check: Callable[[], None]) -> None:
+        """Live until it is done; `check` raises when there is no point in going on."""
+        while not done():
+            self.run(time.monotonic() - self._began)
+            check()
+            try:
+                what = self._posted.get(timeout=0.02)
+            except Empty:
+                continue
+            self.now = max(self.now, time.monotonic() - self._began)
+            what()
+
+
+class DdsPlace:
+    """One node on DDS, whose messages come at the timeline's own time."""
+
+    def __init__(self, timeline: RealTime, domain: int, name: str) -> None:
+        self.name = name
+        self.dropped: dict[str, int] = {}
+        self._timeline = timeline
+        self._closed = False
+        self._inner = DdsTransport(name.replace("/", "_"), domain, loopback=True)
+
+    def publisher(self, topic: Topic[Any]) -> Publisher[Any]:
+        return self._inner.publisher(topic)
+
+    def subscribe(
+        self, topic: Topic[Any], received: Callable[[Any], None], *, others_only: bool = False
+    ) -> Subscription:
+        def post(message: Any) -> None:
+            self._timeline.post(partial(self._arrive, received, message))
+
+        return self._inner.subscribe(topic, post, others_only=others_only)
+
+    def close(self) -> None:
+        self._closed = True
+        self._inner.close()
+
+    def _arrive(self, received: Callable[[Any], None], message: Any) -> None:
+        if not self._closed:
+            received(message)
+
+
+class RealSite:
+    """A lift, a door, both supervisors, and robots that compete for them (`robots.Ground`)."""
+
+    def __init__(self, directory: Path, domain: int, names: tuple[str, ...]) -> None:
+        self.timeline = RealTime()
+        self.opinions = 0
+        self.sessions: list[str] = [""]
+        self._directory = directory
+        self._domain = domain
+        self._started = 0
+        self._inside: set[str] = set()
+        self._across: dict[str, str] = {}
+        self._edges: dict[tuple[str, str], bool] = {}
+        self.daemons: dict[str, Daemon] = {}
+        self.observer = DdsPlace(self.timeline, domain, "observer")
+        self.observer.subscribe(topics.LIFT_STATES, self._lift_state)
+        self.voices = self.observer.subscribe(topics.LIFT_REQUESTS, lambda message: None)
+        for party in FILES:
+            self.start(party)
+        self.robots = [self._robot(f"fleet/{name}") for name in names]
+
+    def start(self, party: str) -> None:
+        """A daemon, in the place of the one that was killed."""
+        self._started += 1
+        directory = self._directory / str(self._started)
+        directory.mkdir()
+        self.daemons[party] = daemon = Daemon(FILES[party], directory, self._domain)
+        if party in ("lift", "door"):
+            daemon.follow(lambda edge: self.timeline.post(partial(self._edge, edge)))
+
+    def restart(self, party: str, how: signal.Signals) -> None:
+        """Kill it, as a process is killed: with SIGKILL nothing is said any more. Start another."""
+        daemon = self.daemons.pop(party)
+        if party in ("lift", "door"):
+            device = LIFT if party == "lift" else DOOR
+            self._across = {r: where for r, where in self._across.items() if where != device}
+            self._edges = {key: on for key, on in self._edges.items() if key[0] != device}
+        if how == signal.SIGTERM:
+            daemon.ask_to_stop()
+        daemon.end(time.monotonic() + (10.0 if how == signal.SIGTERM else 0.0))
+        self.start(party)
+
+    def restart_adapter(self, robot: Resident) -> None:
+        """A new fleet adapter for this robot, which stays where it is."""
+        robot.kill()
+        self._across.pop(robot.name, None)
+        self._inside.discard(robot.name)
+        robot.start()
+
+    def check(self) -> None:
+        """All daemons live, and nobody waits for ever. Raises Wrong or AssertionError."""
+        for daemon in self.daemons.values():
+            daemon.check()
+        for robot in self.robots:
+            waited_s = self.timeline.now - robot.since
+            assert not robot.waits_for or waited_s < PATIENCE_S, f"{robot.name}: {robot.waits_for}"
+
+    def until(self, done: Callable[[], bool]) -> None:
+        """Let them live until it is done."""
+        self.timeline.until(done, self.check)
+
+    def done(self, what: str) -> int:
+        """How often the robots have done this, together."""
+        return sum(robot.done[what] for robot in self.robots)
+
+    def driven(self) -> list[tuple[str, str]]:
+        """What is on at the terminal blocks: (device, relay)."""
+        return [key for key, on in self._edges.items() if on and key[1] in RELAYS]
+
+    def close(self) -> None:
+        """Everybody goes home, whatever has happened."""
+        for robot in self.robots:
+            if robot.alive:
+                robot.kill()
+        self.observer.close()
+        stop_all(self.daemons.values())
+
+    def _robot(self, name: str) -> Resident:
+        def join(name: str) -> DdsPlace:
+            robot.skew = time.time() - EPOCH - self.timeline.now
+            return DdsPlace(self.timeline, self._domain, name)
+
+        robot = Resident(self.timeline, join, self, name, Random(name), PLACES, PACE)
+        return robot
+
+    # ---- the laws
+
+    def _lift_state(self, state: d.LiftState) -> None:
+        before = self.sessions[-1]
+        if state.session_id != before:
+            handed = before and state.session_id
+            assert not handed, f"the lift went from {before} to {state.session_id}"
+            self.sessions.append(state.session_id)
+
+    def _edge(self, edge: Edge) -> None:
+        self._edges[edge.device, edge.signal] = bool(edge.value)
+        lets_go = edge.signal in ("door_open", "hold_open") and not edge.value
+        across = [robot for robot, where in self._across.items() if where == edge.device]
+        assert not (lets_go and across), f"{edge.device} lets its door go with {across} in it"
+
+    # ---- where the robots are
+
+    def may_enter_lift(self, robot: Resident, lift: str, floor: str) -> bool:
+        return self._edges.get((lift, "door"), False)
+
+    def boards(self, robot: Resident, lift: str, floor: str) -> None:
+        assert not self._inside - {robot.name}, f"{robot.name} meets {self._inside} in the car"
+        self._inside.add(robot.name)
+        self._across[robot.name] = lift
+
+    def leaves(self, robot: Resident, lift: str, floor: str) -> None:
+        self._across[robot.name] = lift
+
+    def crossed(self, robot: Resident) -> None:
+        self._across.pop(robot.name, None)
+
+    def is_out(self, robot: Resident, lift: str) -> None:
+        self._inside.discard(robot.name)
+
+    def may_enter_door(self, robot: Resident, door: str) -> bool:
+        return self._edges.get((door, "opened"), False)
+
+    def in_doorway(self, robot: Resident, door: str) -> None:
+        self._across[robot.name] = door
+
+    def on_pad(self, robot: Resident, charger: str) -> None:
+        """There is no charger."""
+
+    def off_pad(self, robot: Resident, charger: str) -> None:
+        """There is no charger."""
+
+    def charged(self, charger: str) -> bool:
+        return True
+
+
+RELAYS = {"hold_open", "door_open", "agv_mode_request", *(f"call_L{n}" for n in range(1, 5))}

@@ -1,0 +1,387 @@
+"""The robots: each with its fleet adapter (RMF's rules, `hal_fakes.rmf`) and a day without end.
+
+Again and again: through a door, to another floor by lift, through another door, sometimes to a charger,
+sometimes a rest. Now and then a task is cancelled while it waits. An adapter that dies forgets all but
+where its robot stands; then the robot is led out of there first.
+"""
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from random import Random
+from typing import Any, Protocol
+
+from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from bridges.rmf.stamps import duration
+from bridges.rmf.transport import Transport
+from hal_fakes.rmf.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
+from hal_fakes.rmf.robot import Phase, Robot
+from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
+
+FRESH_S = 2.5
+"""A charger's state as old as this is not driven by."""
+PAD_S = 2.0
+"""From the pad's edge onto it, and off it again."""
+CHARGER_PATIENCE_S = 8.0
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where robots go, by RMF's names."""
+
+    floors: list[str]
+    lifts: list[str]
+    doors: list[str]
+    chargers: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Within:
+    """A phase that is cancelled when it has taken so long (s)."""
+
+    phase: Phase
+    patience_s: float = NEVER
+
+
+Want = Within | float
+Day = Generator[Want, bool, None]
+"""What a day waits for next, a phase or seconds; it is told whether the phase was done."""
+
+
+class Ground(Protocol):
+    """Where the robots really are: what the building has to do with them."""
+
+    def may_enter_lift(self, robot: "Resident", lift: str, floor: str) -> bool:
+        """Does it see an open car there?"""
+
+    def boards(self, robot: "Resident", lift: str, floor: str) -> None:
+        """It crosses the threshold of the car, inwards."""
+
+    def leaves(self, robot: "Resident", lift: str, floor: str) -> None:
+        """It crosses the threshold outwards."""
+
+    def crossed(self, robot: "Resident") -> None:
+        """It is across: the car's threshold or the doorway."""
+
+    def is_out(self, robot: "Resident", lift: str) -> None:
+        """It is out of the car."""
+
+    def may_enter_door(self, robot: "Resident", door: str) -> bool:
+        """Does it see an open door?"""
+
+    def in_doorway(self, robot: "Resident", door: str) -> None:
+        """It stands in the doorway."""
+
+    def on_pad(self, robot: "Resident", charger: str) -> None:
+        """It has arrived on the pad."""
+
+    def off_pad(self, robot: "Resident", charger: str) -> None:
+        """It has left the pad."""
+
+    def charged(self, charger: str) -> bool:
+        """Its battery is full."""
+
+
+class Resident:
+    """One robot. `waits_for`, since `since`: what it is told by RMF to wait for.
+
+    `join(name)`: a place on the graph for its adapter. `pace`: its pauses, against those of a robot.
+
+    `disturbed_at`: when its adapter last died: what RMF then says in its name is not its wish.
+    """
+
+    def __init__(
+        self,
+        timeline: Timeline,
+        join: Callable[[str], Transport],
+        ground: Ground,
+        name: str,
+        random: Random,
+        places: Places,
+        pace: float = 1.0,
+    ) -> None:
+        self.name = name
+        self.floor = random.choice(places.floors)
+        self.alive = False
+        self.homing = False
+        self.waits_for = ""
+        self.since = 0.0
+        self.disturbed_at = -NEVER
+        self.skew = random.uniform(-3.0, 3.0)
+        self.done = {"doors": 0, "rides": 0, "charges": 0, "cancelled": 0}
+        self.in_car: tuple[str, str, str] | None = None
+        self.doorway = ""
+        self.pad = ""
+        self.robot: Robot
+        self._timeline = timeline
+        self._join = join
+        self._ground = ground
+        self._random = random
+        self._places = places
+        self._pace = pace
+        self._alarm = Alarm(timeline, self._tick)
+        self._until = NEVER
+        self._awaits: Phase | None = None
+        self._day: Day
+        self._place: Transport
+        self._publishers: dict[str, Any] = {}
+        self._stations: dict[str, tuple[float, d.ChargerState]] = {}
+        self._request = 0
+
+    # ---- the adapter
+
+    def start(self) -> None:
+        """A new fleet adapter: it knows where its robot is, and nothing else."""
+        self.alive = True
+        self.robot = Robot(self.name)
+        self.robot.in_car = self.in_car is not None
+        self._place = self._join(self.name)
+        published = (
+            topics.ADAPTER_LIFT_REQUESTS,
+            topics.ADAPTER_DOOR_REQUESTS,
+            topics.CHARGER_REQUESTS,
+            topics.CHARGER_CANCELS,
+        )
+        self._publishers = {t.name: self._place.publisher(t) for t in published}
+        for topic in (*self.robot.subscribes, topics.CHARGER_STATES):
+            self._place.subscribe(topic, self._hear)
+        self._day = self._live()
+        self._go_on(True, first=True)
+
+    def kill(self) -> None:
+        """The adapter dies. Its robot stays where it is."""
+        self.alive = False
+        self.disturbed_at = self._timeline.now
+        self._alarm.set(NEVER)
+        self._until, self._awaits, self.waits_for = NEVER, None, ""
+        self._place.close()
+        self._day.close()
+
+    @property
+    def at_rest(self) -> bool:
+        """It has nothing to do any more."""
+        return self.homing and not (self.waits_for or self.in_car or self.doorway or self.pad)
+
+    @property
+    def _wall(self) -> float:
+        return EPOCH + self._timeline.now + self.skew
+
+    def _hear(self, message: Any) -> None:
+        if isinstance(message, d.ChargerState):
+            self._stations[message.charger_name] = (self._timeline.now, message)
+            return
+        self._say(self.robot.hear(message, self._wall))
+        self._look()
+
+    def _tick(self) -> None:
+        if self._wall >= self.robot.wake_at() - 1e-6:
+            self._say(self.robot.tick(self._wall + 1e-6))
+        self._look()
+
+    def _look(self) -> None:
+        """Is what the day waits for there?"""
+        if self._awaits is not None and self._awaits.done:
+            self._go_on(True)
+        elif self._timeline.now >= self._until:
+            self._go_on(False)
+        else:
+            self._set_alarm()
+
+    def _go_on(self, done: bool, first: bool = False) -> None:
+        """The next thing of the day."""
+        if self._awaits is not None and not done:
+            self.robot.phase = None
+            self.done["cancelled"] += 1
+        want = next(self._day) if first else self._day.send(done)
+        now = self._timeline.now
+        if isinstance(want, Within):
+            self._awaits, self._until = want.phase, now + want.patience_s
+            self.waits_for, self.since = _words(want.phase), now
+            self._say(self.robot.begin(want.phase, self._wall))
+        else:
+            self._awaits, self._until = None, now + want
+        self._look() if self._awaits is not None and self._awaits.done else self._set_alarm()
+
+    def _set_alarm(self) -> None:
+        wake_at = self.robot.wake_at() - EPOCH - self.skew
+        self._alarm.set(min(self._until, wake_at))
+
+    def _say(self, said: Any) -> None:
+        for topic, message in said:
+            self._publishers[topic.name].publish(message)
+
+    # ---- the day
+
+    def _live(self) -> Day:
+        yield from self._get_clear()
+        while not self.homing:
+            self.robot.on_task = True
+            yield from self._through_door(self._random.choice(self._places.doors))
+            yield from self._ride()
+            yield from self._through_door(self._random.choice(self._places.doors))
+            if self._places.chargers and self._random.random() < 0.3:
+                yield from self._charge()
+            self.robot.on_task = False
+            yield self._pause(1.0, 30.0)
+        self.waits_for = ""
+        while True:
+            yield 60.0
+
+    def _pause(self, least_s: float, most_s: float) -> float:
+        """The robot drives, or rests: nothing is waited for."""
+        self.waits_for = ""
+        return self._pace * self._random.uniform(least_s, most_s)
+
+    def _patience(self) -> float:
+        """Seldom a task is cancelled."""
+        return self._random.uniform(0.5, 20.0) if self._random.random() < 0.04 else NEVER
+
+    def _get_clear(self) -> Day:
+        """After its adapter's death: out of wherever it stands."""
+        if self.doorway:
+            yield self._pause(1.0, 5.0)
+            self.doorway = ""
+            self._ground.crossed(self)
+        if self.pad:
+            yield from self._off_pad()
+        if self.in_car:
+            lift, _, target = self.in_car
+            if self._random.random() < 0.5:  # RMF sees our session meanwhile, and ends it
+                yield self._pause(1.0, 4.0)
+            yield from self._ride_on(lift, target)
+        yield self._pause(0.1, 3.0)
+
+    def _through_door(self, door: str) -> Day:
+        opened = yield Within(DoorOpen(door), self._patience())
+        if opened:
+            while not self._ground.may_enter_door(self, door):
+                yield 0.5
+            self.doorway = door
+            self._ground.in_doorway(self, door)
+            yield self._pause(3.0, 12.0)
+            self.doorway = ""
+            self._ground.crossed(self)
+            self.done["doors"] += 1
+        yield Within(DoorClose(door))
+        yield self._pause(2.0, 10.0)
+
+    def _ride(self) -> Day:
+        lift = self._random.choice(self._places.lifts)
+        target = self._random.choice([f for f in self._places.floors if f != self.floor])
+        came = yield Within(RequestLift(lift, self.floor, inside=False), self._patience())
+        if not came:
+            return  # another task; the context lets the lift go when nothing has wanted it for 30 s
+        while not self._ground.may_enter_lift(self, lift, self.floor):
+            yield 0.5
+        self.in_car = (lift, self.floor, target)
+        self._ground.boards(self, lift, self.floor)
+        yield self._pause(3.0, 7.0)
+        self.robot.in_car = True
+        self._ground.crossed(self)
+        yield from self._ride_on(lift, target)
+
+    def _ride_on(self, lift: str, target: str) -> Day:
+        yield Within(RequestLift(lift, target, inside=True))
+        while not self._ground.may_enter_lift(self, lift, target):
+            yield 0.5
+        self.in_car = (lift, target, target)
+        self._ground.leaves(self, lift, target)
+        yield self._pause(3.0, 7.0)
+        self.robot.in_car, self.in_car, self.floor = False, None, target
+        self._ground.crossed(self)
+        self._ground.is_out(self, lift)
+        yield Within(EndLiftSession(lift))
+        self.done["rides"] += 1
+        yield self._pause(2.0, 10.0)
+
+    # ---- charging: nothing in RMF asks for it; our own words
+
+    def _charge(self) -> Day:
+        """Try the stations until one is ours; drive there; charge; leave."""
+        self.waits_for, self.since = "a charger", self._timeline.now
+        while not self.homing:
+            for charger in self._random.sample(self._places.chargers, len(self._places.chargers)):
+                state = self._station(charger)
+                blindly = self._random.random() < 0.5
+                if not blindly and (
+                    state is None or state.state != d.ChargerStateValue.CHARGER_IDLE
+                ):
+                    continue
+                request_id = self._new_request()
+                if (yield from self._is_assigned(charger, request_id)):
+                    yield self._random.uniform(4.0, 12.0)  # the way there
+                    if (yield from self._charge_at(charger, request_id)):
+                        return
+                yield from self._cancel(charger, request_id)
+            yield 1.0
+
+    def _is_assigned(self, charger: str, request_id: str) -> Generator[Want, bool, bool]:
+        give_up_at = self._timeline.now + CHARGER_PATIENCE_S
+        while self._timeline.now < give_up_at:
+            fleet, robot = self.name.split("/")
+            wish = d.ChargerRequest(charger, fleet, robot, duration(60), request_id)
+            self._say([(topics.CHARGER_REQUESTS, wish)])
+            yield 1.0
+            if self._is_ours(charger, request_id):
+                return True
+        return False
+
+    def _charge_at(self, charger: str, request_id: str) -> Generator[Want, bool, bool]:
+        """True if current has flowed. It goes onto the pad only while that is said to be ours."""
+        if not self._is_ours(charger, request_id):
+            return False
+        yield PAD_S
+        self.pad = charger
+        self._ground.on_pad(self, charger)
+        leave_at = self._timeline.now + self._random.uniform(15.0, 60.0)
+        flowed = False
+        while self._timeline.now < leave_at and not self._ground.charged(charger):
+            state = self._station(charger)
+            flowed |= state is not None and state.state == d.ChargerStateValue.CHARGER_CHARGING
+            yield 0.5
+        yield from self._off_pad()
+        self.done["charges"] += flowed
+        return flowed
+
+    def _off_pad(self) -> Day:
+        yield PAD_S
+        charger, self.pad = self.pad, ""
+        self._ground.off_pad(self, charger)
+
+    def _cancel(self, charger: str, request_id: str) -> Day:
+        """Until the station does not show the request any more."""
+        for _ in range(5):
+            self._say([(topics.CHARGER_CANCELS, d.ChargerCancel(charger, request_id))])
+            yield 1.0
+            state = self._station(charger)
+            if state is not None and state.request_id != request_id:
+                return
+
+    def _is_ours(self, charger: str, request_id: str) -> bool:
+        state = self._station(charger)
+        assigned = state is not None and state.state == d.ChargerStateValue.CHARGER_ASSIGNED
+        return assigned and state is not None and state.request_id == request_id
+
+    def _station(self, charger: str) -> d.ChargerState | None:
+        """Its latest state, if that is fresh."""
+        at, state = self._stations.get(charger, (-NEVER, None))
+        return state if self._timeline.now - at <= FRESH_S else None
+
+    def _new_request(self) -> str:
+        self._request += 1
+        return f"{self.name}/{self._request}"
+
+
+def _words(phase: Phase) -> str:
+    """What a phase waits for, as a person says it."""
+    match phase:
+        case RequestLift():
+            inside = " from inside" if phase.wanted.inside else ""
+            return f"{phase.wanted.lift} at {phase.wanted.floor}{inside}"
+        case EndLiftSession():
+            return f"{phase.lift} to be released"
+        case DoorOpen():
+            return f"{phase.door} open"
+        case DoorClose():
+            return f"{phase.door} let go"
+    return type(phase).__name__

@@ -1,0 +1,49 @@
+"""Robots compete for one lift and one door on DDS, and every daemon and an adapter is killed once."""
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hal_fakes.domain import free_domain
+from tests.site.on_dds import RealSite
+
+
+@pytest.fixture
+def site(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[RealSite]:
+    directory: Path = tmp_path_factory.mktemp("s")  # a socket's name has 107 characters at the most
+    monkeypatch.setenv("XDG_STATE_HOME", str(directory))
+    site = RealSite(directory, free_domain(), ("red", "green", "blue"))
+    yield site
+    site.close()
+
+
+@pytest.mark.timeout(180)
+def test_three_robots_share_a_lift_and_a_door_while_everybody_is_killed_once(
+    site: RealSite,
+) -> None:
+    for robot in site.robots:
+        robot.start()
+    _they_get_on(site)
+    for party, how in (("lift supervisor", signal.SIGTERM), ("door", signal.SIGKILL)):
+        site.restart(party, how)
+    site.restart_adapter(site.robots[0])
+    _they_get_on(site)
+    for party, how in (("lift", signal.SIGKILL), ("door supervisor", signal.SIGKILL)):
+        site.restart(party, how)
+    _they_get_on(site)
+    for robot in site.robots:
+        robot.homing = True
+    site.until(lambda: all(robot.at_rest for robot in site.robots))
+    site.until(lambda: site.sessions[-1] == "" and site.driven() == [])
+    assert all(robot.done["rides"] > 0 for robot in site.robots)
+    assert site.voices.matched() == 1
+
+
+def _they_get_on(site: RealSite) -> None:
+    """Somebody has ridden, and two have gone through the door."""
+    rides, doors = site.done("rides"), site.done("doors")
+    site.until(lambda: site.done("rides") > rides and site.done("doors") > doors + 1)

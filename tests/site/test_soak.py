@@ -1,0 +1,40 @@
+"""A short day at the site, for a few seeds; `make soak` plays whole days."""
+
+import pytest
+
+from tests.site.day import Site
+from tests.site.growth import Look, growth
+
+MINUTES = 20
+
+
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_site_lives_through_its_troubles(seed: int) -> None:
+    """If this fails: `make soak SEED=… HOURS=0.3333` plays it again, and prints what went before."""
+    site = Site(seed)
+    site.run(MINUTES / 60)
+    done = site.counts()
+    assert done["rides"] > 20
+    assert done["doors"] > 40
+    assert sum(site.trouble.counts.values()) > 5
+
+
+@pytest.mark.timeout(240)
+def test_the_same_seed_is_the_same_day() -> None:
+    days = [Site(5), Site(5)]
+    for day in days:
+        day.run(0.15)
+    assert days[0].counts() == days[1].counts()
+    assert list(days[0].laws.log) == list(days[1].laws.log)
+
+
+def test_what_grows_by_the_hour_is_told() -> None:
+    flat = [Look(hour, 1, 6, 33_000 + 100 * (hour % 2), 34.0) for hour in range(1, 6)]
+    assert growth(flat) == []
+    assert growth([*flat, Look(6, 2, 9, 39_000, 60.0)]) == [
+        "threads: 1 to 2",
+        "descriptors: 6 to 9",
+        "objects: 33000 to 39000",
+        "memory: 34.0 to 60.0 MB",
+    ]

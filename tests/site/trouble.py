@@ -1,0 +1,246 @@
+"""What goes wrong, and when it is mended: from the seed alone.
+
+Trouble comes in bouts: a few things break within a minute, each is mended after a while, and then there
+is calm, sometimes long enough that everybody must have got what they wait for. Who mends a wire, a part
+or a fire latch also resets the device (`rmf-bridge reset`), as a technician does; after restarts, cuts,
+lost buses and hazards that clear by themselves nobody resets anything.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from random import Random
+from typing import Protocol
+
+from bridges.lift.signals import Hazard
+from hal_fakes.charger_plant import CAUSES, ChargerPlant
+from hal_fakes.door_plant import DoorPlant
+from hal_fakes.lift_plant import FAILS, LiftPlant
+from hal_fakes.plant import FailureMode
+from tests.site.building import Device
+from tests.site.timeline import NEVER, Timeline
+
+WIRE_MODES: tuple[FailureMode, ...] = ("off", "stuck", "slow", "garbage", "wrong")
+LIES: tuple[FailureMode, ...] = ("stuck", "slow", "garbage", "wrong")
+RESET = ", to be reset"
+BY_RESET_S = 4.0
+"""After the repair: hazards have cleared, the technician resets, the device is itself again."""
+LIFT_HAZARDS = ("fire_alarm", "code_blue", "manual_mode", "earthquake")
+
+
+class Ills:
+    """What ails whom, since when; and what has, until when. `device` may be any party."""
+
+    def __init__(self, timeline: Timeline) -> None:
+        self._timeline = timeline
+        self._now: dict[str, dict[str, float]] = {}
+        self._over: dict[str, dict[str, float]] = {}
+        self._modes: dict[tuple[str, str], FailureMode] = {}
+        self._obstructed: dict[str, float] = {}
+        self._calm_at = 0.0
+
+    def begin(self, device: str, what: str, mode: FailureMode | None = None) -> None:
+        """It breaks."""
+        self._now.setdefault(device, {})[what] = self._timeline.now
+        if mode is not None:
+            self._modes[device, what] = mode
+
+    def end(self, device: str, what: str) -> None:
+        """It is well again."""
+        del self._now[device][what]
+        self._over.setdefault(device, {})[what] = self._timeline.now
+        self._calm_at = self._timeline.now
+
+    def has(self, device: str, what: str) -> bool:
+        """Is it broken?"""
+        return what in self._now.get(device, {})
+
+    def any(self, device: str) -> bool:
+        """Is anything wrong with it?"""
+        return bool(self._now.get(device))
+
+    def since(self, device: str, what: str) -> float:
+        """Since when it is broken; inf: it is not."""
+        return self._now.get(device, {}).get(what, NEVER)
+
+    def since_over(self, device: str, *what: str) -> float:
+        """Since when all of these have been well again."""
+        over = self._over.get(device, {})
+        return max(over.get(one, -NEVER) for one in what)
+
+    def well_since(self, device: str) -> float:
+        """Since when nothing has been wrong with it; inf: something is."""
+        if self.any(device):
+            return NEVER
+        return max(self._over.get(device, {}).values(), default=-NEVER)
+
+    def lying(self, device: str, settles_s: float) -> Iterator[str]:
+        """The wires and parts that say what is not so, or did a moment ago."""
+        for (name, what), mode in self._modes.items():
+            if name != device or mode not in LIES:
+                continue
+            over_at = self._over.get(device, {}).get(what, -NEVER)
+            if self.has(device, what) or over_at + settles_s > self._timeline.now:
+                yield what
+
+    def hazard_since(self, device: str) -> float:
+        """Since when a hazard is there whose wire is sound; inf: none is."""
+        now, over = self._now.get(device, {}), self._over.get(device, {})
+        return min(
+            (
+                max(since, over.get(what.removeprefix("hazard "), -NEVER))
+                for what, since in now.items()
+                if what.startswith("hazard ")
+                and not what.endswith(RESET)
+                and what.removeprefix("hazard ") not in now
+            ),
+            default=NEVER,
+        )
+
+    def obstruct(self, device: str) -> None:
+        """Somebody stands in the doorway from now on."""
+        self._obstructed[device] = self._timeline.now
+
+    def obstructed_since(self, device: str) -> float:
+        """Since when."""
+        return self._obstructed.get(device, NEVER)
+
+    def calm_since(self) -> float:
+        """Since when nothing at all has been wrong; inf: something is."""
+        return NEVER if any(self._now.values()) else self._calm_at
+
+    def all(self) -> list[str]:
+        """What is wrong now."""
+        return [f"{device}: {what}" for device, ills in self._now.items() for what in ills]
+
+
+class Mortal(Protocol):
+    """A party that can be killed and started."""
+
+    name: str
+    alive: bool
+
+    def start(self) -> None: ...
+
+    def kill(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Ill:
+    """One thing that can go wrong: with whom, what, how it begins and ends, how long it lasts (s).
+
+    `sort`: to count it by. `reset`: what whoever mends it does afterwards, if it was broken for longer
+    than `heals_s` (s): until then it comes right by itself.
+    """
+
+    sort: str
+    device: str
+    what: str
+    begin: Callable[[], None]
+    end: Callable[[], None]
+    least_s: float = 3.0
+    most_s: float = 90.0
+    mode: FailureMode | None = None
+    reset: Callable[[], None] | None = None
+    heals_s: float = 0.0
+
+
+class Trouble:
+    """Bouts of it. `draw`: something that may go wrong now."""
+
+    def __init__(
+        self,
+        timeline: Timeline,
+        ills: Ills,
+        random: Random,
+        draw: Callable[[Random], Ill],
+        note: Callable[[str], None],
+    ) -> None:
+        self.counts: dict[str, int] = {}
+        self.over_at = NEVER
+        self._timeline = timeline
+        self._ills = ills
+        self._random = random
+        self._draw = draw
+        self._note = note
+
+    def begin(self, until: float) -> None:
+        """The first bout, and others after it, all over by then."""
+        self.over_at = until
+        self._timeline.after(self._random.uniform(20.0, 60.0), self._bout)
+
+    def _bout(self) -> None:
+        random, now = self._random, self._timeline.now
+        last = now
+        for _ in range(random.randint(3, 10)):
+            at = now + random.uniform(0.0, 60.0)
+            lasts = self._strike(at)
+            last = max(last, lasts)
+        calm_s = random.uniform(5.0, 45.0) if random.random() < 0.75 else random.uniform(310, 350)
+        if last + calm_s + 120.0 < self.over_at:
+            self._timeline.at(last + calm_s, self._bout)
+
+    def _strike(self, at: float) -> float:
+        """One thing breaks then; when it is mended."""
+        ill = self._draw(self._random)
+        lasts_s = self._random.uniform(ill.least_s, ill.most_s)
+        if self._random.random() < 0.1:
+            lasts_s *= 3.0
+        end = min(at + lasts_s, self.over_at)
+        if at >= end:
+            return at
+        self._timeline.at(at, lambda: self._begin(ill, end))
+        return end + BY_RESET_S
+
+    def _begin(self, ill: Ill, end: float) -> None:
+        again = f"{ill.what}{RESET}"
+        if self._ills.has(ill.device, ill.what) or self._ills.has(ill.device, again):
+            return
+        self.counts[ill.sort] = self.counts.get(ill.sort, 0) + 1
+        self._note(f"--- {ill.device}: {ill.what} {ill.mode or ''}")
+        self._ills.begin(ill.device, ill.what, ill.mode)
+        ill.begin()
+        begun = self._timeline.now
+        self._timeline.at(end, lambda: self._end(ill, begun))
+
+    def _end(self, ill: Ill, begun: float) -> None:
+        self._note(f"--- {ill.device}: {ill.what} is mended")
+        ill.end()
+        self._ills.end(ill.device, ill.what)
+        broken_s = self._timeline.now - begun
+        if ill.reset is not None and broken_s > ill.heals_s:
+            self._ills.begin(ill.device, f"{ill.what}{RESET}")
+            self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
+
+    def _reset(self, ill: Ill) -> None:
+        """By a technician, who waits until the device answers: nobody resets what cannot be seen."""
+        assert ill.reset is not None
+        if self._ills.has(ill.device, "bus") or self._ills.has(ill.device, "daemon"):
+            self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
+            return
+        ill.reset()
+        self._ills.end(ill.device, f"{ill.what}{RESET}")
+
+
+Breakable = list[tuple[str, tuple[FailureMode, ...]]]
+
+
+def breakable(device: Device) -> tuple[Breakable, Breakable]:
+    """The wires and the parts of a device, and how each can fail."""
+    plant = device.plant
+    wires = [(signal, WIRE_MODES) for signal in (*plant._sensors, *plant._relays)]
+    if isinstance(plant, LiftPlant):
+        return wires, [(p, m) for p, m in FAILS.items() if not p.startswith("rear")]
+    if isinstance(plant, DoorPlant):
+        return wires, [("operator", WIRE_MODES)]
+    assert isinstance(plant, ChargerPlant)
+    return wires, [(part, WIRE_MODES) for part in ("receiver", "server", "headers", "body")]
+
+
+def pressable(device: Device) -> list[str]:
+    """What the building does to a device that counts as an ill."""
+    plant = device.plant
+    if isinstance(plant, LiftPlant):
+        return [h for h in LIFT_HAZARDS if Hazard(h) in plant._pressed]
+    if isinstance(plant, DoorPlant):
+        return ["obstruction", *(["fire"] if "fire" in plant._sensors else [])]
+    return list(CAUSES)

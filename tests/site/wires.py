@@ -1,0 +1,185 @@
+"""The far side of every bus, in virtual time: what the drivers talk to instead of `drivers/hal/`.
+
+A bus that is down raises HalError, as the HAL does after its timeout. The module behind it drops its
+outputs after WATCHDOG_S, as those with a watchdog do; the GPIO header has no bus to lose.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from drivers import points
+from drivers.hal import HalError
+from drivers.hal.modbus_points import Point
+from drivers.points import Pull, Wire
+from hal_fakes.charger_plant import ChargerPlant, Reading
+from hal_fakes.http import Station
+from hal_fakes.machine import Machine
+from hal_fakes.register_door import RegisterDoor
+from hal_fakes.wiring import Wiring
+from tests.site.timeline import Timeline
+
+WATCHDOG_S = 2.0
+
+
+class PointsFar:
+    """Contacts and relays on a header or at a module (`drivers.points.PointsBus`)."""
+
+    def __init__(self, timeline: Timeline, plant: Machine, wires: Iterable[Wire]) -> None:
+        self.down = False
+        self._timeline = timeline
+        self._wiring = Wiring(plant, wires, str)
+        self._safe: dict[str, bool] = {}
+
+    def canonical(self, point: str) -> str:
+        return point
+
+    def lines(
+        self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]
+    ) -> "points.Lines":
+        self._safe = dict(outputs)
+        return _Lines(self, dict(outputs))
+
+    def watchdog(self) -> None:
+        """The module has not been spoken to for too long."""
+        if self.down:
+            self.drive(self._safe)
+
+    def levels(self) -> dict[str, bool]:
+        self.check()
+        return self._wiring.levels(self._timeline.now)
+
+    def drive(self, levels: Mapping[str, bool]) -> None:
+        for point, level in levels.items():
+            self._wiring.drive(point, level, self._timeline.now)
+
+    def check(self) -> None:
+        if self.down:
+            raise HalError("the module does not answer")
+
+
+class _Lines:
+    def __init__(self, far: PointsFar, safe: dict[str, bool]) -> None:
+        self._far = far
+        self._safe = safe
+
+    def claim(self) -> None:
+        self.write(self._safe)
+
+    def read(self) -> Mapping[str, bool]:
+        return self._far.levels()
+
+    def write(self, levels: Mapping[str, bool]) -> None:
+        self._far.check()
+        self._far.drive(levels)
+
+    def outputs(self) -> None:
+        return None
+
+    def close(self) -> None:
+        if not self._far.down:
+            self._far.drive(self._safe)
+
+
+@dataclass
+class _Reply:
+    """As much of pymodbus's reply as `drivers/hal/modbus_registers.py` looks at."""
+
+    address: int
+    registers: list[int] = field(default_factory=list)
+
+    def isError(self) -> bool:
+        return False
+
+
+class RegisterFar:
+    """A door operator's registers (the part of `drivers.hal.modbus.ModbusBus` that its driver uses)."""
+
+    def __init__(self, timeline: Timeline, door: RegisterDoor) -> None:
+        self.down = False
+        self._timeline = timeline
+        self._door = door
+        self._first = {p: door.get(p, 0.0) for p in door.outputs}
+
+    def guard(self, units: Iterable[int]) -> "RegisterFar":
+        return self
+
+    def check(self) -> None:
+        """The guard's: nothing has tripped."""
+
+    def insist(self) -> None:
+        """There is no pause to break off."""
+
+    def watchdog(self) -> None:
+        """The operator has not been spoken to for too long."""
+        if self.down:
+            for point, value in self._first.items():
+                self._door.set(point, value, self._timeline.now)
+
+    def read(self, asked: Any) -> dict[Point, bool]:
+        self._answers()
+        return {p: bool(self._door.get(p, self._timeline.now)) for p in asked.points()}
+
+    def write(self, point: Point, value: int) -> None:
+        self._answers()
+        self._door.set(point, int(value), self._timeline.now)
+
+    def ask(self, unit: int, function: int, what: str, call: Callable[[Any], Any]) -> Any:
+        self._answers()
+        return call(self)
+
+    # ---- as a pymodbus client
+
+    def read_holding_registers(self, start: int, *, count: int, device_id: int) -> _Reply:
+        return self._registers("holding register", start, count, device_id)
+
+    def read_input_registers(self, start: int, *, count: int, device_id: int) -> _Reply:
+        return self._registers("input register", start, count, device_id)
+
+    def write_register(self, address: int, value: int, *, device_id: int) -> _Reply:
+        self._door.set(Point(device_id, "holding register", address), value, self._timeline.now)
+        return _Reply(address, [value])
+
+    def _registers(self, table: Any, start: int, count: int, unit: int) -> _Reply:
+        now = self._timeline.now
+        values = [self._door.get(Point(unit, table, start + i), now) for i in range(count)]
+        return _Reply(start, values)
+
+    def _answers(self) -> None:
+        if self.down:
+            raise HalError("the operator does not answer")
+
+
+class HttpFar:
+    """A charging station's HTTP (`drivers.charger_http.Calls`)."""
+
+    def __init__(self, timeline: Timeline, plant: ChargerPlant, settings: Any) -> None:
+        self.down = False
+        self._timeline = timeline
+        self._plant = plant
+        self._station = Station(plant, settings)
+
+    def watchdog(self) -> None:
+        """It charges by itself."""
+
+    def get_json(self, path: str) -> dict[str, Any]:
+        self._plant.advance(self._timeline.now)
+        reading: Reading = self._plant.sense("reading")
+        self._answers(reading.failures)
+        found: dict[str, Any] = json.loads(self._station.body(reading))
+        return found
+
+    def post(self, path: str) -> None:
+        self._answers(self._plant.failures)
+        self._plant.drive("clear_error", True, self._timeline.now)
+
+    def _answers(self, failures: Mapping[str, Any]) -> None:
+        """All that ends in a deadline, a refusal or nonsense is the same to the driver."""
+        server, body = failures.get("server"), failures.get("body")
+        broken = server in ("off", "slow", "garbage") or "headers" in failures
+        if self.down or broken or body in ("off", "stuck", "slow", "garbage"):
+            raise HalError("the station does not answer")
+
+
+Far = PointsFar | RegisterFar | HttpFar
