@@ -131,6 +131,14 @@ class TestTheGenericRegisterDoorOnRs485(TestTheGenericRegisterDoor):
     serial: ClassVar = RS485
 
 
+class TestTheGenericRegisterDoorWithAnotherCommand(RegisterContract):
+    settings: ClassVar = {
+        "unit": 1,
+        "profile": "generic-register-door",
+        "changes": {"command": {"at": "coil 4", "hold": 1, "release": 0}},
+    }
+
+
 class TestARegisterDoorThatIsCommandedByACoil(RegisterContract):
     settings: ClassVar = {
         "unit": 7,
