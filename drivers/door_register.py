@@ -6,9 +6,7 @@ agree with the status. The command holds the door open or releases it: nothing d
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Final
-
-import msgspec
+from typing import Final
 
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
@@ -16,9 +14,7 @@ from bridges.fields import Name
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus_points import Point
 from drivers.hal.modbus_registers import (
-    REGISTERS,
     WRITABLE,
-    Place,
     RegisterLines,
     Unit,
     Word,
@@ -27,137 +23,11 @@ from drivers.hal.modbus_registers import (
     place,
 )
 from drivers.profile import Profile, profile_problems
+from drivers.register_map import DoorMap, Errors, Flag, Parts, Problems, Status
 
 BUSES: Final = ("modbus",)
 
 BITS: Final = 16
-Bit = Annotated[int, msgspec.Meta(ge=0, le=15)]
-Percent = Annotated[int, msgspec.Meta(ge=0, le=100)]
-Problems = Iterator[tuple[tuple[str, ...], str]]
-
-
-class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the door is, as one number; a number that is not listed is a fault.
-
-    `at`: `input register N` or `holding register N`.
-    `open`: the numbers of a fully open door.
-    `closed`: the numbers of a closed door.
-    `moving`: the numbers of a door between its limits, and well.
-    `faults`: number -> what is wrong.
-    """
-
-    at: Place
-    open: Annotated[list[Word], msgspec.Meta(min_length=1)]
-    closed: Annotated[list[Word], msgspec.Meta(min_length=1)]
-    moving: Annotated[list[Word], msgspec.Meta(min_length=1)]
-    faults: dict[Word, Name] = msgspec.field(default_factory=dict)
-
-    def problems(self) -> Problems:
-        """A place that is no register; a number that means two things."""
-        yield from _place_problems(self.at, REGISTERS)
-        first: dict[int, str] = {}
-        for key in ("open", "closed", "moving", "faults"):
-            for i, value in enumerate(getattr(self, key)):
-                if value in first:
-                    path = (key, str(value if key == "faults" else i))
-                    yield path, f"{value} is listed under {first[value]} already"
-                first.setdefault(value, key)
-
-
-class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How far the door is open, from 0 (closed) to 100 (open); any other number is a fault.
-
-    `at`: `input register N` or `holding register N`.
-    `unknown`: the number by which the operator says that it does not know; then only the status counts.
-    `open_from`: at less than this the door is not open, whatever the status.
-    `closed_to`: at more than this the door is not closed, whatever the status.
-    """
-
-    at: Place
-    unknown: Word | None = None
-    open_from: Percent = 95
-    closed_to: Percent = 5
-
-    def problems(self) -> Problems:
-        """A place that is no register; limits the wrong way round."""
-        yield from _place_problems(self.at, REGISTERS)
-        if self.unknown is not None and self.unknown <= 100:
-            yield ("unknown",), "0 to 100 are positions"
-        if self.open_from <= self.closed_to:
-            yield ("open_from",), "must be greater than closed_to"
-
-
-class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the operator says is wrong with it: shown, and nothing is driven by it.
-
-    `at`: `input register N` or `holding register N`.
-    `bits`: bit (0 is the least) -> what is wrong; a bit that is not listed is shown by its number.
-    """
-
-    at: Place
-    bits: dict[Bit, Name] = msgspec.field(default_factory=dict)
-
-    def problems(self) -> Problems:
-        """A place that is no register."""
-        yield from _place_problems(self.at, REGISTERS)
-
-
-class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One bit of a register.
-
-    `at`: `input register N` or `holding register N`.
-    `bit`: which; 0 is the least.
-    """
-
-    at: Place
-    bit: Bit
-
-    def problems(self) -> Problems:
-        """A place that is no register."""
-        yield from _place_problems(self.at, REGISTERS)
-
-
-class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the door is held open. There is no value that drives it shut.
-
-    `at`: `coil N` or `holding register N`.
-    `hold`: the value that holds it open.
-    `release`: the value that lets it go, so that it closes by its own rules.
-    `read_back`: false where it can only be written; then it is written in every scan, and nothing
-    proves that it was taken.
-    """
-
-    at: Place
-    hold: Word
-    release: Word
-    read_back: bool = True
-
-    def problems(self) -> Problems:
-        """A place that cannot be written; values that it cannot take."""
-        yield from _place_problems(self.at, WRITABLE)
-        if self.hold == self.release:
-            yield ("release",), "is the value of hold"
-        if misplaced(self.at, ("coil",)) is None:
-            for key in ("hold", "release"):
-                if getattr(self, key) > 1:
-                    yield (key,), "a coil is 0 or 1"
-
-
-class DoorMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where an operator has what. Addresses begin at 0.
-
-    `status`: where the door is, as one number.
-    `position`: how far it is open.
-    `errors`: what the operator says is wrong with it.
-    `obstruction`: somebody is in the doorway: after CLOSE, the hold is kept until they are not.
-    `command`: how the door is held open.
-    """
-
-    status: Status
-    position: Position | None = None
-    errors: Errors | None = None
-    obstruction: Flag | None = None
-    command: Command
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -166,6 +36,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     `unit`: the operator's Modbus unit.
     `profile`: a file of drivers/profiles/ that has the map.
     `map`: the map, written here.
+    `changes`: the parts of the profile's map that are otherwise at this door.
     `base_address`: added to every address of the map, for a gateway that has several operators in one
     unit.
     """
@@ -173,6 +44,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     unit: Unit
     profile: Name | None = None
     map: DoorMap | None = None
+    changes: Parts | None = None
     base_address: Word = 0
 
     def problems(self) -> Problems:
@@ -180,7 +52,9 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         yield from super().problems()
         before = list(profile_problems(PROFILE, self.profile, self.map))
         yield from before
-        if not before and max(map(_address, _places(door_map(self)).values())) > (
+        if self.map and self.changes:
+            yield ("changes",), "is for a profile: change the map that is written here"
+        if not before and max(map(_address, door_map(self).places().values())) > (
             65535 - self.base_address
         ):
             yield ("base_address",), "with it an address is beyond 65535, the last"
@@ -196,14 +70,14 @@ PROFILE: Final = Profile("door_register", "map", DoorMap)
 def door_map(settings: Settings) -> DoorMap:
     """The map, from wherever it is."""
     found: DoorMap = settings.map or PROFILE.load(settings.profile or "")
-    return found
+    return found.changed(settings.changes)
 
 
 def points(settings: Settings) -> dict[str, Point]:
     """Where each part of the map is at this operator; `command` among them."""
     return {
         part: at(settings.unit, text, settings.base_address)
-        for part, text in _places(door_map(settings)).items()
+        for part, text in door_map(settings).places().items()
     }
 
 
@@ -214,7 +88,8 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
     place_of_command = door_map(settings).command.at
     if misplaced(place_of_command, WRITABLE) is None:
         point = at(settings.unit, place_of_command, settings.base_address)
-        yield str(point), ("map", "command", "at") if settings.map else ("unit",)
+        written = _command_in(settings)
+        yield str(point), (*written, "at") if written else ("unit",)
 
 
 def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
@@ -241,8 +116,16 @@ def warnings(settings: Settings) -> Problems:
         text = f"nobody has tried the profile {settings.profile} on hardware: watch the door move"
         yield ("profile",), text
     if not door_map(settings).command.read_back:
-        path = ("map", "command", "read_back") if settings.map else ("profile",)
+        written = _command_in(settings)
+        path = (*written, "read_back") if written else ("profile",)
         yield path, "the command cannot be read back: that the door was released is not verified"
+
+
+def _command_in(settings: Settings) -> tuple[str, ...]:
+    """Where the YAML itself says what the command is; () where the profile does."""
+    if settings.map:
+        return "map", "command"
+    return ("changes", "command") if settings.changes and settings.changes.command else ()
 
 
 def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterDoor":
@@ -326,21 +209,11 @@ def _errors(errors: Errors | None, words: Mapping[str, int]) -> tuple[str, ...]:
     return tuple(errors.bits.get(bit, f"error bit {bit}") for bit in on)
 
 
-def _places(found: DoorMap) -> dict[str, str]:
-    parts = ("status", "position", "errors", "obstruction", "command")
-    return {part: getattr(found, part).at for part in parts if getattr(found, part) is not None}
-
-
 def _address(text: str) -> int:
     try:
         return place(text)[1]
     except ValueError:
         return 0  # reported where the place is spelled
-
-
-def _place_problems(text: str, tables: tuple[str, ...]) -> Problems:
-    if reason := misplaced(text, tables):
-        yield ("at",), reason
 
 
 def _status_text(status: Status) -> str:

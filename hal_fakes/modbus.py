@@ -9,11 +9,12 @@ unit|server MODE`) one unit, or the server with all of them, is
 - `off`: the unit is silent; the server refuses and drops connections
 - `stuck`: the unit's inputs stay as they were; the server takes requests and never answers
 - `slow`: the reply comes after the client has stopped waiting
-- `garbage`: bytes that are no Modbus
-- `wrong`: the unit answers exception 4, the server with another transaction's number
+- `garbage`: bytes that are no Modbus, or half a reply
+- `wrong`: the unit answers exception 4, the server for another transaction, or as another unit
 """
 
 import asyncio
+import itertools
 import random
 import threading
 from collections.abc import Coroutine, Iterable, Mapping
@@ -34,6 +35,9 @@ from hal_fakes.xnergy_rcu import ModbusRcu
 
 CELLS: Final = {("door", "register"): RegisterDoor, ("charger", "modbus"): ModbusRcu}
 """What a unit consists of that has more than contacts, by kind and driver."""
+TRANSACTION: Final = 0
+UNIT: Final = 6
+"""Where a reply on TCP has them."""
 LOOK_S: Final = 0.02
 """How soon a server that is told to be off is off."""
 READY_S: Final = 10.0
@@ -72,6 +76,7 @@ class ModbusServer:
     def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
         self._units = Units(devices, slow_s)
         self._noise = random.Random("modbus")
+        self._kinds = itertools.cycle((0, 1))
         self._port = 0
         self._server: Any = None
         self._closed = False
@@ -131,9 +136,11 @@ class ModbusServer:
             return packet
         server = self._units.failure("server")
         if "garbage" in (server, self._units.failure("unit", packet[6])):
-            return self._noise.randbytes(self._noise.randrange(1, 30))
+            noise = self._noise.randbytes(self._noise.randrange(1, 30))
+            return packet[: len(packet) // 2] if next(self._kinds) else noise
         if server == "wrong":
-            return bytes((packet[0] ^ 0x55,)) + packet[1:]
+            at = UNIT if next(self._kinds) else TRANSACTION
+            return packet[:at] + bytes((packet[at] ^ 0x55,)) + packet[at + 1 :]
         return packet
 
 

@@ -10,7 +10,8 @@ MODE`) one unit, or the server, which is the line with all of them, is
 - `stuck`: the unit's inputs stay as they were; the line is cut, and silent
 - `slow`: the reply comes after the client has stopped waiting
 - `garbage`: a wrong CRC, or half a frame
-- `wrong`: every bit set, and in the name of another unit, or of another function
+- `wrong`: every bit set, in the name of another unit, or of another function; or exception 4; or, on a
+  line, our own request comes back before the reply, as from an adapter that echoes unannounced
 """
 
 import asyncio
@@ -28,6 +29,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
 from pymodbus.framer import FramerRTU
 from pymodbus.pdu import DecodePDU
@@ -94,7 +96,7 @@ class RtuLine:
         self._due: list[tuple[float, int, bytes]] = []
         self._frame = b""
         self._busy_until = 0.0
-        self._kinds: Iterator[int] = itertools.cycle((0, 1))
+        self._kinds: Iterator[int] = itertools.cycle(range(4))
         self._decoder = DecodePDU(is_server=True)
         self._decoder.register(CoilRequest)
         self._framer = FramerRTU(DecodePDU(is_server=False))
@@ -196,16 +198,24 @@ class RtuLine:
         return self._framer.buildFrame(response)
 
     def _spoiled(self, mode: FailureMode | None, reply: bytes) -> bytes:
-        """What is on the wire instead, the two ways of each mode in turn."""
+        """What is on the wire instead, the ways of each mode in turn."""
         if mode == "garbage":
             broken = bytes((reply[-1] ^ 0x55,))
-            return reply[:-1] + broken if next(self._kinds) else reply[: len(reply) // 2]
-        if mode == "wrong":
-            unit, function = reply[0], reply[1] & 0x7F
-            head = (unit % 247 + 1, function) if next(self._kinds) else (unit, function ^ 3)
-            frame = bytes(head) + b"\x01\xff"
-            return frame + FramerRTU.compute_CRC(frame).to_bytes(2, "big")
-        return reply
+            return reply[:-1] + broken if next(self._kinds) % 2 else reply[: len(reply) // 2]
+        return self._wrong(reply) if mode == "wrong" else reply
+
+    def _wrong(self, reply: bytes) -> bytes:
+        unit, function = reply[0], reply[1] & 0x7F
+        bodies = (
+            bytes((unit, function ^ 3, 1, 0xFF)),
+            bytes((unit % 247 + 1, function, 1, 0xFF)),
+            bytes((unit, function | 0x80, ExcCodes.DEVICE_FAILURE)),
+        )
+        kind = next(self._kinds)
+        if kind == len(bodies) and self._units.failure("server") == "wrong":
+            return self.requests[-1] + reply
+        body = bodies[kind % len(bodies)]
+        return body + FramerRTU.compute_CRC(body).to_bytes(2, "big")
 
 
 def _plain(settings: Serial) -> dict[str, object]:

@@ -3,9 +3,10 @@
 It has found its ends: the position is 0 or 100 there, and between them the number for `unknown`, or 50.
 """
 
-from drivers.door_register import DoorMap, Settings, Status, door_map, points
+from drivers.door_register import Settings, door_map, points
 from drivers.hal.modbus_points import Point
 from drivers.points import Wire
+from drivers.register_map import DoorMap, Status
 from hal_fakes.plant import Plant
 
 NONSENSE = 65535

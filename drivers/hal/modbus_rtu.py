@@ -68,13 +68,14 @@ class Line:
         time.sleep(max(0.0, self._late.pop(unit, 0.0) - time.monotonic()))
 
     def connect(self) -> None:
-        """Have the port open; a try begins here. Raises Unreachable."""
-        self._deadline.start(self._timeout_s)
+        """Have the port open; a try begins then. Raises Unreachable."""
+        _client_class()  # a Pi loads the library for longer than a try may last
         if self._port is None:
             try:
                 self._port = self._opened()
             except (OSError, ValueError, termios.error) as error:
                 raise Unreachable(self._unreachable(error)) from error
+        self._deadline.start(self._timeout_s)
 
     def ask(self, function: int, call: Call) -> "ModbusPDU":
         """The answer to one request: of this function, or an exception. Raises NoReply."""

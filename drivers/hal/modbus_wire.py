@@ -59,13 +59,14 @@ class Connection:
 
     def connect(self) -> None:
         """Have a connection; a try begins here. Raises Unreachable."""
+        make = _client_class()  # a Pi loads the library for longer than a try may last
         self._dialler.deadline.start(self._timeout_s)
         if self._client is None:
             try:
                 connection = self._dialler.dial()
             except OSError as error:
                 raise Unreachable(self._unreachable(error)) from error
-            self._client = _client_class()(connection, self._dialler.deadline, self._last_number)
+            self._client = make(connection, self._dialler.deadline, self._last_number)
 
     def ask(self, function: int, call: Call) -> "ModbusPDU":
         """The answer to one request: of this function, or an exception. Raises NoReply."""

@@ -10,6 +10,7 @@ from drivers import door_dry_contact, door_register
 from drivers.hal import gpio, modbus
 from hal_fakes.gpio import WiredFactory
 from hal_fakes.modbus import ModbusServer
+from hal_fakes.modbus_rtu import RtuLine
 from hal_fakes.modbus_units import FarSide
 from hal_fakes.realtime import RealTime
 from hal_fakes.register_door import RegisterDoor, contacts
@@ -18,6 +19,7 @@ from tests.door.contract import Bench, DoorContract, WiredDoorContract, quick
 from tests.modbus.module import Time
 
 TIMEOUT_S = 0.2
+RS485 = modbus.Serial(port="/dev/null", baudrate=57600, parity="none", stopbits=1)
 
 
 def dry(
@@ -39,10 +41,19 @@ def dry(
 
 @contextmanager
 def served(
-    far_sides: Iterable[FarSide], world: RealTime, create: Any, settings: Any
+    far_sides: Iterable[FarSide],
+    world: RealTime,
+    create: Any,
+    settings: Any,
+    serial: modbus.Serial | None,
 ) -> Iterator[Bench]:
-    """A bench in front of a Modbus server with these far sides."""
-    server, clock = ModbusServer(far_sides, slow_s=1.5 * TIMEOUT_S), Time()
+    """A bench in front of a Modbus server, or a line, with these far sides."""
+    clock = Time()
+    server = (
+        RtuLine(far_sides, serial, slow_s=2.2 * TIMEOUT_S)
+        if serial
+        else ModbusServer(far_sides, slow_s=1.5 * TIMEOUT_S)
+    )
     plain = {"type": "modbus", "timeout_s": TIMEOUT_S, **server.replace}
     bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
     try:
@@ -55,6 +66,7 @@ def served(
 
 class TestDryContactsOnModbus(WiredDoorContract):
     flash: ClassVar[dict[str, str]] = {}
+    serial: ClassVar[modbus.Serial | None] = None
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
@@ -63,12 +75,20 @@ class TestDryContactsOnModbus(WiredDoorContract):
         wires = door_dry_contact.wires(settings)
         world = RealTime({"door": quick("door", wires)})
         wiring = Wiring(world.plants["door"], wires, modbus.canonical)
-        with served([wiring], world, door_dry_contact.create, settings) as bench:
+        with served([wiring], world, door_dry_contact.create, settings, self.serial) as bench:
             yield bench
+
+
+class TestDryContactsOnRs485(TestDryContactsOnModbus):
+    serial: ClassVar = RS485
 
 
 class TestAPulseThatTheModuleTimes(TestDryContactsOnModbus):
     flash: ClassVar = {"flash": "unit 1 coil 0x200"}
+
+
+class TestAPulseThatTheModuleTimesOnRs485(TestAPulseThatTheModuleTimes):
+    serial: ClassVar = RS485
 
 
 class TestDryContactsOnGpio(DoorContract):
@@ -92,18 +112,31 @@ class RegisterContract(WiredDoorContract):
     """Doors on registers, by their settings."""
 
     settings: ClassVar[dict[str, Any]]
+    serial: ClassVar[modbus.Serial | None] = None
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
         settings = msgspec.convert(self.settings, door_register.Settings)
         world = RealTime({"door": quick("door", contacts(settings))})
         door = RegisterDoor(world.plants["door"], settings)
-        with served([door], world, door_register.create, settings) as bench:
+        with served([door], world, door_register.create, settings, self.serial) as bench:
             yield bench
 
 
 class TestTheGenericRegisterDoor(RegisterContract):
     settings: ClassVar = {"unit": 1, "profile": "generic-register-door", "base_address": 0x200}
+
+
+class TestTheGenericRegisterDoorOnRs485(TestTheGenericRegisterDoor):
+    serial: ClassVar = RS485
+
+
+class TestTheGenericRegisterDoorWithAnotherCommand(RegisterContract):
+    settings: ClassVar = {
+        "unit": 1,
+        "profile": "generic-register-door",
+        "changes": {"command": {"at": "coil 4", "hold": 1, "release": 0}},
+    }
 
 
 class TestARegisterDoorThatIsCommandedByACoil(RegisterContract):

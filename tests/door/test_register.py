@@ -1,5 +1,6 @@
 """The door on registers: what its numbers mean, and what its YAML and profiles may say."""
 
+import re
 from pathlib import Path
 
 import msgspec
@@ -12,10 +13,12 @@ from bridges.decision import Sampled
 from bridges.door.signals import DoorSample
 from bridges.rmf.definitions import DoorModeValue
 from bridges.settings import SettingsError, load
-from drivers.door_register import PROFILE, DoorMap, Settings, decode, points
+from drivers.door_register import PROFILE, Settings, decode, door_map, points
 from drivers.hal.modbus_points import Point
 from drivers.profile import FOLDER
+from drivers.register_map import DoorMap
 from tests.door.virtual import CLOSED, CoreAlone
+from tests.settings.reading import problems_of as settings_problems
 
 CONFIG = Path(__file__).parents[2] / "config"
 GENERIC: DoorMap = PROFILE.load("generic-register-door")
@@ -149,6 +152,63 @@ def test_a_device_gives_the_unit_and_a_base_for_every_address() -> None:
         "obstruction": Point(3, "input register", 103),
         "command": Point(3, "holding register", 100),
     }
+
+
+CHANGED: dict[str, dict[str, object]] = {
+    "command": {"at": "coil 4", "hold": 0, "release": 1},
+    "position": {"at": "input register 9"},
+}
+
+
+def test_a_device_may_change_parts_of_its_profiles_map() -> None:
+    plain = {"unit": 1, "profile": "generic-register-door", "changes": CHANGED}
+    changed = msgspec.convert(plain, Settings)
+    assert msgspec.to_builtins(door_map(changed)) == {
+        **msgspec.to_builtins(GENERIC),
+        "command": {**CHANGED["command"], "read_back": True},
+        "position": {**CHANGED["position"], "unknown": None, "open_from": 95, "closed_to": 5},
+    }
+    assert points(changed)["command"] == Point(1, "coil", 4)
+
+
+PROFILED = YAML[: YAML.index("    map:")] + "    profile: generic-register-door\n"
+
+
+@pytest.mark.parametrize(
+    ("changes", "wanted"),
+    [
+        ("{command: {at: coil 4, hold: 1, release: 0}}", []),
+        ("{command: {at: coil 4, hold: 1}}", ["9:15: 'command' needs 'release'"]),
+        ("{command: {at: coil 4, hold: 1, release: 1}}", ["9:55: is the value of hold"]),
+        ("{commands: {at: coil 4}}", ["9:15: unknown key 'commands': did you mean 'command'?"]),
+    ],
+)
+def test_what_a_device_changes_is_judged_where_it_stands(
+    tmp_path: Path, changes: str, wanted: list[str]
+) -> None:
+    found = settings_problems(tmp_path / "door.yaml", f"{PROFILED}    changes: {changes}\n")
+    assert [re.split(": a |known here", problem)[0].strip() for problem in found] == wanted
+
+
+def test_a_map_that_is_written_out_has_no_changes_beside_it(tmp_path: Path) -> None:
+    text = "    changes: {command: {at: coil 4, hold: 1, release: 0}}\n"
+    assert settings_problems(tmp_path / "door.yaml", YAML + text) == [
+        "11:5: is for a profile: change the map that is written here"
+    ]
+
+
+def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "door.yaml"
+    changes = "    changes: {command: {at: coil 4, hold: 1, release: 0, read_back: false}}\n"
+    path.write_text(PROFILED + changes)
+    assert [(w.line, w.column) for w in load(path).warnings] == [(9, 69)]
+    second = PROFILED[PROFILED.index("  front:") :].replace("front", "back") + changes
+    path.write_text(PROFILED + changes + second)
+    text = r"unit 1 coil 4 is taken by front changes\.command\.at on line 9"
+    with pytest.raises(SettingsError, match=text):
+        load(path)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from bridges.decision import Decision, IoFailed, Sampled
+from bridges.decision import Decision, IoFailed, Sampled, WriteFailed
 from bridges.door.core import (
     CloseDoor,
     DoorMemory,
@@ -190,7 +190,7 @@ class Door:
         try:
             self.driver.write(decided.outputs)
         except DriverError as error:
-            decided = self._decide(IoFailed(str(error)))
+            decided = self._decide(WriteFailed(str(error)))
         self.wake_at = decided.wake_at
         self.report = decided.report
         _note(self.told, self.now, word(decided.report.mode))

@@ -184,6 +184,36 @@ def test_each_failure_is_a_hal_error_and_the_door_is_back_afterwards(
     assert site.patiently("ward") == CLOSED
 
 
+WAYS: dict[str, dict[FailureMode, tuple[str, ...]]] = {
+    "tcp": {"wrong": ("no reply within",), "garbage": ("no reply within",)},
+    "rtu": {
+        "wrong": ("of another unit", "exception 4", "does the adapter echo?"),
+        "garbage": ("half a frame", "CRC of "),
+    },
+}
+"""What is said of the far side as a whole in each of its ways to be wrong, or garbled."""
+
+
+@pytest.mark.parametrize("mode", ["wrong", "garbage"])
+@pytest.mark.parametrize("framing", WAYS)
+def test_a_far_side_fails_in_several_ways_and_each_is_named(
+    framing: str, mode: FailureMode
+) -> None:
+    site = Site(SERIAL[framing])
+    try:
+        site.plants["front"].fail("server", mode)
+        found: list[str] = []
+
+        def all_seen() -> bool:
+            found.append(str(site.patiently("front")))
+            return all(any(way in text for text in found) for way in WAYS[framing][mode])
+
+        wait_until(all_seen, mode)
+        assert str(CLOSED) not in found
+    finally:
+        site.close()
+
+
 @pytest.mark.parametrize("mode", ["off", "slow", "garbage", "wrong"])
 def test_a_failing_unit_does_not_keep_the_other_from_being_read(
     site: Site, mode: FailureMode

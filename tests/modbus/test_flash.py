@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from bridges.commands.check import described
-from bridges.decision import IoFailed, Sampled
+from bridges.decision import Sampled, WriteFailed
 from bridges.door.core import CloseDoor, Event, OpenDoor, decide, initial
 from bridges.door.settings import DoorLimits
 from bridges.door.signals import DoorOutputs
@@ -101,7 +101,7 @@ def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, s
         try:
             driver.write(decision.outputs)
         except DriverError as error:
-            memory = decide(memory, IoFailed(str(error)), now, limits).memory
+            memory = decide(memory, WriteFailed(str(error)), now, limits).memory
         told += [(now, pdu) for pdu in writes(module)]
         module.asked.clear()
     return told

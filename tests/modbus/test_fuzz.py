@@ -1,16 +1,22 @@
-"""Whatever a module sends, on TCP or on a line: only HalErrors, and no door open by mistake."""
+"""Whatever a module sends, on TCP or on a line: only HalErrors, no door open, no pulse by mistake."""
 
 import itertools
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 import msgspec
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from bridges.door.signals import DoorOutputs
 from drivers import DriverError
 from drivers.door_dry_contact import DryContactDoor, Settings, create
+from drivers.hal.modbus import ModbusBus
+from drivers.hal.modbus_flash import ask_for
+from drivers.hal.modbus_points import Point
+from drivers.hal.modbus_registers import read
+from drivers.points import HalError
 from tests.modbus.line import SerialModule, crc, rtu
 from tests.modbus.module import Module, Time, bits_reply, bus_to, frame
 
@@ -184,3 +190,44 @@ def test_no_bytes_on_a_line_break_the_driver_or_open_the_door(
     step(door.make_safe)
     door.close()
     bus.close()
+
+
+SORTS = pytest.mark.parametrize("sort", [Module, SerialModule])
+PDUS = st.one_of(*(st.binary(max_size=8).map(b.__add__) for b in (b"", b"\3\2", b"\5")))
+
+
+@contextmanager
+def saying(sort: type[Module], pdu: bytes) -> Iterator[tuple[Module, ModbusBus]]:
+    """A module that answers everything with this, and a bus to it."""
+    module = sort(lambda request: frame(request, pdu))
+    bus = bus_to(module.port, timeout_s=0.02, retries=1)
+    try:
+        yield module, bus
+    finally:
+        bus.close()
+        module.close()
+
+
+@SORTS
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(pdu=PDUS)
+@example(pdu=b"\3\2\xab\xcd")
+def test_a_register_reads_as_what_was_sent_or_not_at_all(sort: type[Module], pdu: bytes) -> None:
+    register = Point(1, "holding register", 0)
+    with saying(sort, pdu) as (_, bus), suppress(HalError):
+        assert read(bus, [register]) == {register: int.from_bytes(pdu[2:4], "big")}
+        assert (pdu[:2], len(pdu)) == (b"\x03\x02", 4)
+
+
+@SORTS
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(pdu=PDUS)
+@example(pdu=bytes.fromhex("0502000007"))
+def test_a_pulse_is_asked_for_once_and_believed_by_its_echo_alone(
+    sort: type[Module], pdu: bytes
+) -> None:
+    with saying(sort, pdu) as (module, bus):
+        with suppress(HalError):
+            ask_for(bus, Point(1, "coil", 0x200), 0.7)
+            assert pdu.hex() == "0502000007"
+        assert len(module.asked) == 1

@@ -3,8 +3,6 @@
 import struct
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from drivers.hal.modbus_points import Point
 from drivers.hal.modbus_registers import (
@@ -93,22 +91,6 @@ def test_an_exception_is_named(module: Module) -> None:
         HalError, match="read holding register 0: exception 2, illegal data address"
     ):
         read(bus_to(module.port), [H0])
-
-
-@settings(derandomize=True, max_examples=150, deadline=None)
-@given(pdu=st.binary(max_size=12))
-def test_no_bytes_raise_anything_but_a_hal_error_or_read_as_what_was_not_sent(pdu: bytes) -> None:
-    module = Module()
-    module.reply = lambda request: frame(request, pdu)
-    bus = bus_to(module.port, Time(), timeout_s=0.05, retries=0)
-    try:
-        assert read(bus, [H0]) == {H0: int.from_bytes(pdu[2:4], "big")}
-        assert (pdu[:2], len(pdu)) == (b"\x03\x02", 4)
-    except HalError:
-        pass
-    finally:
-        bus.close()
-        module.close()
 
 
 @pytest.mark.parametrize(

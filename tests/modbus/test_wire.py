@@ -15,6 +15,7 @@ import pytest
 from bridges.settings import load
 from drivers.hal.modbus import Serial, Settings, Tcp, warnings
 from drivers.hal.modbus_wire import Connection, NoReply, Unreachable
+from tests.modbus.module import Module, door
 
 
 def unreachable(failure: OSError) -> str:
@@ -154,6 +155,19 @@ def loaded(code: str) -> set[str]:
         [sys.executable, "-c", f"{watched}; {code}; {show}"], capture_output=True, check=True
     )
     return set(done.stdout.decode().split())
+
+
+def test_loading_the_vendors_library_costs_the_first_request_none_of_its_time(
+    either: Module,
+) -> None:
+    """It takes longer than a try may last."""
+    door(either)
+    loaded(
+        "from tests.modbus.module import bus_to;"
+        f"bus = bus_to({either.port!r}, timeout_s=0.1, retries=0);"
+        "bus.lines({'unit 1 coil 0': None}, {}).read()"
+    )
+    assert either.functions() == [1]
 
 
 def test_the_vendors_library_is_loaded_with_the_first_connection_and_its_server_never() -> None:
