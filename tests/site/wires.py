@@ -170,7 +170,7 @@ class HttpFar:
         found: dict[str, Any] = json.loads(self._station.body(reading))
         return found
 
-    def post(self, path: str) -> None:
+    def send(self, path: str, method: str = "POST", body: str | None = None) -> None:
         self._answers(self._plant.failures)
         self._plant.drive("clear_error", True, self._timeline.now)
 
