@@ -195,6 +195,13 @@ def test_a_hold_that_ends_during_a_pulse_switches_off_at_once_and_verifies_it(
     assert (writes(either), either.coils[1, 0]) == ([FLASH_PDU, "0500000000"], False)
 
 
+def test_a_door_that_was_let_go_while_it_could_not_be_seen_is_flashed_anew(either: Module) -> None:
+    driver = claimed(either)
+    for outputs in (PULSE, BETWEEN, RELEASE, PULSE):
+        driver.write(outputs)
+    assert writes(either) == [FLASH_PDU, "0500000000", FLASH_PDU]
+
+
 def test_make_safe_after_a_flash_switches_off_and_sees_a_relay_that_stays_on(
     either: Module,
 ) -> None:
