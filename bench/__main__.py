@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench import doors, idle, latency, lifts, many_doors
+from bench import doors, idle, latency, lifts, many_doors, ros
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -23,6 +23,7 @@ SECTIONS = {
     "lifts": lifts,
     "doors": doors,
     "many_doors": many_doors,
+    "ros": ros,
 }
 
 
