@@ -11,6 +11,7 @@ rclpy is imported here alone, the message packages in ros_types.py, and both onl
 import logging
 import os
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -51,6 +52,10 @@ ON_LOOPBACK: Final = {
 its own words as well, does not even leave the loopback interface."""
 UNHEARD: Final = 256
 """Own messages that may be on their way back to us: more than twice any topic's depth."""
+
+YIELD_S: Final = 50e-6
+"""rclpy's executor goes on for a while in Python after a callback; whom the message has woken need
+not wait for that."""
 
 
 class Ros2Transport:
@@ -264,8 +269,9 @@ class _Subscription(Generic[M]):
             return
         if message in self.said:
             self.said.remove(message)
-        else:
-            self._received(message)
+            return
+        self._received(message)
+        time.sleep(YIELD_S)
 
 
 def _profile(qos: topics.Qos) -> Any:
