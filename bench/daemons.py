@@ -38,7 +38,7 @@ def running(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 def daemon(file: Path, directory: Path, domain: int, transport: str = "dds") -> list[str]:
     """The command of one simulated daemon, on this transport whatever its YAML says."""
-    text = re.sub(r"transport: .*", f"transport: {transport}", file.read_text())
+    text = re.sub(r"transport: \w+", f"transport: {transport}", file.read_text())
     file = directory.with_suffix(".yaml")
     file.write_text(re.sub(r" *ros_setup: .*\n", "", text))
     run = [sys.executable, "-m", "bridges.cli", "run", str(file), "--simulate"]

@@ -10,9 +10,11 @@ def pytest_deselected(items: Sequence[pytest.Item]) -> None:
     _deselected.extend(item.nodeid for item in items if item.get_closest_marker("ros"))
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
     """Say so: a green run without ROS has not seen the ros2 transport."""
-    if _deselected:
+    if _deselected and config.getoption("markexpr") == "not ros":
         files = sorted({nodeid.partition("::")[0] for nodeid in _deselected})
         terminalreporter.write_line(
             f"not run: {len(_deselected)} tests that need ROS 2 (make test-ros), in {', '.join(files)}"

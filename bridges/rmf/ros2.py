@@ -8,7 +8,6 @@ Source: rclpy 7.1 (ROS 2 Jazzy); its public API, with RCLError and InvalidHandle
 rclpy is imported here alone, the message packages in ros_types.py, and both only by choose.py.
 """
 
-import logging
 import os
 import threading
 import time
@@ -20,7 +19,7 @@ from typing import Any, Final, Generic, TypeVar
 from rclpy.context import Context
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import NameValidationException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
@@ -30,15 +29,12 @@ from rclpy.qos import (
     qos_policy_name_from_kind,
 )
 
-from bridges.log import pairs
 from bridges.rmf import cdr, notices, topics
 from bridges.rmf.definitions import Message
 from bridges.rmf.loopback import LOOPBACK
 from bridges.rmf.ros_types import ros_type
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
-
-log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=Message)
 
@@ -160,11 +156,8 @@ class Ros2Transport:
         self._leaving = self.node.create_guard_condition(lambda: None)
 
     def _spin(self) -> None:
-        try:
-            while not self._closed:
-                self._executor.spin_once()
-        except ExternalShutdownException:
-            log.error(pairs("reader_lost", node=self.name, reason="ROS was shut down"))
+        while not self._closed:
+            self._executor.spin_once()
 
     @contextmanager
     def _reporting(self, text: str) -> Iterator[None]:

@@ -86,7 +86,7 @@ def shipped(name: str, directory: Path, transport: str) -> Path:
     text = (ROOT / "config" / name).read_text()
     text = re.sub(r" *ros_setup: .*\n", "", text)
     file = directory / name
-    file.write_text(re.sub(r"transport: .*", f"transport: {transport}", text))
+    file.write_text(re.sub(r"transport: \w+", f"transport: {transport}", text))
     return file
 
 
