@@ -12,7 +12,8 @@ from typing import Any
 from bridges.rmf.definitions import PACKAGES
 from bridges.rmf.transport import TransportError
 
-NAMES = {str: "string", bool: "boolean"}
+NAMES = {str: "string", bool: "boolean", "byte": "octet", "float32": "float", "float64": "double"}
+"""Where Python's message classes speak IDL and not ROS."""
 
 
 def ros_type(message_type: type) -> Any:
@@ -54,7 +55,8 @@ def fields_of(message_type: type) -> dict[str, str]:
 
 def _name(kind: Any) -> str:
     if typing.get_origin(kind) is typing.Annotated:
-        return str(kind.__metadata__[0])
+        name = str(kind.__metadata__[0])
+        return NAMES.get(name, name)
     if typing.get_origin(kind) is tuple:
         return f"sequence<{_name(typing.get_args(kind)[0])}>"
     return NAMES.get(kind) or f"{PACKAGES[kind]}/{kind.__name__}"
