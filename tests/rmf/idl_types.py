@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 from cyclonedds.idl import IdlStruct, annotations
-from cyclonedds.idl.types import float32, int32, sequence, uint8, uint32
+from cyclonedds.idl.types import int32, sequence, uint8, uint32
 
 # mypy knows nothing of cyclonedds.
 # mypy: disable-error-code="misc, call-arg"
@@ -138,16 +138,6 @@ class Bool(IdlStruct, typename="std_msgs.msg.dds_.Bool_"):
 class EmergencySignal(IdlStruct, typename="rmf_fleet_msgs.msg.dds_.EmergencySignal_"):
     fleet_names: sequence[str]
     is_emergency: bool
-
-
-@annotations.final
-@dataclass
-class OtherLiftRequest(IdlStruct, typename="rmf_lift_msgs.msg.dds_.LiftRequest_"):
-    """Another definition under RMF's name."""
-
-    number: uint32
-    lift_name: str
-    height: float32
 
 
 def to_idl(value: Any) -> Any:

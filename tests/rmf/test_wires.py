@@ -3,10 +3,12 @@
 import os
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pytest
+from cyclonedds.idl import IdlStruct, annotations
+from cyclonedds.idl.types import float32, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
@@ -17,7 +19,7 @@ from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE, Topic
 from bridges.rmf.transport import Publisher, TransportError
 from hal_fakes.domain import free_domain
-from tests.rmf import idl_types, peer
+from tests.rmf import peer
 from tests.rmf.conftest import ROS2, Join, joining
 from tests.rmf.domains import domain_of_this_run
 from tests.rmf.observing import PUBLICATION, SUBSCRIPTION, seen
@@ -208,18 +210,28 @@ def test_forged_samples_are_dropped_and_the_good_ones_after_them_arrive(
     assert told.startswith(f'sample_dropped topic=lift_requests reason="{first}')
 
 
+@annotations.final
+@dataclass
+class OtherLiftRequest(IdlStruct, typename="rmf_lift_msgs.msg.dds_.LiftRequest_"):  # type: ignore[misc, call-arg]
+    """Another definition under RMF's name."""
+
+    number: uint32
+    lift_name: str
+    height: float32
+
+
 def test_a_type_of_the_same_name_with_other_fields_is_never_taken_for_ours(
     join_wire: Join, observer: Any
 ) -> None:
     received: list[d.LiftRequest] = []
     join_wire("listener").subscribe(LIFT_REQUESTS, received.append)
-    topic = DdsTopic(observer, "rt/lift_requests", idl_types.OtherLiftRequest)
+    topic = DdsTopic(observer, "rt/lift_requests", OtherLiftRequest)
     cdr = Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False)
     stranger = DataWriter(observer, topic, qos=Qos(Policy.Reliability.Reliable(0), cdr))
     speaker = join_wire("speaker").publisher(LIFT_REQUESTS)
 
     def good_arrives() -> bool:
-        stranger.write(idl_types.OtherLiftRequest(7, "Lift1", 0.5))
+        stranger.write(OtherLiftRequest(7, "Lift1", 0.5))
         speaker.publish(d.LiftRequest("Lift1"))
         return len(received) >= 20
 
