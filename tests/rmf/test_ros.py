@@ -53,8 +53,8 @@ def test_our_table_has_the_constants_of_the_installed_package(enum: Any) -> None
     message_name = enum.__doc__.partition(".")[0]  # "LiftState.door_state."
     found = installed(getattr(d, message_name))
     prefix = os.path.commonprefix(list(ours))
-    constants = [name for name in dir(type(found)) if name.isupper() and name.startswith(prefix)]
-    theirs = {name: getattr(found, name) for name in constants}
+    public = [name for name in dir(type(found)) if name.isupper() and name[0] != "_"]
+    theirs = {name: getattr(found, name) for name in public if name.startswith(prefix)}
     # A ROS `byte` is a bytes object in Python.
     assert ours == {name: v[0] if isinstance(v, bytes) else v for name, v in theirs.items()}
 
