@@ -2,11 +2,12 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: help demo demo-charging test lint format bench soak mutate clean
+.PHONY: help demo demo-charging test test-ros lint format bench soak mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
+	@echo "make test-ros  the tests that need ROS 2, in a shell that has sourced its setup file"
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again"
 	@echo "make mutate  break the lift's core in every small way, and list what no test noticed (docs/mutation.md)"
@@ -29,6 +30,17 @@ demo-charging: .venv/ready
 test: .venv/ready lint
 	$(BIN)/pytest
 
+# rclpy belongs to ROS's own Python and needs its packages (numpy): an environment of its own, on top.
+ROS_BIN := .venv-ros/bin
+test-ros:
+	@$(PYTHON) -c 'import rclpy' || { \
+	  echo "no ROS here, so nothing was tested: $(PYTHON) does not import rclpy (the line above says why)."; \
+	  echo "Source ROS's setup file first (. /opt/ros/jazzy/setup.bash), or name its Python: make test-ros PYTHON=/usr/bin/python3"; \
+	  exit 1; }
+	@test .venv-ros/ready -nt pyproject.toml || { $(PYTHON) -m venv --system-site-packages .venv-ros && \
+	  $(ROS_BIN)/pip install --quiet --disable-pip-version-check -e '.[dev]' && touch .venv-ros/ready; }
+	$(ROS_BIN)/python -m pytest -m ros
+
 lint: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -40,7 +52,7 @@ format: .venv/ready
 	$(BIN)/ruff format .
 
 bench: .venv/ready
-	$(BIN)/python -m bench
+	$(if $(wildcard .venv-ros/ready),$(ROS_BIN),$(BIN))/python -m bench
 
 # Without SEED one is drawn, and printed.
 soak: .venv/ready
@@ -60,5 +72,5 @@ mutate: .venv/ready
 	@echo "one of them: cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut show NAME"
 
 clean:
-	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv .venv-ros build dist *.egg-info .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench import can, chargers, doors, idle, latency, lifts, many_doors
+from bench import can, chargers, doors, idle, latency, lifts, many_doors, ros
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -25,6 +25,7 @@ SECTIONS = {
     "many_doors": many_doors,
     "chargers": chargers,
     "can": can,
+    "ros": ros,
 }
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -19,7 +20,8 @@ STOP_S = 5.0
 def running(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
     """A process, ended by SIGTERM."""
     with log.open("wb") as out:
-        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=out)
+        pipe = subprocess.PIPE
+        child = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=out)
     try:
         yield child
     finally:
@@ -29,12 +31,16 @@ def running(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
         except subprocess.TimeoutExpired:
             child.kill()
             child.wait()
-        if child.stdout:
-            child.stdout.close()
+        for end in (child.stdin, child.stdout):
+            assert end is not None
+            end.close()
 
 
-def daemon(file: Path, directory: Path, domain: int) -> list[str]:
-    """The command of one simulated daemon."""
+def daemon(file: Path, directory: Path, domain: int, transport: str = "dds") -> list[str]:
+    """The command of one simulated daemon, on this transport whatever its YAML says."""
+    text = re.sub(r"transport: \w+", f"transport: {transport}", file.read_text())
+    file = directory.with_suffix(".yaml")
+    file.write_text(re.sub(r" *ros_setup: .*\n", "", text))
     run = [sys.executable, "-m", "bridges.cli", "run", str(file), "--simulate"]
     return [*run, "--domain-id", str(domain), "--runtime-dir", str(directory)]
 

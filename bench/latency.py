@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bench.daemons import ROOT, PlantSocket, daemon, running, wait_for_log
+from bench.daemons import ROOT, PlantSocket, daemon, memory_mb, running, wait_for_log
 from bridges.fields import Rmf
 from bridges.rmf.choose import open_transport
 from bridges.rmf.definitions import LiftMode, LiftRequest, LiftRequestType, LiftState
@@ -25,7 +25,7 @@ PAUSE_S = 0.12
 def measure(scratch: Path) -> dict[str, Any]:
     """Milliseconds, p50 and p99, of each path."""
     bare = _bare_round_trips(scratch)
-    relay, state = _daemon_paths(scratch)
+    relay, state, _ = daemon_paths(scratch)
     return {
         "bare round trip": figures(bare, bare),
         "LiftRequest to relay edge": figures(relay, bare),
@@ -118,9 +118,10 @@ def quick_lift(scratch: Path) -> Path:
     return file
 
 
-def _daemon_paths(scratch: Path) -> tuple[list[float], list[float]]:
-    log, directory = scratch / "quick.log", scratch / "quick"
-    with running(daemon(quick_lift(scratch), directory, DOMAIN), log):
+def daemon_paths(scratch: Path, transport: str = "dds") -> tuple[list[float], list[float], float]:
+    """Seconds of each request to the relay and each edge to RMF, and the daemon's memory (MB)."""
+    log, directory = scratch / f"quick_{transport}.log", scratch / f"quick_{transport}"
+    with running(daemon(quick_lift(scratch), directory, DOMAIN, transport), log) as child:
         wait_for_log(log, "ready")
         graph = Graph()
         plant = PlantSocket(directory / "plant.sock")
@@ -128,10 +129,9 @@ def _daemon_paths(scratch: Path) -> tuple[list[float], list[float]]:
         driver = PlantSocket(directory / "plant.sock")
         relay = [_to_relay(graph, plant) for _ in range(WARM_UP + ROUNDS)]
         state = [_to_state(graph, plant, driver) for _ in range(WARM_UP + ROUNDS)]
-        plant.close()
-        driver.close()
-        graph.transport.close()
-    return relay[WARM_UP:], state[WARM_UP:]
+        for end in (plant, driver, graph.transport):
+            end.close()
+        return relay[WARM_UP:], state[WARM_UP:], memory_mb(child.pid)
 
 
 def _to_relay(graph: Graph, plant: PlantSocket) -> float:

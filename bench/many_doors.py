@@ -39,6 +39,7 @@ DEAD_OF: Final = 8
 BUS: Final = """\
 kind: door
 driver: dry_contact
+rmf: {transport: dds}
 buses:
   gateway: {type: modbus, tcp: {host: 127.0.0.1, port: 502}}
 doors:

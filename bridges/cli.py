@@ -26,17 +26,30 @@ def main(argv: list[str] | None = None) -> int:
     )
     parser.add_argument("--version", action="version", version=f"rmf-bridge {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    arguments = sys.argv[1:] if argv is None else argv
+    arguments, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
     for name, text in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=text, description=text)
         if name in arguments:  # only the command that runs is imported
             _module(name).add_arguments(subparser)
-    parsed = parser.parse_args(arguments)
+    parsed = parser.parse_args(arguments, argparse.Namespace(ros_args=ros_args))
     try:
         return int(_module(parsed.command).run(parsed))
     except BrokenPipeError:  # the reader of a pipe has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+
+
+def split_ros_args(argv: list[str]) -> tuple[list[str], list[str]]:
+    """Our own arguments, and ROS's: from each `--ros-args` to the next `--`, or to the end."""
+    ours, ros = list[str](), list[str]()
+    into = ours
+    for argument in argv:
+        if argument == "--ros-args":
+            into = ros
+        into.append(argument)
+        if argument == "--" and into is ros:
+            into = ours
+    return ours, ros
 
 
 def _module(command: str):  # type: ignore[no-untyped-def]

@@ -8,6 +8,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Sequence
 from types import FrameType
 from typing import Any
 
@@ -39,6 +40,7 @@ class Daemon:
         open_bus: OpenBus = open_bus,
         localhost: bool = False,
         simulated: bool = False,
+        ros_args: Sequence[str] = (),
     ) -> None:
         """Raises TransportError or HalError when it cannot be."""
         self._config = config
@@ -48,7 +50,9 @@ class Daemon:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
         node_name = f"rmf_bridge_{config.path.stem}"
-        self._transport = open_transport(config.rmf, node_name, localhost=localhost)
+        self._transport = open_transport(
+            config.rmf, node_name, localhost=localhost, ros_args=ros_args
+        )
         if config.buses and not simulated:
             runtime.claim(config.text)  # before anything is: `outputs-off` goes by it
         kept = None if simulated else KeptFile(state_file(config.path))

@@ -25,6 +25,15 @@ Name = Annotated[
     ),
 ]
 """A name that RMF uses: any text, quoted in YAML where YAML would read something else."""
+AbsolutePath = Annotated[
+    str,
+    Meta(
+        max_length=4096,
+        pattern=r"^/[^\x00-\x1f\x7f]*$(?!\n)",
+        extra={"pattern": "a file's whole path (/opt/ros/jazzy/setup.bash)"},
+    ),
+]
+"""A file by its path from the root."""
 
 
 class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -33,12 +42,15 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     `transport`: `ros2` (rclpy), `dds` (without ROS), or `auto`: rclpy where it imports, else dds.
     `domain_id`: the DDS domain; ROS_DOMAIN_ID, or 0, when absent.
     `network`: `localhost` keeps all traffic on the loopback interface.
+    `ros_setup`: ROS's setup file, sourced before the daemon starts (not for `dds`): a service has no
+    shell that has done so. Where `auto` does not find it, that is logged.
     `topics`: RMF's topic name -> the name that the site uses.
     """
 
     transport: Literal["auto", "ros2", "dds"] = "auto"
     domain_id: Annotated[int, Meta(ge=0, le=232)] | None = None
     network: Literal["subnet", "localhost"] = "subnet"
+    ros_setup: AbsolutePath | None = None
     topics: dict[Name, Name] = msgspec.field(default_factory=dict)
 
 

@@ -25,8 +25,12 @@ from drivers.hal import Bus
 
 log = logging.getLogger(__name__)
 
-CLOCK = Clock(time.monotonic, time.time)
 OpenBus = Callable[[str, Any], Bus]
+
+
+def _clock(transport: Transport) -> Clock:
+    """Durations by the machine's own clock, stamps by RMF's."""
+    return Clock(time.monotonic, transport.wall)
 
 
 def open_bus(name: str, settings: Any) -> Bus:
@@ -86,7 +90,9 @@ def service(
         return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
     if isinstance(kind, GraphKind):
-        return GraphService(GraphNode(kind, config.section, transport, CLOCK, named, kept))
+        return GraphService(
+            GraphNode(kind, config.section, transport, _clock(transport), named, kept)
+        )
     return Devices(config, kind, transport, open_bus, named)
 
 
@@ -126,6 +132,7 @@ class Devices:
         self._kind = kind
         self._driver = importlib.import_module(f"drivers.{config.kind}_{config.driver}")
         self._transport = transport
+        self._clock = _clock(transport)
         self._named = named
         self._strangers: Counter[str] = Counter()
         self._publishers: dict[str, Publisher[Any]] = {
@@ -166,13 +173,13 @@ class Devices:
             for name, device in self._config.devices.items()
             if self._config.bus_of(name) == bus_name
         ]
-        return Loop(bus_name, bus, nodes, settings.scan_s, CLOCK)
+        return Loop(bus_name, bus, nodes, settings.scan_s, self._clock)
 
     def _node(self, name: str, device: Any, bus: Bus) -> Node:
         debounce: Mapping[str, float] = getattr(self._driver, "debounce", lambda _: {})(device)
         limits = self._kind.limits(device, debounce)
         driver = self._driver.create(name, device, bus)
-        return Node(name, self._kind, device, limits, driver, self._publish, CLOCK)
+        return Node(name, self._kind, device, limits, driver, self._publish, self._clock)
 
     def _to_inbox(self, topic: Topic[Any]) -> Callable[[Any], None]:
         """A callback for the transport's thread. Other nodes' states are not ours to count."""

@@ -51,7 +51,7 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
         domain_id=args.domain_id,
         network="localhost" if args.localhost else "subnet",
     )
-    return open_transport(rmf, node_name, localhost=args.localhost)
+    return open_transport(rmf, node_name, localhost=args.localhost, ros_args=args.ros_args)
 
 
 @contextmanager

@@ -3,12 +3,13 @@
 import argparse
 import logging
 import os
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 
-from bridges import log, runtime
+from bridges import log, ros_setup, runtime
 from bridges.daemon import Daemon
 from bridges.rmf.transport import TransportError
 from bridges.settings import Config, SettingsError, load
@@ -71,9 +72,11 @@ def _overridden(config: Config, args: argparse.Namespace) -> Config:
 
 
 def _serve(config: Config, held: runtime.RuntimeDirectory, args: argparse.Namespace) -> int:
+    if command := ros_setup.sourcing(config.rmf, os.environ, sys.orig_argv):
+        os.execvpe(command[0], command, ros_setup.sourced(config.rmf, os.environ))
     if not args.simulate:
         os.chdir(held.path)  # lgpio leaves a FIFO where it is imported
-        return Daemon(config, held).serve()
+        return Daemon(config, held, ros_args=args.ros_args).serve()
     from hal_fakes.simulate import Simulation
 
     logging.warning("SIMULATED: no hardware moves, and nothing that RMF is told is true")
@@ -85,6 +88,7 @@ def _serve(config: Config, held: runtime.RuntimeDirectory, args: argparse.Namesp
             open_bus=simulation.open_bus,
             localhost=not args.expose,
             simulated=True,
+            ros_args=args.ros_args,
         ).serve()
     finally:
         simulation.close()

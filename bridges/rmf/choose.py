@@ -1,17 +1,20 @@
 """Which transport a daemon speaks, in which DDS domain, on which network.
 
 The YAML says it; ROS's own environment variables fill in what the YAML leaves open, as they do for
-any ROS node. A file beside this one for each transport: `dds.py`; `ros2.py` (rclpy) and `zenoh.py`
-are not in this version.
+any ROS node. A file beside this one for each transport: `ros2.py`, `dds.py`; `zenoh.py` is not in
+this version.
 """
 
+import importlib
 import importlib.util
 import logging
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 
 from bridges.fields import Rmf
 from bridges.log import pairs
+from bridges.rmf.definitions import PACKAGES
 from bridges.rmf.transport import Transport, TransportError
 
 log = logging.getLogger(__name__)
@@ -24,22 +27,35 @@ NO_CYCLONEDDS = (
 )
 
 
-def open_transport(rmf: Rmf, node_name: str, *, localhost: bool = False) -> Transport:
+NO_ROS = (
+    "transport ros2 needs ROS 2 with RMF's messages, and {}. On Ubuntu 24.04 `sudo apt install"
+    " ros-jazzy-rclpy {}`; the virtual environment needs --system-site-packages and ROS's own"
+    " Python, and the shell ROS's setup file (`. /opt/ros/jazzy/setup.bash`; for a service"
+    " `ros_setup:` below `rmf:`). `transport: dds` needs none of that and speaks to the same nodes"
+)
+
+
+def open_transport(
+    rmf: Rmf, node_name: str, *, localhost: bool = False, ros_args: Sequence[str] = ()
+) -> Transport:
     """Join the RMF graph as `node_name`. Raises TransportError with what to do about it.
 
     `localhost` keeps all traffic on this machine, whatever the YAML and the environment say.
+    `ros_args`: `--ros-args` and what stood behind it on the command line.
     """
-    if rmf.transport == "ros2":
-        raise TransportError(
-            "transport ros2 (rclpy) is not in this version: write `transport: dds`, which needs no"
-            " ROS and speaks to the same nodes"
-        )
     domain = domain_id(rmf, os.environ)
     loopback = localhost or stays_on_loopback(rmf, os.environ)
     network = "localhost" if loopback else "subnet"
-    log.info(
-        pairs("transport", speaks="dds", domain_id=domain, network=network, reason=_reason(rmf))
-    )
+    speaks, reason = _choice(rmf)
+    log.info(pairs("transport", speaks=speaks, domain_id=domain, network=network, reason=reason))
+    node_name = re.sub(r"\W", "_", node_name, flags=re.ASCII)  # ROS knows no other characters
+    if speaks == "ros2":
+        return _open_ros2(node_name, domain, loopback=loopback, ros_args=ros_args)
+    if set(ros_args) - {"--ros-args", "--"}:
+        raise TransportError(
+            f"{' '.join(ros_args)}: only rclpy understands this. Write `transport: ros2`, or give"
+            " names by `topics:` in the YAML"
+        )
     return _open_dds(node_name, domain, loopback=loopback)
 
 
@@ -69,12 +85,41 @@ def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str]) -> bool:
     return text == "LOCALHOST"
 
 
-def _reason(rmf: Rmf) -> str:
+def _choice(rmf: Rmf) -> tuple[str, str]:
+    """The transport, and why it is this one."""
     if rmf.transport == "dds":
-        return "configured"
-    if importlib.util.find_spec("rclpy") is None:
-        return "rclpy is not installed"
-    return "rclpy is installed, but this version has no ros2 transport"
+        return "dds", "configured"
+    missing = missing_of_ros()
+    if rmf.transport == "auto":
+        return ("dds", missing) if missing else ("ros2", "rclpy and RMF's messages are here")
+    if missing:
+        packages = " ".join(_apt_name(package) for package in sorted(set(PACKAGES.values())))
+        raise TransportError(NO_ROS.format(missing, packages))
+    return "ros2", "configured"
+
+
+def missing_of_ros() -> str:
+    """What keeps a node from being a ROS node here; "" for nothing."""
+    try:
+        importlib.import_module("rclpy")
+    except ImportError as error:
+        return f"rclpy does not import: {error}"
+    for package in sorted(set(PACKAGES.values())):
+        if importlib.util.find_spec(package) is None:
+            return f"the ROS package {package} is not here"
+    return ""
+
+
+def _apt_name(package: str) -> str:
+    return f"ros-jazzy-{package.replace('_', '-')}"
+
+
+def _open_ros2(
+    node_name: str, domain: int, *, loopback: bool, ros_args: Sequence[str]
+) -> Transport:
+    from bridges.rmf.ros2 import Ros2Transport
+
+    return Ros2Transport(node_name, domain, loopback=loopback, ros_args=ros_args)
 
 
 def _open_dds(node_name: str, domain: int, *, loopback: bool) -> Transport:

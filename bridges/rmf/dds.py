@@ -13,6 +13,7 @@ cyclonedds is imported here, in idl.py and in graph.py, and these three only by 
 
 import logging
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final, Generic, TypeVar
@@ -28,11 +29,12 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.log import pairs
-from bridges.rmf import topics
+from bridges.rmf import notices, topics
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
 from bridges.rmf.graph import NodeOnGraph
 from bridges.rmf.idl import sample_type
+from bridges.rmf.loopback import LOOPBACK
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
@@ -40,16 +42,6 @@ from bridges.rmf.transport import TransportError
 log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=Message)
-
-LOOPBACK: Final = (
-    "<CycloneDDS><Domain><General>"
-    '<Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
-    "<AllowMulticast>false</AllowMulticast></General>"
-    "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
-    "<MaxAutoParticipantIndex>30</MaxAutoParticipantIndex>"
-    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
-)
-"""Cyclone's configuration that keeps a node on this machine: unicast on `lo`, 31 processes."""
 
 CANNOT_JOIN: Final = (
     "is a network interface up, and does CYCLONEDDS_URI, if set, name one that exists? "
@@ -115,6 +107,10 @@ class DdsTransport:
             self._waitset.attach(self._keep(core.ReadCondition(reader, ANY_SAMPLE)))
             self._node.add_reader(reader)
         return subscription
+
+    def wall(self) -> float:
+        """The wall clock (s since the epoch)."""
+        return time.time()
 
     def close(self) -> None:
         """Leave the graph at once. Each entity is deleted by name: none waits for a collector."""
@@ -228,7 +224,7 @@ class _Publisher(Generic[M]):
         """Say that a subscription of this topic cannot be served, when there is a new one."""
         status = self._writer.get_offered_incompatible_qos_status()
         if status.total_count_change:
-            _log_misfit(self._topic, "a subscription is not served", status)
+            _log_misfit(self._topic, notices.NOT_SERVED, status)
 
 
 class _Subscription(Generic[M]):
@@ -257,7 +253,7 @@ class _Subscription(Generic[M]):
             try:
                 samples = self._reader.take(1)
             except CdrError as error:
-                self._drop(error)
+                notices.drop(self._dropped, self._topic, error)
                 continue
             if not samples:
                 return taken > 0
@@ -269,18 +265,12 @@ class _Subscription(Generic[M]):
         """Say that a publisher of this topic cannot be heard, when there is a new one."""
         status = self._reader.get_requested_incompatible_qos_status()
         if status.total_count_change:
-            _log_misfit(self._topic, "a publisher is not heard", status)
-
-    def _drop(self, error: CdrError) -> None:
-        name = self._topic.name
-        self._dropped[name] = self._dropped.get(name, 0) + 1
-        if self._dropped[name] == 1:
-            log.warning(pairs("sample_dropped", topic=name, reason=error, further="only counted"))
+            _log_misfit(self._topic, notices.NOT_HEARD, status)
 
 
 def _log_misfit(topic: Topic[M], text: str, status: Any) -> None:
     policy = POLICIES.get(status.last_policy_id, f"QoS policy {status.last_policy_id}")
-    log.warning(pairs("misfit", topic=topic.name, reason=f"{text}: its {policy} does not fit ours"))
+    notices.misfit(topic, text, policy)
 
 
 def _loopback_domain(domain_id: int) -> Any:

@@ -1,10 +1,12 @@
-"""The `memory` transport: nodes of one process, for tests in virtual time. No thread, no clock.
+"""The `memory` transport: nodes of one process, for tests in virtual time. No thread, and no
+clock but the wall's.
 
 A message is delivered before `publish` returns, in the order in which the subscriptions were made.
 Who hears whom follows DDS: same name, same type, and a subscription that wants retained messages
 hears nobody who does not retain any.
 """
 
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
@@ -50,6 +52,10 @@ class MemoryTransport:
         self._network.subscriptions.append(subscription)
         subscription.catch_up()
         return subscription
+
+    def wall(self) -> float:
+        """The wall clock (s since the epoch)."""
+        return time.time()
 
     def close(self) -> None:
         """Leave the network, with all that was retained here."""

@@ -1,4 +1,4 @@
-"""What a transport does, whichever wire it speaks: `dds`, `memory`, later `ros2` and `zenoh`.
+"""What a transport does, whichever wire it speaks: `ros2`, `dds`, `memory`, later `zenoh`.
 
 One file each beside this one; `bridges/rmf/choose.py` opens the one that the YAML names.
 """
@@ -57,6 +57,9 @@ class Transport(Protocol):
 
         `others_only`: what this same transport publishes on the topic is not delivered to it.
         """
+
+    def wall(self) -> float:
+        """RMF's time, for stamps (s since the epoch): the wall clock, unless ROS simulates time."""
 
     def close(self) -> None:
         """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""

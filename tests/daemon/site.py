@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -16,10 +17,11 @@ from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorSt
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
 from tests.waiting import wait_until
 
+ROOT = Path(__file__).parents[2]
 YAML = """
 kind: door
 driver: dry_contact
-rmf: {{transport: dds, network: localhost, domain_id: {domain}}}
+rmf: {{transport: {transport}, network: localhost, domain_id: {domain}}}
 buses:
   module: {{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}}}
 doors:
@@ -36,12 +38,12 @@ doors:
 class Module:
     """The I/O module and the door behind it; it outlives every daemon."""
 
-    def __init__(self, directory: Path, domain: int) -> None:
+    def __init__(self, directory: Path, domain: int, transport: str = "dds") -> None:
         self.directory = directory
         self.domain = domain
         self.edges: list[dict[str, Any]] = []
         draft = directory / "draft.yaml"
-        draft.write_text(YAML.format(domain=domain, port=502))
+        draft.write_text(YAML.format(domain=domain, transport=transport, port=502))
         path = directory / "plant.sock"
         self._far_side = subprocess.Popen(
             [sys.executable, "-m", "hal_fakes", str(draft), "module", "--socket", str(path)],
@@ -51,7 +53,7 @@ class Module:
         assert self._far_side.stdout
         tcp = json.loads(self._far_side.stdout.readline())["tcp"]
         self.file = directory / "ward_door.yaml"
-        self.file.write_text(YAML.format(domain=domain, port=tcp["port"]))
+        self.file.write_text(YAML.format(domain=domain, transport=transport, port=tcp["port"]))
         self._follow = socket.socket(socket.AF_UNIX)
         self._follow.connect(str(path))
         self._follow.sendall(b"follow\n")
@@ -77,6 +79,15 @@ class Module:
         self._far_side.stdin.close()
         self._far_side.wait(10)
         self._far_side.stdout.close()
+
+
+def shipped(name: str, directory: Path, transport: str) -> Path:
+    """A shipped YAML on this transport, in ROS's surroundings as they are."""
+    text = (ROOT / "config" / name).read_text()
+    text = re.sub(r" *ros_setup: .*\n", "", text)
+    file = directory / name
+    file.write_text(re.sub(r"transport: \w+", f"transport: {transport}", text))
+    return file
 
 
 def command(*arguments: str | Path) -> list[str]:

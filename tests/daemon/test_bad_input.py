@@ -1,4 +1,4 @@
-"""What a lift's daemon makes of requests that cannot be right: a real process, on DDS."""
+"""What a lift's daemon makes of requests that cannot be right: a real process, on each wire."""
 
 import json
 from collections.abc import Iterator
@@ -12,11 +12,11 @@ from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import LiftMode, LiftRequest, LiftState
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 from hal_fakes.domain import free_domain
-from tests.daemon.site import Daemon, daemon
+from tests.daemon.site import Daemon, daemon, shipped
 from tests.rmf import peer
+from tests.rmf.conftest import ROS2
 from tests.waiting import wait_until
 
-LIFT = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
 RIGHT = LiftRequest(
     "Lift1", session_id="fleet/robot", request_type=1, destination_floor="L3", door_state=2
 )
@@ -55,11 +55,12 @@ class Lift:
         return refused
 
 
-@pytest.fixture
-def lift(tmp_path: Path) -> Iterator[Lift]:
+@pytest.fixture(params=["dds", ROS2])
+def lift(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Lift]:
+    file = shipped("lift_dry_contact.yaml", tmp_path, request.param)
     domain = free_domain()
     options = ("--simulate", "--domain-id", str(domain))
-    with daemon(LIFT, tmp_path / "run", *options) as running:
+    with daemon(file, tmp_path / "run", *options) as running:
         running.wait_for("ready")
         made = Lift(running, tmp_path / "run" / "status.json", domain)
         yield made

@@ -13,15 +13,16 @@ import pytest
 from bridges.rmf.definitions import DoorModeValue
 from hal_fakes.domain import free_domain
 from tests.daemon.site import YAML, Daemon, Graph, Module, command, daemon, environment
+from tests.rmf.conftest import ROS2
 from tests.waiting import wait_until
 
 OPEN, CLOSED = DoorModeValue.MODE_OPEN, DoorModeValue.MODE_CLOSED
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture
-def module(tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, free_domain())
+@pytest.fixture(params=["dds", ROS2])
+def module(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Module]:
+    standing = Module(tmp_path, free_domain(), request.param)
     yield standing
     standing.close()
 
@@ -72,7 +73,7 @@ def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_th
 
 
 def test_outputs_that_cannot_be_verified_off_are_said_so(module: Module, tmp_path: Path) -> None:
-    module.file.write_text(YAML.format(domain=module.domain, port=1))
+    module.file.write_text(YAML.format(domain=module.domain, transport="dds", port=1))
     done = subprocess.run(
         command("outputs-off", module.file, "--runtime-dir", tmp_path / "run"),
         env=environment(),

@@ -207,6 +207,9 @@ class WorldTransport:
             self.received[topic.name].append(received)
         return _End(self, topic)
 
+    def wall(self) -> float:
+        return EPOCH + self.world.now
+
     def close(self) -> None:
         for ends in self.world.publishers.values():
             ends.discard(self.name)

@@ -1,6 +1,10 @@
+import gc
+import importlib
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
+from cyclonedds.domain import DomainParticipant
 
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.transport import Transport
@@ -10,36 +14,69 @@ Join = Callable[[str], Transport]
 """Open a node of this name on the graph of this test."""
 
 
-@pytest.fixture(params=["memory", "dds"])
+ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
+
+
+@pytest.fixture(params=["memory", "dds", ROS2])
 def join(request: pytest.FixtureRequest) -> Iterator[Join]:
     """One graph for the test, on each transport in turn; its nodes leave at the end."""
-    nodes: list[Transport] = []
     network = MemoryNetwork()
+    on: dict[str, Join] = {
+        "memory": lambda name: MemoryTransport(network, name),
+        "dds": joining("dds", domain_of_this_run()),
+        "ros2": joining("ros2", domain_of_this_run()),
+    }
+    yield from _graph(on[request.param])
 
-    def join(name: str) -> Transport:
-        nodes.append(MemoryTransport(network, name) if request.param == "memory" else _dds(name))
-        return nodes[-1]
 
-    yield join
-    for node in nodes:
-        node.close()
+@pytest.fixture(params=["dds", ROS2])
+def join_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
+    """One graph for the test, on each transport that has a wire."""
+    yield from _graph(joining(request.param, domain_of_this_run()))
 
 
 @pytest.fixture
 def join_dds() -> Iterator[Join]:
     """One graph for the test, on DDS."""
+    yield from _graph(joining("dds", domain_of_this_run()))
+
+
+@pytest.fixture
+def join_ros() -> Iterator[Join]:
+    """One graph for the test, on ROS; for tests that are marked so."""
+    yield from _graph(joining("ros2", domain_of_this_run()))
+
+
+@pytest.fixture
+def observer(join_dds: Join) -> Iterator[Any]:
+    """A participant that is none of ours, in the same process and so in the same domain."""
+    join_dds("keeps_the_domain")
+    participant = DomainParticipant(domain_of_this_run())
+    yield participant
+    del participant
+    gc.collect()
+
+
+def joining(transport: str, domain: int) -> Join:
+    """What opens nodes of this transport in this domain, on loopback."""
+
+    def join(name: str) -> Transport:
+        # Imported here: there may be no ROS.
+        module = importlib.import_module(f"bridges.rmf.{transport}")
+        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
+        node: Transport = getattr(module, kind)(name, domain, loopback=True)
+        return node
+
+    return join
+
+
+def _graph(opening: Join) -> Iterator[Join]:
     nodes: list[Transport] = []
 
     def join(name: str) -> Transport:
-        nodes.append(_dds(name))
+        nodes.append(opening(name))
         return nodes[-1]
 
     yield join
     for node in nodes:
         node.close()
-
-
-def _dds(name: str) -> Transport:
-    from bridges.rmf.dds import DdsTransport
-
-    return DdsTransport(name, domain_of_this_run(), loopback=True)

@@ -1,4 +1,5 @@
-"""Another process on the graph: `python -m tests.rmf.peer WHAT DOMAIN`; it ends with its stdin.
+"""Another process on the graph: `python -m tests.rmf.peer WHAT DOMAIN TRANSPORT`; it ends with its
+stdin.
 
 `echo` sends back on `pong_<topic>` whatever arrives on `ping_<topic>`, for every topic.
 `hostile` is a node that lies: what it sends as a LiftRequest is no LiftRequest (see there).
@@ -14,6 +15,8 @@ from typing import Any
 
 from bridges.rmf import topics
 from bridges.rmf.topics import Topic
+from bridges.rmf.transport import Publisher
+from tests.rmf.conftest import joining
 from tests.waiting import wait_until
 
 TOPICS: dict[str, Topic[Any]] = {
@@ -22,9 +25,9 @@ TOPICS: dict[str, Topic[Any]] = {
 
 
 @contextmanager
-def running(what: str, domain: int) -> Iterator[None]:
+def running(what: str, domain: int, transport: str = "dds") -> Iterator[None]:
     """The peer as a child process, until the end of the block."""
-    command = [sys.executable, "-m", "tests.rmf.peer", what, str(domain)]
+    command = [sys.executable, "-m", "tests.rmf.peer", what, str(domain), transport]
     with subprocess.Popen(command, stdin=subprocess.PIPE) as child:
         try:
             yield
@@ -34,16 +37,20 @@ def running(what: str, domain: int) -> Iterator[None]:
             child.wait()
 
 
-def echo(domain: int) -> None:
+def echo(domain: int, transport: str) -> None:
     """Send back every message of every topic, under another name."""
-    from bridges.rmf.dds import DdsTransport
-
-    node = DdsTransport("echo", domain, loopback=True)
+    node = joining(transport, domain)("echo")
     for topic in TOPICS.values():
         back = node.publisher(topic.named(f"pong_{topic.name}"))
         node.subscribe(topic.named(f"ping_{topic.name}"), back.publish)
     sys.stdin.read()
     node.close()
+
+
+def sent(publisher: Publisher[Any], message: Any) -> bool:
+    """Publish, for a condition that is not yet met: the peer may find us later than we find it."""
+    publisher.publish(message)
+    return False
 
 
 GOOD = bytes.fromhex(
@@ -69,7 +76,7 @@ COUNTED_AS_DROPPED = {
 """These pass it, and are refused by our decoder."""
 
 
-def hostile(domain: int) -> None:
+def hostile(domain: int, transport: str) -> None:
     """Match as an honest node would, then put forged samples on the wire as the writer's own.
 
     The forged ones use up the sequence numbers of the writer's next own samples: only later ones of
@@ -80,7 +87,7 @@ def hostile(domain: int) -> None:
     from cyclonedds.qos import Policy, Qos
     from cyclonedds.topic import Topic as DdsTopic
 
-    from bridges.rmf.dds import LOOPBACK
+    from bridges.rmf.loopback import LOOPBACK
     from tests.rmf import idl_types
 
     kept = Domain(domain, LOOPBACK)
@@ -116,4 +123,4 @@ def _send_raw(domain: int, packet: bytes) -> None:
 
 
 if __name__ == "__main__":
-    {"echo": echo, "hostile": hostile}[sys.argv[1]](int(sys.argv[2]))
+    {"echo": echo, "hostile": hostile}[sys.argv[1]](int(sys.argv[2]), sys.argv[3])

@@ -1,5 +1,9 @@
+import importlib.util
 import logging
 import sys
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Literal
 
 import msgspec
 import pytest
@@ -7,6 +11,7 @@ import pytest
 from bridges.fields import Rmf
 from bridges.rmf.choose import domain_id, open_transport, stays_on_loopback
 from bridges.rmf.dds import DdsTransport
+from bridges.rmf.definitions import PACKAGES
 from bridges.rmf.transport import TransportError
 from tests.rmf.domains import domain_of_this_run
 
@@ -61,9 +66,69 @@ def test_a_range_in_which_nobody_is_found_is_refused(text: str) -> None:
         stays_on_loopback(Rmf(), {"ROS_AUTOMATIC_DISCOVERY_RANGE": text})
 
 
-def test_ros2_is_not_in_this_version_and_the_error_says_what_is() -> None:
-    with pytest.raises(TransportError, match="`transport: dds`, which needs no ROS"):
+@pytest.fixture
+def no_ros(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a machine without ROS, wherever this runs."""
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+
+
+@pytest.fixture
+def bare_rclpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a machine with ROS but without RMF's packages."""
+    for package in set(PACKAGES.values()) | {"rclpy"}:
+        monkeypatch.setitem(sys.modules, package, ModuleType(package))
+    found = ModuleSpec("found", None)
+    lacking = {"rmf_charger_msgs": None}
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: lacking.get(name, found))
+
+
+def test_without_ros_the_error_says_how_to_get_it(no_ros: None) -> None:
+    with pytest.raises(TransportError) as refused:
         open_transport(Rmf(transport="ros2"), "node", localhost=True)
+    text = str(refused.value)
+    assert text.startswith(
+        "transport ros2 needs ROS 2 with RMF's messages, and rclpy does not import: "
+    )
+    assert "sudo apt install ros-jazzy-rclpy ros-jazzy-builtin-interfaces" in text
+    assert "`transport: dds` needs none of that" in text
+
+
+def test_without_rmfs_packages_the_error_names_the_one_that_is_missing(bare_rclpy: None) -> None:
+    with pytest.raises(TransportError, match="the ROS package rmf_charger_msgs is not here"):
+        open_transport(Rmf(transport="ros2"), "node", localhost=True)
+
+
+@pytest.mark.parametrize("transport", ["auto", "dds"])
+def test_ros_args_are_for_ros_alone(no_ros: None, transport: Literal["auto", "dds"]) -> None:
+    rmf = Rmf(transport=transport, domain_id=domain_of_this_run())
+    with pytest.raises(TransportError, match="--ros-args -r a:=b: only rclpy understands this"):
+        open_transport(rmf, "node", localhost=True, ros_args=["--ros-args", "-r", "a:=b"])
+    open_transport(rmf, "node", localhost=True, ros_args=["--ros-args"]).close()
+
+
+@pytest.mark.parametrize("transport", ["dds", pytest.param("ros2", marks=pytest.mark.ros)])
+def test_a_node_name_has_only_the_characters_that_ros_knows(
+    transport: Literal["dds", "ros2"],
+) -> None:
+    rmf = Rmf(transport=transport, domain_id=domain_of_this_run())
+    node = open_transport(rmf, "rmf_bridge_lift-a.ü", localhost=True)
+    node.close()
+    assert node.name == "rmf_bridge_lift_a__"
+
+
+@pytest.mark.ros
+def test_auto_opens_ros2_where_all_of_it_is_here_and_says_why(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.INFO)
+    domain = domain_of_this_run()
+    node = open_transport(Rmf(domain_id=domain), "chosen", localhost=True)
+    node.close()
+    assert type(node).__name__ == "Ros2Transport"
+    assert caplog.messages == [
+        f"transport speaks=ros2 domain_id={domain} network=localhost"
+        ' reason="rclpy and RMF\'s messages are here"'
+    ]
 
 
 def test_without_cyclonedds_the_error_says_how_to_get_it(
@@ -74,7 +139,9 @@ def test_without_cyclonedds_the_error_says_how_to_get_it(
         open_transport(Rmf(transport="dds"), "node", localhost=True)
 
 
-def test_auto_opens_dds_and_says_why(caplog: pytest.LogCaptureFixture) -> None:
+def test_auto_opens_dds_without_ros_and_says_why(
+    no_ros: None, caplog: pytest.LogCaptureFixture
+) -> None:
     caplog.set_level(logging.INFO)
     domain = domain_of_this_run()
     node = open_transport(Rmf(domain_id=domain), "chosen", localhost=True)
@@ -83,7 +150,7 @@ def test_auto_opens_dds_and_says_why(caplog: pytest.LogCaptureFixture) -> None:
     assert [text.split(" reason=")[0] for text in caplog.messages] == [
         f"transport speaks=dds domain_id={domain} network=localhost"
     ]
-    assert "rclpy is " in caplog.text
+    assert 'reason="rclpy does not import: ' in caplog.text
 
 
 def test_simulation_stays_on_loopback_whatever_the_yaml_and_the_environment_say(

@@ -124,6 +124,10 @@ def test_others_only_leaves_out_what_the_same_node_says(join: Join) -> None:
     wait_until(lambda: len(echoed) == 2 and from_others, "all has arrived")
     assert sorted(numbers(echoed)) == [1, 2]
     assert numbers(from_others) == [2]
+    our_voice.publish(numbered(3))
+    other_voice.publish(numbered(3))  # the same words are still another's
+    wait_until(lambda: len(echoed) == 4 and len(from_others) == 2, "all has arrived")
+    assert numbers(from_others) == [2, 3]
     assert (everything.matched(), others_only.matched()) == (2, 1)
 
 
@@ -155,6 +159,25 @@ def test_who_leaves_is_gone_for_the_others_and_may_leave_twice(join: Join) -> No
     with pytest.raises(TransportError, match="has left the graph"):
         speaker.subscribe(HEARD, received.append)
     assert received == []
+
+
+def test_one_end_may_leave_and_come_back_while_its_node_stays(join: Join) -> None:
+    speaker, listener = join("speaker"), join("listener")
+    received: list[d.DoorRequest] = []
+    subscription = listener.subscribe(HEARD, received.append)
+    first = speaker.publisher(HEARD)
+    wait_for_match(first, subscription)
+    first.close()
+    first.close()
+    wait_until(lambda: subscription.matched() == 0, "the end is gone")
+    assert first.matched() == 0
+    with pytest.raises(TransportError):
+        first.publish(numbered(1))
+    second = speaker.publisher(HEARD)
+    wait_for_match(second, subscription)
+    second.publish(numbered(2))
+    wait_until(lambda: received, "the new end is heard")
+    assert numbers(received) == [2]
 
 
 def test_what_a_node_retained_leaves_with_it(join: Join) -> None:

@@ -1,0 +1,63 @@
+"""The thing to compare with on ROS: an rclpy node that only sets a pin (run as its own process).
+
+A LiftRequest switches the pin, `on` and `off` on stdin switch an input, whose edge goes out as a
+LiftState. Each edge is a line on stdout: its signal, its level, and when (monotonic s).
+"""
+
+import os
+import sys
+import threading
+import time
+from typing import Any
+
+import rclpy
+from gpiozero import Button, Device, OutputDevice
+from gpiozero.pins.mock import MockFactory
+from rclpy.executors import ExternalShutdownException
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rmf_lift_msgs.msg import LiftRequest, LiftState
+
+from bridges.rmf.loopback import LOOPBACK
+
+
+def main(domain: int) -> None:
+    """Serve until SIGTERM."""
+    os.environ["CYCLONEDDS_URI"] = LOOPBACK
+    Device.pin_factory = MockFactory()
+    relay, emergency = OutputDevice(12), Button(11, pull_up=False)
+    rclpy.init(args=[], domain_id=domain)
+    node = rclpy.create_node("minimal")
+    volatile = QoSProfile(depth=100, durability=DurabilityPolicy.VOLATILE)
+    states = node.create_publisher(LiftState, "lift_states", volatile)
+
+    def serve(request: Any) -> None:
+        relay.value = request.request_type == LiftRequest.REQUEST_AGV_MODE
+        _tell("relay", relay.value)
+
+    def tell(mode: int) -> None:
+        states.publish(LiftState(lift_name="Lift1", current_mode=mode))
+
+    emergency.when_pressed = lambda: tell(LiftState.MODE_EMERGENCY)
+    emergency.when_released = lambda: tell(LiftState.MODE_AGV)
+    node.create_subscription(LiftRequest, "lift_requests", serve, volatile)
+    threading.Thread(target=_turn, args=(emergency.pin,), daemon=True).start()
+    print("ready", file=sys.stderr, flush=True)
+    try:
+        rclpy.spin(node)
+    except ExternalShutdownException:
+        node.destroy_node()
+
+
+def _turn(pin: Any) -> None:
+    for line in sys.stdin:
+        pressed = line.strip() == "on"
+        _tell("input", pressed)
+        (pin.drive_high if pressed else pin.drive_low)()
+
+
+def _tell(signal: str, level: object) -> None:
+    print(signal, int(bool(level)), time.monotonic(), flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -1,0 +1,68 @@
+"""The types of `definitions.py` as rclpy wants them: the classes of the installed ROS packages.
+
+Samples pass rclpy as bytes (`ros2.py`), so what the classes hold is never used; what they say of
+their fields is compared with our table, as bytes of another definition would be read as nonsense.
+"""
+
+import importlib
+import typing
+from dataclasses import fields
+from typing import Any
+
+from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.transport import TransportError
+
+NAMES = {str: "string", bool: "boolean", "byte": "octet", "float32": "float", "float64": "double"}
+"""Where Python's message classes speak IDL and not ROS."""
+
+
+def ros_type(message_type: type) -> Any:
+    """The ROS class of a message type. Raises TransportError where it is missing or another."""
+    package, name = PACKAGES[message_type], message_type.__name__
+    try:
+        found = getattr(importlib.import_module(f"{package}.msg"), name, None)
+    except ImportError as error:
+        raise TransportError(
+            f"{package} does not import ({error}): {how_to_install(package)}"
+        ) from error
+    if found is None:
+        raise TransportError(
+            f"the installed {package} has no {name}: a newer one is needed, or `transport: dds`"
+        )
+    for nested in sorted(_nested_in(message_type), key=lambda kind: kind.__name__):
+        ros_type(nested)
+    theirs, ours = found.get_fields_and_field_types(), fields_of(message_type)
+    if list(theirs.items()) != list(ours.items()):
+        raise TransportError(
+            f"the installed {package}/{name} has the fields {theirs}, this version knows {ours}:"
+            " `transport: dds` would not match such nodes either"
+        )
+    return found
+
+
+def how_to_install(package: str) -> str:
+    """What to type on Ubuntu with ROS 2's package sources."""
+    return (
+        f"`sudo apt install ros-jazzy-{package.replace('_', '-')}`, and source ROS's setup file"
+        " (`ros_setup:` in the YAML does that for a service)"
+    )
+
+
+def fields_of(message_type: type) -> dict[str, str]:
+    """Field -> type, in the words of `get_fields_and_field_types()`."""
+    return {field.name: _name(field.type) for field in fields(message_type)}
+
+
+def _name(kind: Any) -> str:
+    if typing.get_origin(kind) is typing.Annotated:
+        name = str(kind.__metadata__[0])
+        return NAMES.get(name, name)
+    if typing.get_origin(kind) is tuple:
+        return f"sequence<{_name(typing.get_args(kind)[0])}>"
+    return NAMES.get(kind) or f"{PACKAGES[kind]}/{kind.__name__}"
+
+
+def _nested_in(message_type: type) -> set[type]:
+    kinds: list[Any] = [field.type for field in fields(message_type)]
+    sequences = {typing.get_args(kind)[0] for kind in kinds if typing.get_origin(kind) is tuple}
+    return PACKAGES.keys() & {*kinds, *sequences}

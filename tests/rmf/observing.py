@@ -1,0 +1,25 @@
+"""A participant that is none of ours and looks at what the others announce."""
+
+from typing import Any
+
+from cyclonedds import builtin
+
+from bridges.rmf.topics import Topic
+from tests.waiting import wait_until
+
+PUBLICATION = builtin.BuiltinTopicDcpsPublication
+SUBSCRIPTION = builtin.BuiltinTopicDcpsSubscription
+
+
+def seen(observer: Any, kind: Any, topic: Topic[Any]) -> Any:
+    """The one end of a topic that is announced."""
+    reader = builtin.BuiltinDataReader(observer, kind)
+    found: list[Any] = []
+
+    def look() -> bool:
+        found.extend(end for end in reader.take(100) if end.topic_name == f"rt/{topic.name}")
+        return bool(found)
+
+    wait_until(look, f"{topic.name} is announced")
+    assert len(found) == 1
+    return found[0]

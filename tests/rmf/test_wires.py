@@ -1,0 +1,285 @@
+"""What every transport with a wire does: `dds` everywhere, `ros2` where ROS is (make test-ros)."""
+
+import os
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+from cyclonedds.idl import IdlStruct, annotations
+from cyclonedds.idl.types import float32, uint32
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.topic import Topic as DdsTopic
+from hypothesis import given
+
+from bridges.rmf import definitions as d
+from bridges.rmf.rihs01 import type_hash
+from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE, Topic
+from bridges.rmf.transport import Publisher, TransportError
+from hal_fakes.domain import free_domain
+from tests.rmf import peer
+from tests.rmf.conftest import ROS2, Join, joining
+from tests.rmf.domains import domain_of_this_run
+from tests.rmf.observing import PUBLICATION, SUBSCRIPTION, seen
+from tests.rmf.values import repeatable, values
+from tests.waiting import wait_until
+
+DOMAIN = domain_of_this_run()
+OTHER_DOMAIN = free_domain()
+
+ALL_TOPICS = pytest.mark.parametrize("topic", peer.TOPICS.values(), ids=peer.TOPICS.keys())
+OURS = pytest.mark.parametrize("ours", ["dds", ROS2])
+THEIRS = pytest.mark.parametrize("theirs", ["dds", ROS2])
+
+
+@pytest.fixture(scope="module", params=["dds", ROS2])
+def echo(request: pytest.FixtureRequest) -> Iterator[None]:
+    """A second process that sends everything back, on each wire in turn."""
+    with peer.running("echo", DOMAIN, request.param):
+        yield
+
+
+# --- to another process ------------------------------------------------------------------------
+
+
+@ALL_TOPICS
+def test_every_message_survives_the_wire_to_another_process_and_back(
+    echo: None, join_wire: Join, topic: Topic[Any]
+) -> None:
+    received: list[Any] = []
+    node = join_wire("here")
+    subscription = node.subscribe(topic.named(f"pong_{topic.name}"), received.append)
+    publisher = node.publisher(topic.named(f"ping_{topic.name}"))
+    wait_until(lambda: publisher.matched() and subscription.matched(), "the echo matches")
+
+    @repeatable
+    @given(values(topic.type))
+    def comes_back(message: Any) -> None:
+        publisher.publish(message)
+        wait_until(lambda: received[-1] == message, f"{message} comes back")
+
+    wait_until(lambda: received or peer.sent(publisher, topic.type()), "a first echo comes back")
+    comes_back()
+
+
+@OURS
+@THEIRS
+@pytest.mark.parametrize(
+    "name", ["EMERGENCY_SIGNAL", "FIRE_ALARM_TRIGGER", "ADAPTER_LIFT_REQUESTS"]
+)
+def test_retained_messages_reach_a_process_that_starts_later(
+    ours: str, theirs: str, name: str
+) -> None:
+    topic = peer.TOPICS[name]
+    numbered: dict[Any, Callable[[int], d.Message]] = {
+        d.EmergencySignal: lambda number: d.EmergencySignal((str(number),), True),
+        d.Bool: lambda number: d.Bool(number % 3 == 0),
+        d.LiftRequest: lambda number: d.LiftRequest(destination_floor=str(number)),
+    }
+    received: list[Any] = []
+    sent = [numbered[topic.type](number) for number in range(130)]
+    node = joining(ours, OTHER_DOMAIN)("here")
+    try:
+        publisher = node.publisher(topic.named(f"ping_{topic.name}"))
+        node.subscribe(topic.named(f"pong_{topic.name}"), received.append)
+        for message in sent:
+            publisher.publish(message)
+        with peer.running("echo", OTHER_DOMAIN, theirs):
+            wait_until(lambda: len(received) == 100, "the hundred newest come back")
+    finally:
+        node.close()
+    assert received == sent[30:]
+
+
+@OURS
+@THEIRS
+def test_what_a_supervisor_retained_is_not_replayed_to_a_lift_that_starts_later(
+    ours: str, theirs: str
+) -> None:
+    received: list[d.LiftRequest] = []
+    node = joining(ours, OTHER_DOMAIN)("supervisor")
+    try:
+        publisher = node.publisher(LIFT_REQUESTS.named("ping_lift_requests"))
+        node.subscribe(LIFT_REQUESTS.named("pong_lift_requests"), received.append)
+        publisher.publish(d.LiftRequest("before"))
+        with peer.running("echo", OTHER_DOMAIN, theirs):
+            after = d.LiftRequest("after")
+            wait_until(lambda: received or peer.sent(publisher, after), "a new one comes back")
+    finally:
+        node.close()
+    assert set(received) == {after}
+
+
+@OURS
+@THEIRS
+def test_a_process_that_leaves_is_gone_at_once_for_the_others(ours: str, theirs: str) -> None:
+    node = joining(ours, OTHER_DOMAIN)("stays")
+    try:
+        publisher = node.publisher(LIFT_STATES.named("ping_lift_states"))
+        subscription = node.subscribe(LIFT_STATES.named("pong_lift_states"), print)
+        with peer.running("echo", OTHER_DOMAIN, theirs):
+            wait_until(lambda: publisher.matched() and subscription.matched(), "it is found")
+        # Without a farewell it would be missed only when its lease runs out, after 10 s.
+        wait_until(
+            lambda: not publisher.matched() and not subscription.matched(), "it is gone", 5.0
+        )
+    finally:
+        node.close()
+
+
+# --- on our own thread -------------------------------------------------------------------------
+
+
+def test_messages_arrive_on_the_thread_of_the_transport(join_wire: Join) -> None:
+    threads: list[str] = []
+    listener = join_wire("listener")
+    listener.subscribe(LIFT_STATES, lambda _: threads.append(threading.current_thread().name))
+    publisher = join_wire("speaker").publisher(LIFT_STATES)
+    wait_until(lambda: threads or peer.sent(publisher, d.LiftState()), "a message arrives")
+    assert {name.rpartition("-")[0] for name in threads} == {"listener"}
+
+
+def test_a_reader_thread_that_has_died_shows_at_the_next_publish(
+    join_wire: Join, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    died: list[Any] = []
+    monkeypatch.setattr(threading, "excepthook", died.append)
+
+    def broken(message: d.LiftState) -> None:
+        raise ArithmeticError
+
+    node = join_wire("broken")
+    node.subscribe(LIFT_STATES, broken)
+    publisher = node.publisher(LIFT_STATES)
+    wait_until(lambda: died or not _refuses(publisher), "the first message is sent")
+    wait_until(lambda: died, "the thread dies")
+    wait_until(lambda: _refuses(publisher), "publishing is refused")
+
+
+def _refuses(publisher: Publisher[d.LiftState]) -> bool:
+    try:
+        publisher.publish(d.LiftState())
+    except TransportError:
+        return True
+    return False
+
+
+def test_nodes_that_come_and_go_leave_no_thread_no_file_and_no_complaint_behind(
+    join_wire: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    def come_and_go() -> None:
+        node = join_wire("guest")
+        node.subscribe(LIFT_REQUESTS, print)
+        node.publisher(LIFT_STATES).publish(d.LiftState())
+        node.close()
+
+    come_and_go()
+    before = _threads_and_files()
+    for _ in range(10):
+        come_and_go()
+    wait_until(lambda: _threads_and_files() <= before, "threads and files are as before")
+    assert caplog.messages == []
+
+
+def _threads_and_files() -> tuple[int, int]:
+    return len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd"))
+
+
+# --- bad input ---------------------------------------------------------------------------------
+
+
+def test_forged_samples_are_dropped_and_the_good_ones_after_them_arrive(
+    join_wire: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    received: list[d.LiftRequest] = []
+    node = join_wire("listener")
+    node.subscribe(LIFT_REQUESTS, received.append)
+    with peer.running("hostile", DOMAIN):
+        wait_until(lambda: received[-1:] == [d.LiftRequest("after")], "a good one arrives")
+    names = [request.lift_name for request in received]
+    assert names[names.index("Lift1") :] == ["Lift1"] + ["after"] * names.count("after")
+    # cyclonedds refuses some before they reach us; rclpy hands on whatever comes.
+    by_us, first = {
+        "DdsTransport": (4, "a string is not UTF-8: 'utf-8' codec can't decode byte 0xff"),
+        "Ros2Transport": (8, "cut short: unpack_from requires a buffer of at least 24 bytes"),
+    }[type(node).__name__]
+    assert node.dropped == {"lift_requests": by_us}
+    (told,) = [text for text in caplog.messages if "sample_dropped" in text]
+    assert told.startswith(f'sample_dropped topic=lift_requests reason="{first}')
+
+
+@annotations.final
+@dataclass
+class OtherLiftRequest(IdlStruct, typename="rmf_lift_msgs.msg.dds_.LiftRequest_"):  # type: ignore[misc, call-arg]
+    """Another definition under RMF's name."""
+
+    number: uint32
+    lift_name: str
+    height: float32
+
+
+def test_a_type_of_the_same_name_with_other_fields_is_never_taken_for_ours(
+    join_wire: Join, observer: Any
+) -> None:
+    received: list[d.LiftRequest] = []
+    join_wire("listener").subscribe(LIFT_REQUESTS, received.append)
+    topic = DdsTopic(observer, "rt/lift_requests", OtherLiftRequest)
+    cdr = Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False)
+    stranger = DataWriter(observer, topic, qos=Qos(Policy.Reliability.Reliable(0), cdr))
+    speaker = join_wire("speaker").publisher(LIFT_REQUESTS)
+
+    def good_arrives() -> bool:
+        stranger.write(OtherLiftRequest(7, "Lift1", 0.5))
+        speaker.publish(d.LiftRequest("Lift1"))
+        return len(received) >= 20
+
+    wait_until(good_arrives, "the good ones arrive")
+    assert set(received) == {d.LiftRequest("Lift1")}
+
+
+def test_a_peer_whose_durability_does_not_fit_is_named_once(
+    join_wire: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    join_wire("listener").subscribe(FIRE_ALARM_TRIGGER, print)
+    join_wire("stranger").publisher(replace(FIRE_ALARM_TRIGGER, publish=VOLATILE))
+    wait_until(lambda: len(caplog.messages) == 2, "both ends say so")
+    assert sorted(caplog.messages) == [
+        'misfit topic=fire_alarm_trigger reason="a publisher is not heard:'
+        ' its durability does not fit ours"',
+        'misfit topic=fire_alarm_trigger reason="a subscription is not served:'
+        ' its durability does not fit ours"',
+    ]
+
+
+# --- as the others see us ----------------------------------------------------------------------
+
+
+@ALL_TOPICS
+def test_each_end_has_the_qos_the_type_and_the_type_hash_of_the_table(
+    join_wire: Join, observer: Any, topic: Topic[Any]
+) -> None:
+    node = join_wire("observed")
+    node.publisher(topic)
+    node.subscribe(topic, print)
+    written, read = seen(observer, PUBLICATION, topic), seen(observer, SUBSCRIPTION, topic)
+
+    package = d.PACKAGES[topic.type]
+    wire_type = f"{package}::msg::dds_::{topic.type.__name__}_"
+    assert {written.type_name, read.type_name} == {wire_type}
+    for qos in (written.qos, read.qos):
+        assert isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable)
+        assert qos[Policy.DataRepresentation] == Policy.DataRepresentation(True, False)
+        assert qos[Policy.Userdata].data.decode() == f"typehash={type_hash(topic.type)};"
+    durability = {
+        "volatile": Policy.Durability.Volatile,
+        "transient_local": Policy.Durability.TransientLocal,
+    }
+    assert written.qos[Policy.Durability] == durability[topic.publish.durability]
+    assert written.qos[Policy.History] == Policy.History.KeepLast(topic.publish.depth)
+    assert read.qos[Policy.Durability] == durability[topic.subscribe.durability]
+    assert read.qos[Policy.History] == Policy.History.KeepLast(topic.subscribe.depth)
+    if topic.publish.durability == "transient_local":
+        service = written.qos[Policy.DurabilityService]
+        assert service.history == Policy.History.KeepLast(topic.publish.depth)
