@@ -55,11 +55,14 @@ class Broken(AssertionError):
 class LiftTruth:
     """Of one lift: when its door was last truly open at each floor, and what was last published.
 
-    `crossing`, `inside`: the robots there, since when. `ended`: when each session was last told to end.
+    `last`: who had it before; within the grace its session is resumed as it was. `offered`: it has been
+    shown OPEN at its destination. `crossing`, `inside`: the robots there, since when. `ended`: when
+    each session was last told to end.
     """
 
     open_at: dict[str, float] = field(default_factory=dict)
     session: str = ""
+    last: str = ""
     since: float = 0.0
     offered: bool = False
     crossing: dict[str, tuple[str, float]] = field(default_factory=dict)
@@ -159,7 +162,10 @@ class Laws:
         ended = truth.ended.get(before, -NEVER) > truth.since - LATE_S
         self.require(ended or not handed, f"{name} went from {before} to {state.session_id}")
         if state.session_id != before:
-            truth.session, truth.since, truth.offered = state.session_id, now, False
+            resumed = state.session_id == truth.last and now - truth.since <= GRACE_S
+            truth.offered = truth.offered and (resumed or not state.session_id)
+            truth.last = before or truth.last
+            truth.session, truth.since = state.session_id, now
         if state.door_state != d.LiftDoor.DOOR_OPEN:
             return
         self._open_is_true(name, state)
