@@ -83,6 +83,9 @@ class DdsPlace:
 
         return self._inner.subscribe(topic, post, others_only=others_only)
 
+    def wall(self) -> float:
+        return self._inner.wall()
+
     def close(self) -> None:
         self._closed = True
         self._inner.close()
