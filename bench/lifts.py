@@ -64,7 +64,7 @@ def _hazard(scratch: Path) -> dict[str, Any]:
     return {
         "a bare edge callback": figures(bare, bare),
         "all outputs off": figures(off, bare),
-        "slowest_scans": max(off) / load(file).buses["gpio"].scan_s,
+        "slowest_scans": max(off) / load(file).buses["header"].scan_s,
     }
 
 
@@ -75,7 +75,8 @@ def _to_outputs_off(graph: Graph, plant: PlantSocket, hand: PlantSocket) -> floa
     at = plant.edge("fire_alarm", True)
     took = plant.edge("agv_mode_request", False) - at
     # While it burns: a session that outlived the fire would have its relay back at once.
-    graph.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
+    ended_at = graph.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
+    graph.state(ended_at, lambda state: not state.session_id)
     hand.say("press Lift1 fire_alarm off")
     plant.edge("fire_alarm", False)
     time.sleep(PAUSE_S)
