@@ -144,7 +144,9 @@ class _Lift(LiftNode):
 
 
 class _Rider(Rider):
-    """Takes the two lifts in turn."""
+    """Takes the two lifts in turn, and has something to do for a minute between its rides."""
+
+    REST_S = 60.0
 
     def _phase(self) -> Phase:
         lift = f"Lift{1 + len(self.trips) % 2}"

@@ -312,6 +312,7 @@ class Rider:
     """
 
     ENTER_S = 3.0
+    REST_S = 3.0
 
     def __init__(
         self,
@@ -364,7 +365,7 @@ class Rider:
         if self._step == 3:
             self.rode.append((round(self.world.now, 3), self.trips.pop(0)))
             self._step = 0
-            self._next_at = NEVER if self.done else self.world.now + self.ENTER_S
+            self._next_at = NEVER if self.done else self.world.now + self.REST_S
             return
         self.robot.in_car = self._step == 1
         for to, said in self.robot.begin(self._phase(), EPOCH + self.world.now + self.skew):
