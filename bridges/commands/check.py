@@ -14,8 +14,8 @@ from typing import Any
 import msgspec
 
 from bridges import named
-from bridges.graph_kind import GraphKind
 from bridges.building_map import BuildingMap, load_map
+from bridges.graph_kind import GraphKind
 from bridges.map_names import mismatches, places
 from bridges.settings import Config, Problem, SettingsError, load
 from drivers.points import Wire
