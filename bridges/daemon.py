@@ -24,7 +24,7 @@ from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import DIAGNOSTICS
 from bridges.rmf.transport import Publisher, TransportError
 from bridges.runtime import KeptFile, RuntimeDirectory, state_file
-from bridges.service import CLOCK, OpenBus, named_by, open_bus, service
+from bridges.service import OpenBus, named_by, open_bus, service
 from bridges.settings import Config
 from drivers import DriverError
 
@@ -133,7 +133,7 @@ class Daemon:
         self._runtime.write_status(msgspec.json.encode({**daemon, "devices": devices}))
         if self._diagnostics is None:
             return
-        at = stamp(CLOCK.wall())
+        at = stamp(time.time())
         found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
         try:
             self._diagnostics.publish(found)
