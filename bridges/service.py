@@ -119,8 +119,7 @@ class GraphService:
 
     def status(self) -> Mapping[str, Any]:
         """For the status file."""
-        subjects = {subject.name: subject.status() for subject in self._node.nodes}
-        return {**self._node.status(), "subjects": subjects}
+        return self._node.status()
 
     def devices(self) -> Mapping[str, Mapping[str, Any]]:
         """For the status file."""

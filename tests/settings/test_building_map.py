@@ -81,6 +81,19 @@ chargers:
   pad_a: {codes: {idle: [0], charging: [5], error: [238]}}
 """
 
+COORDINATOR = """\
+kind: charger_coordinator
+coordinator:
+  stations:
+    pad_a: {}
+    b:
+      waypoint: pharmacy
+  fleets:
+    tiny:
+      waypoints: {pad_a: *at, wait: *at, pharmacy: *at}
+      robots: {AMR01: {stations: [pad_a], waits_at: wait}}
+""".replace("*at", "{level: L1, x: 1, y: 2}")
+
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,6 +205,16 @@ def test_a_charger_is_a_vertex_where_robots_charge(capsys: pytest.CaptureFixture
     ]
     assert complaints(capsys, CHARGER.replace("pad_a", "charger_9")) == [
         "device.yaml:5:3: building.yaml has no charger 'charger_9': it has pad_a"
+    ]
+
+
+def test_a_coordinators_waypoints_and_stations_stand_on_the_map(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert complaints(capsys, COORDINATOR) == [
+        "device.yaml:6:7: building.yaml:12: the waypoint 'pharmacy' is no charger: is_charger is"
+        " not true",
+        "device.yaml:9:51: building.yaml has no waypoint 'wait': it has pad_a, pharmacy",
     ]
 
 
