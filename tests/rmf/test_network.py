@@ -60,6 +60,7 @@ class Echoed:
     """A node under test, and a process that sends back what it hears."""
 
     def __init__(self, domain: int) -> None:
+        self.domain = domain
         self.node = DdsTransport("node", domain, loopback=False)
         self.heard: list[d.Message] = []
         self.node.subscribe(DOOR_STATES.named("pong_door_states"), self.heard.append)
@@ -91,11 +92,15 @@ def test_another_address_is_joined_with_all_ends_and_what_was_retained_goes_out_
     echoed.alarm.publish(d.Bool(True))
     wait_until(lambda: echoed.heard.count(d.Bool(True)) == 1, "the alarm is heard")
     machine.addresses = frozenset({(2, "10.0.0.8")})
-    # Twice more: what the other process retains, and what it hears from our new place.
-    wait_until(lambda: echoed.heard.count(d.Bool(True)) == 3, "and heard again from the new place")
     wait_until(lambda: echoed.comes_back(2), "states go there and back")
+    before = echoed.heard.count(d.Bool(True))
+    with peer.running("echo", echoed.domain):
+        wait_until(
+            lambda: echoed.heard.count(d.Bool(True)) > before,
+            "a process that comes later hears what was retained",
+        )
     later = echoed.node.publisher(DOOR_STATES.named("ping_door_states"))
-    wait_until(lambda: later.matched() == 1, "an end that is declared later has its place too")
+    wait_until(lambda: later.matched() > 0, "an end that is declared later has its place too")
     later.close()
     assert later.matched() == 0
 
