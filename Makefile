@@ -2,13 +2,14 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: help demo demo-charging test test-ros lint format bench soak mutate clean
+.PHONY: help demo demo-charging test test-ros lint format bench flood soak mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
 	@echo "make test-ros  the tests that need ROS 2, in a shell that has sourced its setup file"
 	@echo "make bench   latency and memory, beside a bare transport node"
+	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again"
 	@echo "make mutate  break the lift's core in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make format  rewrite the sources as the linter wants them"
@@ -53,6 +54,9 @@ format: .venv/ready
 
 bench: .venv/ready
 	$(if $(wildcard .venv-ros/ready),$(ROS_BIN),$(BIN))/python -m bench
+
+flood: .venv/ready
+	$(BIN)/python -m bench.flood
 
 # Without SEED one is drawn, and printed.
 soak: .venv/ready

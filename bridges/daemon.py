@@ -15,11 +15,16 @@ from typing import Any
 import msgspec
 
 from bridges import __version__
+from bridges.diagnostics import diagnosis
 from bridges.log import pairs
 from bridges.notify import notify, watchdog_s
 from bridges.rmf.choose import open_transport
+from bridges.rmf.definitions import DiagnosticArray
+from bridges.rmf.stamps import stamp
+from bridges.rmf.topics import DIAGNOSTICS
+from bridges.rmf.transport import Publisher, TransportError
 from bridges.runtime import KeptFile, RuntimeDirectory, state_file
-from bridges.service import OpenBus, open_bus, service
+from bridges.service import OpenBus, named_by, open_bus, service
 from bridges.settings import Config
 from drivers import DriverError
 
@@ -58,6 +63,9 @@ class Daemon:
         kept = None if simulated else KeptFile(state_file(config.path))
         self._service = service(config, self._transport, open_bus, kept)
         self._loops = self._service.loops
+        self._diagnostics: Publisher[DiagnosticArray] | None = None
+        if config.rmf.diagnostics:
+            self._diagnostics = self._transport.publisher(named_by(config, DIAGNOSTICS))
 
     def serve(self) -> int:
         """Run until a signal, and return the exit code: 0 when every output is off and verified."""
@@ -89,7 +97,7 @@ class Daemon:
                 notify("WATCHDOG=1")
                 fed = scans
             if told_ready:
-                self._runtime.write_status(self._status())
+                self._tell()
 
     def _shut_down(self) -> bool:
         notify("STOPPING=1")
@@ -112,16 +120,25 @@ class Daemon:
         about = {"version": __version__, "node": self._transport.name, "pid": os.getpid()}
         return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
 
-    def _status(self) -> bytes:
-        return msgspec.json.encode(
-            {
-                "simulated": self._simulated,
-                "file": str(self._config.path),
-                **self._about(),
-                "samples_dropped": dict(self._transport.dropped),
-                **self._service.status(),
-            }
-        )
+    def _tell(self) -> None:
+        """How everything is, to the status file and to ROS."""
+        daemon = {
+            "simulated": self._simulated,
+            "file": str(self._config.path),
+            **self._about(),
+            "samples_dropped": dict(self._transport.dropped),
+            **self._service.status(),
+        }
+        devices = self._service.devices()
+        self._runtime.write_status(msgspec.json.encode({**daemon, "devices": devices}))
+        if self._diagnostics is None:
+            return
+        at = stamp(time.time())
+        found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
+        try:
+            self._diagnostics.publish(found)
+        except TransportError as error:  # the states, more urgent, say so as an error
+            log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))
 
 
 def outputs_off(config: Config, timeout_s: float) -> bool:

@@ -44,6 +44,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     `network`: `localhost` keeps all traffic on the loopback interface.
     `ros_setup`: ROS's setup file, sourced before the daemon starts (not for `dds`): a service has no
     shell that has done so. Where `auto` does not find it, that is logged.
+    `diagnostics`: each second, say on ROS's `/diagnostics` how the daemon and its devices are.
     `topics`: RMF's topic name -> the name that the site uses.
     """
 
@@ -51,6 +52,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     domain_id: Annotated[int, Meta(ge=0, le=232)] | None = None
     network: Literal["subnet", "localhost"] = "subnet"
     ros_setup: AbsolutePath | None = None
+    diagnostics: bool = True
     topics: dict[Name, Name] = msgspec.field(default_factory=dict)
 
 

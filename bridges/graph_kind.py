@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bridges.decision import Decision
+from bridges.kind import Place
 from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
 
@@ -42,6 +43,7 @@ class GraphKind:
     `decide`: the core; its `publish` leaves stamps to `stamped(message, time)`, at the time of sending.
     `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`: nothing
     worth remembering is left of this subject.
+    `on_map(settings)`: which settings name a place on RMF's map (`bridges/kind.py`).
 
     For a kind that speaks of all its subjects in one message: `together(memories)`, sent when it has
     changed and each second. For one whose memory must outlive the daemon: `persist(memories)`, the
@@ -71,3 +73,4 @@ class GraphKind:
     restore: Callable[[bytes, Any, float], Mapping[str, Any]] | None = None
     described: Callable[[Any], list[tuple[str, ...]]] | None = None
     warnings: Callable[[Any], Iterable[tuple[tuple[str, ...], str]]] | None = None
+    on_map: Callable[[Any], Iterable[Place]] = lambda settings: ()

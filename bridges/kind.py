@@ -3,13 +3,16 @@
 `bridges/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or doors.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from bridges.decision import Decision
 from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
+
+Place = tuple[tuple[str, ...], str, str]
+"""A setting that names something on RMF's map: its path, what it is (`building_map`), the name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +30,8 @@ class Kind:
     `summary(report)`: key -> value for the log line, the status file and `watch`.
     `published(memory, report)`: the memory after this report has gone out to RMF.
     `alarm_topics(settings)`: what a device publishes beside its states.
+    `on_map(settings)`: which of its settings name a place on RMF's map, as (path, what it is, name);
+    that the device's own name stands there goes without saying.
     """
 
     name: str
@@ -42,3 +47,4 @@ class Kind:
     summary: Callable[[Any], Mapping[str, str]]
     published: Callable[[Any, Any], Any] = lambda memory, report: memory
     alarm_topics: Callable[[Any], tuple[Topic[Any], ...]] = lambda settings: ()
+    on_map: Callable[[Any], Iterable[Place]] = lambda settings: ()

@@ -8,6 +8,7 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, Protocol
 
 from bridges.decision import OperatorReset
@@ -74,7 +75,15 @@ class Service(Protocol):
         """An operator says that latched faults may clear."""
 
     def status(self) -> Mapping[str, Any]:
-        """For the status file."""
+        """For the status file: how the service as a whole is."""
+
+    def devices(self) -> Mapping[str, Mapping[str, Any]]:
+        """For the status file: each device, lift or door by name."""
+
+
+def named_by(config: Config, topic: Topic[Any]) -> Topic[Any]:
+    """A topic under the name that the site has given it."""
+    return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
 
 def service(
@@ -85,10 +94,7 @@ def service(
     `kept`: where a kind that has to remembers across restarts; None to forget.
     """
     kind: Kind | GraphKind = importlib.import_module(f"bridges.{config.kind}").KIND
-
-    def named(topic: Topic[Any]) -> Topic[Any]:
-        return topic.named(config.rmf.topics.get(topic.name, topic.name))
-
+    named = partial(named_by, config)
     if isinstance(kind, GraphKind):
         return GraphService(
             GraphNode(kind, config.section, transport, _clock(transport), named, kept)
@@ -113,8 +119,11 @@ class GraphService:
 
     def status(self) -> Mapping[str, Any]:
         """For the status file."""
-        subjects = {subject.name: subject.status() for subject in self._node.nodes}
-        return {**self._node.status(), "subjects": subjects}
+        return self._node.status()
+
+    def devices(self) -> Mapping[str, Mapping[str, Any]]:
+        """For the status file."""
+        return {subject.name: subject.status() for subject in self._node.nodes}
 
 
 class Devices:
@@ -158,8 +167,11 @@ class Devices:
         return {
             "requests_for_others": self._strangers["requests"],
             "events_dropped": sum(loop.inbox.dropped for loop in self.loops),
-            "devices": {name: node.status() for name, (node, _) in self._placed.items()},
         }
+
+    def devices(self) -> Mapping[str, Mapping[str, Any]]:
+        """For the status file."""
+        return {name: node.status() for name, (node, _) in self._placed.items()}
 
     def _topics(self) -> list[Topic[Any]]:
         alarms = {t for d in self._config.devices.values() for t in self._kind.alarm_topics(d)}

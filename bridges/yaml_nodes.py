@@ -15,9 +15,20 @@ import yaml
 from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNode, SequenceNode
 from yaml.reader import ReaderError
 
-MAX_BYTES = 256 * 1024
 MAX_DEPTH = 32
-MAX_VALUES = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class Sort:
+    """One sort of file: what it is called, how it begins, and how much of it anybody writes."""
+
+    name: str
+    begins: str
+    max_bytes: int
+    max_values: int
+
+
+DEVICE = Sort("device YAML", "kind: ...", 256 * 1024, 20_000)
 
 FIXES = {
     "found character '\\t' that cannot start any token": "a tab: YAML indents with spaces",
@@ -122,9 +133,10 @@ class _Refused(MarkedYAMLError):
 class _Composer(yaml.SafeLoader):
     """Nodes with limits; tags are refused, and aliases only repeat what is complete."""
 
-    def __init__(self, text: str, page: Page) -> None:
+    def __init__(self, text: str, page: Page, max_values: int) -> None:
         super().__init__(text)
         self._page = page
+        self._max_values = max_values
         self._depth = 0
         self._sizes: dict[int, int] = {}
 
@@ -138,8 +150,8 @@ class _Composer(yaml.SafeLoader):
         if isinstance(event, AliasEvent) and id(node) not in self._sizes:
             raise _Refused(mark, "an alias ('*name') inside the very value that it repeats")
         self._sizes[id(node)] = size = 1 + sum(self._sizes[id(n)] for n in _children(node))
-        if size > MAX_VALUES:
-            raise _Refused(mark, f"more than {MAX_VALUES} values, with aliases written out")
+        if size > self._max_values:
+            raise _Refused(mark, f"more than {self._max_values} values, with aliases written out")
         return node
 
     @contextmanager
@@ -159,27 +171,27 @@ def _children(node: Node | None) -> Iterator[Node]:
             yield from pair
 
 
-def read(file: str) -> bytes:
-    """The file's bytes. Raises SettingsError if it cannot be read or is too long for a YAML."""
+def read(file: str, sort: Sort = DEVICE) -> bytes:
+    """The file's bytes. Raises SettingsError if it cannot be read or is too long for its sort."""
     try:
         with open(file, "rb") as source:
-            text = source.read(MAX_BYTES + 1)
+            text = source.read(sort.max_bytes + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SettingsError([Problem(file, 1, 1, f"cannot be read: {reason}")]) from None
-    if len(text) > MAX_BYTES:
-        reason = f"longer than {MAX_BYTES // 1024} KiB: this is no device YAML"
+    if len(text) > sort.max_bytes:
+        reason = f"longer than {sort.max_bytes // 1024} KiB: this is no {sort.name}"
         raise SettingsError([Problem(file, 1, 1, reason)])
     return text
 
 
-def compose(page: Page, text: bytes) -> MappingNode:
+def compose(page: Page, text: bytes, sort: Sort = DEVICE) -> MappingNode:
     """The mapping that a file is. Raises SettingsError where it is none."""
-    root = _root(page, _decoded(page, text))
+    root = _root(page, _decoded(page, text), sort)
     if not isinstance(root, MappingNode):
         found = "empty" if root is None else "not a mapping"
         page.problems.append(
-            Problem(page.file, 1, 1, f"the file is {found}: it begins with 'kind: ...'")
+            Problem(page.file, 1, 1, f"the file is {found}: it begins with '{sort.begins}'")
         )
         raise SettingsError(page.problems)
     return root
@@ -194,10 +206,10 @@ def _decoded(page: Page, text: bytes) -> str:
         raise SettingsError([_problem_after(page, before, reason)]) from None
 
 
-def _root(page: Page, text: str) -> Node | None:
+def _root(page: Page, text: str, sort: Sort) -> Node | None:
     composer = None
     try:
-        composer = _Composer(text, page)
+        composer = _Composer(text, page, sort.max_values)
         return composer.get_single_node()
     except ReaderError as error:
         reason = f"the character U+{error.character:04X} may not stand in YAML: delete it"

@@ -46,4 +46,5 @@ KIND = GraphKind(
     restore=keep.restore,
     described=described,
     warnings=warnings,
+    on_map=lambda settings: settings.on_map(),
 )

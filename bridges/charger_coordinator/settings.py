@@ -7,8 +7,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from bridges.building_map import CHARGER, WAYPOINT
 from bridges.charger.settings import ReceiverId, Robot, StartTimeout
 from bridges.fields import Name
+from bridges.kind import Place
 
 QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
@@ -83,6 +85,15 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     full_percent: Full = 100.0
     again_percent: Low = 90.0
     quiet_start_s: QuietStart = 3.0
+
+    def on_map(self) -> Iterator[Place]:
+        """RMF's map has the stations' places, as chargers, and each fleet's waypoints."""
+        for name, station in self.stations.items():
+            path = ("stations", name, *(["waypoint"] if station.waypoint else []))
+            yield path, CHARGER, station.waypoint or name
+        for fleet, settings in self.fleets.items():
+            for name in settings.waypoints:
+                yield ("fleets", fleet, "waypoints", name), WAYPOINT, name
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
         """Names that lead nowhere, places given twice."""

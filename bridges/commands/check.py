@@ -14,7 +14,9 @@ from typing import Any
 import msgspec
 
 from bridges import named
+from bridges.building_map import BuildingMap, load_map
 from bridges.graph_kind import GraphKind
+from bridges.map_names import mismatches, places
 from bridges.settings import Config, Problem, SettingsError, load
 from drivers.points import Wire
 
@@ -38,24 +40,47 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-q", "--quiet", action="store_true", help="print problems only: no table, no warning"
     )
+    parser.add_argument(
+        "--building-map",
+        metavar="MAP",
+        help="compare the names with RMF's: a *.building.yaml, or a navigation graph",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Check every file. Returns 0, or 78 (EX_CONFIG) if any cannot be right."""
-    right = [_check(file, args.quiet) for file in args.files]
+    try:
+        building = load_map(args.building_map) if args.building_map else None
+    except SettingsError as error:
+        _print_problems(args.building_map, error.problems)
+        return os.EX_CONFIG
+    right = [_check(file, args.quiet, building) for file in args.files]
     return 0 if all(right) else os.EX_CONFIG
 
 
-def _check(file: str, quiet: bool) -> bool:
+def _check(file: str, quiet: bool, building: BuildingMap | None) -> bool:
     try:
         config = load(file)
     except SettingsError as error:
         _print_problems(file, error.problems)
         return False
+    problems = mismatches(config, building) if building else []
     if not quiet:
         _complain(map(str, config.warnings))
-        sys.stdout.write("\n".join(described(config)) + "\n")
-    return True
+        lines = described(config)
+        if building and not problems:
+            lines += [_agreement(config, building), ""]
+        sys.stdout.write("\n".join(lines) + "\n")
+    if problems:
+        _print_problems(file, problems)
+    return not problems
+
+
+def _agreement(config: Config, building: BuildingMap) -> str:
+    names = ", ".join(dict.fromkeys(name for _, _, name in places(config)))
+    if not names:
+        return f"nothing in this file stands on {building.file}"
+    return f"named as on {building.file}: {names}"
 
 
 def _print_problems(file: str, problems: Sequence[Problem]) -> None:

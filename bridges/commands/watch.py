@@ -1,5 +1,7 @@
 """`rmf-bridge watch`: the lifts, doors and chargers of the RMF graph, live, one row each.
 
+RMF's states have no place for faults; our daemons name theirs on `/diagnostics`.
+
 On a terminal the table is redrawn in place; into a pipe goes one line for each change. Ctrl-C is
 how one leaves it, so it exits 0.
 """
@@ -13,6 +15,7 @@ from contextlib import closing
 from dataclasses import astuple, dataclass
 from typing import TextIO
 
+from bridges import diagnostics
 from bridges.commands.graph import (
     SILENT_AFTER_S,
     Ears,
@@ -69,6 +72,7 @@ def listen_on(transport: Transport) -> Ears:
         topics.CHARGER_STATES,
         topics.DOOR_SUPERVISOR_HEARTBEAT,
         topics.CHARGING_ASSIGNMENTS,
+        topics.DIAGNOSTICS,
     )
 
 
@@ -78,7 +82,7 @@ def listen_on(transport: Transport) -> Ears:
 @dataclass(frozen=True, slots=True)
 class Row:
     """One device, or a robot with its place by the charging assignments. `age` is that of the reading;
-    `mark` is "" or why not to trust the row."""
+    `mark` is "" or why not to trust the row; `faults` are what the daemons that serve it name."""
 
     kind: str
     name: str
@@ -86,6 +90,7 @@ class Row:
     holder: str
     age: str
     mark: str
+    faults: str = ""
 
 
 class Board:
@@ -95,6 +100,7 @@ class Board:
         self._latest: dict[tuple[str, str], Heard] = {}
         self._requesters: dict[str, str] = {}
         self._places: dict[str, str] = {}
+        self._faults: dict[tuple[str, str], dict[str, tuple[float, tuple[str, ...]]]] = {}
 
     def take(self, heard: Heard) -> None:
         """One message."""
@@ -109,6 +115,9 @@ class Board:
                     mode = words.word(d.ChargingMode, one.mode)
                     place = words.printable(f"{mode} at {one.waypoint_name}")
                     self._places[words.printable(f"{fleet}/{one.robot_name}")] = place
+            case d.DiagnosticArray():
+                for status in heard.message.status:
+                    self._take_faults(status, heard.at)
             case state:
                 key = (KINDS[type(state)], words.device(state))
                 self._latest[key] = heard
@@ -123,9 +132,22 @@ class Board:
                 self._holder(heard.message) or "-",
                 _age(words.stamped_at(heard.message), wall),
                 _mark(heard, now, wall),
+                self._named_faults((kind, name), now),
             )
             for (kind, name), heard in sorted(self._latest.items(), key=_order)
         ] + [Row("robot", who, place, "-", "-", "") for who, place in sorted(self._places.items())]
+
+    def _take_faults(self, status: d.DiagnosticStatus, at: float) -> None:
+        """A supervisor's are shown with the lift or door itself. Others write diagnostics too."""
+        kind = next((pair.value for pair in status.values if pair.key == "kind"), "")
+        device = (kind.removesuffix("_supervisor"), status.hardware_id)
+        if device in self._latest:
+            self._faults.setdefault(device, {})[status.name] = (at, diagnostics.faults(status))
+
+    def _named_faults(self, device: tuple[str, str], now: float) -> str:
+        named = self._faults.get(device, {}).values()
+        codes = [code for at, codes in named if now - at <= SILENT_AFTER_S for code in codes]
+        return words.printable(" ".join(dict.fromkeys(codes)))
 
     def _holder(self, state: words.Stated) -> str:
         if isinstance(state, d.DoorState):
@@ -159,7 +181,9 @@ def _mark(heard: Heard, now: float, wall: float) -> str:
 
 def table(rows: Iterable[Row]) -> list[str]:
     """The rows in columns, under a heading."""
-    cells = [("kind", "name", "state", "session or request", "age", ""), *map(astuple, rows)]
+    shown = [astuple(row) for row in rows]
+    faults = "faults" if any(row[-1] for row in shown) else ""
+    cells = [("kind", "name", "state", "session or request", "age", "", faults), *shown]
     if len(cells) == 1:
         return ["nothing heard yet"]
     widths = [max(len(cell) for cell in column) for column in zip(*cells, strict=True)]
@@ -173,14 +197,14 @@ def changes(before: list[Row], after: list[Row]) -> list[Row]:
 
 
 def _news(row: Row) -> tuple[str, ...]:
-    return row.state, row.holder, row.mark.rstrip("0123456789 s")
+    return row.state, row.holder, row.mark.rstrip("0123456789 s"), row.faults
 
 
 def change_line(row: Row, wall: float) -> str:
     """A changed row as one line, to be read in a pipe."""
     clock = time.strftime("%H:%M:%S", time.localtime(wall)) + f".{int(wall * 1000) % 1000:03d}"
     line = f"{clock}  {row.kind:<7}  {row.name:<12}  {row.state:<20}  {row.holder}  age {row.age}"
-    return f"{line}  {row.mark}".rstrip()
+    return f"{line}  {row.mark}".rstrip() + (f"  {row.faults}" if row.faults else "")
 
 
 def repaint(rows: list[Row], lines_before: int, columns: int, lines: int) -> tuple[str, int]:
@@ -191,7 +215,7 @@ def repaint(rows: list[Row], lines_before: int, columns: int, lines: int) -> tup
     shown = table(rows)
     if len(shown) >= lines:
         shown = [*shown[: lines - 2], f"… and {len(shown) - lines + 2} more"]
-    marked = {i for i, row in enumerate(rows, start=1) if row.mark}
+    marked = {i for i, row in enumerate(rows, start=1) if row.mark or row.faults}
     text = f"\x1b[{lines_before}A" if lines_before else ""
     for i, line in enumerate(shown):
         line = line[: columns - 1]

@@ -17,6 +17,7 @@ KIND = Kind(
     decide=core.decide,
     published=core.published,
     alarm_topics=messages.alarm_topics,
+    on_map=lambda settings: settings.on_map(),
     state_message=messages.state_message,
     summary=messages.summary,
 )

@@ -6,7 +6,9 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from bridges.building_map import FLOOR
 from bridges.fields import DeviceSettings, Name, Period, Seconds
+from bridges.kind import Place
 from bridges.lift.signals import Side, Stop
 
 
@@ -69,6 +71,12 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     limits: Limits = Limits()
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
+
+    def on_map(self) -> list[Place]:
+        """RMF's map has these floors too."""
+        if isinstance(self.floors, list):
+            return [(("floors", str(i)), FLOOR, name) for i, name in enumerate(self.floors)]
+        return [(("floors", name), FLOOR, name) for name in self.floors]
 
     def stops(self) -> Mapping[str, Stop]:
         """RMF's floor name -> landing and door, from the lowest up."""

@@ -23,6 +23,7 @@ LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 BIG_ENDIAN = b"\x00\x00\x00\x00"
 HEADER = 4
 CODES = {"int32": "i", "uint32": "I", "uint64": "Q", "float32": "f"}
+BYTES = ("uint8", "byte")
 
 
 class CdrError(ValueError):
@@ -77,7 +78,7 @@ def _put(kind: Any) -> Put:
     """How a value of this type is appended."""
     if typing.get_origin(kind) is typing.Annotated:
         name = kind.__metadata__[0]
-        return _put_byte if name == "uint8" else _putting_number(CODES[name])
+        return _put_byte if name in BYTES else _putting_number(CODES[name])
     if kind is str:
         return _put_text
     if kind is bool:
@@ -140,7 +141,7 @@ def _get(kind: Any, order: str) -> Get:
     """How a value of this type is read at a position: the value, and where the next one begins."""
     if typing.get_origin(kind) is typing.Annotated:
         name = kind.__metadata__[0]
-        return _get_byte if name == "uint8" else _getting_number(order + CODES[name])
+        return _get_byte if name in BYTES else _getting_number(order + CODES[name])
     if kind is str:
         return _getting_text(order)
     if kind is bool:

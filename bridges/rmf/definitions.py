@@ -3,7 +3,8 @@
 This is the only table of them. The transports make their own types from it (field by field,
 from the annotations), and the RIHS01 type hashes are computed from it.
 
-Source: rmf_internal_msgs 3d4df02 (4.1.0), builtin_interfaces and std_msgs of ROS 2 Jazzy.
+Source: rmf_internal_msgs 3d4df02 (4.1.0), builtin_interfaces, std_msgs and diagnostic_msgs of ROS 2
+Jazzy.
 A `T[]` of ROS is a tuple here, so that a message is a value: hashable, comparable, immutable.
 """
 
@@ -12,6 +13,7 @@ from enum import IntEnum
 from typing import Annotated, Final
 
 uint8 = Annotated[int, "uint8"]
+byte = Annotated[int, "byte"]
 uint32 = Annotated[int, "uint32"]
 uint64 = Annotated[int, "uint64"]
 int32 = Annotated[int, "int32"]
@@ -316,6 +318,45 @@ class Bool:
     data: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Header:
+    stamp: Time = Time()
+    frame_id: str = ""
+
+
+# --- diagnostic_msgs ---------------------------------------------------------------------------
+
+
+class DiagnosticLevel(IntEnum):
+    """DiagnosticStatus.level."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class KeyValue:
+    key: str = ""
+    value: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosticStatus:
+    level: byte = 0
+    name: str = ""
+    message: str = ""
+    hardware_id: str = ""
+    values: tuple[KeyValue, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosticArray:
+    header: Header = Header()
+    status: tuple[DiagnosticStatus, ...] = ()
+
+
 Message = (
     LiftRequest
     | LiftState
@@ -330,6 +371,7 @@ Message = (
     | Alert
     | Bool
     | EmergencySignal
+    | DiagnosticArray
 )
 
 PACKAGES: Final[dict[type, str]] = {
@@ -356,5 +398,9 @@ PACKAGES: Final[dict[type, str]] = {
     AlertParameter: "rmf_task_msgs",
     Alert: "rmf_task_msgs",
     Bool: "std_msgs",
+    Header: "std_msgs",
+    KeyValue: "diagnostic_msgs",
+    DiagnosticStatus: "diagnostic_msgs",
+    DiagnosticArray: "diagnostic_msgs",
 }
 """The ROS package that defines each type."""

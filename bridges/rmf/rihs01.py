@@ -16,7 +16,16 @@ from typing import Any
 from bridges.rmf.definitions import PACKAGES
 
 NESTED = 1
-TYPE_IDS = {"uint8": 3, "int32": 6, "uint32": 7, "uint64": 9, "float32": 10, bool: 15, str: 17}
+TYPE_IDS = {
+    "uint8": 3,
+    "int32": 6,
+    "uint32": 7,
+    "uint64": 9,
+    "float32": 10,
+    "byte": 16,
+    bool: 15,
+    str: 17,
+}
 UNBOUNDED_SEQUENCE = 144
 
 

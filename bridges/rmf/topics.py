@@ -67,3 +67,4 @@ FIRE_ALARM_TRIGGER = Topic("fire_alarm_trigger", d.Bool, publish=RETAINED, subsc
 EMERGENCY_SIGNAL = Topic(
     "emergency_signal", d.EmergencySignal, publish=RETAINED, subscribe=RETAINED
 )
+DIAGNOSTICS = Topic("diagnostics", d.DiagnosticArray)

@@ -338,5 +338,6 @@ def test_a_request_sent_to_a_charger_directly_makes_that_robots_place() -> None:
     site.fleet.charge("AMR03", site.now)
     told = [what for _, what in site.run(15.0)]
     assert told == ["AMR02 -> CHARGE dock_b"]
-    status = GraphService(site.node).status()
-    assert (status["passive"], status["subjects"]["site"]["queue"]) == (False, "tiny/AMR03")
+    service = GraphService(site.node)
+    queue = service.devices()["site"]["queue"]
+    assert (service.status()["passive"], queue) == (False, "tiny/AMR03")

@@ -8,6 +8,7 @@ import pytest
 from bridges.commands import watch
 from bridges.commands.graph import Heard
 from bridges.commands.watch import Board, Row, change_line, changes, repaint, table
+from bridges.diagnostics import diagnosis
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import stamp
 
@@ -77,6 +78,48 @@ def test_a_door_shows_who_the_supervisor_says_holds_it() -> None:
     assert row.holder == "fleet/a fleet/b"
     (row,) = board(DOOR, heartbeat, d.SupervisorHeartbeat()).rows(100.0, WALL)
     assert row.holder == "-"
+
+
+def told(kind: str, name: str, *codes: str, node: str = "node") -> d.DiagnosticArray:
+    """What one of our daemons says of a device."""
+    faults = [{"code": code, "detail": ""} for code in codes]
+    status = {"faults": faults, "input_age_s": 0.1}
+    return diagnosis(node, kind, {}, {name: status}, d.Time())
+
+
+def test_a_row_names_the_faults_that_its_daemon_and_its_supervisor_tell() -> None:
+    heard = board(
+        LIFT,
+        told("lift", "Lift1", "RMF_SILENT", "OVERLOAD"),
+        told("lift_supervisor", "Lift1", "HOLDER_SILENT", node="supervisor"),
+        told("lift", "Lift2", "OVERLOAD"),
+        told("door", "Lift1", "DOOR_SILENT"),
+    )
+    (row,) = heard.rows(100.0, WALL)
+    assert row.faults == "RMF_SILENT OVERLOAD HOLDER_SILENT"
+    heard.take(Heard(told("lift", "Lift1"), 101.0))
+    assert [row.faults for row in heard.rows(101.0, WALL)] == ["HOLDER_SILENT"]
+    assert [row.faults for row in heard.rows(104.0, WALL)] == [""]
+
+
+def test_diagnostics_of_others_and_of_the_daemon_itself_name_no_fault_of_a_device() -> None:
+    stranger = d.DiagnosticStatus(2, "camera: lens", "DIRTY", "Lift1")
+    heard = board(LIFT, d.DiagnosticArray(d.Header(), (stranger,)))
+    heard.take(Heard(diagnosis("Lift1", "lift", {"simulated": True}, {}, d.Time()), 100.0))
+    assert [row.faults for row in heard.rows(100.0, WALL)] == [""]
+
+
+def test_faults_have_a_column_when_there_are_any_and_are_a_change() -> None:
+    first = board(LIFT, DOOR).rows(100.0, WALL)
+    faulty = board(LIFT, DOOR, told("door", "ward", "DOOR_SILENT")).rows(100.0, WALL)
+    assert table(faulty) == [
+        "kind  name   state        session or request  age      faults",
+        "lift  Lift1  L1 OPEN AGV  fleet/robot         0.0 s",
+        "door  ward   CLOSED       -                   0.0 s    DOOR_SILENT",
+    ]
+    (row,) = changes(first, faulty)
+    assert change_line(row, WALL).endswith("age 0.0 s  DOOR_SILENT")
+    assert repaint(faulty, 0, columns=80, lines=24)[0].count("\x1b[31m") == 1
 
 
 def test_a_pipe_gets_a_line_for_a_change_and_none_for_an_age() -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 from cyclonedds.idl import IdlStruct, annotations
-from cyclonedds.idl.types import float32, int32, sequence, uint8, uint32, uint64
+from cyclonedds.idl.types import byte, float32, int32, sequence, uint8, uint32, uint64
 
 # mypy knows nothing of cyclonedds.
 # mypy: disable-error-code="misc, call-arg"
@@ -215,6 +215,37 @@ class Alert(IdlStruct, typename="rmf_task_msgs.msg.dds_.Alert_"):
     responses_available: sequence[str]
     alert_parameters: sequence[AlertParameter]
     task_id: str
+
+
+@annotations.final
+@dataclass
+class Header(IdlStruct, typename="std_msgs.msg.dds_.Header_"):
+    stamp: Time
+    frame_id: str
+
+
+@annotations.final
+@dataclass
+class KeyValue(IdlStruct, typename="diagnostic_msgs.msg.dds_.KeyValue_"):
+    key: str
+    value: str
+
+
+@annotations.final
+@dataclass
+class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs.msg.dds_.DiagnosticStatus_"):
+    level: byte
+    name: str
+    message: str
+    hardware_id: str
+    values: sequence[KeyValue]
+
+
+@annotations.final
+@dataclass
+class DiagnosticArray(IdlStruct, typename="diagnostic_msgs.msg.dds_.DiagnosticArray_"):
+    header: Header
+    status: sequence[DiagnosticStatus]
 
 
 def to_idl(value: Any) -> Any:

@@ -3,11 +3,13 @@
 Read in open-rmf/rmf_internal_msgs at 3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0), every line
 of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg, rmf_task_msgs/msg/Alert and its
 AlertParameter, and in rmf_fleet_msgs/msg EmergencySignal, FleetState, ChargingAssignments and theirs;
-Time, Duration and Bool from ROS 2 Jazzy's builtin_interfaces and std_msgs.
+Time, Duration, Bool and Header from ROS 2 Jazzy's builtin_interfaces and std_msgs, and diagnostic_msgs
+from ros2/common_interfaces c0c0bc57f958eb54a142446f0c2a475754367eee.
 """
 
 import typing
 from dataclasses import fields
+from enum import IntEnum
 from typing import Any
 
 import pytest
@@ -66,6 +68,7 @@ CONSTANTS = {
     },
     d.ChargingMode: {"MODE_CHARGE": 0, "MODE_WAIT": 1},
     d.AlertTier: {"TIER_INFO": 0, "TIER_WARNING": 1, "TIER_ERROR": 2},
+    d.DiagnosticLevel: {"OK": 0, "WARN": 1, "ERROR": 2, "STALE": 3},
 }
 
 FIELDS = {
@@ -125,7 +128,25 @@ FIELDS = {
         " string[] responses_available, rmf_task_msgs/AlertParameter[] alert_parameters,"
         " string task_id"
     ),
+    "std_msgs/Header": "builtin_interfaces/Time stamp, string frame_id",
+    "diagnostic_msgs/KeyValue": "string key, string value",
+    "diagnostic_msgs/DiagnosticStatus": (
+        "byte level, string name, string message, string hardware_id,"
+        " diagnostic_msgs/KeyValue[] values"
+    ),
+    "diagnostic_msgs/DiagnosticArray": (
+        "std_msgs/Header header, diagnostic_msgs/DiagnosticStatus[] status"
+    ),
 }
+
+
+def test_there_are_no_constants_beside_those_of_the_table() -> None:
+    enums = {
+        kind
+        for kind in vars(d).values()
+        if isinstance(kind, type) and kind.__module__ == d.__name__
+    }
+    assert {kind for kind in enums if issubclass(kind, IntEnum)} == CONSTANTS.keys()
 
 
 @pytest.mark.parametrize("enum", CONSTANTS, ids=lambda enum: enum.__name__)

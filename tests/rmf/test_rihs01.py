@@ -36,7 +36,15 @@ COMPUTED_BY_ROSBAGS = {
 }
 """From the .msg files at rmf_internal_msgs 3d4df02, by rosbags 0.11's `hash_rihs01`."""
 
-HASHES: dict[Any, str] = {**SEEN_ON_JAZZY, **COMPUTED_BY_ROSBAGS}
+BUILT_INTO_JAZZY = {
+    d.Header: "f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01",
+    d.KeyValue: "d68081eaa540288c5440753baecef0c4e16e81a5f78ad68902ded5100413bb42",
+    d.DiagnosticStatus: "b0e3e692ea2d54a8af2f4ef1930e81556a2db55216b771f8a7d2724ed47bf0e4",
+    d.DiagnosticArray: "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
+}
+"""In the `share/<package>/msg/*.json` that a build of common_interfaces 5283bd9 (5.3.5) installs."""
+
+HASHES: dict[Any, str] = {**SEEN_ON_JAZZY, **COMPUTED_BY_ROSBAGS, **BUILT_INTO_JAZZY}
 
 
 def test_there_is_a_hash_to_compare_with_for_every_type() -> None:

@@ -11,6 +11,7 @@ from bridges.rmf import definitions as d
 
 NUMBERS: dict[str, st.SearchStrategy[Any]] = {
     "uint8": st.integers(0, 2**8 - 1),
+    "byte": st.integers(0, 2**8 - 1),
     "uint32": st.integers(0, 2**32 - 1),
     "uint64": st.integers(0, 2**64 - 1),
     "int32": st.integers(-(2**31), 2**31 - 1),

@@ -1,0 +1,97 @@
+"""`make flood`: a lift's daemon under ten thousand requests a second for a minute.
+
+Half of the requests are right, half are for floors that it has not. What must hold: memory stays where
+it is, the state still comes once a second, and the last right request is the one that counts.
+"""
+
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from bench.daemons import ROOT, cpu_s, daemon, memory_mb, running, wait_for_log
+from bridges.rmf.dds import DdsTransport
+from bridges.rmf.definitions import LiftRequest, LiftState
+from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
+from bridges.rmf.transport import Publisher
+
+DOMAIN = 78
+SECONDS = 60.0
+A_SECOND = 10_000
+BURST = 100
+SETTLED_S = 3.0
+RIGHT = LiftRequest(
+    "Lift1", session_id="fleet/robot", request_type=1, destination_floor="L3", door_state=2
+)
+WRONG = replace(RIGHT, destination_floor="L9")
+
+
+def measure(scratch: Path, seconds: float) -> dict[str, Any]:
+    """The daemon before, during and after the flood."""
+    log = scratch / "flood.log"
+    command = daemon(ROOT / "config/lift_dry_contact.yaml", scratch / "flood", DOMAIN)
+    with running(command, log) as child:
+        wait_for_log(log, "ready")
+        rmf = DdsTransport("flood", DOMAIN, loopback=True)
+        heard: list[tuple[float, LiftState]] = []
+        rmf.subscribe(LIFT_STATES, lambda state: heard.append((time.monotonic(), state)))
+        requests = rmf.publisher(LIFT_REQUESTS)
+        time.sleep(SETTLED_S)
+        before_mb, before_s, started_at = memory_mb(child.pid), cpu_s(child.pid), time.monotonic()
+        rss_mb, sent = _flood(requests, child.pid, seconds)
+        took_s = time.monotonic() - started_at
+        during_s = cpu_s(child.pid) - before_s
+        requests.publish(replace(RIGHT, destination_floor="L2"))
+        time.sleep(SETTLED_S)
+        rmf.close()
+        return {
+            "sent_a_second": sent / took_s,
+            "seconds": took_s,
+            "cpu_percent": 100 * during_s / took_s,
+            "rss_mb": {"before": before_mb, "after 5 s": rss_mb[0], "most": max(rss_mb)},
+            "longest_gap_s": _longest_gap(heard, started_at, started_at + took_s),
+            "last_right_request_counts": heard[-1][1].destination_floor == "L2",
+        }
+
+
+def _flood(requests: Publisher[LiftRequest], pid: int, seconds: float) -> tuple[list[float], int]:
+    """Send; the daemon's memory (MB) each 5 s, and how many were sent."""
+    sent, started_at = 0, time.monotonic()
+    rss_mb: list[float] = []
+    while (passed_s := time.monotonic() - started_at) < seconds:
+        for _ in range(BURST // 2):
+            requests.publish(RIGHT)
+            requests.publish(WRONG)
+        sent += BURST
+        if passed_s >= 5 * (len(rss_mb) + 1):
+            rss_mb.append(memory_mb(pid))
+        time.sleep(max(0.0, started_at + sent / A_SECOND - time.monotonic()))
+    return [*rss_mb, memory_mb(pid)], sent
+
+
+def _longest_gap(heard: list[tuple[float, LiftState]], start: float, end: float) -> float:
+    times = [start, *(at for at, _ in heard if start < at < end), end]
+    return max(after - before for before, after in pairwise(times))
+
+
+def show(figures: dict[str, Any]) -> None:
+    """One figure a line."""
+    for name, value in figures.items():
+        shown = value if isinstance(value, dict | bool) else round(value, 2)
+        print(f"{name:28}{shown}")
+
+
+def main() -> int:
+    """As many seconds as the command line says; a minute otherwise."""
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
+    with tempfile.TemporaryDirectory(prefix="rmf-flood-") as scratch:
+        figures = measure(Path(scratch), seconds)
+    show(figures)
+    return 0 if figures["last_right_request_counts"] and figures["longest_gap_s"] < 2 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

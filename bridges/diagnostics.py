@@ -1,0 +1,83 @@
+"""What a daemon says of itself on ROS's `/diagnostics`, from what its status file says.
+
+One status for the daemon, and one for each device (of a supervisor: each lift or door that it looks
+after). `name` is `<node>: <device>`, as ROS's aggregator wants it; `hardware_id` is the device's name;
+`message` names the faults. The values are the status file's, with a fault's detail under its code.
+LiftState, DoorState and their like have no place for any of this.
+
+    OK      the input is read, and nothing is wrong
+    WARN    the daemon: it is a simulation, or leaves its work to another node
+    ERROR   the device has faults
+    STALE   its input has not been read yet
+"""
+
+from collections.abc import Iterator, Mapping
+from itertools import islice
+from typing import Any, Final
+
+from bridges.rmf.definitions import (
+    DiagnosticArray,
+    DiagnosticLevel,
+    DiagnosticStatus,
+    Header,
+    KeyValue,
+    Time,
+)
+
+MOST: Final = 100
+"""A supervisor learns of its lifts from the network: no flood of names makes us say more than this."""
+SIMULATED: Final = "SIMULATED"
+PASSIVE: Final = "PASSIVE"
+
+Status = Mapping[str, Any]
+
+
+def diagnosis(
+    node: str, kind: str, daemon: Status, devices: Mapping[str, Status], at: Time
+) -> DiagnosticArray:
+    """The message. `daemon` and `devices` (by name): as in the status file. `at`: now."""
+    statuses = [_daemon(node, kind, daemon)]
+    statuses += [_device(node, kind, *named) for named in islice(devices.items(), MOST)]
+    return DiagnosticArray(Header(at), tuple(statuses))
+
+
+def faults(status: DiagnosticStatus) -> tuple[str, ...]:
+    """The codes of the faults in a device's status."""
+    shown = status.message if status.level == DiagnosticLevel.ERROR else ""
+    return tuple(code for code in shown.split(", ") if code)
+
+
+def _daemon(node: str, kind: str, status: Status) -> DiagnosticStatus:
+    odd = [
+        word for key, word in (("simulated", SIMULATED), ("passive", PASSIVE)) if status.get(key)
+    ]
+    level = DiagnosticLevel.WARN if odd else DiagnosticLevel.OK
+    values = _values({"kind": kind, **status})
+    return DiagnosticStatus(level, f"{node}: daemon", ", ".join(odd) or "OK", node, values)
+
+
+def _device(node: str, kind: str, name: str, status: Status) -> DiagnosticStatus:
+    found = status.get("faults", ())
+    level, message = DiagnosticLevel.OK, "OK"
+    if found:
+        level, message = DiagnosticLevel.ERROR, ", ".join(fault["code"] for fault in found)
+    elif status.get("input_age_s") is None:
+        level, message = DiagnosticLevel.STALE, "not read yet"
+    return DiagnosticStatus(
+        level, f"{node}: {name}", message, name, _values({"kind": kind, **status})
+    )
+
+
+def _values(status: Status) -> tuple[KeyValue, ...]:
+    return tuple(KeyValue(key, value) for key, value in _pairs(status))
+
+
+def _pairs(status: Status) -> Iterator[tuple[str, str]]:
+    """Flat: a fault is its code and detail, a table of counts one value for each."""
+    for key, value in status.items():
+        if key == "faults":
+            yield from ((fault["code"], fault["detail"]) for fault in value)
+        elif isinstance(value, Mapping):
+            yield from ((f"{key} {part}", str(count)) for part, count in value.items())
+        else:
+            yield key, str(value)

@@ -1,0 +1,173 @@
+"""The ends of the `dds` transport: what a publisher and a subscription are in DDS.
+
+An end outlives its writer or reader: when the transport joins anew, it is given another one.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final, Generic, TypeVar
+
+from cyclonedds.core import DDSException, DDSStatus
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
+
+from bridges.rmf import notices, topics
+from bridges.rmf.cdr import CdrError
+from bridges.rmf.definitions import Message
+from bridges.rmf.idl import sample_type
+from bridges.rmf.rihs01 import type_hash
+from bridges.rmf.topics import Topic
+from bridges.rmf.transport import TransportError
+
+M = TypeVar("M", bound=Message)
+
+WRITE_BLOCKS_NS: Final = 20_000_000
+"""A writer that waits for a peer holds Python's lock meanwhile: keep it below one scan."""
+AT_ONCE: Final = 100
+"""Samples taken from one subscription before the others have their turn."""
+POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation", 24: "type"}
+
+
+class DdsPublisher(Generic[M]):
+    """One topic's sending end. `withdraw`: takes it off the graph."""
+
+    def __init__(
+        self,
+        topic: Topic[M],
+        reader_thread: threading.Thread,
+        withdraw: Callable[["DdsPublisher[Any]", Any], None],
+    ) -> None:
+        self.topic = topic
+        self._withdraw = withdraw
+        self._writer: Any = None
+        self._reader_thread = reader_thread
+        self._sample = sample_type(topic.type)
+        depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
+        self._retained: deque[Any] = deque(maxlen=depth)
+
+    watched = DDSStatus.OfferedIncompatibleQos
+
+    def create(self, participant: Any, topic: Any) -> Any:
+        """The writer, in place of any that was."""
+        qos = _writer_qos(self.topic.publish, self.topic.type)
+        self._writer = DataWriter(participant, topic, qos=qos)
+        return self._writer
+
+    def send_retained(self) -> None:
+        """Give late joiners what the writer before this one kept for them."""
+        for sample in list(self._retained):
+            self._writer.write(sample)
+
+    def publish(self, message: M) -> None:
+        """Send; blocks for 20 ms at most. Raises TransportError when it was not sent."""
+        if self._writer is None:
+            raise TransportError(f"topic {self.topic.name}: not sent: there is no network")
+        if not self._reader_thread.is_alive():
+            raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
+        sample = self._sample(message)
+        self._retained.append(sample)
+        try:
+            self._writer.write(sample)
+        except DDSException as error:
+            raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
+
+    def matched(self) -> int:
+        """How many subscriptions are reached; 0 after close."""
+        try:
+            return len(self._writer.get_matched_subscriptions()) if self._writer else 0
+        except DDSException:
+            return 0
+
+    def close(self) -> None:
+        """Take this end off the graph."""
+        self._withdraw(self, self._writer)
+
+    def log_misfits(self) -> None:
+        """Say that a subscription of this topic cannot be served, when there is a new one."""
+        status = self._writer.get_offered_incompatible_qos_status()
+        if status.total_count_change:
+            _log_misfit(self.topic, notices.NOT_SERVED, status)
+
+
+class DdsSubscription(Generic[M]):
+    """One topic's receiving end. `dropped`: counts samples that are no messages, by topic."""
+
+    def __init__(
+        self,
+        topic: Topic[M],
+        received: Callable[[M], None],
+        dropped: dict[str, int],
+        *,
+        others_only: bool,
+    ) -> None:
+        self.topic = topic
+        self._others_only = others_only
+        self._reader: Any = None
+        self._received = received
+        self._dropped = dropped
+
+    watched = DDSStatus.RequestedIncompatibleQos
+
+    def create(self, participant: Any, topic: Any) -> Any:
+        """The reader, in place of any that was."""
+        qos = _reader_qos(self.topic.subscribe, self.topic.type, others_only=self._others_only)
+        self._reader = DataReader(participant, topic, qos=qos)
+        return self._reader
+
+    def matched(self) -> int:
+        """How many publishers are heard; 0 after close."""
+        try:
+            return len(self._reader.get_matched_publications()) if self._reader else 0
+        except DDSException:
+            return 0
+
+    def take(self) -> bool:
+        """Hand on what has arrived; False when nothing had."""
+        for taken in range(AT_ONCE):
+            try:
+                samples = self._reader.take(1)
+            except CdrError as error:
+                notices.drop(self._dropped, self.topic, error)
+                continue
+            if not samples:
+                return taken > 0
+            if samples[0].sample_info.valid_data:
+                self._received(samples[0].message)
+        return True
+
+    def log_misfits(self) -> None:
+        """Say that a publisher of this topic cannot be heard, when there is a new one."""
+        status = self._reader.get_requested_incompatible_qos_status()
+        if status.total_count_change:
+            _log_misfit(self.topic, notices.NOT_HEARD, status)
+
+
+def _log_misfit(topic: Topic[M], text: str, status: Any) -> None:
+    policy = POLICIES.get(status.last_policy_id, f"QoS policy {status.last_policy_id}")
+    notices.misfit(topic, text, policy)
+
+
+def _writer_qos(qos: topics.Qos, message_type: type) -> Any:
+    if qos.durability == "volatile":
+        return Qos(Policy.Durability.Volatile, *_policies(qos, message_type))
+    # What a late joiner gets is the durability service's history, which is 1 deep by default.
+    retained = Policy.DurabilityService(0, Policy.History.KeepLast(qos.depth), -1, -1, -1)
+    return Qos(Policy.Durability.TransientLocal, retained, *_policies(qos, message_type))
+
+
+def _reader_qos(qos: topics.Qos, message_type: type, *, others_only: bool) -> Any:
+    durability = Policy.Durability
+    wanted = durability.Volatile if qos.durability == "volatile" else durability.TransientLocal
+    ignored = Policy.IgnoreLocal.Participant if others_only else Policy.IgnoreLocal.Nothing
+    return Qos(wanted, ignored, *_policies(qos, message_type))
+
+
+def _policies(qos: topics.Qos, message_type: type) -> list[Any]:
+    return [
+        Policy.Reliability.Reliable(WRITE_BLOCKS_NS),
+        Policy.History.KeepLast(qos.depth),
+        Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
+        Policy.Userdata(f"typehash={type_hash(message_type)};".encode()),
+    ]

@@ -1,0 +1,8 @@
+"""`ros2 launch rmf_bridges door.launch.py config:=FILE`"""
+
+from bridges.ros_launch import LaunchDescription, daemon
+
+
+def generate_launch_description() -> LaunchDescription:
+    """What ROS's launch asks for."""
+    return daemon("door")

@@ -1,0 +1,38 @@
+"""The ROS package, for colcon: the packages of the folder above, the marker, launch files, examples.
+
+pip does not read this file; its own is pyproject.toml, above.
+"""
+
+import os
+import re
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+HERE = Path(__file__).resolve().parent
+ABOVE = Path(os.path.relpath(HERE.parent))
+VERSION = re.search(r'__version__ = "(.*)"', (ABOVE / "bridges/__init__.py").read_text())
+
+
+def files(pattern: str) -> list[str]:
+    """Paths below the project's folder, as setuptools wants them: relative."""
+    return sorted(map(str, ABOVE.glob(pattern)))
+
+
+setup(
+    name="rmf_bridges",
+    version=VERSION[1],
+    description="Daemons that connect Open-RMF to the lifts, doors and chargers of a building",
+    license="Apache-2.0",
+    packages=find_packages(str(ABOVE), include=["bridges*", "drivers*", "hal_fakes*"]),
+    package_dir={"": str(ABOVE)},
+    package_data={"drivers": ["profiles/*.yaml"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", files("ros/resource/rmf_bridges")),
+        ("share/rmf_bridges", files("ros/package.xml")),
+        ("share/rmf_bridges/launch", files("ros/launch/*.launch.py")),
+        ("share/rmf_bridges/config", files("config/*.yaml")),
+    ],
+    entry_points={"console_scripts": ["rmf-bridge = bridges.cli:main"]},
+    zip_safe=False,
+)

@@ -1,0 +1,145 @@
+"""A machine whose network comes, goes and changes, and ROS's variables that say whom to look for."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+import pytest
+
+from bridges.rmf import definitions as d
+from bridges.rmf import network
+from bridges.rmf.dds import DdsTransport
+from bridges.rmf.loopback import LOOPBACK
+from bridges.rmf.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
+from bridges.rmf.transport import TransportError
+from hal_fakes.domain import free_domain
+from tests.rmf import peer
+from tests.waiting import wait_until
+
+AUTO = (
+    "<CycloneDDS><Domain><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+    "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>{}</Discovery></Domain></CycloneDDS>"
+)
+PEERS = '<Peers><Peer address="10.0.0.5"/><Peer address="rmf.local"/></Peers>'
+
+
+@pytest.mark.parametrize(
+    ("environ", "wanted"),
+    [
+        ({}, AUTO.format("")),
+        ({"ROS_STATIC_PEERS": "10.0.0.5;rmf.local"}, AUTO.format(PEERS)),
+        ({"ROS_STATIC_PEERS": ";; 10.0.0.5; rmf.local ;"}, AUTO.format(PEERS)),
+        ({"ROS_STATIC_PEERS": '"<&'}, AUTO.format("<Peers><Peer address='\"&lt;&amp;'/></Peers>")),
+        ({"CYCLONEDDS_URI": "file:///c.xml"}, AUTO.format("") + ",file:///c.xml"),
+        (
+            {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", "ROS_STATIC_PEERS": "10.0.0.5"},
+            "",
+        ),
+    ],
+)
+def test_ross_variables_become_cyclones_configuration(environ: dict[str, str], wanted: str) -> None:
+    assert network.configuration(environ) == wanted
+
+
+class Machine:
+    """Its addresses, as the test wants them."""
+
+    def __init__(self) -> None:
+        self.addresses: network.Addresses = frozenset({(2, "10.0.0.7")})
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
+    """A machine whose nodes go by its addresses, and in truth stay on loopback."""
+    made = Machine()
+    monkeypatch.setattr(network, "addresses", lambda: made.addresses)
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+    return made
+
+
+class Echoed:
+    """A node under test, and a process that sends back what it hears."""
+
+    def __init__(self, domain: int) -> None:
+        self.domain = domain
+        self.node = DdsTransport("node", domain, loopback=False)
+        self.heard: list[d.Message] = []
+        self.node.subscribe(DOOR_STATES.named("pong_door_states"), self.heard.append)
+        self.node.subscribe(FIRE_ALARM_TRIGGER.named("pong_fire_alarm_trigger"), self.heard.append)
+        self.states = self.node.publisher(DOOR_STATES.named("ping_door_states"))
+        self.alarm = self.node.publisher(FIRE_ALARM_TRIGGER.named("ping_fire_alarm_trigger"))
+
+    def comes_back(self, number: int) -> bool:
+        """Whether a state that is sent again and again has been there and back."""
+        state = d.DoorState(d.Time(number), "ward")
+        with suppress(TransportError):
+            self.states.publish(state)
+        return state in self.heard
+
+
+@pytest.fixture
+def echoed(machine: Machine) -> Iterator[Echoed]:
+    domain = free_domain()
+    made = Echoed(domain)
+    with peer.running("echo", domain):
+        wait_until(lambda: made.comes_back(1), "the process is found")
+        yield made
+        made.node.close()
+
+
+def test_another_address_is_joined_with_all_ends_and_what_was_retained_goes_out_again(
+    echoed: Echoed, machine: Machine
+) -> None:
+    echoed.alarm.publish(d.Bool(True))
+    wait_until(lambda: echoed.heard.count(d.Bool(True)) == 1, "the alarm is heard")
+    machine.addresses = frozenset({(2, "10.0.0.8")})
+    wait_until(lambda: echoed.comes_back(2), "states go there and back")
+    before = echoed.heard.count(d.Bool(True))
+    with peer.running("echo", echoed.domain):
+        wait_until(
+            lambda: echoed.heard.count(d.Bool(True)) > before,
+            "a process that comes later hears what was retained",
+        )
+    later = echoed.node.publisher(DOOR_STATES.named("ping_door_states"))
+    wait_until(lambda: later.matched() > 0, "an end that is declared later has its place too")
+    later.close()
+    assert later.matched() == 0
+
+
+def test_without_a_network_it_waits_says_so_once_and_is_back_when_the_network_is(
+    echoed: Echoed,
+    machine: Machine,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace('"lo"', '"no-such-interface"'))
+    machine.addresses = frozenset()
+    wait_until(lambda: any("not_joined" in text for text in caplog.messages), "it cannot join")
+    with pytest.raises(TransportError):
+        echoed.states.publish(d.DoorState())
+    assert echoed.states.matched() == 0
+    meanwhile = echoed.node.publisher(DOOR_STATES.named("ping_door_states"))
+    assert meanwhile.matched() == 0
+    with pytest.raises(TransportError):
+        meanwhile.publish(d.DoorState())
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+    wait_until(lambda: echoed.comes_back(2), "states go there and back")
+    assert sum("not_joined" in text for text in caplog.messages) == 1
+
+
+def test_it_can_be_closed_while_there_is_no_network(
+    echoed: Echoed,
+    machine: Machine,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace('"lo"', '"no-such-interface"'))
+    machine.addresses = frozenset()
+    wait_until(lambda: any("not_joined" in text for text in caplog.messages), "it cannot join")
+    echoed.states.close()
+    echoed.node.close()
+    with pytest.raises(TransportError):
+        echoed.alarm.publish(d.Bool(True))
+
+
+def test_loopback_and_what_has_no_link_are_no_way_to_another_machine() -> None:
+    assert "127.0.0.1" not in {address for _, address in network.addresses()}

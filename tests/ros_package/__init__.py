@@ -1,0 +1,1 @@
+"""The ROS package beside the pip one."""
