@@ -160,7 +160,7 @@ def test_ros_has_nothing_to_warn_about_when_a_dds_node_joins(
 ) -> None:
     domain = free_domain()
     if breaks:  # so that we know that a warning would be seen
-        monkeypatch.setattr("bridges.rmf.dds.type_hash", lambda kind: "none")
+        monkeypatch.setattr("bridges.rmf.dds_ends.type_hash", lambda kind: "none")
     command = [sys.executable, "-m", "tests.rmf.peer", "echo", str(domain), "ros2"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as ros:
         node = joining("dds", domain)("newcomer")
