@@ -133,7 +133,7 @@ class Daemon:
         self._runtime.write_status(msgspec.json.encode({**daemon, "devices": devices}))
         if self._diagnostics is None:
             return
-        at = stamp(time.time())
+        at = stamp(self._transport.wall())
         found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
         try:
             self._diagnostics.publish(found)
