@@ -220,10 +220,10 @@ def test_a_code_with_two_meanings_or_twice_is_a_problem_at_its_place() -> None:
     [
         ("idle: [0]", "", "needs 'charging'"),
         ("idle: []\n      charging: [5]", "", "at least 1"),
-        ("idle: [0]\n      charging: [65536]", "21:18", "65535"),
-        ("idle: [0]\n      charging: [-1]", "21:18", "0"),
-        ("idle: [0]\n      charging: [5, 0]", "21:21", "state 0 is already idle"),
-        ("idle: [0]\n      charging: [5]\n      manual: [12]", "22:7", "unknown key 'manual'"),
+        ("idle: [0]\n      charging: [65536]", "22:18", "65535"),
+        ("idle: [0]\n      charging: [-1]", "22:18", "0"),
+        ("idle: [0]\n      charging: [5, 0]", "22:21", "state 0 is already idle"),
+        ("idle: [0]\n      charging: [5]\n      manual: [12]", "23:7", "unknown key 'manual'"),
     ],
 )
 def test_a_code_table_that_cannot_be_right_is_refused(

@@ -303,20 +303,20 @@ def test_the_fake_modules_pulse_is_ended_by_a_coil_that_is_written_off(
         ("unit 1 coil 0x207", ""),
         (
             "unit 2 coil 0x200",
-            "29:7: 'hold_open': flash is at unit 2, and the relay at unit 1: one is wrong",
+            "30:7: 'hold_open': flash is at unit 2, and the relay at unit 1: one is wrong",
         ),
         (
             "unit 1 discrete input 9",
-            "29:7: 'hold_open': flash is asked for with a write to a coil, not to a discrete input",
+            "30:7: 'hold_open': flash is asked for with a write to a coil, not to a discrete input",
         ),
         (
             "unit 1 coil 0",
-            "29:64: unit 1 coil 0 is taken by ward_door outputs.hold_open on line 29:"
+            "30:64: unit 1 coil 0 is taken by ward_door outputs.hold_open on line 30:"
             " ward_door outputs.hold_open needs a point of its own",
         ),
         (
             "0x200",
-            "29:64: '0x200' is not a Modbus point: write 'unit 1 coil 0' or"
+            "30:64: '0x200' is not a Modbus point: write 'unit 1 coil 0' or"
             " 'unit 1 discrete input 0'; addresses begin at 0",
         ),
     ],

@@ -135,7 +135,7 @@ def test_check_warns_of_a_port_that_may_become_another(tmp_path: Path) -> None:
     file.write_text(re.sub(r"/dev/serial/by-id/\S+", "/dev/ttyUSB0", shipped.read_text()))
     assert load(shipped).warnings == ()
     assert [str(warning) for warning in load(file).warnings] == [
-        f"{file}:13:13: warning: bus 'line': /dev/ttyUSB0 may be another adapter after the next"
+        f"{file}:14:13: warning: bus 'line': /dev/ttyUSB0 may be another adapter after the next"
         " start: write its /dev/serial/by-id path"
     ]
 
