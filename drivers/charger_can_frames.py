@@ -127,7 +127,7 @@ def warnings(settings: Settings) -> Problems:
         yield ("profile",), text
     found = frame_map(settings)
     if found.receiver is None and settings.receivers:
-        yield ("receivers",), "the map has no receiver: the robot is not verified"
+        yield ("receivers",), "the map has no receiver: it will charge nobody"
     if settings.limits.peer_internal_timeout_s is None:
         text = "ask the maker after how long without frames it stops, and pull the plug to see it"
         yield (), f"{text}; write it down as limits: {{peer_internal_timeout_s: …}}"

@@ -61,12 +61,7 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
         ("clear error", "no object for it is published: cycle the receiver's power"),
         ("end of the daemon", "0 is written" if settings.on_death == "stop" else "nothing"),
     ]
-    for meaning in Activity:
-        codes = [str(code) for code in range(256) if xnergy.activity(code) is meaning]
-        if meaning is not Activity.UNKNOWN:
-            rows.append((f"state {meaning}", ", ".join(codes)))
-    rows.append(("any other state", "error, with its number"))
-    return rows
+    return rows + xnergy.state_rows()
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
@@ -79,7 +74,7 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
     if settings.heartbeat == "none":
         yield ("heartbeat",), "without it a receiver that restarts is not noticed"
     if settings.receivers:
-        yield ("receivers",), "this controller tells no receiver's id: the robot is not verified"
+        yield ("receivers",), "this controller tells no receiver's id: it will charge nobody"
 
 
 def create(name: str, settings: Settings, bus: can.CanBus) -> "CanOpenCharger":

@@ -53,11 +53,7 @@ def describe(settings: Settings, bus_settings: modbus.Settings) -> list[tuple[st
         ("clear error", "no place for it is published: cycle the receiver's power"),
         ("end of the daemon", "0 is written" if settings.on_death == "stop" else "nothing"),
     ]
-    for meaning in Activity:
-        codes = [str(code) for code in range(256) if xnergy.activity(code) is meaning]
-        if meaning is not Activity.UNKNOWN:
-            rows.append((f"state {meaning}", ", ".join(codes)))
-    return [*rows, ("any other state", "error, with its number")]
+    return rows + xnergy.state_rows()
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:

@@ -125,6 +125,19 @@ def activity(code: int) -> Activity:
     return CODES.get(code, (Activity.UNKNOWN, ""))[0]
 
 
+def state_rows() -> list[tuple[str, str]]:
+    """What `check` says of the state codes: (meaning, its numbers)."""
+    rows = [
+        (
+            f"state {meaning}",
+            ", ".join(str(code) for code in range(256) if activity(code) is meaning),
+        )
+        for meaning in Activity
+        if meaning is not Activity.UNKNOWN
+    ]
+    return [*rows, ("any other state", "error, with its number")]
+
+
 def sample(words: Words, settled: bool = True) -> ChargerSample:
     """One reading. `words` has at least state, error_low and error_high; never raises.
 
