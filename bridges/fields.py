@@ -15,6 +15,10 @@ Seconds = Annotated[float, Meta(ge=0, le=86400, extra={"unit": "s"})]
 """A duration that may be zero."""
 Period = Annotated[float, Meta(ge=0.01, le=60, extra={"unit": "s"})]
 """A repetition period."""
+QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
+"""How long a node without hardware only listens at first."""
+Patience = Annotated[float, Meta(ge=3, le=86400, extra={"unit": "s"})]
+"""How long somebody may be silent, or something may last, before it matters."""
 Name = Annotated[
     str,
     Meta(

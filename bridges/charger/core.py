@@ -28,7 +28,7 @@ from msgspec.structs import replace
 
 from bridges.charger import pad, session, told
 from bridges.charger.memory import (
-    NEVER,
+    AGES_AGO,
     RIVAL_GONE_S,
     Cancelled,
     Event,
@@ -147,7 +147,7 @@ def _protected(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
     if sample.activity is Activity.ERROR and sample.side != "robot":
         return replace(memory, protection=told.error_text(sample))
     if now <= memory.clear_by and sample.activity not in AT_FAULT | CURRENT_FLOWS:
-        return replace(memory, protection="", clear_by=NEVER)
+        return replace(memory, protection="", clear_by=AGES_AGO)
     return memory
 
 

@@ -10,7 +10,7 @@ from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 RIVAL_GONE_S = 5.0
 """A second node for this charger is gone when unheard for so long; states come at 1 Hz."""
-NEVER = float("-inf")
+AGES_AGO = float("-inf")
 
 
 class Requested(msgspec.Struct, frozen=True):
@@ -83,11 +83,11 @@ class Memory(msgspec.Struct, frozen=True):
     power: bool | None = None
     disobeyed_since: float | None = None
     protection: str = ""
-    clear_by: float = NEVER
+    clear_by: float = AGES_AGO
     clear_errors: int = 0
-    cleared_at: float = NEVER
+    cleared_at: float = AGES_AGO
     range_checks: int = 0
-    rival_at: float = NEVER
+    rival_at: float = AGES_AGO
 
 
 Event = Sampled[ChargerSample] | IoFailed | RivalSeen | OperatorReset | Requested | Cancelled

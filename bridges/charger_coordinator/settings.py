@@ -9,10 +9,9 @@ from msgspec import Meta
 
 from bridges.building_map import CHARGER, WAYPOINT
 from bridges.charger.settings import ReceiverId, Robot, StartTimeout
-from bridges.fields import Name
+from bridges.fields import Name, QuietStart
 from bridges.kind import Place
 
-QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
 Near = Annotated[float, Meta(ge=0.1, le=5, extra={"unit": "m"})]
 Full = Annotated[float, Meta(ge=50, le=100, extra={"unit": "%"})]

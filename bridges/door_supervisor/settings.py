@@ -1,15 +1,10 @@
 """The door supervisor's section of its YAML."""
 
 from collections.abc import Iterable
-from typing import Annotated
 
 import msgspec
-from msgspec import Meta
 
-from bridges.fields import Name
-
-QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
-Patience = Annotated[float, Meta(ge=3, le=86400, extra={"unit": "s"})]
+from bridges.fields import Name, Patience, QuietStart
 
 
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -22,7 +22,7 @@ REPLAY_S = 1.0
 """A replay comes in a burst; a live requester repeats itself at 1 Hz."""
 BROKEN_OFF_S = 3.0
 FUTURE_S = 2.0
-NEVER = -math.inf
+AGES_AGO = -math.inf
 
 
 class Rules(msgspec.Struct, frozen=True):
@@ -41,11 +41,11 @@ class Voice(msgspec.Struct, frozen=True):
     `doubted_since` until `doubted_at` (s, ours).
     """
 
-    newest: float = NEVER
-    newest_end: float = NEVER
-    doubted: float = NEVER
-    doubted_since: float = NEVER
-    doubted_at: float = NEVER
+    newest: float = AGES_AGO
+    newest_end: float = AGES_AGO
+    doubted: float = AGES_AGO
+    doubted_since: float = AGES_AGO
+    doubted_at: float = AGES_AGO
 
     def heard(
         self, stamp: float, age_s: float, now: float, rules: Rules, *, ends: bool
@@ -64,7 +64,7 @@ class Voice(msgspec.Struct, frozen=True):
     def _is_live(self, stamp: float, age_s: float, rules: Rules, *, ends: bool) -> bool:
         if stamp <= (self.newest_end if ends else self.newest):
             return False
-        known = rules.known_clocks and self.newest > NEVER
+        known = rules.known_clocks and self.newest > AGES_AGO
         return known or -rules.future_s <= age_s <= rules.most_s
 
     def _doubt(self, stamp: float, now: float) -> "Voice":
