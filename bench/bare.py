@@ -4,7 +4,7 @@ import signal
 import sys
 import threading
 
-from bridges.fields import Rmf
+from bridges.core.fields import Rmf
 from bridges.rmf.choose import open_transport
 from bridges.rmf.definitions import LiftRequest, LiftState
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES

@@ -21,7 +21,7 @@ from typing import Any, Final
 import requests
 
 from bench.daemons import cpu_s, memory_mb, running, threads, wait_for_log
-from bridges.fields import Rmf
+from bridges.core.fields import Rmf
 from bridges.rmf.choose import open_transport
 from bridges.rmf.definitions import ChargerState
 from bridges.rmf.stamps import in_seconds

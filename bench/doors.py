@@ -10,8 +10,8 @@ import time
 from pathlib import Path
 from typing import Any, Final, cast
 
-from bridges.settings import Config, load
-from drivers.door_dry_contact import create
+from bridges.settings.load import Config, load
+from drivers.door.dry_contact import create
 from drivers.hal.modbus import ModbusBus
 from hal_fakes.simulate import Simulation
 

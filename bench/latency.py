@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.daemons import ROOT, PlantSocket, daemon, memory_mb, running, wait_for_log
-from bridges.fields import Rmf
+from bridges.core.fields import Rmf
 from bridges.rmf.choose import open_transport
 from bridges.rmf.definitions import LiftMode, LiftRequest, LiftRequestType, LiftState
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES

@@ -11,11 +11,11 @@ from bench.daemons import ROOT, PlantSocket, daemon, running, wait_for_log
 from bench.idle import watch
 from bench.latency import DOMAIN, PAUSE_S, Graph, figures, quick_lift
 from bridges.rmf.definitions import LiftRequestType
-from bridges.settings import load
+from bridges.settings.load import load
 from drivers.hal.gpio import canonical
-from drivers.lift_dry_contact import Settings, wires
+from drivers.lift.dry_contact import Settings, wires
 from hal_fakes.gpio import WiredFactory
-from hal_fakes.lift_plant import build
+from hal_fakes.plants.lift import build
 from hal_fakes.rmf.phases import EndLiftSession, RequestLift
 from hal_fakes.rmf.robot import Phase
 from hal_fakes.wiring import Wiring

@@ -24,7 +24,7 @@ from bench.daemons import (
     wait_for_log,
 )
 from bench.doors import DOOR
-from bridges.fields import Rmf
+from bridges.core.fields import Rmf
 from bridges.rmf.choose import open_transport
 from bridges.rmf.definitions import DoorState
 from bridges.rmf.stamps import in_seconds

@@ -23,7 +23,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
-from bridges.settings import SettingsError, load
+from bridges.settings.load import SettingsError, load
 from drivers import DriverError
 from hal_fakes.control import Control
 from hal_fakes.realtime import RealTime

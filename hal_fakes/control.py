@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import cast
 
 from drivers import DriverError
-from hal_fakes.plant import Edge, FailureMode, Plant
+from hal_fakes.plants.plant import Edge, FailureMode, Plant
 
 
 class Control:

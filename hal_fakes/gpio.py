@@ -1,7 +1,7 @@
 """The far side of the GPIO header: gpiozero's mock pins, wired to plants.
 
 The daemon's own code runs down to gpiozero: only the pins are ours. They claim an output at its
-safe level in one call, as `drivers/hal/_gpio_pins.py` does on hardware (gpiozero's stock MockPin
+safe level in one call, as `drivers/hal/gpio/pins.py` does on hardware (gpiozero's stock MockPin
 records a glitch there), and refuse what hardware refuses: a pin claimed twice, another pull where a
 resistor is fixed, driving an input, a pull on an output.
 """
@@ -14,7 +14,7 @@ from typing import Any
 from gpiozero import PinInvalidFunction
 from gpiozero.pins.mock import MockFactory, MockPin
 
-from bridges.settings import Config
+from bridges.settings.load import Config
 from drivers.hal.gpio import GpioBus, canonical
 from drivers.hal.gpio import Settings as GpioSettings
 from drivers.hal.gpio import open_bus as open_real_bus

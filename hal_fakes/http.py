@@ -2,7 +2,7 @@
 
 `GET state_path` answers what the station does in the maker's numbers or words and fields; clearing,
 start, stop and range check do what they are called. How the wire fails, by part and mode
-(`hal_fakes.plant.FAILURE_MODES`):
+(`hal_fakes.plants.plant.FAILURE_MODES`):
 
 |         | off              | stuck           | slow               | garbage        | wrong         |
 | server  | hangs up at once | the last answer | answers too late   | an HTML page   | state as text |
@@ -24,8 +24,8 @@ from typing import Any, Final, cast
 
 from bridges.charger.signals import Activity
 from drivers.hal.http import base
-from hal_fakes.charger_plant import ROBOTS_FAULTS, Reading
-from hal_fakes.plant import FailureMode, Plant
+from hal_fakes.plants.charger import ROBOTS_FAULTS, Reading
+from hal_fakes.plants.plant import FailureMode, Plant
 from hal_fakes.wiring import devices_on
 
 LOOK_S: Final = 0.05

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 
-from hal_fakes.plant import Edge, FailureMode, Plant
+from hal_fakes.plants.plant import Edge, FailureMode, Plant
 
 
 class RealTime:

@@ -19,7 +19,7 @@ from typing import Any, cast
 
 import msgspec
 
-from bridges.settings import Config
+from bridges.settings.load import Config
 from drivers.hal import Bus, HalError
 from hal_fakes.control import Control
 from hal_fakes.realtime import RealTime

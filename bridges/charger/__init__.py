@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from bridges.charger import core, messages
 from bridges.charger.settings import ChargerLimits, ChargerSettings
-from bridges.kind import Kind
+from bridges.core.kind import Kind
 from bridges.rmf.topics import CHARGER_CANCELS, CHARGER_REQUESTS, CHARGER_STATES
 
 

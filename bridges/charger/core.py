@@ -47,7 +47,7 @@ from bridges.charger.signals import (
     ChargerOutputs,
     ChargerSample,
 )
-from bridges.decision import Decision, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.core.decision import Decision, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 
 __all__ = ["Cancelled", "Event", "Holder", "Memory", "Requested", "decide", "initial"]
 

@@ -6,7 +6,7 @@ import msgspec
 
 from bridges.charger.settings import ChargerLimits, Robot
 from bridges.charger.signals import ChargerSample
-from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled
+from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 RIVAL_GONE_S = 5.0
 """A second node for this charger is gone when unheard for so long; states come at 1 Hz."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from bridges.charger.memory import Cancelled, Requested
 from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerSettings
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.rmf.definitions import (
     ChargerCancel,
     ChargerRequest,

@@ -11,7 +11,7 @@ import msgspec
 from bridges.charger.memory import Memory
 from bridges.charger.settings import ChargerLimits, Robot
 from bridges.charger.signals import CURRENT_FLOWS, ChargerSample
-from bridges.decision import Fault
+from bridges.core.decision import Fault
 
 WRONG_DOCKING = "WRONG_DOCKING"
 

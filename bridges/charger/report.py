@@ -6,7 +6,7 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.charger.signals import Measured
-from bridges.decision import Fault
+from bridges.core.decision import Fault
 from bridges.rmf.definitions import ChargerStateValue
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, NamedTuple
 import msgspec
 from msgspec import Meta
 
-from bridges.fields import DeviceSettings, Name, Seconds
+from bridges.core.fields import DeviceSettings, Name, Seconds
 
 Misses = Annotated[int, Meta(ge=1, le=100)]
 PerHour = Annotated[int, Meta(ge=0, le=60, extra={"unit": "per hour"})]

@@ -5,7 +5,7 @@ from bridges.charger.memory import Memory, rivalled, unreachable
 from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerLimits, Robot
 from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerSample, Measured
-from bridges.decision import Fault
+from bridges.core.decision import Fault
 from bridges.rmf.definitions import ChargerStateValue
 
 IDLE = ChargerStateValue.CHARGER_IDLE

@@ -3,7 +3,7 @@
 from bridges.charger_coordinator import core, keep, messages
 from bridges.charger_coordinator.described import described, warnings
 from bridges.charger_coordinator.settings import Settings, site
-from bridges.graph_kind import GraphKind
+from bridges.core.graph_kind import GraphKind
 from bridges.rmf.topics import (
     ADAPTER_CHARGER_CANCELS,
     ADAPTER_CHARGER_REQUESTS,

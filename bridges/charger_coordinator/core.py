@@ -56,8 +56,8 @@ from bridges.charger_coordinator.memory import (
 from bridges.charger_coordinator.queue import UNASKED, allot
 from bridges.charger_coordinator.report import SiteReport, report
 from bridges.charger_coordinator.settings import Site
-from bridges.decision import Decision, OperatorReset
-from bridges.graph_kind import MaySpeak
+from bridges.core.decision import Decision, OperatorReset
+from bridges.core.graph_kind import MaySpeak
 
 SETTLES_S: Final = 2.0
 """A robot that passes by on another task still shows the mode of its last charging."""

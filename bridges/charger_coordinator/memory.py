@@ -9,8 +9,8 @@ from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator.diagnosis import Side, side
-from bridges.decision import OperatorReset
-from bridges.graph_kind import MaySpeak, Woken
+from bridges.core.decision import OperatorReset
+from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf.definitions import ChargerStateValue, ChargingAssignments
 
 K = TypeVar("K")

@@ -18,7 +18,7 @@ from bridges.charger_coordinator.memory import (
 )
 from bridges.charger_coordinator.report import SiteReport
 from bridges.charger_coordinator.settings import Fleet, Settings
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.rmf import definitions as d
 from bridges.rmf.definitions import Time
 

@@ -8,7 +8,7 @@ import msgspec
 from bridges.charger_coordinator.diagnosis import UNKNOWN_RECEIVER, Side, on_pad
 from bridges.charger_coordinator.memory import Memory, Seen
 from bridges.charger_coordinator.settings import Site
-from bridges.decision import Fault
+from bridges.core.decision import Fault
 
 
 class SiteReport(msgspec.Struct, frozen=True):

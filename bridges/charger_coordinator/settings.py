@@ -7,10 +7,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from bridges.building_map import CHARGER, WAYPOINT
 from bridges.charger.settings import ReceiverId, Robot, StartTimeout
-from bridges.fields import Name, QuietStart
-from bridges.kind import Place
+from bridges.core.fields import Name, QuietStart
+from bridges.core.kind import Place
+from bridges.settings.building_map import CHARGER, WAYPOINT
 
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
 Near = Annotated[float, Meta(ge=0.1, le=5, extra={"unit": "m"})]

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from bridges.charger_coordinator.memory import ASSIGNED, CHARGING, ERROR, NODE, Grant, Memory
 from bridges.charger_coordinator.report import SiteReport
 from bridges.charger_coordinator.settings import Site
-from bridges.decision import Fault
+from bridges.core.decision import Fault
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import duration
 from bridges.rmf.topics import (

@@ -13,12 +13,12 @@ from typing import Any
 
 import msgspec
 
-from bridges import named
-from bridges.building_map import BuildingMap, load_map
-from bridges.graph_kind import GraphKind
-from bridges.map_names import mismatches, places
-from bridges.settings import Config, Problem, SettingsError, load
-from drivers.points import Wire
+from bridges.core.graph_kind import GraphKind
+from bridges.settings import names as named
+from bridges.settings.building_map import BuildingMap, load_map
+from bridges.settings.load import Config, Problem, SettingsError, load
+from bridges.settings.map_names import mismatches, places
+from drivers.hal.points import Wire
 
 HEADINGS = (
     "device",

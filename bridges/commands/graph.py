@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from bridges.fields import Rmf
+from bridges.core.fields import Rmf
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
 

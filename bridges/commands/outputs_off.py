@@ -8,9 +8,10 @@ import argparse
 import logging
 from pathlib import Path
 
-from bridges import log, runtime
-from bridges.daemon import outputs_off
-from bridges.settings import SettingsError, load
+from bridges import log
+from bridges.serve import directory as runtime
+from bridges.serve.daemon import outputs_off
+from bridges.settings.load import SettingsError, load
 
 TIMEOUT_S = 5.0
 EX_UNAVAILABLE, EX_CONFIG = 69, 78

@@ -6,7 +6,7 @@ import signal
 import sys
 from pathlib import Path
 
-from bridges import runtime
+from bridges.serve import directory as runtime
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

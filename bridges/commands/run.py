@@ -9,10 +9,12 @@ from pathlib import Path
 
 import msgspec
 
-from bridges import log, ros_setup, runtime
-from bridges.daemon import Daemon
+from bridges import log
+from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
-from bridges.settings import Config, SettingsError, load
+from bridges.serve import directory as runtime
+from bridges.serve.daemon import Daemon
+from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
 
 EX_USAGE, EX_UNAVAILABLE, EX_CONFIG = 64, 69, 78

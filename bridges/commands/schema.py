@@ -3,7 +3,7 @@
 import argparse
 import json
 
-from bridges import reference
+from bridges.settings import reference
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

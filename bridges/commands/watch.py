@@ -15,7 +15,6 @@ from contextlib import closing
 from dataclasses import astuple, dataclass
 from typing import TextIO
 
-from bridges import diagnostics
 from bridges.commands.graph import (
     SILENT_AFTER_S,
     Ears,
@@ -28,6 +27,7 @@ from bridges.commands.graph import (
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.transport import Transport, TransportError
+from bridges.serve import diagnostics
 
 REDRAW_S = 0.5
 REDRAW_AT_MOST_EVERY_S = 0.1

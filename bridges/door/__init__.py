@@ -1,8 +1,8 @@
 """Doors."""
 
+from bridges.core.kind import Kind
 from bridges.door import core, messages
 from bridges.door.settings import DoorLimits
-from bridges.kind import Kind
 from bridges.rmf import topics
 
 KIND = Kind(

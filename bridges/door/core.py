@@ -25,7 +25,7 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from bridges.decision import (
+from bridges.core.decision import (
     Decision,
     Fault,
     IoFailed,

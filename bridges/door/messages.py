@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.door.core import CloseDoor, DoorReport, OpenDoor
 from bridges.door.settings import DoorSettings
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Time

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import msgspec
 from msgspec.structs import replace
 
-from bridges.debounce import Settled, forget, settle
+from bridges.core.debounce import Settled, forget, settle
 from bridges.door.settings import DoorLimits
 from bridges.door.signals import DoorSample
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from bridges.fields import DeviceSettings, Seconds
+from bridges.core.fields import DeviceSettings, Seconds
 
 StaleAfter = Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})]
 PulseSeconds = Annotated[float, Meta(ge=0.05, le=600, extra={"unit": "s"})]

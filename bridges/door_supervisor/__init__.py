@@ -1,8 +1,8 @@
 """The door supervisor: in the place of RMF's own, between fleet adapters and any number of doors."""
 
+from bridges.core.graph_kind import GraphKind
 from bridges.door_supervisor import core, messages, table
 from bridges.door_supervisor.settings import Settings
-from bridges.graph_kind import GraphKind
 from bridges.rmf.topics import (
     ADAPTER_DOOR_REQUESTS,
     DOOR_REQUESTS,

@@ -25,9 +25,9 @@ from typing import Any, Final
 import msgspec
 from msgspec.structs import replace
 
-from bridges.decision import Decision, Fault
+from bridges.core.decision import Decision, Fault
+from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.door_supervisor.voice import Voice
-from bridges.graph_kind import MaySpeak, Woken
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, Message
 from bridges.rmf.topics import DOOR_REQUESTS, Topic
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.door_supervisor.core import REQUESTER_ID, Closes, DoorHoldReport, Opens, Shown
 from bridges.door_supervisor.settings import Settings
 from bridges.rmf.definitions import DoorModeValue, DoorRequest, DoorState, SupervisorHeartbeat, Time

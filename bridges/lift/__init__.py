@@ -1,6 +1,6 @@
 """Lifts: RMF's LiftRequest to relays, and the truth about the car as LiftState."""
 
-from bridges.kind import Kind
+from bridges.core.kind import Kind
 from bridges.lift import core, messages
 from bridges.lift.limits import LiftLimits
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES

@@ -23,7 +23,7 @@ from typing import Generic, Literal, TypeVar
 import msgspec
 from msgspec.structs import replace
 
-from bridges.decision import Fault
+from bridges.core.decision import Fault
 from bridges.lift.limits import LiftLimits
 from bridges.lift.sensing import View
 from bridges.lift.signals import Hazard, LiftOutputs, Side

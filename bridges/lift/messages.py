@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.lift.core import Asked, Ended
 from bridges.lift.report import LiftReport
 from bridges.lift.settings import LiftSettings

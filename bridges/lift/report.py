@@ -4,7 +4,7 @@ from typing import Any
 
 import msgspec
 
-from bridges.decision import Fault
+from bridges.core.decision import Fault
 from bridges.lift.drive import Session
 from bridges.lift.limits import LiftLimits
 from bridges.lift.sensing import View

@@ -20,8 +20,8 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from bridges.debounce import Settled, forget, settle
-from bridges.decision import Fault
+from bridges.core.debounce import Settled, forget, settle
+from bridges.core.decision import Fault
 from bridges.lift.limits import LiftLimits
 from bridges.lift.signals import Door, Hazard, LiftSample, Motion, Side
 

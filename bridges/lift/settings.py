@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from bridges.building_map import FLOOR
-from bridges.fields import DeviceSettings, Name, Period, Seconds
-from bridges.kind import Place
+from bridges.core.fields import DeviceSettings, Name, Period, Seconds
+from bridges.core.kind import Place
 from bridges.lift.signals import Side, Stop
+from bridges.settings.building_map import FLOOR
 
 
 class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

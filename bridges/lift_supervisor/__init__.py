@@ -2,7 +2,7 @@
 
 import math
 
-from bridges.graph_kind import GraphKind
+from bridges.core.graph_kind import GraphKind
 from bridges.lift_supervisor import core, messages
 from bridges.lift_supervisor.memory import Limits
 from bridges.lift_supervisor.settings import Settings

@@ -27,8 +27,8 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.decision import Decision
-from bridges.graph_kind import MaySpeak
+from bridges.core.decision import Decision
+from bridges.core.graph_kind import MaySpeak
 from bridges.lift_supervisor.freshness import FUTURE_S, Rules, Voice
 from bridges.lift_supervisor.memory import (
     FLOWING_S,

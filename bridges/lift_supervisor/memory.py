@@ -6,7 +6,7 @@ from typing import Final
 
 import msgspec
 
-from bridges.graph_kind import MaySpeak, Woken
+from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.lift_supervisor.freshness import Voice
 from bridges.rmf.definitions import LiftMode, LiftRequest
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.lift_supervisor.core import AGV, END
 from bridges.lift_supervisor.memory import Asked, Ended, Shown, Wish
 from bridges.lift_supervisor.report import SupervisorReport

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import msgspec
 
-from bridges.decision import Fault
+from bridges.core.decision import Fault
 from bridges.lift_supervisor.memory import FLOWING_S, Limits, Memory
 
 OVERDUE_S: Final = 30.0

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import msgspec
 
-from bridges.fields import Name, Patience, QuietStart, Seconds
+from bridges.core.fields import Name, Patience, QuietStart, Seconds
 
 
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

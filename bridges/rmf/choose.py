@@ -12,7 +12,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 
-from bridges.fields import Rmf
+from bridges.core.fields import Rmf
 from bridges.log import pairs
 from bridges.rmf.definitions import PACKAGES
 from bridges.rmf.transport import Transport, TransportError

@@ -8,7 +8,7 @@ fail at once, so that a dead device costs the others on its bus no more than one
 
 from collections.abc import Callable
 
-from drivers.points import HalError
+from drivers.hal.points import HalError
 
 __all__ = ["Bus", "HalError"]
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from drivers.points import HalError
+from drivers.hal.points import HalError
 
 BACKOFF_FIRST_S: Final = 0.5
 BACKOFF_MAX_S: Final = 30.0

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import msgspec
 
-from bridges.fields import Name, Period
+from bridges.core.fields import Name, Period
 from drivers.hal import Bus, HalError
 from drivers.hal.deadline import Dialler, Resolve
 

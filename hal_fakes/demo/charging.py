@@ -8,7 +8,7 @@ with, 1 with the reason, 130 after Ctrl-C. Nothing is left running.
 import sys
 from pathlib import Path
 
-from bridges.settings import load
+from bridges.settings.load import load
 from hal_fakes.demo import charging_day
 from hal_fakes.demo.charging_verdict import problems, summary
 from hal_fakes.demo.charging_yard import Yard

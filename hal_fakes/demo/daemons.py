@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from hal_fakes.plant import Edge
+from hal_fakes.plants.plant import Edge
 
 STOP_WITHIN_S = 5.0
 CONNECT_WITHIN_S = 15.0

@@ -8,7 +8,7 @@ from typing import Literal
 from bridges.rmf import definitions as d
 from bridges.rmf import words
 from bridges.rmf.words import Requested, Stated
-from hal_fakes.plant import Edge
+from hal_fakes.plants.plant import Edge
 
 What = Literal["robot", "request", "relay", "sensor", "state", "place", "alert", "demo"]
 SETTLES_S = 0.15

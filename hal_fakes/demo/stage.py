@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-from bridges.fields import Rmf
+from bridges.core.fields import Rmf
 from bridges.rmf import words
 from bridges.rmf.choose import open_transport
 from bridges.rmf.transport import Transport, TransportError

@@ -15,7 +15,7 @@ from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Transport
 from hal_fakes.demo.daemons import Wrong
 from hal_fakes.demo.journal import SETTLES_S, Journal
-from hal_fakes.plant import Edge
+from hal_fakes.plants.plant import Edge
 from hal_fakes.rmf import Party, Said
 from hal_fakes.rmf.robot import Phase, Robot
 from hal_fakes.rmf.supervisors import DoorSupervisor, LiftSupervisor

@@ -5,7 +5,7 @@ whether a request still holds the station.
 """
 
 from bridges.charger.signals import Activity
-from bridges.decision import IoFailed, OperatorReset, Sampled
+from bridges.core.decision import IoFailed, OperatorReset, Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from tests.charger.walk import CLEAR_S, RIVAL_S, Step
 

@@ -11,7 +11,7 @@ from bridges.charger.core import Cancelled, Requested
 from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerLimits, Limits, robot
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
-from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled
+from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 DURATIONS = Limits(misses=3, start_timeout_s=60.0, released_s=2.0)
 LIMITS = ChargerLimits(DURATIONS, can_stop=False)

@@ -6,7 +6,7 @@ from bridges.charger import core
 from bridges.charger.core import Cancelled, Requested
 from bridges.charger.report import ChargerReport
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
-from bridges.decision import Fault, Sampled
+from bridges.core.decision import Fault, Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from tests.charger.story import (
     AMR1,

@@ -9,7 +9,7 @@ from bridges.charger.core import Cancelled, Requested
 from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerLimits, ChargerSettings, Limits
 from bridges.charger.signals import Measured
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.rmf.definitions import (
     ChargerCancel,
     ChargerRequest,

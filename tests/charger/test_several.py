@@ -10,9 +10,9 @@ import pytest
 from bridges.rmf.definitions import ChargerState, ChargerStateValue
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import CHARGER_STATES
-from bridges.service import open_bus, service
-from bridges.settings import load
-from tests.http_bus.far_end import Caller, Conversation, FarEnd, always, answer
+from bridges.serve.service import open_bus, service
+from bridges.settings.load import load
+from tests.drivers.hal.http.far_end import Caller, Conversation, FarEnd, always, answer
 from tests.waiting import wait_until
 
 TIMEOUT_S = 0.5

@@ -9,7 +9,7 @@ from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerLimits, Limits
 from bridges.charger.signals import Activity as A
 from bridges.charger.signals import ChargerOutputs, ChargerSample, Measured
-from bridges.decision import Fault, Sampled, WriteFailed
+from bridges.core.decision import Fault, Sampled, WriteFailed
 from bridges.rmf.definitions import ChargerStateValue as State
 from tests.charger.story import (
     AMR1,

@@ -15,7 +15,7 @@ from bridges.charger.core import Cancelled, Event, Memory, Requested, decide
 from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerLimits, Limits, Robot, robot
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
-from bridges.decision import Decision, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.core.decision import Decision, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 
 LIMITS = Limits(
     misses=2, start_timeout_s=8.0, stop_timeout_s=4.0, released_s=2.0, peer_internal_timeout_s=16.0

@@ -23,7 +23,7 @@ from bridges.charger_coordinator.memory import (
     Wanted,
 )
 from bridges.charger_coordinator.settings import site
-from bridges.graph_kind import MaySpeak, Woken
+from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf import definitions as d
 from tests.charger_coordinator.yard import RECEIVERS, settings
 

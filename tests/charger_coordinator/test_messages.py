@@ -8,9 +8,9 @@ import pytest
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator import KIND, messages
 from bridges.charger_coordinator.memory import CHARGING, Dedicated, Shown, Sighting
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.rmf import definitions as d
-from bridges.settings import SettingsError, load
+from bridges.settings.load import SettingsError, load
 from tests.charger_coordinator.yard import settings
 
 SETTINGS = settings(near_m=2.5)

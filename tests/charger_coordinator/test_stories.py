@@ -3,10 +3,10 @@
 from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
-from bridges.decision import OperatorReset
+from bridges.core.decision import OperatorReset
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
-from bridges.service import GraphService
+from bridges.serve.service import GraphService
 from tests.charger_coordinator.yard import Yard
 
 

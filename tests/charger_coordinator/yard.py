@@ -13,13 +13,13 @@ from bridges.charger_coordinator.settings import (
     Fleet as FleetSettings,
 )
 from bridges.charger_coordinator.settings import RobotSettings, Settings, Station, Waypoint
-from bridges.decision import IoFailed, RequestRefused, Sampled
-from bridges.graph_node import GraphNode
-from bridges.node import Clock
+from bridges.core.decision import IoFailed, RequestRefused, Sampled
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import duration
+from bridges.serve.device import Clock
+from bridges.serve.graph import GraphNode
 from hal_fakes.rmf.fleet import Fleet
 
 STEP_S = 0.25

@@ -8,9 +8,9 @@ import pytest
 from bridges.commands import watch
 from bridges.commands.graph import Heard
 from bridges.commands.watch import Board, Row, change_line, changes, repaint, table
-from bridges.diagnostics import diagnosis
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import stamp
+from bridges.serve.diagnostics import diagnosis
 
 WALL = 1_700_000_000.0
 LIFT = d.LiftState(

@@ -5,7 +5,7 @@ Judged from the event, the inputs, the outputs and the walk's ledger; the core's
 
 from typing import Any
 
-from bridges.decision import Sampled, WriteFailed
+from bridges.core.decision import Sampled, WriteFailed
 from bridges.door.core import DoorMemory, OpenDoor, decide
 from bridges.door.settings import DoorLimits
 from bridges.rmf.definitions import DoorModeValue

@@ -4,7 +4,7 @@ import math
 
 from msgspec.structs import replace
 
-from bridges.decision import Fault, IoFailed, OperatorReset, RivalSeen
+from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen
 from bridges.door.core import CloseDoor, DoorReport, OpenDoor
 from bridges.door.settings import DoorLimits, Limits, Pulse
 from bridges.door.signals import DoorOutputs, DoorSample

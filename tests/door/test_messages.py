@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridges.decision import Fault, RequestRefused
+from bridges.core.decision import Fault, RequestRefused
 from bridges.door import KIND, messages
 from bridges.door.core import CloseDoor, DoorReport, OpenDoor
 from bridges.door.settings import DoorLimits

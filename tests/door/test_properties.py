@@ -6,7 +6,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled
+from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 from bridges.door.core import RIVAL_QUIET_S, CloseDoor, DoorMemory, Event, OpenDoor, decide, initial
 from bridges.door.settings import DoorLimits, Limits, Pulse
 from bridges.door.signals import DoorSample

@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from bridges.decision import Decision, IoFailed, Sampled, WriteFailed
+from bridges.core.decision import Decision, IoFailed, Sampled, WriteFailed
 from bridges.door.core import (
     CloseDoor,
     DoorMemory,
@@ -19,9 +19,9 @@ from bridges.door.settings import DoorLimits
 from bridges.door.signals import DoorOutputs, DoorSample
 from bridges.rmf.definitions import DoorModeValue
 from drivers import DriverError
-from drivers.door_dry_contact import DryContactDoor, Settings, create, debounce, wires
-from drivers.points import HalError, Pull
-from hal_fakes.door_plant import build
+from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires
+from drivers.hal.points import HalError, Pull
+from hal_fakes.plants.door import build
 from hal_fakes.wiring import Wiring
 
 SCAN_S = 0.125

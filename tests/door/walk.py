@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from bridges.debounce import Settled
-from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.core.debounce import Settled
+from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from bridges.door.core import RIVAL_QUIET_S, CloseDoor, DoorMemory, Event, OpenDoor, decide, initial
 from bridges.door.settings import DoorLimits, Limits
 from bridges.door.signals import DoorSample

@@ -2,9 +2,9 @@
 
 from typing import Any
 
+from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.door_supervisor import core
 from bridges.door_supervisor.core import Closes, Decided, Limits, Memory, Opens, Shown
-from bridges.graph_kind import MaySpeak, Woken
 from bridges.rmf.definitions import DoorModeValue, DoorRequest
 
 SECOND_NS = 10**9

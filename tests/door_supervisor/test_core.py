@@ -4,9 +4,9 @@ from itertools import pairwise
 
 import pytest
 
+from bridges.core.graph_kind import MaySpeak
 from bridges.door_supervisor import core
 from bridges.door_supervisor.core import Limits
-from bridges.graph_kind import MaySpeak
 from bridges.rmf.definitions import DoorModeValue
 from tests.door_supervisor.alone import Alone
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.door_supervisor import KIND, core, limits, messages, quiet_s, table
 from bridges.door_supervisor.core import (
     Closes,

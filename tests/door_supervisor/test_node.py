@@ -4,12 +4,12 @@ from typing import Any
 
 from bridges.door_supervisor import KIND
 from bridges.door_supervisor.settings import Settings
-from bridges.graph_node import GraphNode
-from bridges.node import Clock
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import stamp
+from bridges.serve.device import Clock
+from bridges.serve.graph import GraphNode
 
 HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT
 

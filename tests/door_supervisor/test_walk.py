@@ -10,10 +10,10 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.door_supervisor import core, table
 from bridges.door_supervisor.core import Closes, Limits, Memory, Opens, Shown
 from bridges.door_supervisor.settings import Settings
-from bridges.graph_kind import MaySpeak, Woken
 from bridges.rmf.definitions import DoorModeValue, DoorRequest
 
 LIMITS = Limits(open_alarm_s=30.0)

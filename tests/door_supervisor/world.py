@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterable, Sequence
 from random import Random
 from typing import Any
 
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
+from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.door import messages as door_messages
 from bridges.door_supervisor import KIND, core, messages, table
 from bridges.door_supervisor.core import Memory
 from bridges.door_supervisor.settings import Settings
-from bridges.graph_kind import MaySpeak, Woken
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp

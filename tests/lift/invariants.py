@@ -5,7 +5,7 @@ Judged from the event, the inputs and the outputs; the core's own conclusions ar
 
 from typing import Any
 
-from bridges.decision import IoFailed, Sampled, WriteFailed
+from bridges.core.decision import IoFailed, Sampled, WriteFailed
 from bridges.lift.core import Asked, Ended, Memory, decide
 from bridges.lift.limits import LiftLimits
 from bridges.lift.report import LiftReport

@@ -10,13 +10,12 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from bridges.decision import OperatorReset
-from bridges.kind import Kind
+from bridges.core.decision import OperatorReset
+from bridges.core.kind import Kind
 from bridges.lift import KIND
 from bridges.lift.limits import LiftLimits
 from bridges.lift.settings import Floor, LiftSettings, Limits
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
-from bridges.node import Clock, Node
 from bridges.rmf.definitions import (
     LiftDoor,
     LiftMode,
@@ -27,6 +26,7 @@ from bridges.rmf.definitions import (
     Message,
 )
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.serve.device import Clock, Node
 from drivers import DriverError
 
 SCAN_S = 0.05

@@ -10,9 +10,9 @@ import pytest
 
 from bridges.lift.signals import LiftOutputs
 from bridges.rmf.definitions import LiftState
-from drivers.lift_dry_contact import wires
-from hal_fakes.lift_plant import FAILS
-from hal_fakes.plant import FailureMode
+from drivers.lift.dry_contact import wires
+from hal_fakes.plants.lift import FAILS
+from hal_fakes.plants.plant import FailureMode
 from hal_fakes.rmf.robot import Robot
 from tests.lift.rmf_world import World
 from tests.lift.wired import WiredStory, shipped

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from bridges.decision import Fault, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from bridges.lift.core import Asked, Ended, Memory, decide
 from bridges.lift.limits import LiftLimits
 from bridges.lift.sensing import MOTION_MEMORY_S

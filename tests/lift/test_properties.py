@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridges.decision import Sampled
+from bridges.core.decision import Sampled
 from bridges.lift import KIND, core
 from bridges.lift.signals import Door, Hazard, LiftSample, Motion
 from bridges.rmf.definitions import LiftDoor, LiftRequest, LiftState

@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.lift import messages
 from bridges.lift.settings import Floor, LiftSettings
 from bridges.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side

@@ -8,7 +8,7 @@ import logging
 
 import pytest
 
-from bridges.decision import RequestRefused
+from bridges.core.decision import RequestRefused
 from bridges.lift import KIND, messages
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion

@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.decision import Fault, Sampled
+from bridges.core.decision import Fault, Sampled
 from bridges.lift.core import Asked, Memory, decide
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.rmf.definitions import LiftMotion

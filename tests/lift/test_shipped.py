@@ -5,8 +5,8 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from bridges.lift.signals import Door
-from bridges.settings import load
-from drivers.lift_dry_contact import debounce
+from bridges.settings.load import load
+from drivers.lift.dry_contact import debounce
 from tests.lift.story import STANDING, Building, Story
 
 CONFIG = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"

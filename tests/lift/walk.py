@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from bridges.debounce import Settled
-from bridges.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.core.debounce import Settled
+from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from bridges.lift.core import Asked, Ended, Event, Memory, decide, initial, published
 from bridges.lift.drive import Channel
 from bridges.lift.limits import LiftLimits

@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Any
 
 from bridges.lift.signals import LiftOutputs, LiftSample
-from bridges.settings import load
-from drivers.lift_dry_contact import Settings, create, debounce, wires
-from drivers.points import Pull
-from hal_fakes.lift_plant import LiftPlant
-from hal_fakes.plant import FailureMode
+from bridges.settings.load import load
+from drivers.hal.points import Pull
+from drivers.lift.dry_contact import Settings, create, debounce, wires
+from hal_fakes.plants.lift import LiftPlant
+from hal_fakes.plants.plant import FailureMode
 from hal_fakes.wiring import Wiring
 from tests.lift.story import Building, Story
 
@@ -23,7 +23,7 @@ def shipped() -> Settings:
 
 
 class WiredBuilding(Building):
-    """The plant at the far ends of the wires; it is also the bus (`drivers.points.PointsBus`)."""
+    """The plant at the far ends of the wires; it is also the bus (`drivers.hal.points.PointsBus`)."""
 
     def __init__(self, settings: Settings) -> None:
         super().__init__()
@@ -56,7 +56,7 @@ class WiredBuilding(Building):
 
 
 class _Lines:
-    """Levels straight from the plant and to it (`drivers.points.Lines`)."""
+    """Levels straight from the plant and to it (`drivers.hal.points.Lines`)."""
 
     def __init__(self, building: WiredBuilding, safe: dict[str, bool]) -> None:
         self._building, self._safe = building, safe

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from bridges.decision import Decision
-from bridges.graph_kind import MaySpeak, Woken
+from bridges.core.decision import Decision
+from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.lift_supervisor import core
 from bridges.lift_supervisor.memory import Asked, Ended, Limits, Memory, Shown, Wish
 from bridges.lift_supervisor.report import SupervisorReport

@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.graph_kind import MaySpeak
+from bridges.core.graph_kind import MaySpeak
 from bridges.lift_supervisor import core
 from bridges.lift_supervisor.memory import Asked, Claim, Limits, Wish
 from bridges.lift_supervisor.report import SupervisorReport

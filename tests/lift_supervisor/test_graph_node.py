@@ -7,16 +7,16 @@ from typing import Any
 
 import pytest
 
-from bridges import graph_node
-from bridges.graph_node import SPREAD_MOST_S, GraphNode
 from bridges.lift_supervisor import KIND
 from bridges.lift_supervisor.settings import Settings
-from bridges.node import Clock
 from bridges.rmf.definitions import LiftRequest, LiftState, Time
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import Transport, TransportError
+from bridges.serve import graph as graph_node
+from bridges.serve.device import Clock
+from bridges.serve.graph import SPREAD_MOST_S, GraphNode
 from tests.rmf.domains import domain_of_this_run
 from tests.waiting import wait_until
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from bridges.decision import Fault, RequestRefused
+from bridges.core.decision import Fault, RequestRefused
 from bridges.lift_supervisor import messages
 from bridges.lift_supervisor.memory import Asked, Ended, Shown, Wish
 from bridges.lift_supervisor.report import SupervisorReport

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bridges.graph_kind import MaySpeak, Woken
+from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.lift_supervisor import core
 from bridges.lift_supervisor.memory import NOBODY_IS_SENT, Asked, Ended, Limits, Memory, Shown, Wish
 from bridges.rmf.definitions import LiftMode

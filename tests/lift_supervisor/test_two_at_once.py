@@ -4,13 +4,13 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from bridges.graph_node import GraphNode
 from bridges.lift_supervisor import KIND
 from bridges.lift_supervisor.settings import Settings
-from bridges.node import Clock
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Subscription
+from bridges.serve.device import Clock
+from bridges.serve.graph import GraphNode
 
 DISCOVERY_S = 0.3
 STEP_S = 0.05

@@ -9,16 +9,16 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-from bridges.graph_node import GraphNode
-from bridges.kind import Kind
+from bridges.core.kind import Kind
 from bridges.lift import KIND as LIFT
 from bridges.lift.settings import LiftSettings
 from bridges.lift_supervisor import KIND as SUPERVISOR
 from bridges.lift_supervisor.settings import Settings
-from bridges.node import Clock, Node
 from bridges.rmf.definitions import LiftRequest, LiftState, Message
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import Publisher, Subscription
+from bridges.serve.device import Clock, Node
+from bridges.serve.graph import GraphNode
 from hal_fakes.rmf import Party as RmfParty
 from hal_fakes.rmf.phases import EndLiftSession, RequestLift
 from hal_fakes.rmf.robot import Phase, Robot

@@ -5,7 +5,8 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
-from bridges import named, reference
+from bridges.settings import names as named
+from bridges.settings import reference
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = sorted((ROOT / "config").glob("*.yaml"))

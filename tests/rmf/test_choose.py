@@ -8,7 +8,7 @@ from typing import Literal
 import msgspec
 import pytest
 
-from bridges.fields import Rmf
+from bridges.core.fields import Rmf
 from bridges.rmf.choose import domain_id, open_transport, stays_on_loopback
 from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import PACKAGES

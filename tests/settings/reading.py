@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bridges.settings import Config, SettingsError, load
+from bridges.settings.load import Config, SettingsError, load
 
 RIGHT = """\
 kind: gate

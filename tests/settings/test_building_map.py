@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from bridges.building_map import MAP, BuildingMap, load_map
 from bridges.cli import main
-from bridges.settings import SettingsError
+from bridges.settings.building_map import MAP, BuildingMap, load_map
+from bridges.settings.load import SettingsError
 
 BUILDING = """\
 name: ward

@@ -9,10 +9,10 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridges import named
-from bridges.fields import Rmf
-from bridges.settings import Config, Problem, load
-from drivers.points import Wire
+from bridges.core.fields import Rmf
+from bridges.settings import names as named
+from bridges.settings.load import Config, Problem, load
+from drivers.hal.points import Wire
 from tests.settings.reading import RIGHT, changed, config_of
 
 GATE = {

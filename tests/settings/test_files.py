@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.settings import SettingsError, load
+from bridges.settings.load import SettingsError, load
 from tests.settings.reading import RIGHT, changed, config_of, problems_of
 
 

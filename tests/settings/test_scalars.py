@@ -7,7 +7,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridges.yaml_scalars import reads_as
+from bridges.settings.scalars import reads_as
 from tests.settings.reading import RIGHT, changed, config_of, problems_of
 
 NAMES_THAT_ARE_NONE = {

@@ -26,10 +26,10 @@ from msgspec.inspect import (
 )
 from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges import named
 from bridges.commands.check import described
-from bridges.fields import Rmf
-from bridges.settings import load
+from bridges.core.fields import Rmf
+from bridges.settings import names as named
+from bridges.settings.load import load
 from tests.settings.reading import problems_of
 
 CONFIG = Path(__file__).parents[2] / "config"

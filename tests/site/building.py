@@ -14,15 +14,21 @@ from typing import Any
 import msgspec
 
 from bridges.charger import KIND as CHARGER
+from bridges.core.kind import Kind
 from bridges.door import KIND as DOOR
-from bridges.kind import Kind
 from bridges.lift import KIND as LIFT
-from bridges.settings import load
-from drivers import Driver, charger_http, door_dry_contact, door_register, lift_dry_contact
-from hal_fakes import charger_plant, door_plant, lift_plant
-from hal_fakes.machine import Machine
-from hal_fakes.register_door import RegisterDoor
-from tests.lift_driver.wirings import alarm, coil, line
+from bridges.settings.load import load
+from drivers import Driver
+from drivers.charger import http as charger_http
+from drivers.door import dry_contact as door_dry_contact
+from drivers.door import register as door_register
+from drivers.lift import dry_contact as lift_dry_contact
+from hal_fakes.modbus.register_door import RegisterDoor
+from hal_fakes.plants import charger as charger_plant
+from hal_fakes.plants import door as door_plant
+from hal_fakes.plants import lift as lift_plant
+from hal_fakes.plants.machine import Machine
+from tests.drivers.lift.wirings import alarm, coil, line
 from tests.site.timeline import Timeline
 from tests.site.wires import Far, HttpFar, PointsFar, RegisterFar
 

@@ -11,14 +11,14 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from bridges.decision import OperatorReset
-from bridges.graph_kind import GraphKind
-from bridges.graph_node import GraphNode
-from bridges.node import Clock, Node
+from bridges.core.decision import OperatorReset
+from bridges.core.graph_kind import GraphKind
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import LIFT_REQUESTS, Topic
 from bridges.rmf.transport import Publisher
-from hal_fakes.plant import Edge
+from bridges.serve.device import Clock, Node
+from bridges.serve.graph import GraphNode
+from hal_fakes.plants.plant import Edge
 from hal_fakes.rmf.supervisors import LiftSupervisor
 from tests.site.building import Device
 from tests.site.network import Air, Place

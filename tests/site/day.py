@@ -8,9 +8,9 @@ from random import Random
 
 from bridges.door_supervisor import KIND as DOOR_SUPERVISOR
 from bridges.lift_supervisor import KIND as LIFT_SUPERVISOR
-from hal_fakes.charger_plant import ChargerPlant
-from hal_fakes.door_plant import DoorPlant
-from hal_fakes.lift_plant import FAILS, LiftPlant
+from hal_fakes.plants.charger import ChargerPlant
+from hal_fakes.plants.door import DoorPlant
+from hal_fakes.plants.lift import FAILS, LiftPlant
 from tests.site.building import CHARGERS, DOORS, FLOORS, LIFTS, Device, devices
 from tests.site.daemons import RIVAL, DeviceDaemon, GraphDaemon, RmfsSupervisor
 from tests.site.growth import Look, look

@@ -15,11 +15,11 @@ from bridges.charger.signals import CURRENT_FLOWS
 from bridges.lift.signals import Side
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
-from drivers.dry_contact.lift_table import group
-from hal_fakes.charger_plant import ChargerPlant
-from hal_fakes.door_plant import DoorPlant
-from hal_fakes.lift_plant import LiftPlant
-from hal_fakes.plant import Edge
+from drivers.lift.table import group
+from hal_fakes.plants.charger import ChargerPlant
+from hal_fakes.plants.door import DoorPlant
+from hal_fakes.plants.lift import LiftPlant
+from hal_fakes.plants.plant import Edge
 from tests.site.daemons import DeviceDaemon
 from tests.site.timeline import NEVER, Timeline
 from tests.site.trouble import Ills

@@ -19,7 +19,7 @@ from bridges.rmf.dds import DdsTransport
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Subscription
 from hal_fakes.demo.daemons import Daemon, stop_all
-from hal_fakes.plant import Edge
+from hal_fakes.plants.plant import Edge
 from tests.site.robots import Places, Resident
 from tests.site.timeline import EPOCH, Timeline
 

@@ -12,10 +12,10 @@ from random import Random
 from typing import Protocol
 
 from bridges.lift.signals import Hazard
-from hal_fakes.charger_plant import CAUSES, ChargerPlant
-from hal_fakes.door_plant import DoorPlant
-from hal_fakes.lift_plant import FAILS, LiftPlant
-from hal_fakes.plant import FailureMode
+from hal_fakes.plants.charger import CAUSES, ChargerPlant
+from hal_fakes.plants.door import DoorPlant
+from hal_fakes.plants.lift import FAILS, LiftPlant
+from hal_fakes.plants.plant import FailureMode
 from tests.site.building import Device
 from tests.site.timeline import NEVER, Timeline
 

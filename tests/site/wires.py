@@ -9,14 +9,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from drivers import points
-from drivers.hal import HalError
-from drivers.hal.modbus_points import Point
-from drivers.points import Pull, Wire
-from hal_fakes.charger_plant import ChargerPlant, Reading
+from drivers.hal import HalError, points
+from drivers.hal.modbus.points import Point
+from drivers.hal.points import Pull, Wire
 from hal_fakes.http import Station
-from hal_fakes.machine import Machine
-from hal_fakes.register_door import RegisterDoor
+from hal_fakes.modbus.register_door import RegisterDoor
+from hal_fakes.plants.charger import ChargerPlant, Reading
+from hal_fakes.plants.machine import Machine
 from hal_fakes.wiring import Wiring
 from tests.site.timeline import Timeline
 
@@ -24,7 +23,7 @@ WATCHDOG_S = 2.0
 
 
 class PointsFar:
-    """Contacts and relays on a header or at a module (`drivers.points.PointsBus`)."""
+    """Contacts and relays on a header or at a module (`drivers.hal.points.PointsBus`)."""
 
     def __init__(self, timeline: Timeline, plant: Machine, wires: Iterable[Wire]) -> None:
         self.down = False
@@ -84,7 +83,7 @@ class _Lines:
 
 @dataclass
 class _Reply:
-    """As much of pymodbus's reply as `drivers/hal/modbus_registers.py` looks at."""
+    """As much of pymodbus's reply as `drivers/hal/modbus/registers.py` looks at."""
 
     address: int
     registers: list[int] = field(default_factory=list)
@@ -152,7 +151,7 @@ class RegisterFar:
 
 
 class HttpFar:
-    """A charging station's HTTP (`drivers.charger_http.Calls`)."""
+    """A charging station's HTTP (`drivers.charger.http.Calls`)."""
 
     def __init__(self, timeline: Timeline, plant: ChargerPlant, settings: Any) -> None:
         self.down = False

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import msgspec
 
-from drivers.points import Wire
+from drivers.hal.points import Wire
 
 
 class Settings(

@@ -2,7 +2,7 @@
 
 from typing import Any, cast
 
-from bridges.kind import Kind
+from bridges.core.kind import Kind
 
 
 def _unused(*_: Any) -> Any:

@@ -1,0 +1,1 @@
+"""What every decision core shares: decisions, debounce, kinds, and the fields of a device YAML."""

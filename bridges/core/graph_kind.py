@@ -1,0 +1,76 @@
+"""What a kind without hardware is to the daemon: topics in, topics out, and the core between them.
+
+A supervisor or coordinator has no driver and no bus. It serves any number of subjects (lifts, doors)
+that it learns of from messages, with one core memory for each. `bridges/<kind>/__init__.py` holds the
+`KIND`; `bridges/serve/graph.py` serves it.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from bridges.core.decision import Decision
+from bridges.core.kind import Place
+from bridges.rmf.definitions import Message, Time
+from bridges.rmf.topics import Topic
+
+
+@dataclass(frozen=True, slots=True)
+class MaySpeak:
+    """Whether the core may publish: not in the quiet time at start, nor beside a rival."""
+
+    yes: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Woken:
+    """Nothing but time has passed: it is the core's `wake_at`."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraphKind:
+    """One kind that lives on RMF's graph alone.
+
+    `devices_key`: the YAML's section of its settings. `settings`: the struct that reads it.
+    `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
+    RequestRefused; `wall` is our clock (s since the epoch).
+    `publishes`: what it sends. `sole`: those of them that one node alone may send; while another
+    does, ours is passive.
+    `device_name`: which subject a message is about.
+    `quiet_s(settings)`: how long it listens, alone, before it speaks.
+    `limits(settings)`: what the core is to know of them.
+    `initial(subject, started_at)`: a subject's memory; `started_at` is the daemon's start.
+    `decide`: the core; its `publish` leaves stamps to `stamped(message, time)`, at the time of sending.
+    `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`: nothing
+    worth remembering is left of this subject.
+    `on_map(settings)`: which settings name a place on RMF's map (`bridges/core/kind.py`).
+
+    For a kind that speaks of all its subjects in one message: `together(memories)`, sent when it has
+    changed and each second. For one whose memory must outlive the daemon: `persist(memories)`, the
+    same bytes while nothing worth keeping has changed, and `restore(kept, settings, now)`, which
+    raises ValueError for bytes that are not that. What is kept is kept before it is told together.
+
+    For one whose settings are more than a few numbers: `described(settings)`, as rows for `check`, and
+    `warnings(settings)`, as (path, text) of what is legal but worth a look.
+    """
+
+    name: str
+    devices_key: str
+    settings: type
+    requests: Mapping[Topic[Any], Callable[[Any, Any, float], Any]]
+    publishes: tuple[Topic[Any], ...]
+    sole: tuple[Topic[Any], ...]
+    device_name: Callable[[Any], str]
+    quiet_s: Callable[[Any], float]
+    limits: Callable[[Any], Any]
+    initial: Callable[[str, float], Any]
+    decide: Callable[[Any, Any, float, Any], Decision[Any, Any, Any]]
+    stamped: Callable[[Any, Time], Message]
+    summary: Callable[[Any, float], Mapping[str, str]]
+    idle: Callable[[Any, float], bool]
+    together: Callable[[Mapping[str, Any]], tuple[Topic[Any], Message]] | None = None
+    persist: Callable[[Mapping[str, Any]], bytes] | None = None
+    restore: Callable[[bytes, Any, float], Mapping[str, Any]] | None = None
+    described: Callable[[Any], list[tuple[str, ...]]] | None = None
+    warnings: Callable[[Any], Iterable[tuple[tuple[str, ...], str]]] | None = None
+    on_map: Callable[[Any], Iterable[Place]] = lambda settings: ()

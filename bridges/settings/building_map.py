@@ -1,0 +1,151 @@
+"""RMF's map of a building, as far as its names must be ours: levels, lifts, doors, waypoints.
+
+Two files hold it, and either is taken:
+
+    *.building.yaml   traffic-editor's: `levels: {L1: {vertices: [[x, y, z, name, {is_charger: [4,
+                      true]}]], doors: [[from, to, {name: [1, D1]}]]}}`, where a parameter is [its
+                      type's number, its value]; `lifts: {Lift1: {level_doors: {L1: [door]}}}`
+    a nav graph       generated from it: `levels: {L1: {vertices: [[x, y, {name: A, lift: Lift1,
+                      is_charger: true}]], lanes: [[from, to, {door_name: D1}]]}}`, `lifts: {Lift1:
+                      …}`, `doors: {D1: …}`; older ones lack the last two
+
+Source: open-rmf/rmf_traffic_editor 65437ea, rmf_building_map_tools/building_map (vertex.py, edge.py,
+lift.py, building.py), and rmf_ros2's parse_graph.cpp, which reads the graph.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from yaml import MappingNode, Node, ScalarNode, SequenceNode
+
+from bridges.settings.nodes import Page, Sort, compose, read
+
+MAP = Sort("building map or navigation graph", "levels: ...", 4 * 1024 * 1024, 400_000)
+
+FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
+"""What a name on the map can be of."""
+
+Lines = dict[str, int]
+"""Name -> the line where it first stands."""
+
+
+@dataclass(frozen=True, slots=True)
+class BuildingMap:
+    """The names of one file. `named`: what -> name -> line. `stops`: lift -> the floors it serves."""
+
+    file: str
+    named: Mapping[str, Lines]
+    stops: Mapping[str, Lines]
+
+
+def load_map(file: str) -> BuildingMap:
+    """Read a building map or navigation graph. Raises SettingsError with what is wrong with it."""
+    page = Page(file)
+    root = compose(page, read(file, MAP), MAP)
+    page.check()
+    reading = _Reading(page)
+    reading.all(root)
+    page.check()
+    return BuildingMap(file, reading.named, reading.stops)
+
+
+class _Reading:
+    """One file on its way to its names; what has another form than RMF's goes to the page."""
+
+    def __init__(self, page: Page) -> None:
+        self.named: dict[str, Lines] = {w: {} for w in (FLOOR, LIFT, DOOR, CHARGER, WAYPOINT)}
+        self.stops: dict[str, Lines] = {}
+        self._page = page
+
+    def all(self, root: MappingNode) -> None:
+        """Levels first: they tell the two forms apart, vertex by vertex."""
+        if _below(root, "levels") is None:
+            self._page.note(root, f"this is no {MAP.name}: it has no 'levels:'")
+        for level, node in self._entries(root, "levels"):
+            self._add(FLOOR, level)
+            for vertex in self._items(node, "vertices", "a vertex"):
+                self._vertex(level, vertex)
+            for edge in self._items(node, "doors", "a door"):
+                self._add(DOOR, _param(edge, "name"))
+            for edge in self._items(node, "lanes", "a lane"):
+                self._add(DOOR, _param(edge, "door_name"))
+        for lift, node in self._entries(root, "lifts"):
+            self._add(LIFT, lift)
+            for level, doors in self._entries(node, "level_doors"):
+                if not isinstance(doors, SequenceNode) or doors.value:
+                    self._add_stop(lift, level)
+        for door, _ in self._entries(root, "doors"):
+            self._add(DOOR, door)
+
+    def _vertex(self, level: ScalarNode, vertex: SequenceNode) -> None:
+        name = _param(vertex, "name")
+        if name is None and len(vertex.value) > 3 and isinstance(vertex.value[3], ScalarNode):
+            name = vertex.value[3]
+        self._add(WAYPOINT, name)
+        charger = _param(vertex, "is_charger")
+        if charger is not None and charger.value.lower() == "true":
+            self._add(CHARGER, name)
+        lift = _param(vertex, "lift")
+        if lift is not None and lift.value:
+            self._add(LIFT, lift)
+            self._add_stop(lift, level)
+
+    def _add(self, what: str, name: ScalarNode | None) -> None:
+        """An unnamed vertex is named ""; so is a door that nobody has named."""
+        if name is not None and name.value:
+            self.named[what].setdefault(name.value, _line(name))
+
+    def _add_stop(self, lift: ScalarNode, level: ScalarNode) -> None:
+        self.stops.setdefault(lift.value, {}).setdefault(level.value, _line(level))
+
+    def _entries(self, node: Node, key: str) -> Iterator[tuple[ScalarNode, Node]]:
+        """The entries of a mapping below `key`; none where nothing is."""
+        section = _below(node, key)
+        if section is None or _is_empty(section):
+            return
+        if not isinstance(section, MappingNode):
+            self._page.note(section, f"'{key}' is not a mapping (name: ...), as RMF has it")
+            return
+        for name, value in section.value:
+            if isinstance(name, ScalarNode):
+                yield name, value
+            else:
+                self._page.note(name, f"a name in '{key}' is not a text")
+
+    def _items(self, node: Node, key: str, what: str) -> Iterator[SequenceNode]:
+        """The lists in a list below `key`; none where nothing is."""
+        section = _below(node, key)
+        if section is None or _is_empty(section):
+            return
+        if not isinstance(section, SequenceNode):
+            self._page.note(section, f"'{key}' is not a list, as RMF has it")
+            return
+        for item in section.value:
+            if isinstance(item, SequenceNode):
+                yield item
+            else:
+                self._page.note(item, f"{what} is not a list ([x, y, ...]), as RMF has it")
+
+
+def _below(node: Node, key: str) -> Node | None:
+    if isinstance(node, MappingNode):
+        for name, value in node.value:
+            if isinstance(name, ScalarNode) and name.value == key:
+                return value  # type: ignore[no-any-return]
+    return None
+
+
+def _param(item: SequenceNode, key: str) -> ScalarNode | None:
+    """A parameter of a vertex or an edge, whose last item holds them: `V`, or `[type, V]`."""
+    found = _below(item.value[-1], key) if item.value else None
+    if isinstance(found, SequenceNode) and len(found.value) == 2:
+        found = found.value[1]
+    return found if isinstance(found, ScalarNode) else None
+
+
+def _is_empty(node: Node) -> bool:
+    return isinstance(node, ScalarNode) and node.value in ("", "~", "null")
+
+
+def _line(node: Node) -> int:
+    return int(node.start_mark.line) + 1

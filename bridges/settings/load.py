@@ -1,0 +1,326 @@
+"""A device YAML becomes a Config, or a SettingsError that names every problem with its place.
+
+    kind: lift              a folder of bridges/ that holds a KIND
+    driver: dry_contact     a file of drivers/
+    rmf: {...}              bridges.core.fields.Rmf
+    buses: {name: {type: a file of drivers/hal/, ...}}
+    lifts: {name: {...}}    the kind's own key; what each holds is the driver's `Settings`
+
+A kind that lives on RMF's graph alone has `kind`, `rmf` and one section of its own.
+
+Structs say what may stand in a section (`yaml_values`); what concerns several sections is checked
+here and in `wiring`. The daemon takes nothing else from the file, and checks nothing again.
+
+A driver's file may have, besides what `drivers/__init__.py` says: `warnings(settings)`, as (path,
+text) of what is legal but worth a look; and where there are no wires, `describe(settings, bus's
+settings)`, as (what, text), for `check`; and `claims(settings)`, as (place, path), of what no other
+device of its bus may use.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import msgspec
+from msgspec.inspect import LiteralType
+from yaml import MappingNode, Node, ScalarNode
+
+from bridges.core.fields import Name, Rmf
+from bridges.core.graph_kind import GraphKind
+from bridges.core.kind import Kind
+from bridges.settings import names as named
+from bridges.settings.nodes import (
+    Page,
+    Problem,
+    SettingsError,
+    compose,
+    either,
+    nearest,
+    read,
+    unknown,
+)
+from bridges.settings.values import BROKEN, Entry, Spot, Values, below, is_none, locate
+from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
+from drivers.hal.points import Wire
+
+__all__ = ["Config", "Problem", "SettingsError", "load"]
+
+MAPPING = "a mapping (key: value)"
+
+
+@dataclass(frozen=True)
+class Config:
+    """A file that is right.
+
+    `text`: its bytes as they were read. `buses` and `devices`: name -> the `Settings` of the bus's
+    or driver's file. `bus_types`: name -> `type:`. `warnings`: what is legal but worth a look.
+    `section`: the settings of a kind without devices (`bridges/core/graph_kind.py`): it has no driver
+    and no buses.
+    """
+
+    path: Path
+    text: bytes
+    kind: str
+    driver: str
+    rmf: Rmf
+    buses: Mapping[str, Any]
+    devices: Mapping[str, Any]
+    bus_types: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[Problem, ...] = ()
+    section: Any = None
+
+    def bus_of(self, device_name: str) -> str:
+        """The name of the bus that a device stands on."""
+        named_bus: str | None = self.devices[device_name].bus
+        return named_bus or next(iter(self.buses))
+
+    def wires(self, device_name: str) -> list[Wire]:
+        """A device's wiring table; empty where its driver has none."""
+        driver = named.driver_called(self.kind, self.driver)
+        return wires_of(driver, self.devices[device_name])
+
+
+def wires_of(driver: ModuleType, settings: Any) -> list[Wire]:
+    """A device's wiring table; empty where its driver has none."""
+    table = getattr(driver, "wires", None)
+    return list(table(settings)) if table else []
+
+
+def load(path: Path | str) -> Config:
+    """Read a device YAML. Raises SettingsError with every problem of it that can be seen."""
+    page = Page(str(path))
+    text = read(page.file)
+    root = compose(page, text)
+    reading = _Reading(page, root)
+    reading.all()
+    page.check()
+    return reading.config(Path(path), text)
+
+
+@dataclass(frozen=True, slots=True)
+class _Bus:
+    """A bus as far as it could be read."""
+
+    entry: Entry
+    type: str | None
+    hal: ModuleType | None
+    settings: Any
+
+
+class _Reading:
+    """One file on its way to a Config, section by section; problems go to its page."""
+
+    def __init__(self, page: Page, root: MappingNode) -> None:
+        self._page = page
+        self._top = Spot(root, root, "the file")
+        self._values = Values(page)
+        self._kind: Kind | GraphKind | None = None
+        self._section: Any = None
+        self._kind_name = ""
+        self._driver: ModuleType | None = None
+        self._driver_name = ""
+        self._rmf = Rmf()
+        self._buses: dict[str, _Bus] = {}
+        self._devices: dict[str, Any] = {}
+        self._uses: list[Use] = []
+        self._warnings: list[Problem] = []
+
+    def config(self, path: Path, text: bytes) -> Config:
+        """What was read, if no problem was noted."""
+        return Config(
+            path=path,
+            text=text,
+            kind=self._kind_name,
+            driver=self._driver_name,
+            rmf=self._rmf,
+            buses={name: bus.settings for name, bus in self._buses.items()},
+            devices=self._devices,
+            bus_types={name: bus.type or "" for name, bus in self._buses.items()},
+            warnings=tuple(sorted(self._warnings)),
+            section=self._section,
+        )
+
+    def all(self) -> None:
+        """Every section, as far as those before it allow."""
+        entries = self._values.entries(self._top)
+        self._read_kind(below(self._top.node, "kind"))
+        if not isinstance(self._kind, GraphKind):
+            self._read_driver(below(self._top.node, "driver"))
+        sections = self._values.known(entries, self._top, self._keys())
+        if "rmf" in sections:
+            self._rmf = self._values.make(Rmf, sections["rmf"].spot())
+        if "buses" in sections:
+            self._read_buses(sections["buses"].spot())
+        if isinstance(self._kind, GraphKind):
+            self._read_section(sections.get(self._kind.devices_key), self._kind)
+        elif self._kind and self._kind.devices_key in sections:
+            self._read_devices(sections[self._kind.devices_key].spot())
+        note_conflicts(self._page, self._uses)
+
+    def _keys(self) -> dict[str, str | None]:
+        """The keys of a file of this kind; of every kind while the kind is not known."""
+        keys = {"kind": either(named.kind_names()), "driver": "a driver of that kind"}
+        if isinstance(self._kind, GraphKind):
+            return {"kind": keys["kind"], "rmf": None, self._kind.devices_key: None}
+        sections = {"rmf": None, "buses": MAPPING}
+        if self._kind:
+            keys["driver"] = either(named.driver_names(self._kind_name))
+            return {**keys, **sections, self._kind.devices_key: MAPPING}
+        others = (named.kind_called(name).devices_key for name in named.kind_names())
+        return {**keys, **sections, **dict.fromkeys(others)}
+
+    def _read_kind(self, entry: Entry | None) -> None:
+        name = self._word(entry, named.kind_names())
+        if name:
+            self._kind_name = name
+            self._kind = named.kind_called(name)
+
+    def _read_driver(self, entry: Entry | None) -> None:
+        name = self._word(entry, named.driver_names(self._kind_name)) if self._kind else None
+        if name:
+            self._driver_name = name
+            self._driver = named.driver_called(self._kind_name, name)
+
+    def _read_section(self, entry: Entry | None, kind: GraphKind) -> None:
+        """The settings of a kind without devices; all of them may have defaults."""
+        if entry:
+            self._section = self._values.make(kind.settings, entry.spot())
+            spot = Spot(entry.value, entry.key, entry.spot().label)
+            found = kind.warnings(self._section) if kind.warnings and not self._broken() else ()
+            for path, text in found:
+                self._warn(locate(spot, path).where(), text)
+        elif any(field.required for field in msgspec.structs.fields(kind.settings)):
+            self._page.note(self._top.at, f"the file needs '{kind.devices_key}': {MAPPING}")
+        else:
+            self._section = kind.settings()
+
+    def _broken(self) -> bool:
+        return self._section is BROKEN or bool(self._page.problems)
+
+    def _word(self, entry: Entry | None, words: list[str]) -> str | None:
+        """One of these words; None where it is none of them, or not there."""
+        if entry is None:
+            return None
+        word = self._values.make(LiteralType(tuple(words)), entry.spot())
+        return None if word is BROKEN else str(word)
+
+    def _names(self, spot: Spot, of: str) -> list[Entry]:
+        """The entries of a section whose keys are names."""
+        entries = self._values.entries(spot)
+        if isinstance(spot.node, MappingNode) and not spot.node.value:
+            self._page.note(spot.at, f"{spot.label} is empty: it needs at least one {of}")
+        for entry in entries:
+            self._values.make(Name, Spot(entry.key, entry.key, "this name"))
+        return entries
+
+    def _read_buses(self, spot: Spot) -> None:
+        for entry in self._names(spot, "bus"):
+            self._buses[entry.name] = self._bus(entry)
+
+    def _bus(self, entry: Entry) -> _Bus:
+        allowed = self._allowed_types()
+        kind = below(entry.value, "type")
+        if not isinstance(entry.value, MappingNode):
+            self._values.entries(entry.spot())
+            return _Bus(entry, None, None, BROKEN)
+        if kind is None:
+            self._note_untyped(entry, allowed)
+            return _Bus(entry, None, None, BROKEN)
+        name = self._bus_type(kind, allowed)
+        if name is None:
+            return _Bus(entry, None, None, BROKEN)
+        hal = named.bus_called(name)
+        settings = self._values.make(hal.Settings, entry.spot(), ("type",))
+        warnings = getattr(hal, "warnings", None)
+        for path, text in warnings(settings) if warnings and settings is not BROKEN else ():
+            self._warn(locate(entry.spot(), path).where(), f"bus '{entry.name}': {text}")
+        return _Bus(entry, name, hal, settings)
+
+    def _note_untyped(self, bus: Entry, allowed: list[str]) -> None:
+        """That a bus has no type, or none that is spelt so; its other keys mean nothing yet."""
+        entries = {e.name: e for e in self._values.entries(bus.spot())}
+        near = nearest("type", entries)
+        if near is None:
+            self._page.note(bus.key, f"'{bus.name}' needs 'type': {either(allowed)}")
+        else:
+            self._page.note(entries[near].key, unknown("key", near, ["type"]))
+
+    def _bus_type(self, entry: Entry, allowed: list[str]) -> str | None:
+        word = entry.value.value
+        if isinstance(entry.value, ScalarNode) and word in set(named.bus_types()).difference(
+            allowed
+        ):
+            text = f"'type' is '{word}', but the driver '{self._driver_name}' stands on"
+            self._page.note(entry.value, f"{text} {either(allowed)}")
+            return None
+        return self._word(entry, allowed)
+
+    def _allowed_types(self) -> list[str]:
+        """The bus types that the driver can stand on; all while the driver is not known."""
+        types = named.bus_types()
+        return [t for t in types if t in self._driver.BUSES] if self._driver else types
+
+    def _read_devices(self, spot: Spot) -> None:
+        entries = self._names(spot, (self._kind.name if self._kind else ""))
+        buses = [self._bus_name(entry) for entry in entries]
+        for entry, bus in zip(entries, buses, strict=True):
+            if self._driver:
+                self._devices[entry.name] = self._device(entry, bus, self._driver)
+        for name in self._buses:
+            if entries and name not in buses and None not in buses:
+                text = f"no device stands on the bus '{name}': delete it, or name it in a 'bus:'"
+                self._page.note(self._buses[name].entry.key, text)
+
+    def _bus_name(self, device: Entry) -> str | None:
+        """The bus of a device; None where that cannot be told."""
+        entry = below(device.value, "bus")
+        if entry is None or is_none(entry.value):
+            if len(self._buses) > 1 and isinstance(device.value, MappingNode):
+                self._page.note(device.key, f"'{device.name}' needs 'bus': {either(self._buses)}")
+            return next(iter(self._buses)) if len(self._buses) == 1 else None
+        name = entry.value.value
+        if isinstance(entry.value, ScalarNode) and name and self._buses:
+            if name in self._buses:
+                return str(name)
+            self._page.note(entry.value, unknown("bus", name, self._buses))
+        return None
+
+    def _device(self, entry: Entry, bus: str | None, driver: ModuleType) -> Any:
+        """A device's settings, with all that can be said about its wires."""
+        spot = Spot(entry.value, entry.key, entry.spot().label)
+        hal = self._buses[bus].hal if bus else None
+        wiring = Wiring(self._page, entry.name, bus or "", hal)
+        values = Values(self._page, wiring.checks)
+        before = len(self._page.problems)
+        settings = values.make(driver.Settings, spot)
+        if settings is BROKEN:
+            wiring.parts(values.structs, spot)
+        else:
+            self._check_signals(settings, spot, wiring, driver)
+        if len(self._page.problems) == before:
+            self._collect_warnings(settings, spot, driver)
+        self._uses += wiring.uses
+        return settings
+
+    def _check_signals(self, settings: Any, spot: Spot, wiring: Wiring, driver: ModuleType) -> None:
+        """The wires of a device whose settings are all there and of the right sort."""
+        wires = wires_of(driver, settings)
+        wiring.wires(wires, spot)
+        claims = getattr(driver, "claims", None)
+        wiring.claims(claims(settings) if claims else (), spot)
+        signals = [wire.signal for wire in wires]
+        note_unknown_signals(self._page, settings.accept_unsafe, signals, spot)
+
+    def _collect_warnings(self, settings: Any, spot: Spot, driver: ModuleType) -> None:
+        """What is to be known of a device that is in order."""
+        for signal, reason in settings.accept_unsafe.items():
+            key = locate(spot, ("accept_unsafe", signal)).key
+            self._warn(key, f"{spot.label}: unsafe wiring of '{signal}' is accepted: {reason}")
+        warnings = getattr(driver, "warnings", None)
+        for path, text in warnings(settings) if warnings else ():
+            self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
+
+    def _warn(self, node: Node, text: str) -> None:
+        self._warnings.append(self._page.problem(node, f"warning: {text}"))

@@ -1,0 +1,89 @@
+"""Whether a device YAML and RMF's map of the building mean the same by their names.
+
+RMF finds a lift, a floor, a door or a charger by its name alone; a name that differs is not an error
+to anybody, only a robot that waits for ever.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from bridges.core.graph_kind import GraphKind
+from bridges.core.kind import Place
+from bridges.settings import names as named
+from bridges.settings.building_map import CHARGER, FLOOR, LIFT, WAYPOINT, BuildingMap
+from bridges.settings.load import Config
+from bridges.settings.nodes import Page, Problem, compose, nearest, shown
+from bridges.settings.values import Spot, locate
+
+
+def places(config: Config) -> list[Place]:
+    """Everything in a file that RMF's map has to know, by its path from the file's top."""
+    kind = named.kind_called(config.kind)
+    if isinstance(kind, GraphKind):
+        found = kind.on_map(config.section)
+        return [((kind.devices_key, *path), what, name) for path, what, name in found]
+    all_places: list[Place] = []
+    for name, settings in config.devices.items():
+        top = (kind.devices_key, name)
+        if config.kind in (LIFT, "door", CHARGER):
+            all_places.append((top, config.kind, name))
+        all_places += [((*top, *path), what, n) for path, what, n in kind.on_map(settings)]
+    return all_places
+
+
+def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
+    """Every name of the file that the map does not have so, and every stop that the file lacks."""
+    page = Page(str(config.path))
+    root = compose(page, config.text)
+    top = Spot(root, root, "the file")
+    found = places(config)
+    for path, what, name in found:
+        lift = path[1] if what == FLOOR else ""
+        text = _missing(building, what, name, lift)
+        if text:
+            page.note(locate(top, path).key, text)
+    for path, what, lift in found:
+        if what == LIFT:
+            ours = {name for p, w, name in found if w == FLOOR and p[:2] == path}
+            for text in _not_served(building, lift, ours):
+                page.note(locate(top, (*path, "floors")).key, text)
+    return sorted(page.problems)
+
+
+def _missing(building: BuildingMap, what: str, name: str, lift: str) -> str:
+    """ "" when the map has it; else that it has not, and what was probably meant."""
+    stops = building.stops.get(lift)
+    known = building.named[what] if stops is None else stops
+    if name in known:
+        return ""
+    where = Path(building.file).name
+    if stops is not None:
+        has = f"the lift '{shown(lift)}' does not stop at '{shown(name)}' on {where}"
+        if name in building.named[FLOOR]:
+            return f"{has}, though the level is there (line {building.named[FLOOR][name]})"
+    elif what == CHARGER and name in building.named[WAYPOINT]:
+        line = building.named[WAYPOINT][name]
+        return f"{where}:{line}: the waypoint '{shown(name)}' is no charger: is_charger is not true"
+    else:
+        has = f"{where} has no {what} '{shown(name)}'"
+    near = nearest(name, known)
+    if near is not None:
+        return f"{has}: did you mean '{shown(near)}' (line {known[near]})?"
+    return f"{has}: {_listed(known)}"
+
+
+def _listed(known: dict[str, int]) -> str:
+    if not known:
+        return "it has none"
+    some = ", ".join(map(shown, list(known)[:12]))
+    return f"it has {some}" + (f" and {len(known) - 12} more" if len(known) > 12 else "")
+
+
+def _not_served(building: BuildingMap, lift: str, ours: set[str]) -> Iterator[str]:
+    for floor, line in building.stops.get(lift, {}).items():
+        if floor not in ours:
+            where = Path(building.file).name
+            yield (
+                f"on {where} (line {line}) '{shown(lift)}' stops at '{shown(floor)}' too: a robot"
+                " sent there would be refused for ever. Add the floor, or take the stop off the map"
+            )

@@ -1,0 +1,282 @@
+"""YAML nodes to msgspec structs: every independent problem at once, each at its line and column.
+
+`msgspec.convert` stops at the first problem and knows no lines, so the walk is ours; the structs,
+with their bounds and units, stay the one description of what may stand in a file.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from msgspec import inspect
+from msgspec.inspect import (
+    DictType,
+    ListType,
+    Metadata,
+    NoneType,
+    StructType,
+    Type,
+    UnionType,
+    VarTupleType,
+)
+from yaml import MappingNode, Node, ScalarNode, SequenceNode
+
+from bridges.settings.leaves import Wrong, leaf, looks, wanted_text
+from bridges.settings.nodes import Page, either, is_plain, nearest, shown, unknown
+from bridges.settings.scalars import is_null, is_null_word
+
+BROKEN = object()
+"""In place of a value that could not be made."""
+
+_LISTS = (ListType, VarTupleType)
+_MAPPINGS = (DictType, StructType)
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A value on its way into a struct.
+
+    `at`: where a text about the whole value points (its key). `label`: what it is called there.
+    `path`: where it is below the struct that was asked for.
+    """
+
+    node: Node
+    at: Node
+    label: str
+    path: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One `key: value` of a mapping."""
+
+    name: str
+    key: Node
+    value: Node
+
+    def spot(self, path: tuple[str, ...] = ()) -> Spot:
+        """The value, below `path`."""
+        return Spot(self.value, self.key, f"'{shown(self.name)}'", (*path, self.name))
+
+    def where(self) -> Node:
+        """Where a text about the value points: to what fits on its line, else to its key."""
+        node = self.value
+        if isinstance(node, ScalarNode) and (node.value or not is_plain(node)):
+            return node
+        return self.key
+
+
+def below(node: Node, part: str) -> Entry | None:
+    """The entry of a mapping, or the item of a list, that `part` names."""
+    if isinstance(node, MappingNode):
+        for key, value in node.value:
+            if isinstance(key, ScalarNode) and key.value == part:
+                return Entry(part, key, value)
+    if isinstance(node, SequenceNode) and part.isdecimal() and int(part) < len(node.value):
+        return Entry(part, node.value[int(part)], node.value[int(part)])
+    return None
+
+
+def locate(spot: Spot, path: Iterable[object]) -> Entry:
+    """The entry at `path` below a value, or the nearest above it that exists."""
+    found = Entry("", spot.at, spot.node)
+    for part in path:
+        entry = below(found.value, str(part))
+        if entry is None:
+            break
+        found = entry
+    return found
+
+
+def is_none(node: Node) -> bool:
+    """Whether `null` or `~` is written; an empty place is a forgotten value and not meant here."""
+    return isinstance(node, ScalarNode) and is_plain(node) and is_null_word(node.value)
+
+
+def _node_of(wanted: Type) -> type[Node]:
+    if isinstance(wanted, Metadata):
+        return _node_of(wanted.type)
+    if isinstance(wanted, _LISTS):
+        return SequenceNode
+    return MappingNode if isinstance(wanted, _MAPPINGS) else ScalarNode
+
+
+Check = Callable[[str, Spot], str | None]
+"""Judges a text where it stands: None, or what is wrong with it."""
+
+
+class Values:
+    """Makes values of one file's nodes, and notes on its page what is wrong with them.
+
+    `checks`: for texts whose type says `Meta(extra={"check": name})`. Such a text is taken as it is
+    written; only its check knows what it may be. `structs`: every struct that was made.
+    """
+
+    def __init__(self, page: Page, checks: Mapping[str, Check] | None = None) -> None:
+        self._page = page
+        self._checks = checks or {}
+        self.structs: list[tuple[tuple[str, ...], Any]] = []
+
+    def make(self, cls: Any, spot: Spot, besides: tuple[str, ...] = ()) -> Any:
+        """A `cls` (a type, or msgspec's description of one) of a node, or BROKEN.
+
+        `besides`: keys of it that are read elsewhere.
+        """
+        wanted = cls if isinstance(cls, Type) else inspect.type_info(cls)
+        if isinstance(wanted, StructType):
+            return self._struct(wanted, spot, besides)
+        return self._value(wanted, spot)
+
+    def entries(self, spot: Spot) -> list[Entry]:
+        """A mapping's entries without those that cannot be right: doubles, merges, odd keys."""
+        if not isinstance(spot.node, MappingNode):
+            self._mismatch(spot, "a mapping (key: value)")
+            return []
+        seen: dict[str, Entry] = {}
+        for key, value in spot.node.value:
+            if not isinstance(key, ScalarNode):
+                self._page.note(key, f"a key is one word or text, and this is {looks(key)}")
+            elif key.value == "<<" and is_plain(key):
+                self._page.note(key, "merge keys ('<<') are not read: write the keys out")
+            elif key.value in seen:
+                self._double(key, seen[key.value].key)
+            else:
+                seen[key.value] = Entry(key.value, key, value)
+        return list(seen.values())
+
+    def known(
+        self, entries: list[Entry], spot: Spot, fields: Mapping[str, str | None]
+    ) -> dict[str, Entry]:
+        """The entries that `fields` names: key -> what is wanted, or None where it may be absent.
+
+        An unknown key that is nearly a missing one stands for it, so that one slip is one problem.
+        """
+        found = {e.name: e for e in entries}
+        near = {nearest(name, fields) for name in found if name not in fields}
+        for name, entry in found.items():
+            if name not in fields:
+                self._page.note(entry.key, unknown("key", name, fields))
+        for name, wanted in fields.items():
+            if isinstance(spot.node, MappingNode) and wanted and name not in {*found, *near}:
+                self._page.note(spot.at, f"{spot.label} needs '{name}': {wanted}")
+        return {name: entry for name, entry in found.items() if name in fields}
+
+    def _value(self, wanted: Type, spot: Spot, extra: Mapping[str, Any] | None = None) -> Any:
+        if isinstance(wanted, Metadata):
+            return self._value(wanted.type, spot, wanted.extra)
+        if isinstance(wanted, UnionType):
+            return self._union(wanted, spot, extra)
+        if isinstance(wanted, StructType):
+            return self._struct(wanted, spot, ())
+        if isinstance(wanted, DictType):
+            return self._dict(wanted, spot)
+        if isinstance(wanted, _LISTS):
+            return self._list(wanted, spot)
+        return self._leaf([wanted], spot, extra or {})
+
+    def _union(self, wanted: UnionType, spot: Spot, extra: Mapping[str, Any] | None) -> Any:
+        """The one member that a node of this sort can be; of several leaves, the first that fits."""
+        members = [t for t in wanted.types if not isinstance(t, NoneType)]
+        if len(members) < len(wanted.types) and is_none(spot.node):
+            return None
+        fitting = [t for t in members if isinstance(spot.node, _node_of(t))]
+        if not fitting:
+            self._mismatch(spot, wanted_text(wanted))
+            return BROKEN
+        if len(fitting) == 1:
+            return self._value(fitting[0], spot, extra)
+        return self._leaf(fitting, spot, extra or {})
+
+    def _leaf(self, types: list[Type], spot: Spot, extra: Mapping[str, Any]) -> Any:
+        if not isinstance(spot.node, ScalarNode):
+            self._mismatch(spot, either(wanted_text(t, extra) for t in types))
+            return BROKEN
+        try:
+            value = leaf(types, spot.node, extra)
+        except Wrong as wrong:
+            empty = is_plain(spot.node) and not spot.node.value
+            self._page.note(spot.at if empty else spot.node, f"{spot.label} {wrong}")
+            return BROKEN
+        check = self._checks.get(extra.get("check", ""))
+        reason = check(value, spot) if check else None
+        if reason is None:
+            return value
+        self._page.note(spot.node, reason)
+        return BROKEN
+
+    def _list(self, wanted: ListType | VarTupleType, spot: Spot) -> Any:
+        if not isinstance(spot.node, SequenceNode):
+            self._mismatch(spot, wanted_text(wanted))
+            return BROKEN
+        values = [
+            self._value(
+                wanted.item_type,
+                Spot(node, node, f"item {i + 1} of {spot.label}", (*spot.path, str(i))),
+            )
+            for i, node in enumerate(spot.node.value)
+        ]
+        if self._miscounted(wanted, spot, len(values)) or BROKEN in values:
+            return BROKEN
+        return values if isinstance(wanted, ListType) else tuple(values)
+
+    def _dict(self, wanted: DictType, spot: Spot) -> Any:
+        made: dict[Any, tuple[Any, Node]] = {}
+        before = len(self._page.problems)
+        entries = self.entries(spot)
+        broken = len(self._page.problems) > before
+        for entry in entries:
+            key = self._value(wanted.key_type, Spot(entry.key, entry.key, "this key"))
+            value = self._value(wanted.value_type, entry.spot(spot.path))
+            if key is not BROKEN and key in made:
+                self._double(entry.key, made[key][1])
+                broken = True
+            made[key] = (value, entry.key)
+            broken = broken or key is BROKEN or value is BROKEN
+        if broken or self._miscounted(wanted, spot, len(made)):
+            return BROKEN
+        return {key: value for key, (value, _) in made.items()}
+
+    def _struct(self, wanted: StructType, spot: Spot, besides: tuple[str, ...]) -> Any:
+        fields = {f.encode_name: f for f in wanted.fields}
+        known = {n: wanted_text(f.type) if f.required else None for n, f in fields.items()}
+        before = len(self._page.problems)
+        found = self.known(self.entries(spot), spot, {**dict.fromkeys(besides), **known})
+        broken = len(self._page.problems) > before
+        values = {
+            fields[name].name: self._value(fields[name].type, entry.spot(spot.path))
+            for name, entry in found.items()
+            if name in fields
+        }
+        if broken or BROKEN in values.values():
+            return BROKEN
+        made = wanted.cls(**values)
+        self.structs.append((spot.path, made))
+        self._ask(made, spot)
+        return made
+
+    def _ask(self, made: Any, spot: Spot) -> None:
+        problems = getattr(made, "problems", None)
+        for path, text in problems() if problems else ():
+            self._page.note(locate(spot, path).where(), text)
+
+    def _miscounted(self, wanted: ListType | VarTupleType | DictType, spot: Spot, n: int) -> bool:
+        least, most = wanted.min_length or 0, wanted.max_length
+        if n < least:
+            self._page.note(spot.at, f"{spot.label} has {n} entries: at least {least} are wanted")
+        elif most is not None and n > most:
+            self._page.note(spot.at, f"{spot.label} has {n} entries: at most {most} are allowed")
+        else:
+            return False
+        return True
+
+    def _double(self, key: Node, first: Node) -> None:
+        name = shown(key.value)
+        line = first.start_mark.line + 1
+        self._page.note(key, f"the key '{name}' is on line {line} already: delete one of the two")
+
+    def _mismatch(self, spot: Spot, wanted: str) -> None:
+        where = Entry("", spot.at, spot.node).where()
+        if isinstance(spot.node, ScalarNode) and is_plain(spot.node) and is_null(spot.node.value):
+            self._page.note(where, f"{spot.label} has no value: {wanted} is wanted")
+        else:
+            self._page.note(where, f"{spot.label} is {looks(spot.node)}: {wanted} is wanted")

@@ -1,0 +1,116 @@
+"""Checks across the wires of a file: points that do not exist, points used twice, unlikely wires.
+
+What a point may be called and which wires cannot be are the bus's knowledge (`canonical` and
+`wire_problems` of its file in `drivers/hal/`).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+from yaml import Node
+
+from bridges.settings.nodes import Page, unknown
+from bridges.settings.values import Check, Spot, below, locate
+from drivers.hal.points import Input, Output, Wire
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """That a device's signal stands on a point of a bus: in its one spelling, and as written."""
+
+    bus: str
+    point: str
+    written: str
+    user: str
+    node: Node
+
+
+class Wiring:
+    """The points of one device as they are met while its settings are read, and then as wires."""
+
+    def __init__(self, page: Page, device: str, bus: str, hal: ModuleType | None) -> None:
+        self._page = page
+        self._device = device
+        self._bus = bus
+        self._hal = hal
+        self.uses: list[Use] = []
+        self.checks: dict[str, Check] = {"point": self._point}
+
+    def _point(self, text: str, spot: Spot) -> str | None:
+        return self._use(text, spot.path[:-1], spot.node)
+
+    def _use(self, point: str, path: tuple[str, ...], node: Node) -> str | None:
+        canonical = getattr(self._hal, "canonical", None)
+        if canonical is None:
+            return None
+        try:
+            name = canonical(point)
+        except ValueError as error:
+            return str(error)
+        self.uses.append(Use(self._bus, name, point, f"{self._device} {'.'.join(path)}", node))
+        return None
+
+    def wires(self, wires: Iterable[Wire], spot: Spot) -> None:
+        """Judge a driver's table; it replaces the points that were met on the way to it."""
+        self.uses.clear()
+        for wire in wires:
+            places = [("point", wire.point)]
+            if wire.flash is not None:
+                places.append(("flash", wire.flash.point))
+            stands = [self._stands(wire, key, text, spot) for key, text in places]
+            if all(stands):
+                self._judge(wire, spot)
+
+    def _stands(self, wire: Wire, key: str, text: str, spot: Spot) -> bool:
+        """Note that this wire is on this point, or what is wrong with the point."""
+        entry = locate(spot, wire.path)
+        point = below(entry.value, key)
+        node = point.value if point else entry.where()
+        reason = self._use(text, wire.path or (wire.signal,), node)
+        if reason:
+            self._page.note(node, reason)
+        return reason is None
+
+    def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
+        """What the device has for itself where there are no wires: (place, path in its YAML)."""
+        for text, path in places:
+            user = f"{self._device} {'.'.join(path)}"
+            self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
+
+    def parts(self, structs: Iterable[tuple[tuple[str, ...], Any]], spot: Spot) -> None:
+        """Judge the wires of a device that is otherwise not in order, so that no table exists."""
+        for path, struct in structs:
+            if isinstance(struct, Input):
+                pull, debounce_s = struct.pull, struct.debounce_s
+                wire = Wire(path[-1], "in", struct.point, struct.active, pull, debounce_s, path)
+                self._judge(wire, spot)
+            elif isinstance(struct, Output):
+                wire = Wire(path[-1], "out", struct.point, struct.active, path=path)
+                self._judge(wire, spot)
+
+    def _judge(self, wire: Wire, spot: Spot) -> None:
+        problems = getattr(self._hal, "wire_problems", None)
+        for text in problems(wire) if problems else ():
+            name = wire.path[-1] if wire.path else wire.signal
+            self._page.note(locate(spot, wire.path).key, f"'{name}': {text}")
+
+
+def note_conflicts(page: Page, uses: Iterable[Use]) -> None:
+    """One point of one bus serves one signal: the later one in the file is the problem."""
+    first: dict[tuple[str, str], Use] = {}
+    for use in sorted(uses, key=lambda u: (u.node.start_mark.line, u.node.start_mark.column)):
+        other = first.setdefault((use.bus, use.point), use)
+        if other is not use:
+            line = other.node.start_mark.line + 1
+            point = use.point if use.written == use.point else f"{use.written} ({use.point})"
+            taken = f"{point} is taken by {other.user} on line {line}"
+            page.note(use.node, f"{taken}: {use.user} needs a point of its own")
+
+
+def note_unknown_signals(page: Page, accepted: Iterable[str], signals: list[str], s: Spot) -> None:
+    """`accept_unsafe` may only speak of signals that there are."""
+    for signal in accepted:
+        if signal not in signals:
+            page.note(locate(s, ("accept_unsafe", signal)).key, unknown("signal", signal, signals))

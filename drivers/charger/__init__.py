@@ -1,0 +1,1 @@
+"""Drivers for wireless chargers: a file for each protocol."""

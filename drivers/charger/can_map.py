@@ -1,0 +1,169 @@
+"""What a charger's frames mean: a DBC file says where the signals are, this what they are for.
+
+It stands in a device YAML as `map:`, or in a file of `drivers/profiles/`.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Final
+
+import msgspec
+
+from bridges.core.fields import Name, Period
+from bridges.settings.nodes import unknown
+from drivers.charger import dbc
+from drivers.charger.state_codes import Codes
+from drivers.hal.can import named
+from drivers.profiles import Profile
+
+Problems = Iterator[tuple[tuple[str, ...], str]]
+Signal = Annotated[
+    str,
+    msgspec.Meta(
+        pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}\.[A-Za-z_][A-Za-z0-9_]{0,63}$",
+        extra={"pattern": "Frame.Signal, by their names in the DBC file,"},
+    ),
+]
+Mask = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]
+Fresh = Annotated[float, msgspec.Meta(ge=0.05, le=60, extra={"unit": "s"})]
+
+
+class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the charger does, as one number.
+
+    `at`: its signal.
+    `codes`: what its numbers mean.
+    """
+
+    at: Signal
+    codes: Codes
+
+
+class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Signals that are not 0 while something is wrong, each with its text.
+
+    `station`: faults of the station.
+    `robot`: faults of the robot, its receiver and where it stands.
+    """
+
+    station: dict[Signal, Name] = msgspec.field(default_factory=dict)
+    robot: dict[Signal, Name] = msgspec.field(default_factory=dict)
+
+
+class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A frame that the charger must be sent again and again; at least one of `on` and `off`.
+
+    `frame`: its name in the DBC file.
+    `every_s`: how often.
+    `on`: signal -> value, while the charger may charge; without it the frame is not sent then.
+    `setpoints`: signal -> which of the device's `setpoints` it takes while the charger may charge.
+    `off`: signal -> value, while it must not; without it the frame is not sent then.
+    """
+
+    frame: Name
+    every_s: Period
+    on: dict[Name, float] | None = None
+    setpoints: dict[Name, Name] = msgspec.field(default_factory=dict)
+    off: dict[Name, float] | None = None
+
+    def problems(self) -> Problems:
+        """A frame that is never sent."""
+        if self.on is None and self.off is None:
+            yield (), "is never sent: give on, or off, or both"
+
+    def values(self, on: bool, setpoints: Mapping[str, float]) -> dict[str, float] | None:
+        """What it says when the charger may charge or must not; None where it is not sent."""
+        if not on:
+            return self.off
+        if self.on is None:
+            return None
+        return {**self.on, **{signal: setpoints[name] for signal, name in self.setpoints.items()}}
+
+
+class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A make's frames.
+
+    `dbc`: the DBC file, in drivers/profiles/ or by its absolute path.
+    `masks`: frame -> the bits of its id that are compared, for ids that hold a node's number.
+    `state`: what the charger does.
+    `state_timeout_s`: a state that was not sent again for so long is none any more.
+    `others_timeout_s`: likewise for all other frames.
+    `volts`, `amps`: at the battery.
+    `receiver`: whose receiver it is, as a number; 0 is nobody's. Without its frame there is no reading.
+    `out_of_range`: not 0 while the robot stands where it cannot be charged.
+    `errors`: what is wrong.
+    `send`: what must be sent, and how often.
+    """
+
+    dbc: Name
+    masks: dict[Name, Mask] = msgspec.field(default_factory=dict)
+    state: State
+    state_timeout_s: Fresh
+    others_timeout_s: Fresh = 5.0
+    volts: Signal | None = None
+    amps: Signal | None = None
+    receiver: Signal | None = None
+    out_of_range: Signal | None = None
+    errors: Errors = Errors()
+    send: Annotated[list[Sent], msgspec.Meta(min_length=1)]
+
+    def problems(self) -> Problems:
+        """A DBC file that is none, or that lacks what is spoken of."""
+        try:
+            found = dbc.load(self.dbc)
+        except ValueError as error:
+            yield ("dbc",), str(error)
+            return
+        for path, signal in self.signals():
+            yield from _lacks(found, path, *signal.split("."))
+        for name in self.masks:
+            yield from _lacks(found, ("masks", name), name)
+        for n, sent in enumerate(self.send):
+            yield from _lacks(found, ("send", str(n), "frame"), sent.frame)
+            for key, signals in (("on", sent.on), ("setpoints", sent.setpoints), ("off", sent.off)):
+                for signal in signals or () if sent.frame in found.frames() else ():
+                    yield from _lacks(found, ("send", str(n), key, signal), sent.frame, signal)
+
+    def signals(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """Each signal that is read: (where in the map, Frame.Signal)."""
+        yield ("state", "at"), self.state.at
+        for key in ("volts", "amps", "receiver", "out_of_range"):
+            if signal := getattr(self, key):
+                yield (key,), signal
+        for side in ("station", "robot"):
+            for signal in getattr(self.errors, side):
+                yield ("errors", side, signal), signal
+
+    def frames(self) -> list[str]:
+        """The frames that are read, that of the state first."""
+        return list(dict.fromkeys(signal.split(".")[0] for _, signal in self.signals()))
+
+    def wanted_setpoints(self) -> set[str]:
+        """What a device's `setpoints` must give."""
+        return {name for sent in self.send for name in sent.setpoints.values()}
+
+
+PROFILE: Final = Profile("charger_can_frames", "map", FrameMap)
+
+
+def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") -> Problems:
+    if frame not in found.frames():
+        yield path, unknown("frame", frame, found.frames())
+    elif signal and signal not in found.signals(frame):
+        yield path, unknown(f"signal of {frame}", signal, found.signals(frame))
+
+
+def rows(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """For `check`: what is read where, and what is sent how often: (what, meaning)."""
+    frames = dbc.load(found.dbc)
+    yield "frames", str(dbc.path(found.dbc))
+    for path, signal in found.signals():
+        at = named(frames.id(signal.split(".")[0]))
+        text = getattr(found.errors, path[1])[signal] if path[0] == "errors" else ""
+        what = f"{path[1]}'s error" if text else path[0]
+        yield what, f"{signal} ({at}){f': {text}' if text else ''}"
+    for sent in found.send:
+        where = f"{sent.frame} ({named(frames.id(sent.frame))}) every {sent.every_s:g} s"
+        for on in (True, False):
+            values = sent.values(on, setpoints)
+            said = (f"{signal} {value:g}" for signal, value in (values or {}).items())
+            yield f"sent, power {'on' if on else 'off'}", f"{where}: {', '.join(said) or 'nothing'}"

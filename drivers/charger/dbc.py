@@ -1,0 +1,93 @@
+"""DBC files, by cantools: a maker's frames and the signals in them.
+
+`named` frames and signals are the file's. Values are physical: scaled, in the signal's unit; an
+enumerated signal is its number.
+"""
+
+import functools
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from drivers import DriverError
+
+FOLDER: Final = Path(__file__).parents[1] / "profiles"
+EXTENDED: Final = 1 << 31
+SIZE_MAX: Final = 4 << 20
+
+
+class Dbc:
+    """One file. Raises ValueError, with what is wrong with it."""
+
+    def __init__(self, text: str) -> None:
+        import cantools
+        from cantools.database.errors import Error
+
+        try:
+            database: Any = cantools.database.load_string(text, "dbc")
+        except Error as error:
+            raise ValueError(f"is no DBC file: {' '.join(str(error).split())[:200]}") from None
+        self._messages: dict[str, Any] = {message.name: message for message in database.messages}
+
+    def frames(self) -> list[str]:
+        """Their names."""
+        return list(self._messages)
+
+    def signals(self, frame: str) -> list[str]:
+        """The names of a frame's signals."""
+        return [signal.name for signal in self._messages[frame].signals]
+
+    def id(self, frame: str) -> int:
+        """Its id, with EXTENDED where that has 29 bits."""
+        message = self._messages[frame]
+        return int(message.frame_id) | (EXTENDED if message.is_extended_frame else 0)
+
+    def length(self, frame: str) -> int:
+        """How many bytes it has."""
+        return int(self._messages[frame].length)
+
+    def decode(self, frame: str, payload: bytes) -> dict[str, float]:
+        """Each signal's value, those left out that are no numbers. Raises DriverError."""
+        from cantools.database.errors import Error
+
+        try:
+            found = self._messages[frame].decode(payload, decode_choices=False)
+        except (Error, ValueError, KeyError) as error:
+            raise DriverError(f"{frame} {payload.hex(' ')} cannot be decoded: {error}") from None
+        return {
+            name: value
+            for name, value in found.items()
+            if isinstance(value, int | float) and math.isfinite(value)
+        }
+
+    def encode(self, frame: str, values: Mapping[str, float]) -> bytes:
+        """A frame that says this; every signal must be given. Raises ValueError."""
+        from cantools.database.errors import Error
+
+        try:
+            return bytes(self._messages[frame].encode(dict(values)))
+        except (Error, OverflowError) as error:
+            raise ValueError(f"{frame}: {' '.join(str(error).split())}") from None
+
+
+def path(name: str) -> Path:
+    """Where a DBC file is: an absolute path as it is, else a file of drivers/profiles/."""
+    return FOLDER / name
+
+
+@functools.cache
+def load(name: str) -> Dbc:
+    """A file by its name (`path`). Raises ValueError, with what is wrong."""
+    file = path(name)
+    try:
+        with file.open("rb") as opened:
+            text = opened.read(SIZE_MAX + 1)
+    except OSError as error:
+        raise ValueError(f"{file} cannot be read: {error.strerror}") from None
+    if len(text) > SIZE_MAX:
+        raise ValueError(f"{file} is larger than {SIZE_MAX >> 20} MiB")
+    try:
+        return Dbc(text.decode("cp1252"))
+    except (ValueError, UnicodeDecodeError) as error:
+        raise ValueError(f"{file} {error}") from None

@@ -1,0 +1,340 @@
+"""A charging station that answers HTTP with JSON.
+
+The contract of the first station (a wall-mounted transmitter, TPU):
+
+    GET  http://{api_base}/state        ->  200 {"state": 238, "error_msg": "foreign object"}
+    POST http://{api_base}/clear_error  ->  2xx
+
+It has no start, no stop and no receiver's id, so that profile is observe-only: the station decides
+itself whom it charges. Another make's paths and fields are YAML. `codes` says what the maker's states
+mean; one that is in no list is an error, and none is ever passed on as if it were RMF's.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Any, Final, Protocol
+
+import msgspec
+
+from bridges.charger.settings import ChargerSettings
+from bridges.charger.signals import (
+    AT_FAULT,
+    Activity,
+    ChargerOutputs,
+    ChargerSample,
+    Measured,
+    Side,
+)
+from drivers.charger import json_fields
+from drivers.charger.json_fields import Field
+from drivers.charger.state_codes import CODE_MAX, Code, Codes
+from drivers.hal import http
+from drivers.hal.points import Wire
+
+BUSES = ("http",)
+
+UNKNOWN: Final[tuple[Activity, Side]] = (Activity.UNKNOWN, "")
+WORD_MAX: Final = 64
+Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
+Path = Annotated[str, msgspec.Meta(pattern=r"^/[A-Za-z0-9._~/-]*$", max_length=256)]
+
+
+class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A measurement.
+
+    `field`: where it is in the answer.
+    `scale`: what one of the maker's units is in ours (0.001 for mV).
+    """
+
+    field: Field
+    scale: float = 1.0
+
+
+class InRange(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Whether the robot's coil is where it can be charged.
+
+    `field`: where it is in the answer.
+    `when`: the values that say so; without them it must be true or false.
+    """
+
+    field: Field
+    when: list[Code] = []
+
+
+class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the answer to `state_path` has what: names with dots between them.
+
+    `state`: what the station does; `codes` says what it means.
+    `error_text`: the station's own words for an error.
+    `receiver_id`: whose receiver it sees; null or "" for nobody's.
+    `in_range`: whether the robot stands where it can be charged.
+    `volts`: at the battery.
+    `amps`: into the battery.
+    `battery_percent`: how full the battery is, 0 to 100.
+    `time_to_full_s`: how long it still takes (s).
+    """
+
+    state: Field = "state"
+    error_text: Field = "error_msg"
+    receiver_id: Field | None = None
+    in_range: InRange | None = None
+    volts: Number | None = None
+    amps: Number | None = None
+    battery_percent: Number | None = None
+    time_to_full_s: Number | None = None
+
+
+class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One command to the station.
+
+    `path`: below the bus's `api_base`.
+    `method`: how it is sent.
+    `body`: JSON that is sent along, in quotes; nothing when absent.
+    """
+
+    path: Path
+    method: http.Method = "POST"
+    body: Annotated[str, msgspec.Meta(max_length=1024)] | None = None
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """A body that is no JSON."""
+        try:
+            msgspec.json.decode(self.body or "{}")
+        except msgspec.DecodeError as error:
+            yield ("body",), f"is no JSON: {error}"
+
+
+class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One station. The paths follow the bus's `api_base`.
+
+    `codes`: what the maker's state numbers mean.
+    `state_words`: word -> the number that stands for it in `codes`, where the maker says words.
+    `state_path`: where GET answers the station's state.
+    `fields`: where that answer has what.
+    `clear_error_path`: where POST clears the station's error.
+    `start`: begins to charge who is on the pad.
+    `stop`: takes the power away.
+    `range_check`: has the station look where the robot stands, where it does not by itself.
+    """
+
+    codes: Codes
+    state_words: dict[Word, Code] = msgspec.field(default_factory=dict)
+    state_path: Path = "/state"
+    fields: Fields = Fields()
+    clear_error_path: Path = "/clear_error"
+    start: Call | None = None
+    stop: Call | None = None
+    range_check: Call | None = None
+
+    def can_stop(self) -> bool:
+        """Only where the YAML says how."""
+        return self.stop is not None
+
+    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """What the fields cannot say one by one."""
+        yield from super().problems()
+        if self.receivers and self.fields.receiver_id is None:
+            text = "receivers needs it: where does the station say whose receiver it sees?"
+            yield ("fields", "receiver_id"), text
+        if self.start and not self.stop:
+            yield ("start",), "needs stop as well: nobody starts what cannot be stopped"
+        if self.range_check and self.fields.in_range is None:
+            yield ("fields", "in_range"), "range_check needs it: where is its result?"
+        if self.on_death == "keep" and self.stop is None:
+            yield ("on_death",), "this station cannot be stopped: leave this out"
+
+
+class Calls(Protocol):
+    """What this driver needs of an HTTP bus."""
+
+    def get_json(self, path: str) -> dict[str, Any]:
+        """One JSON object. Raises HalError."""
+
+    def send(self, path: str, method: http.Method = "POST", body: str | None = None) -> None:
+        """Once. Raises HalError."""
+
+
+def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
+    """The driver of one station."""
+    return HttpCharger(settings, bus)
+
+
+def wires(settings: Settings) -> list[Wire]:
+    """None: a station on HTTP has no contacts."""
+    return []
+
+
+def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str, str]]:
+    """What `check` prints in place of a wiring table: (what, meaning)."""
+    api, fields = http.base(bus_settings.api_base), settings.fields
+    rows = [("state", f"GET {api.url(settings.state_path)} every {bus_settings.scan_s:g} s")]
+    for what in ("start", "stop", "range_check"):
+        if call := getattr(settings, what):
+            body = f" {call.body}" if call.body else ""
+            rows.append((what.replace("_", " "), f"{call.method} {api.url(call.path)}{body}"))
+    clear = f"POST {api.url(settings.clear_error_path)}, {_how_often(settings)}"
+    rows.append(("clear error", clear))
+    for name in fields.__struct_fields__ if fields != Fields() else ():
+        if place := getattr(fields, name):
+            rows.append((f"field {name}", _place(place)))
+    rows += [(f"word {word}", str(code)) for word, code in settings.state_words.items()]
+    rows += settings.codes.rows()
+    rows += [(f"receiver {known}", who) for known, who in settings.receivers.items()]
+    if settings.stop:
+        rows.append(("on death", settings.on_death))
+    return rows
+
+
+def _place(place: str | Number | InRange) -> str:
+    if isinstance(place, Number):
+        return place.field if place.scale == 1.0 else f"{place.field} x {place.scale:g}"
+    if isinstance(place, InRange):
+        return f"{place.field} is {', '.join(map(str, place.when)) or 'true'}"
+    return place
+
+
+def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+    """What this profile cannot do, as (path, text)."""
+    missing = [name for name in ("receiver_id", "stop") if _lacks(settings, name)]
+    consequences = {
+        "receiver_id": "the robot on the pad is not verified, a robot at the wrong station is not"
+        " refused",
+        "stop": "power is not switched off after a fault",
+    }
+    if missing:
+        sort = "observe-only: " if settings.stop is None else ""
+        what = ", and ".join(consequences[name] for name in missing)
+        yield (), f"{sort}without {' and '.join(missing)}, {what}"
+    if not _lacks(settings, "receiver_id") and not settings.receivers:
+        yield ("fields",), "receiver_id is read, but without receivers nobody is verified"
+    if not settings.codes.error:
+        yield ("codes",), "no code means error: each of them will be shown as an unknown state"
+
+    known = settings.codes.meanings()
+    for word, code in settings.state_words.items():
+        if code not in known:
+            yield ("state_words", word), f"{code} stands nowhere in codes: an unknown state"
+
+
+def _lacks(settings: Settings, what: str) -> bool:
+    return (settings.stop if what == "stop" else settings.fields.receiver_id) is None
+
+
+def _how_often(settings: Settings) -> str:
+    per_hour = settings.limits.clear_errors_per_h
+    by_itself = f", and by itself at most {per_hour} times an hour" if per_hour else ""
+    return f"when an operator resets{by_itself}"
+
+
+class HttpCharger:
+    """One station, read by polling.
+
+    Power is a level: a start is repeated while the station stays idle, a stop while it goes on.
+    """
+
+    def __init__(self, settings: Settings, bus: Calls) -> None:
+        self._settings = settings
+        self._bus = bus
+        self._meaning = settings.codes.meanings()
+        self._activity = Activity.UNKNOWN
+        self._power: bool | None = None
+        self._cleared = 0
+        self._checked = 0
+
+    def open(self) -> None:
+        """Nothing to claim: a charge under way is not ours to end before it has been read."""
+
+    def read(self) -> ChargerSample:
+        """The station's state now. Raises DriverError for an answer that has no meaning."""
+        answer = self._bus.get_json(self._settings.state_path)
+        fields = self._settings.fields
+        code = _code(answer, fields.state, self._settings.state_words)
+        self._activity, side = self._meaning.get(code, UNKNOWN)
+        said = json_fields.text(answer, fields.error_text)
+        return ChargerSample(self._activity, code, said, _measured(answer, fields), side)
+
+    def write(self, outputs: ChargerOutputs) -> None:
+        """Bring the station to this level. Power that is taken goes first.
+
+        A clearing or a range check counts as done before it is sent: if its answer is lost, it is not
+        sent again.
+        """
+        if outputs.power is False:
+            self._stop_if_needed()
+        if outputs.clear_errors != self._cleared:
+            self._cleared = outputs.clear_errors
+            self._bus.send(self._settings.clear_error_path)
+        if outputs.range_checks != self._checked:
+            self._checked = outputs.range_checks
+            self._send(self._settings.range_check)
+        if outputs.power:
+            self._start_if_needed()
+        self._power = outputs.power
+
+    def make_safe(self) -> None:
+        """No power; a station that may go on charging without us is left as it is."""
+        if self._settings.on_death == "stop":
+            self._send(self._settings.stop)
+
+    def close(self) -> None:
+        """Nothing to let go."""
+
+    def _stop_if_needed(self) -> None:
+        given, self._power = self._power, None
+        on = self._activity in (Activity.HANDSHAKE, Activity.CHARGING)
+        if on or (given is not False and self._activity in AT_FAULT):
+            self._send(self._settings.stop)
+
+    def _start_if_needed(self) -> None:
+        given, self._power = self._power, None
+        waits = self._activity is Activity.IDLE
+        if waits or (not given and self._activity is Activity.HANDSHAKE):
+            self._send(self._settings.start)
+
+    def _send(self, call: Call | None) -> None:
+        if call:
+            self._bus.send(call.path, call.method, call.body)
+
+
+def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> int | str:
+    """The maker's number for its state; a word that stands for none is left as it is."""
+    code = json_fields.needed(answer, field)
+    if words and isinstance(code, str):
+        word = json_fields.clean(code, WORD_MAX)
+        return words.get(word, word)
+    if words or not isinstance(code, int) or isinstance(code, bool):
+        raise json_fields.wrong(field, code, "a text" if words else "a whole number")
+    if not 0 <= code <= CODE_MAX:
+        raise json_fields.wrong(field, code, f"0 to {CODE_MAX}")
+    return code
+
+
+def _measured(answer: Mapping[str, Any], fields: Fields) -> Measured:
+    numbers = ("volts", "amps", "battery_percent", "time_to_full_s")
+    found = {name: _number(answer, getattr(fields, name)) for name in numbers}
+    percent, left_s = found["battery_percent"], found["time_to_full_s"]
+    if percent is not None and not 0 <= percent <= 100:
+        assert fields.battery_percent
+        raise json_fields.wrong(fields.battery_percent.field, percent, "0 to 100")
+    if left_s is not None and not 0 <= left_s <= 7 * 86400:
+        assert fields.time_to_full_s
+        raise json_fields.wrong(fields.time_to_full_s.field, left_s, "0 s to a week")
+    receiver = fields.receiver_id and json_fields.name(answer, fields.receiver_id)
+    return Measured(receiver_id=receiver, in_range=_in_range(answer, fields.in_range), **found)
+
+
+def _number(answer: Mapping[str, Any], number: Number | None) -> float | None:
+    return json_fields.number(answer, number.field, number.scale) if number else None
+
+
+def _in_range(answer: Mapping[str, Any], place: InRange | None) -> bool | None:
+    """Null is not in range."""
+    if place is None:
+        return None
+    value = json_fields.needed(answer, place.field)
+    if value is None:
+        return False
+    if place.when:
+        return not isinstance(value, bool | float) and value in place.when
+    if not isinstance(value, bool):
+        raise json_fields.wrong(place.field, value, "true or false")
+    return value

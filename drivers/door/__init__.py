@@ -1,0 +1,1 @@
+"""Drivers for doors: a file for each way of reaching one."""

@@ -1,0 +1,200 @@
+"""A door operator on contacts: a relay that holds it open, and the limit contacts that see it.
+
+The contacts stand on the GPIO header, or at a Modbus I/O module (coils and discrete inputs). Which
+level means what, and what a cut wire reads as, is `drivers/hal/points.py`; the rules are the core's.
+
+Where the operator is triggered by pulses and the module can time one (`flash`), each pulse is asked of
+the module once. A repeat would prolong it, so one whose reply was lost is not sent again: the next
+pulse is the next try. The module ends the pulse; we switch off when the hold ends before.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+import msgspec
+
+from bridges.door.settings import DoorSettings
+from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire
+from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
+
+BUSES: Final = ("gpio", "modbus")
+
+DEBOUNCE_S: Final = 0.05
+
+CUT_MUST_READ: Final = {
+    "opened": (False, "the door reads open"),
+    "obstruction": (True, "somebody in the doorway is not seen"),
+    "fire": (True, "a fire alarm reads clear"),
+}
+"""What a cut wire has to read as, and what it would mean if it did not."""
+
+
+class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The contacts that are read; a limit may be missing with `feedback: estimated`.
+
+    `opened`: the limit contact at the open end: asserted is fully open.
+    `closed`: the limit contact at the closed end.
+    `obstruction`: somebody is in the doorway: after CLOSE, the hold is kept until they are not.
+    `fire`: the fire alarm; `on_fire` says what it does.
+    """
+
+    opened: Input | None = None
+    closed: Input | None = None
+    obstruction: Input | None = None
+    fire: Input | None = None
+
+
+class Hold(Output, frozen=True, forbid_unknown_fields=True):
+    """The relay that holds the door open.
+
+    `flash`: where a Modbus module takes a pulse that it times itself, in tenths of a second: `unit 1
+    coil 0x200` for the first relay of a Waveshare Modbus RTU Relay; each `pulse` is asked for there.
+    """
+
+    flash: Point | None = None
+
+
+class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What we ask of the operator. There is no relay that closes.
+
+    `hold_open`: holds the door open while it is on.
+    """
+
+    hold_open: Hold
+
+
+class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A door and its wiring.
+
+    `inputs`: the contacts that are read.
+    `outputs`: the relay that is driven.
+    """
+
+    inputs: Inputs = Inputs()
+    outputs: Outputs
+
+    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """What the fields cannot say one by one."""
+        yield from super().problems()
+        yield from self._feedback_problems()
+        if self.inputs.fire and self.on_fire is None:
+            yield (
+                ("inputs", "fire"),
+                "say what a fire alarm does: on_fire: open, or on_fire: release",
+            )
+        if self.on_fire and self.inputs.fire is None:
+            yield ("on_fire",), "there is no fire input; wire one under inputs, or leave this out"
+        yield from self._flash_problems()
+        yield from unaccepted(_unsafe(self), self.accept_unsafe)
+
+    def _flash_problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        if self.outputs.hold_open.flash is None:
+            return
+        if self.pulse is None:
+            text = "is for pulses: say pulse: {on_s: …, every_s: …}, or leave this out"
+            yield ("outputs", "hold_open", "flash"), text
+        elif abs(self.pulse.on_s * 10 - round(self.pulse.on_s * 10)) > 1e-6:
+            text = f"with flash the module counts tenths of a second: not {self.pulse.on_s:g}"
+            yield ("pulse", "on_s"), text
+
+    def _feedback_problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        missing = [s for s in ("opened", "closed") if getattr(self.inputs, s) is None]
+        if self.feedback == "sensors":
+            for signal in missing:
+                text = f"needs '{signal}'; without that contact say feedback: estimated"
+                yield ("inputs",), text
+        elif not missing:
+            yield ("feedback",), "both limit contacts are wired: leave feedback out"
+
+
+def wires(settings: Settings) -> list[Wire]:
+    """The wiring table, inputs first."""
+    inputs = [
+        Wire(
+            signal=signal,
+            direction="in",
+            point=contact.point,
+            active=contact.active,
+            pull=contact.pull,
+            debounce_s=DEBOUNCE_S if contact.debounce_s is None else contact.debounce_s,
+            path=("inputs", signal),
+        )
+        for signal in settings.inputs.__struct_fields__
+        if (contact := getattr(settings.inputs, signal)) is not None
+    ]
+    relay = settings.outputs.hold_open
+    flash = None
+    if relay.flash is not None and settings.pulse is not None:
+        flash = Flash(relay.flash, settings.pulse.on_s)
+    path = ("outputs", "hold_open")
+    return [*inputs, Wire("hold_open", "out", relay.point, relay.active, path=path, flash=flash)]
+
+
+def debounce(settings: Settings) -> Mapping[str, float]:
+    """Seconds for which each input must last, by signal."""
+    return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
+
+
+def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What is legal, but should be read before the door is put into service: (path, text)."""
+    for wire in wires(settings):
+        if wire.signal == "closed" and wire.broken_reads() is not False:
+            yield (
+                wire.path,
+                "a cut wire may read as a closed door; wire a contact that shuts with it",
+            )
+    for signal in settings.accept_unsafe.keys() - {signal for signal, _, _ in _unsafe(settings)}:
+        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
+    if settings.feedback == "estimated":
+        yield ("feedback",), "RMF is told OPEN or CLOSED by the clock, whatever the door does"
+
+
+def create(name: str, settings: Settings, bus: PointsBus) -> "DryContactDoor":
+    """The door on its bus; nothing is touched before `open`."""
+    return DryContactDoor(
+        Points(wires(settings), bus), flashes=settings.outputs.hold_open.flash is not None
+    )
+
+
+class DryContactDoor:
+    """`drivers.Driver` of one door. `flashes`: the module times the pulses of its hold."""
+
+    def __init__(self, points: Points, flashes: bool = False) -> None:
+        self._points = points
+        self._flashes = flashes
+        self._asked = False
+
+    def open(self) -> None:
+        """Claim the relay, off, and the contacts."""
+        self._points.open()
+
+    def read(self) -> DoorSample:
+        """Every contact, read now."""
+        read = self._points.read().get
+        return DoorSample(read("opened"), read("closed"), read("obstruction"), read("fire"))
+
+    def write(self, outputs: DoorOutputs) -> None:
+        """The hold relay to this; a pulse that the module times is asked for once."""
+        asked, self._asked = self._asked, outputs.hold_open
+        if not self._flashes or not (outputs.hold_open or outputs.between_pulses):
+            self._points.write({"hold_open": outputs.hold_open})
+        elif outputs.hold_open and not asked:
+            self._points.flash("hold_open")
+
+    def make_safe(self) -> None:
+        """The hold relay off, and seen to be off."""
+        self._asked = False
+        self._points.make_safe()
+
+    def close(self) -> None:
+        """The relay off, and let go."""
+        self._points.close()
+
+
+def _unsafe(settings: Settings) -> Iterator[Unsafe]:
+    table = wires(settings)
+    for wire in table:
+        if wire.signal in CUT_MUST_READ:
+            yield from cut_must_read(wire, *CUT_MUST_READ[wire.signal])
+    yield from energised_at_boot(table)

@@ -1,0 +1,221 @@
+"""A door operator that is read and commanded through Modbus registers.
+
+Its status is one number; the map says which numbers are open, closed, moving or a fault, and one that
+is not listed is a fault too: then nobody knows where the door is. A position, where there is one, must
+agree with the status. The command holds the door open or releases it: nothing drives it shut.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from bridges.core.fields import Name
+from bridges.door.settings import DoorSettings
+from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.door.register_map import DoorMap, Errors, Flag, Parts, Problems, Status
+from drivers.hal.modbus import ModbusBus
+from drivers.hal.modbus.points import Point
+from drivers.hal.modbus.registers import (
+    WRITABLE,
+    RegisterLines,
+    Unit,
+    Word,
+    at,
+    misplaced,
+    place,
+)
+from drivers.profiles import Profile, profile_problems
+
+BUSES: Final = ("modbus",)
+
+BITS: Final = 16
+
+
+class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A door and where its operator is.
+
+    `unit`: the operator's Modbus unit.
+    `profile`: a file of drivers/profiles/ that has the map.
+    `map`: the map, written here.
+    `changes`: the parts of the profile's map that are otherwise at this door.
+    `base_address`: added to every address of the map, for a gateway that has several operators in one
+    unit.
+    """
+
+    unit: Unit
+    profile: Name | None = None
+    map: DoorMap | None = None
+    changes: Parts | None = None
+    base_address: Word = 0
+
+    def problems(self) -> Problems:
+        """What the fields cannot say one by one."""
+        yield from super().problems()
+        before = list(profile_problems(PROFILE, self.profile, self.map))
+        yield from before
+        if self.map and self.changes:
+            yield ("changes",), "is for a profile: change the map that is written here"
+        if not before and max(map(_address, door_map(self).places().values())) > (
+            65535 - self.base_address
+        ):
+            yield ("base_address",), "with it an address is beyond 65535, the last"
+        if self.feedback == "estimated":
+            yield ("feedback",), "the status says where the door is: leave feedback out"
+        if self.on_fire:
+            yield ("on_fire",), "an operator on registers has no fire input: leave this out"
+
+
+PROFILE: Final = Profile("door_register", "map", DoorMap)
+
+
+def door_map(settings: Settings) -> DoorMap:
+    """The map, from wherever it is."""
+    found: DoorMap = settings.map or PROFILE.load(settings.profile or "")
+    return found.changed(settings.changes)
+
+
+def points(settings: Settings) -> dict[str, Point]:
+    """Where each part of the map is at this operator; `command` among them."""
+    return {
+        part: at(settings.unit, text, settings.base_address)
+        for part, text in door_map(settings).places().items()
+    }
+
+
+def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """What no other device may use, and where the YAML says so; nothing while that is not right."""
+    if any(profile_problems(PROFILE, settings.profile, settings.map)):
+        return
+    place_of_command = door_map(settings).command.at
+    if misplaced(place_of_command, WRITABLE) is None:
+        point = at(settings.unit, place_of_command, settings.base_address)
+        written = _command_in(settings)
+        yield str(point), (*written, "at") if written else ("unit",)
+
+
+def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
+    """For `check`: each part of the map, where it is, and what its numbers mean."""
+    found = door_map(settings)
+    meanings = {
+        "status": _status_text(found.status),
+        "position": "0 closed to 100 open",
+        "command": f"{found.command.hold} holds open, {found.command.release} releases",
+    }
+    if found.position and found.position.unknown is not None:
+        meanings["position"] += f", {found.position.unknown} unknown"
+    if found.obstruction:
+        meanings["obstruction"] = f"bit {found.obstruction.bit}"
+    if found.errors:
+        meanings["errors"] = ", ".join(f"bit {b} {t}" for b, t in found.errors.bits.items())
+    for part, point in points(settings).items():
+        yield part, f"{point}: {meanings[part]}".removesuffix(": ")
+
+
+def warnings(settings: Settings) -> Problems:
+    """What is legal, but should be read before the door is put into service: (path, text)."""
+    if settings.profile and PROFILE.untried(settings.profile):
+        text = f"nobody has tried the profile {settings.profile} on hardware: watch the door move"
+        yield ("profile",), text
+    if not door_map(settings).command.read_back:
+        written = _command_in(settings)
+        path = (*written, "read_back") if written else ("profile",)
+        yield path, "the command cannot be read back: that the door was released is not verified"
+
+
+def _command_in(settings: Settings) -> tuple[str, ...]:
+    """Where the YAML itself says what the command is; () where the profile does."""
+    if settings.map:
+        return "map", "command"
+    return ("changes", "command") if settings.changes and settings.changes.command else ()
+
+
+def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterDoor":
+    """The door on its bus; nothing is sent before `open`."""
+    found = points(settings)
+    command = door_map(settings).command
+    reads = {part: point for part, point in found.items() if part != "command"}
+    lines = RegisterLines(bus, reads, found["command"], command.release, command.read_back)
+    return RegisterDoor(door_map(settings), lines)
+
+
+class RegisterDoor:
+    """`drivers.Driver` of one door."""
+
+    def __init__(self, found: DoorMap, lines: RegisterLines) -> None:
+        self._map = found
+        self._lines = lines
+
+    def open(self) -> None:
+        """See that the operator answers, and let go of the door."""
+        self._lines.claim()
+
+    def read(self) -> DoorSample:
+        """Every register, read now."""
+        return decode(self._map, self._lines.read())
+
+    def write(self, outputs: DoorOutputs) -> None:
+        """Hold the door, or release it."""
+        command = self._map.command
+        self._lines.write(command.hold if outputs.hold_open else command.release)
+
+    def make_safe(self) -> None:
+        """Released, and read back where it can be."""
+        self._lines.make_safe()
+
+    def close(self) -> None:
+        """Released, and let go."""
+        self._lines.close()
+
+
+def decode(found: DoorMap, words: Mapping[str, int]) -> DoorSample:
+    """What these numbers, by part of the map, say of the door. Never raises."""
+    lost = _lost(found, words)
+    status = words["status"]
+    return DoorSample(
+        opened=not lost and status in found.status.open,
+        closed=not lost and status in found.status.closed,
+        obstruction=_flag(found.obstruction, words),
+        lost=lost,
+        errors=_errors(found.errors, words),
+    )
+
+
+def _lost(found: DoorMap, words: Mapping[str, int]) -> str:
+    """Why these numbers do not say where the door is; "" when they do."""
+    value, status = words["status"], found.status
+    if value in status.faults:
+        return f"status {value}: {status.faults[value]}"
+    if value not in (*status.open, *status.closed, *status.moving):
+        return f"status {value} is not in the map"
+    position = found.position
+    if position is None or words["position"] == position.unknown:
+        return ""
+    if words["position"] > 100:
+        return "the position is not between 0 and 100"
+    if value in status.open and words["position"] < position.open_from:
+        return "the status is open and the position is not"
+    if value in status.closed and words["position"] > position.closed_to:
+        return "the status is closed and the position is not"
+    return ""
+
+
+def _flag(flag: Flag | None, words: Mapping[str, int]) -> bool | None:
+    return None if flag is None else bool(words["obstruction"] >> flag.bit & 1)
+
+
+def _errors(errors: Errors | None, words: Mapping[str, int]) -> tuple[str, ...]:
+    if errors is None:
+        return ()
+    on = (bit for bit in range(BITS) if words["errors"] >> bit & 1)
+    return tuple(errors.bits.get(bit, f"error bit {bit}") for bit in on)
+
+
+def _address(text: str) -> int:
+    try:
+        return place(text)[1]
+    except ValueError:
+        return 0  # reported where the place is spelled
+
+
+def _status_text(status: Status) -> str:
+    words = [(v, word) for word in ("closed", "moving", "open") for v in getattr(status, word)]
+    return ", ".join(f"{v} {word}" for v, word in sorted([*words, *status.faults.items()]))

@@ -1,0 +1,261 @@
+"""The way onto one CAN bus, by python-can: an interface of the kernel (SocketCAN), or an slcan adapter.
+
+python-can opens, reads and sends; what its interfaces leave open is settled here:
+
+- A reading of nothing does not mean that an slcan adapter has no more: it may have been an
+  acknowledgement. And what is no slcan at all breaks python-can's parser for good, so that the adapter
+  is opened anew.
+- An slcan write waits until the adapter has taken it, without end; here it has `timeout_s`.
+- An interface that is down or gone raises many sorts of exceptions; here all are LinkDown, with a text
+  that says what to do.
+- The bus's own troubles come as error frames (linux/can/error.h), on SocketCAN only.
+"""
+
+import errno
+import functools
+import logging
+import os
+import select
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+
+import msgspec
+
+from bridges.core.fields import Name
+
+if TYPE_CHECKING:
+    from can import BusABC, Message
+
+EXTENDED: Final = 1 << 31
+"""In a frame's id: it has 29 bits. (0x123 and an extended 0x123 are two.)"""
+BITRATES: Final = (
+    10_000,
+    20_000,
+    50_000,
+    83_300,
+    100_000,
+    125_000,
+    250_000,
+    500_000,
+    750_000,
+    1_000_000,
+)
+IN_ONE_GO: Final = 4096
+"""So many lines of an adapter that are no frames are read at once, and no more."""
+
+BUS_OFF: Final = 0x40
+RESTARTED: Final = 0x100
+TROUBLES: Final = {
+    BUS_OFF: "bus-off",
+    0x20: "nobody acknowledges frames",
+    0x04: "the controller counts many errors",
+    0x80: "bus errors",
+    0x08: "protocol errors",
+    0x10: "transceiver errors",
+    0x01: "frames cannot be sent in time",
+}
+"""Bits of an error frame's id (linux/can/error.h), the most telling first."""
+
+
+class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A serial or USB adapter that speaks slcan (LAWICEL).
+
+    `port`: its path; one in /dev/serial/by-id stays the same.
+    `bitrate`: of the CAN bus.
+    `baudrate`: of the serial port; USB adapters take any.
+    """
+
+    port: Name
+    bitrate: Annotated[int, msgspec.Meta(ge=10_000, le=1_000_000, extra={"unit": "bit/s"})]
+    baudrate: Annotated[int, msgspec.Meta(ge=9600, le=3_000_000, extra={"unit": "Bd"})] = 115_200
+
+
+class Frame(NamedTuple):
+    """One data frame; `id` with EXTENDED where it has 29 bits."""
+
+    id: int
+    payload: bytes
+
+
+class Trouble(NamedTuple):
+    """The bus's own, from an error frame. `text`: "" when the controller is well again."""
+
+    text: str
+    bus_off: bool
+
+
+Vendor = Callable[[], Any]
+"""Opens python-can's bus."""
+
+
+class LinkDown(Exception):
+    """The interface cannot be used now. The text says what to look at."""
+
+
+def socketcan(interface: str) -> "BusABC":
+    """An interface of the kernel, which has its bitrate from `ip link`."""
+    from can.interfaces.socketcan import SocketcanBus
+
+    return SocketcanBus(channel=interface)
+
+
+def slcan(settings: Slcan) -> "BusABC":
+    """An adapter on a serial port, for us alone."""
+    bus: BusABC = _slcan_bus()(
+        settings.port,
+        tty_baudrate=settings.baudrate,
+        bitrate=settings.bitrate,
+        sleep_after_open=0,
+        timeout=0,
+    )
+    return bus
+
+
+@functools.cache
+def _slcan_bus() -> Any:
+    from can.exceptions import CanInitializationError, error_check
+    from can.interfaces.slcan import slcanBus
+
+    class Adapter(slcanBus):
+        def _write(self, string: str) -> None:
+            with error_check("Could not write to serial device"):
+                self.serialPortOrig.write(string.encode() + self.LINE_TERMINATOR)
+
+        def open(self) -> None:
+            with error_check(exception_type=CanInitializationError):
+                self.serialPortOrig.exclusive = True
+            super().open()
+
+    return Adapter
+
+
+class Link:
+    """One way onto a bus, opened anew when it is needed. `where`: its name, for texts."""
+
+    def __init__(self, vendor: Vendor, where: str, timeout_s: float) -> None:
+        self._vendor = vendor
+        self._where = where
+        self._timeout_s = timeout_s
+        self._bus: BusABC | None = None
+        self._readable: Callable[[float], bool] | None = None
+
+    def open(self) -> None:
+        """Have it open. Raises LinkDown."""
+        if self._bus is not None:
+            return
+        logging.getLogger("can").setLevel(logging.CRITICAL)  # our texts say it all
+        try:
+            self._bus = self._vendor()
+        except _failures() as error:
+            raise LinkDown(self._explained(error)) from error
+        self._readable = _selecting(self._bus)
+
+    def receive(self, wait_s: float) -> Frame | Trouble | None:
+        """What comes next; None when nothing does within `wait_s`. Raises LinkDown."""
+        assert self._bus is not None
+        for _ in range(IN_ONE_GO):
+            try:
+                if self._readable and not self._readable(wait_s):
+                    return None
+                message = self._bus.recv(0 if self._readable else wait_s)
+            except _failures() as error:
+                raise LinkDown(self._explained(error)) from error
+            if message is None and self._readable is None:
+                return None
+            if message is not None and (meant := _meaning(message)):
+                return meant
+        return None
+
+    def send(self, frame: Frame) -> None:
+        """Send it, or raise LinkDown. Taken by the interface is not yet heard by anybody."""
+        import can
+
+        assert self._bus is not None
+        message = can.Message(
+            arbitration_id=frame.id & ~EXTENDED,
+            is_extended_id=bool(frame.id & EXTENDED),
+            data=frame.payload,
+        )
+        try:
+            self._bus.send(message, timeout=self._timeout_s)
+        except _failures() as error:
+            raise LinkDown(self._explained(error)) from error
+
+    def close(self) -> None:
+        """Let go, whatever state it is in. May be called twice."""
+        bus, self._bus = self._bus, None
+        if bus is None:
+            return
+        with suppress(*_failures()):
+            bus.shutdown()
+        port = getattr(bus, "serialPortOrig", None)
+        if port is not None:  # python-can keeps the port of an adapter that has gone
+            with suppress(*_failures()):
+                port.close()
+
+    def _explained(self, error: BaseException) -> str:
+        code = _code(error)
+        hint = _HINTS.get(code, os.strerror(code) if code else _shown(str(error)))
+        return f"CAN {self._where}: {hint.format(where=self._where)}"
+
+
+_HINTS: Final = {
+    errno.ENODEV: "there is no such interface; `ip link show type can` lists what there is",
+    errno.ENXIO: "there is no such interface; `ip link show type can` lists what there is",
+    errno.ENETDOWN: "the interface is down; sudo ip link set {where} up type can bitrate 250000"
+    " restart-ms 100, with the bitrate of your charger",
+    errno.ENOBUFS: "frames pile up because nobody acknowledges them; is the other side powered,"
+    " wired and terminated, and the bitrate the same?",
+    errno.EAFNOSUPPORT: "this kernel has no CAN; sudo modprobe can-raw",
+    errno.ENOENT: "the adapter is not there; is it plugged in? ls /dev/serial/by-id",
+    errno.EACCES: "it may not be opened; add the daemon's user to the group dialout",
+    errno.EAGAIN: "another program has it open",
+    errno.EBUSY: "another program has it open",
+}
+
+
+@functools.cache
+def _failures() -> tuple[type[Exception], ...]:
+    """What python-can and what is below it may raise; ValueError and IndexError are its parser's."""
+    import can
+    import serial
+
+    return (can.CanError, serial.SerialException, OSError, ValueError, IndexError)
+
+
+def _selecting(bus: "BusABC") -> Callable[[float], bool] | None:
+    """How to wait for an slcan adapter's next byte; None where `recv` itself waits as it should."""
+    port = getattr(bus, "serialPortOrig", None)
+    if port is None:
+        return None
+    descriptor = port.fileno()
+    return lambda wait_s: bool(select.select([descriptor], [], [], wait_s)[0])
+
+
+def _meaning(message: "Message") -> Frame | Trouble | None:
+    """Data frames and the controller's troubles; remote and FD frames are nobody's here."""
+    if message.is_error_frame:
+        found = message.arbitration_id
+        if found & RESTARTED and not found & BUS_OFF:
+            return Trouble("", bus_off=False)
+        text = next((text for bit, text in TROUBLES.items() if found & bit), "")
+        return Trouble(text, bool(found & BUS_OFF)) if text else None
+    if message.is_remote_frame or message.is_fd:
+        return None
+    extended = EXTENDED if message.is_extended_id else 0
+    return Frame(message.arbitration_id | extended, bytes(message.data))
+
+
+def _code(error: BaseException | None) -> int:
+    """The errno of a failure, or of what it was made from."""
+    while error is not None:
+        code = getattr(error, "error_code", None) or getattr(error, "errno", None)
+        if isinstance(code, int):
+            return code
+        error = error.__cause__ or error.__context__
+    return 0
+
+
+def _shown(text: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in text[:120])

@@ -1,0 +1,70 @@
+"""Where Modbus units are: behind a TCP address, or on a serial line."""
+
+import re
+from collections.abc import Iterable
+from typing import Annotated, Literal
+
+import msgspec
+
+from bridges.core.fields import Name
+
+
+class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the module or gateway listens.
+
+    `host`: its address or name.
+    `port`: its TCP port.
+    """
+
+    host: Name
+    port: Annotated[int, msgspec.Meta(ge=1, le=65535)] = 502
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """What cannot be right about the address."""
+        if re.fullmatch(r"[^:]*:[0-9]+", self.host):
+            yield ("host",), "write the host alone; its port goes into port"
+        elif not re.fullmatch(r"[A-Za-z0-9_.:-]+", self.host):
+            yield ("host",), f"{self.host!r} is no host: write its address, 192.168.1.50 say"
+
+
+class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A serial line (RS-485), as every unit on it is set; a character has 8 data bits.
+
+    `port`: the adapter's path, best its stable one: /dev/serial/by-id/….
+    `baudrate`: bits a second.
+    `parity`: the parity bit of each character.
+    `stopbits`: stop bits of each character.
+    `ignore_echo`: the adapter hears what it sends, and it is to be dropped.
+    """
+
+    port: Name
+    baudrate: Annotated[int, msgspec.Meta(ge=300, le=1_000_000)]
+    parity: Literal["none", "even", "odd"]
+    stopbits: Literal[1, 2]
+    ignore_echo: bool = False
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """What cannot be right about the line."""
+        if not self.port.startswith("/"):
+            text = "write the whole path, as `ls /dev/serial/by-id/*` prints it"
+            yield ("port",), f"{self.port!r} is no serial port: {text}"
+
+    def warnings(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """What is legal and may be wrong one day."""
+        if re.match(r"/dev/tty(USB|ACM)", self.port):
+            text = "may be another adapter after the next start: write its /dev/serial/by-id path"
+            yield ("port",), f"{self.port} {text}"
+
+    @property
+    def character_s(self) -> float:
+        """What one character takes on the wire: start, 8 data, parity and stop bits."""
+        bits = 9 + (self.parity != "none") + self.stopbits
+        return bits / self.baudrate
+
+    @property
+    def gap_s(self) -> float:
+        """The silence between two frames: 3.5 characters, and 1.75 ms above 19200 baud.
+
+        Source: Modbus over Serial Line V1.02, 2.5.1.1.
+        """
+        return 0.00175 if self.baudrate > 19200 else 3.5 * self.character_s

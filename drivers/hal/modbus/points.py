@@ -1,0 +1,178 @@
+"""Where a point is at a Modbus module: unit, table and address, as a YAML spells them.
+
+Addresses are those on the wire: they begin at 0. Manuals often print the data model's numbers, which
+begin at 1 and carry the table in their first digit (coil 0 is 00001, discrete input 0 is 10001); such
+a number is refused with the address that is probably meant.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from drivers.hal.points import Wire
+
+Table = Literal["coil", "discrete input", "holding register", "input register"]
+"""A point is in one of the first two; registers are for `modbus_registers.py`."""
+
+GAP_MAX: Final = 8
+"""Addresses between two points that are rather read along than asked for in two requests."""
+BITS_MAX: Final = 2000
+"""The most bits that one reply can carry (Modbus Application Protocol V1.1b3, 6.1 and 6.2)."""
+
+_MODEL_DIGIT: Final[dict[Table, int]] = {"coil": 0, "discrete input": 1}
+_SPELLING: Final = re.compile(
+    r"unit\s*(?P<unit>[0-9]+)[\s,]+(?P<table>[a-z][a-z\s_-]*?)[\s_]*(?P<address>0x[0-9a-f]+|[0-9]+)"
+)
+_HOW: Final = "write 'unit 1 coil 0' or 'unit 1 discrete input 0'; addresses begin at 0"
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Point:
+    """One bit of one unit. `str` of it is its one spelling."""
+
+    unit: int
+    table: Table
+    address: int
+
+    def __str__(self) -> str:
+        plain = str(self.address)
+        address = f"0x{self.address:x}" if _is_model_number(self.table, plain) else plain
+        return f"unit {self.unit} {self.table} {address}"
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Bits of one table that are read with one request."""
+
+    unit: int
+    table: Table
+    start: int
+    count: int
+
+    def __str__(self) -> str:
+        if self.count == 1:
+            return f"{self.table} {self.start}"
+        return f"{self.table}s {self.start} to {self.start + self.count - 1}"
+
+    def points(self) -> list[Point]:
+        """Every point in it, in the order of the reply's bits."""
+        return [Point(self.unit, self.table, self.start + i) for i in range(self.count)]
+
+
+def parse(text: str) -> Point:
+    """A point from any spelling of it. Raises ValueError with what to write instead."""
+    words = _SPELLING.fullmatch(text.strip().lower())
+    if not words:
+        raise ValueError(f"{text!r} is not a Modbus point: {_how(text)}")
+    unit, table = int(words["unit"]), _table(text, words["table"])
+    if unit > 247 and unit != 255:
+        raise ValueError(f"unit {unit} does not exist: units are 0 to 247, and 255 on Modbus TCP")
+    return Point(unit, table, _address(table, words["address"]))
+
+
+def canonical(point: str) -> str:
+    """`Unit 1 COIL 0` is `unit 1 coil 0`. Raises ValueError with what to write instead."""
+    return str(parse(point))
+
+
+def describe(point: str) -> str:
+    """With the number that a manual would print: `unit 1 coil 0 (00001)`."""
+    found = parse(point)
+    return f"{found} ({_MODEL_DIGIT[found.table]}{found.address + 1:04})"
+
+
+def wire_problems(wire: Wire) -> Iterable[str]:
+    """What cannot be right about this wire at a Modbus module."""
+    try:
+        point = parse(wire.point)
+    except ValueError:
+        return  # reported where points are spelled
+    if wire.pull is not None:
+        yield "pull is for GPIO pins; the module has its own: leave it out"
+    if wire.direction == "in":
+        return
+    yield from _flash_problems(wire, point)
+    if point.table != "coil":
+        yield f"an output is a coil, and a {point.table} can only be read"
+    if wire.active == "low":
+        yield (
+            "active: low would switch it on whenever the module restarts with its coils at 0:"
+            " use the relay's normally open contact and write active: high"
+        )
+
+
+def _flash_problems(wire: Wire, output: Point) -> Iterable[str]:
+    if wire.flash is None:
+        return
+    flash = parse(wire.flash.point)
+    if flash.table != "coil":
+        yield f"flash is asked for with a write to a coil, not to a {flash.table}"
+    if flash.unit != output.unit:
+        yield f"flash is at unit {flash.unit}, and the relay at unit {output.unit}: one is wrong"
+
+
+def ranges(points: Iterable[Point], gap: int = GAP_MAX) -> list[Range]:
+    """The fewest sensible requests that read all of these; gaps up to `gap` are read along."""
+    found: list[Range] = []
+    for point in sorted(set(points)):
+        last = found[-1] if found else None
+        if last and _joins(last, point, gap):
+            found[-1] = Range(last.unit, last.table, last.start, point.address - last.start + 1)
+        else:
+            found.append(Range(point.unit, point.table, point.address, 1))
+    return found
+
+
+def pieces(whole: Range, points: Iterable[Point]) -> Sequence[Range]:
+    """The parts of a range that hold nothing but these points."""
+    return ranges(set(points).intersection(whole.points()), gap=0)
+
+
+def _joins(last: Range, point: Point, gap: int) -> bool:
+    same = (last.unit, last.table) == (point.unit, point.table)
+    near = point.address - (last.start + last.count) <= gap
+    return same and near and point.address - last.start < BITS_MAX
+
+
+def _table(text: str, words: str) -> Table:
+    name = " ".join(re.split(r"[\s_-]+", words.strip()))
+    if name in _MODEL_DIGIT:
+        return name
+    if "register" in name:
+        raise ValueError(f"{text!r}: a contact or relay is one bit, and a register is none: {_HOW}")
+    if name == "input":
+        raise ValueError(f"{text!r}: say which input: 'discrete input'")
+    raise ValueError(f"{text!r}: there is no table {name!r}: {_HOW}")
+
+
+def _address(table: Table, text: str) -> int:
+    address = int(text, 16) if text.startswith("0x") else int(text)
+    if address > 65535:
+        raise ValueError(f"address {text} does not exist: addresses are 0 to 65535")
+    if _is_model_number(table, text):
+        raise ValueError(_model_number(table, text, address))
+    return address
+
+
+def _is_model_number(table: Table, text: str) -> bool:
+    if text.startswith("0"):
+        return len(text) > 1 and not text.startswith("0x")
+    return table == "discrete input" and len(text) == 5 and text.startswith("1")
+
+
+def _model_number(table: Table, text: str, number: int) -> str:
+    meant = int(text[1:]) - 1
+    hint = f"write {table} {meant}" if meant >= 0 else "the first one is address 0"
+    return (
+        f"{text} looks like a number of the data model, which begins at 1: {hint}; or 0x{number:x} if"
+        f" {number} really is the address on the wire"
+    )
+
+
+def _how(text: str) -> str:
+    number = re.fullmatch(r"\s*(?P<table>[01])(?P<address>[0-9]{4,5})\s*", text)
+    if not number or int(number["address"]) == 0:
+        return _HOW
+    table = "coil" if number["table"] == "0" else "discrete input"
+    return f"write 'unit 1 {table} {int(number['address']) - 1}' with the right unit"

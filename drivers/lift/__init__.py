@@ -1,0 +1,1 @@
+"""Drivers for lifts: a file for each way of wiring one."""

@@ -1,0 +1,234 @@
+"""What cannot be right about a lift's wiring, what is unsafe, and what deserves a second look."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+
+from bridges.lift.signals import Hazard, Side
+from drivers.hal.points import Wire
+from drivers.lift import codes
+from drivers.lift.table import MOTION, input_rows, wires
+from drivers.lift.wiring import FloorCode, LiftWiring
+from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
+
+Problem = tuple[tuple[str, ...], str]
+"""Where (path below the device), and what is wrong with the fix."""
+
+ALARMS = (Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY)
+
+
+def problems(wiring: LiftWiring) -> Iterator[Problem]:
+    """What keeps the daemon from starting."""
+    found = [
+        *_floors(wiring),
+        *_floor_code(wiring.floor_code, wiring.levels()),
+        *_calls(wiring),
+        *_doors(wiring),
+        *_motion(wiring),
+        *_agv(wiring),
+        *_service(wiring),
+    ]
+    yield from found
+    if not found:
+        yield from unaccepted(unsafe(wiring), wiring.accept_unsafe)
+
+
+def warnings(wiring: LiftWiring) -> Iterator[Problem]:
+    """What works and deserves a second look."""
+    table = {w.signal: w for w in wires(wiring)}
+    if wiring.inputs.agv_mode is None and not _in_service(wiring, "agv_mode"):
+        yield ("inputs",), "no agv_mode: the lift cannot confirm that it obeys"
+    if Hazard.FIRE not in table and not _in_service(wiring, Hazard.FIRE):
+        yield ("inputs",), "no fire_alarm: a fire recall would not be seen"
+    for hazard in ALARMS:
+        for _, path, text in _cut(table, hazard, True, f"{hazard} reads clear"):
+            yield path, text
+    for signal in ("moving", "stopped", "up", "down"):
+        reads_standing = signal == "stopped"
+        for _, path, text in _cut(table, signal, not reads_standing, "the car reads standing"):
+            yield path, text
+    confused = "; ".join(_confusions(wiring.floor_code, table))
+    if confused:
+        yield ("floor_code",), f"{confused}: ask for a parity line, or for codes two lines apart"
+    needed = {signal for signal, _, _ in unsafe(wiring)}
+    for signal in wiring.accept_unsafe.keys() - needed:
+        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
+
+
+def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
+    """What must be accepted by name, because a cut wire or a power-on could hurt."""
+    table = {w.signal: w for w in wires(wiring)}
+    yield from _cut(table, Hazard.FIRE, True, "a fire alarm reads clear")
+    yield from _cut(table, "agv_mode", False, "AGV mode reads on")
+    for prefix in ("door", "rear_door"):
+        single = getattr(wiring.inputs, prefix)
+        if single:
+            wanted = single.proves == "closed"
+            yield from _cut(table, prefix, wanted, f"the {prefix} reads open")
+        yield from _cut(table, f"{prefix}_opened", False, f"the {prefix} reads open")
+    yield from _dead_code(wiring.floor_code, table)
+    yield from energised_at_boot(table.values())
+
+
+def _cut(table: Mapping[str, Wire], signal: str, asserted: bool, meaning: str) -> Iterable[Unsafe]:
+    return cut_must_read(table[signal], asserted, meaning) if signal in table else ()
+
+
+def _floors(wiring: LiftWiring) -> Iterator[Problem]:
+    stops = wiring.stops()
+    if not stops:
+        yield ("floors",), "no floors: name those of RMF's map that this lift serves"
+    if len(stops) != len(wiring.floors):
+        yield ("floors",), "a floor is named twice: delete one"
+    seen: dict[object, str] = {}
+    for name, stop in stops.items():
+        if stop in seen:
+            yield (
+                ("floors", name),
+                f"{name} and {seen[stop]} are the same door of landing {stop.level}",
+            )
+        seen[stop] = name
+
+
+def _named(
+    what: str, section: tuple[str, ...], named: Collection[str], levels: Collection[str]
+) -> Iterator[Problem]:
+    """Every landing has one, and nothing else has."""
+    for level in named:
+        if level not in levels:
+            yield section, f"{level!r} is no landing of this lift, which has {', '.join(levels)}"
+    for level in levels:
+        if level not in named:
+            yield section, f"no {what} for {level}"
+
+
+def _floor_code(code: FloorCode, levels: list[str]) -> Iterator[Problem]:
+    if code.encoding == "one_hot":
+        yield from _named("line", ("floor_code", "lines"), code.lines, levels)
+        if code.bits or code.codes or code.parity:
+            yield ("floor_code",), "one_hot has lines, and no bits, codes or parity"
+        return
+    if code.lines:
+        yield ("floor_code", "lines"), f"{code.encoding} has bits and codes; lines are for one_hot"
+    if not code.bits:
+        yield ("floor_code",), "no bits: list the lines, least significant first"
+    yield from _named("code", ("floor_code", "codes"), set(code.codes.values()), levels)
+    for number in (*code.codes, *code.between_floors):
+        try:
+            codes.encode(code.encoding, number, len(code.bits))
+        except ValueError as error:
+            section = "codes" if number in code.codes else "between_floors"
+            yield ("floor_code", section, str(number)), str(error)
+    for number in code.codes:
+        if number in code.between_floors:
+            yield (
+                ("floor_code", "codes", str(number)),
+                f"{number} is {code.codes[number]} here and means between floors as well: write"
+                f" between_floors: {[n for n in code.between_floors if n not in code.codes]}",
+            )
+
+
+def _calls(wiring: LiftWiring) -> Iterator[Problem]:
+    code = wiring.call_code
+    if code is None:
+        yield from _named("call", ("calls",), wiring.calls, wiring.levels())
+        return
+    if wiring.calls:
+        yield ("calls",), "calls and call_code are two ways of calling: keep one"
+    yield from _named("code", ("call_code", "codes"), set(code.codes.values()), wiring.levels())
+    for number in code.codes:
+        if number == 0 or number >> len(code.bits):
+            why = "0 is no call" if number == 0 else f"{number} does not fit on the bits"
+            yield ("call_code", "codes", str(number)), why
+
+
+def _doors(wiring: LiftWiring) -> Iterator[Problem]:
+    inputs, outputs = wiring.inputs, wiring.outputs
+    rear = any(stop.side is Side.REAR for stop in wiring.stops().values())
+    for prefix, needed in (("door", True), ("rear_door", rear)):
+        single = getattr(inputs, prefix)
+        two = [getattr(inputs, f"{prefix}_{end}") for end in ("opened", "closed")]
+        if single and any(two):
+            yield ("inputs", prefix), f"{prefix} is the only contact: delete the others, or this"
+        elif any(two) and not all(two):
+            have = f"{prefix}_opened" if two[0] else f"{prefix}_closed"
+            end = "open" if two[0] else "closed"
+            yield ("inputs", have), f"with one contact, write {prefix}: {{…, proves: {end}}}"
+        elif needed and not single and not any(two):
+            yield ("inputs",), f"no {prefix} contact: {prefix}, or {prefix}_opened and _closed"
+        elif not needed and (single or any(two)):
+            yield ("inputs",), "a rear door is wired, and no floor has side: rear"
+    if rear and outputs.door_open and not outputs.rear_door_open:
+        yield ("outputs",), "no rear_door_open, and some floors have side: rear"
+
+
+def _motion(wiring: LiftWiring) -> Iterator[Problem]:
+    have = [name for name in MOTION if getattr(wiring.inputs, name) is not None]
+    if have not in ([], ["moving"], ["stopped"], ["up", "down"], ["motion"]):
+        yield (
+            ("inputs", have[0]),
+            f"motion is moving, or stopped, or up with down, or motion; not {' with '.join(have)}",
+        )
+    motion = wiring.inputs.motion
+    if motion is None:
+        return
+    shown = set(motion.codes.values())
+    if "stopped" not in shown or not ("moving" in shown or {"up", "down"} <= shown):
+        yield (
+            ("inputs", "motion", "codes"),
+            "needs a code for stopped, and for moving or up and down",
+        )
+    for number in motion.codes:
+        if number >> len(motion.bits):
+            yield ("inputs", "motion", "codes", str(number)), f"{number} does not fit on the bits"
+
+
+def _agv(wiring: LiftWiring) -> Iterator[Problem]:
+    by_line, by_code = wiring.inputs.agv_mode, _in_service(wiring, "agv_mode")
+    if by_line and by_code:
+        yield ("inputs", "agv_mode"), "service shows agv_mode too: keep one"
+    for signal, path, line in input_rows(wiring):
+        if not line.valid_when:
+            continue
+        if not by_line and not by_code:
+            yield path, "valid_when: agv_mode needs an agv_mode input"
+        elif signal == "agv_mode" or signal.startswith("service_"):
+            yield path, f"{signal} itself tells AGV mode: delete valid_when"
+
+
+def _service(wiring: LiftWiring) -> Iterator[Problem]:
+    service = wiring.inputs.service
+    if service is None:
+        return
+    every = set(range(2 ** len(service.bits)))
+    for number in sorted(every - service.codes.keys()):
+        yield ("inputs", "service", "codes"), f"{number} is missing: say what it means"
+    for number in sorted(service.codes.keys() - every):
+        yield ("inputs", "service", "codes", str(number)), f"{number} does not fit on the bits"
+
+
+def _in_service(wiring: LiftWiring, state: str) -> bool:
+    service = wiring.inputs.service
+    return service is not None and state in service.codes.values()
+
+
+def _dead_code(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
+    """All lines cut at once (a cable, a supply) must not be a floor."""
+    lines = [signal for signal, _, _ in code.inputs()]
+    level, _ = code.read({signal: bool(table[signal].broken_reads()) for signal in lines})
+    if level is not None:
+        yield (
+            lines[0],
+            ("floor_code",),
+            f"with the floor code's cable cut, the car reads at {level}",
+        )
+
+
+def _confusions(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[str]:
+    """One cut line must not turn a floor's code into another floor's."""
+    for level in dict.fromkeys((*code.codes.values(), *code.lines)):
+        shown = code.show(level)
+        for signal in shown:
+            reads = table[signal].broken_reads()
+            for cut in (False, True) if reads is None else (reads,):
+                other, _ = code.read({**shown, signal: cut})
+                if other not in (None, level):
+                    yield f"with {signal} cut, {level} reads as {other}"

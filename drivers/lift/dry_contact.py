@@ -1,0 +1,170 @@
+"""A lift on dry contacts: one line per meaning, or numbers on several lines, as the YAML says.
+
+The points may be GPIO pins, or coils and discrete inputs of a Modbus I/O module.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import cast
+
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from drivers.hal.points import Points, PointsBus, Wire
+from drivers.lift import checks as lift_checks
+from drivers.lift import codes
+from drivers.lift import table as lift_table
+from drivers.lift.wiring import Inputs, LiftWiring
+
+BUSES = ("gpio", "modbus")
+
+DOOR = {
+    (True, False): Door.OPEN,
+    (False, True): Door.CLOSED,
+    (False, False): Door.BETWEEN,
+    (True, True): Door.BOTH,
+}
+"""(opened, closed) contacts."""
+
+UP_DOWN = {
+    (True, False): Motion.UP,
+    (False, True): Motion.DOWN,
+    (False, False): Motion.STOPPED,
+    (True, True): Motion.CONTRADICTORY,
+}
+
+
+class Settings(LiftWiring, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A lift on dry contacts."""
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """What cannot be right, and what is unsafe and not accepted."""
+        return lift_checks.problems(self)
+
+
+def wires(settings: Settings) -> list[Wire]:
+    """The wiring table."""
+    return lift_table.wires(settings)
+
+
+def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+    """What works and deserves a second look: (path below the device, text)."""
+    return lift_checks.warnings(settings)
+
+
+def debounce(settings: Settings) -> Mapping[str, float]:
+    """How long a change must last (s): `floor`, `door`, `rear_door`, `motion`, `agv_mode`, hazards."""
+    return lift_table.debounce(settings)
+
+
+def create(name: str, settings: Settings, bus: object) -> "LiftDryContact":
+    """The driver of one lift. `bus` has points (GPIO or Modbus)."""
+    return LiftDryContact(settings, cast(PointsBus, bus))
+
+
+class LiftDryContact:
+    """One lift (`drivers.Driver[LiftSample, LiftOutputs]`)."""
+
+    def __init__(self, settings: Settings, bus: PointsBus) -> None:
+        self._settings = settings
+        self._conditional = lift_table.conditional(settings)
+        self._points = Points(wires(settings), bus)
+
+    def open(self) -> None:
+        """Claim every output, off, and every input."""
+        self._points.open()
+
+    def read(self) -> LiftSample:
+        """Every input, read now and decoded."""
+        return decode(self._settings, self._points.read(), self._conditional)
+
+    def write(self, outputs: LiftOutputs) -> None:
+        """Bring every output to this level; what goes off goes first."""
+        self._points.write(encode(self._settings, outputs))
+
+    def make_safe(self) -> None:
+        """Every output off."""
+        self._points.make_safe()
+
+    def close(self) -> None:
+        """Outputs off and let go."""
+        self._points.close()
+
+
+def encode(settings: Settings, outputs: LiftOutputs) -> dict[str, bool]:
+    """Signal -> asserted. Signals that are not wired are left out by the points layer."""
+    calls = {f"call_{level}": level == outputs.call for level in settings.calls}
+    if settings.call_code:
+        calls = settings.call_code.lines(outputs.call)
+    return {
+        "agv_mode_request": outputs.agv_request,
+        "door_open": outputs.hold_door is Side.FRONT,
+        "rear_door_open": outputs.hold_door is Side.REAR,
+        **calls,
+    }
+
+
+def decode(
+    settings: Settings, shown: Mapping[str, bool], conditional: frozenset[str]
+) -> LiftSample:
+    """What the lines say (signal -> asserted). `conditional`: what counts only in AGV mode."""
+    inputs = settings.inputs
+    service = _service(inputs, shown)
+    agv = _agv(inputs, shown, service)
+    unknown = frozenset() if agv else conditional
+    level, code_fault = (None, "") if "floor" in unknown else settings.floor_code.read(shown)
+    front = Door.BETWEEN if "door" in unknown else _door(inputs, "door", shown)
+    rear = Door.BETWEEN if "rear_door" in unknown else _door(inputs, "rear_door", shown)
+    return LiftSample(
+        level=level,
+        door=front or Door.BETWEEN,
+        code_fault=code_fault,
+        rear_door=rear,
+        motion=None if "motion" in unknown else _motion(inputs, shown),
+        agv=agv,
+        hazards=frozenset(
+            h for h in Hazard if h == service or (h not in unknown and shown.get(h, False))
+        ),
+    )
+
+
+def _service(inputs: Inputs, shown: Mapping[str, bool]) -> str | None:
+    if inputs.service is None:
+        return None
+    return inputs.service.codes[_number("service", len(inputs.service.bits), shown)]
+
+
+def _agv(inputs: Inputs, shown: Mapping[str, bool], service: str | None) -> bool | None:
+    if inputs.agv_mode:
+        return shown["agv_mode"]
+    if inputs.service and "agv_mode" in inputs.service.codes.values():
+        return service == "agv_mode"
+    return None
+
+
+def _door(inputs: Inputs, prefix: str, shown: Mapping[str, bool]) -> Door | None:
+    single = getattr(inputs, prefix)
+    if single and single.proves == "open":
+        return Door.OPEN if shown[prefix] else Door.NOT_OPEN
+    if single:
+        return Door.CLOSED if shown[prefix] else Door.NOT_CLOSED
+    if f"{prefix}_opened" not in shown:
+        return None
+    return DOOR[shown[f"{prefix}_opened"], shown[f"{prefix}_closed"]]
+
+
+def _motion(inputs: Inputs, shown: Mapping[str, bool]) -> Motion | None:
+    if inputs.moving:
+        return Motion.MOVING if shown["moving"] else Motion.STOPPED
+    if inputs.stopped:
+        return Motion.STOPPED if shown["stopped"] else Motion.MOVING
+    if inputs.up:
+        return UP_DOWN[shown["up"], shown["down"]]
+    if inputs.motion:
+        number = _number("motion", len(inputs.motion.bits), shown)
+        known = inputs.motion.codes.get(number)
+        return Motion(known) if known else Motion.CONTRADICTORY
+    return None
+
+
+def _number(prefix: str, width: int, shown: Mapping[str, bool]) -> int:
+    number = codes.decode("binary", [shown[f"{prefix}_bit{i}"] for i in range(width)])
+    assert number is not None  # binary shows any number
+    return number

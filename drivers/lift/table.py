@@ -1,0 +1,94 @@
+"""A lift's wiring as a table: a row for each line, with its signal, place and debounce."""
+
+from collections.abc import Iterator
+
+from bridges.lift.signals import Hazard
+from drivers.hal.points import Output, Wire
+from drivers.lift.wiring import LiftInput, LiftWiring
+
+DEBOUNCE_S = {"floor": 0.08, "door": 0.1, "rear_door": 0.1, "motion": 0.05, "agv_mode": 0.05}
+"""What each group of signals must last by default; hazards and service codes HAZARD_DEBOUNCE_S.
+
+A door that seems open for 50 ms while the car passes a floor is a glitch, and where no motion line is
+wired nothing else would tell.
+"""
+
+HAZARD_DEBOUNCE_S = 0.05
+MOTION = ("moving", "stopped", "up", "down", "motion")
+
+Row = tuple[str, tuple[str, ...], LiftInput]
+
+
+def input_rows(wiring: LiftWiring) -> Iterator[Row]:
+    """Each input line: its signal, its path below the device, and itself."""
+    for name in wiring.inputs.__struct_fields__:
+        found = getattr(wiring.inputs, name)
+        if isinstance(found, LiftInput):
+            yield name, ("inputs", name), found
+        elif found is not None:
+            for i, bit in enumerate(found.bits):
+                yield f"{name}_bit{i}", ("inputs", name, "bits", str(i)), bit
+    for signal, path, line in wiring.floor_code.inputs():
+        yield signal, ("floor_code", *path), line
+
+
+def output_rows(wiring: LiftWiring) -> Iterator[tuple[str, tuple[str, ...], Output]]:
+    """Each output line: its signal, its path below the device, and itself."""
+    for name in wiring.outputs.__struct_fields__:
+        output = getattr(wiring.outputs, name)
+        if output is not None:
+            yield name, ("outputs", name), output
+    for level, output in wiring.calls.items():
+        yield f"call_{level}", ("calls", level), output
+    for i, output in enumerate(wiring.call_code.bits if wiring.call_code else ()):
+        yield f"call_bit{i}", ("call_code", "bits", str(i)), output
+
+
+def wires(wiring: LiftWiring) -> list[Wire]:
+    """The table, inputs first, with every debounce filled in."""
+    return [
+        *(
+            Wire(signal, "in", line.point, line.active, line.pull, _debounce_s(signal, line), path)
+            for signal, path, line in input_rows(wiring)
+        ),
+        *(
+            Wire(signal, "out", line.point, line.active, path=path)
+            for signal, path, line in output_rows(wiring)
+        ),
+    ]
+
+
+def group(signal: str) -> str:
+    """What a line is a part of: `floor`, `door`, `rear_door`, `motion`, `service`, or itself."""
+    for name in ("floor", "door", "rear_door", "motion", "service"):
+        if signal == name or signal.startswith(f"{name}_"):
+            return name
+    return "motion" if signal in MOTION else signal
+
+
+def debounce(wiring: LiftWiring) -> dict[str, float]:
+    """How long a change of each group must last (s): the longest of its lines.
+
+    A state of the service code is debounced as its lines are.
+    """
+    longest: dict[str, float] = {}
+    for signal, _, line in input_rows(wiring):
+        name = group(signal)
+        longest[name] = max(longest.get(name, 0.0), _debounce_s(signal, line))
+    service_s = longest.pop("service", 0.0)
+    states = wiring.inputs.service.codes.values() if wiring.inputs.service else ()
+    for state in states:
+        if state in (*Hazard, "agv_mode"):
+            longest[state] = max(longest.get(state, 0.0), service_s)
+    return longest
+
+
+def conditional(wiring: LiftWiring) -> frozenset[str]:
+    """The groups that mean something only in AGV mode."""
+    return frozenset(group(s) for s, _, line in input_rows(wiring) if line.valid_when)
+
+
+def _debounce_s(signal: str, line: LiftInput) -> float:
+    if line.debounce_s is not None:
+        return line.debounce_s
+    return DEBOUNCE_S.get(group(signal), HAZARD_DEBOUNCE_S)

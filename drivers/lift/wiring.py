@@ -1,0 +1,230 @@
+"""A lift's wiring as the YAML has it. Sites differ in every signal, so all of it is configuration."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Literal
+
+import msgspec
+
+from bridges.core.fields import Name
+from bridges.lift.settings import LiftSettings
+from drivers.hal.points import Input, Output
+from drivers.lift import codes
+
+Number = Annotated[int, msgspec.Meta(ge=0, le=65535)]
+"""A number that a controller shows on several lines."""
+
+
+class LiftInput(Input, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One line from the lift.
+
+    `valid_when`: with `agv_mode` the line means something only while AGV mode is on. Outside it a
+    floor or motion is not known, a door is neither open nor closed, and a hazard is not there.
+    """
+
+    valid_when: Literal["agv_mode"] | None = None
+
+
+class DoorInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The only contact of a door.
+
+    `proves`: what is sure when it is asserted; the other end is estimated by `door_travel_s`.
+    """
+
+    proves: Literal["open", "closed"]
+
+
+class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A line that makes a broken line of the code show.
+
+    `total`: whether the asserted lines of the code, this one included, are even or odd in number.
+    """
+
+    total: Literal["even", "odd"]
+
+
+class MotionCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Motion as a number on several lines.
+
+    `bits`: least significant first.
+    `codes`: number -> motion; a number not listed is a fault.
+    """
+
+    bits: list[LiftInput]
+    codes: dict[Number, Literal["stopped", "up", "down", "moving"]]
+
+
+ServiceState = Literal[
+    "normal",
+    "agv_mode",
+    "fire_alarm",
+    "code_blue",
+    "earthquake",
+    "emergency",
+    "out_of_service",
+    "manual_mode",
+    "overload",
+]
+
+
+class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The lift's service state as a number on several lines.
+
+    `bits`: least significant first.
+    `codes`: number -> state; every number must be listed.
+    """
+
+    bits: list[LiftInput]
+    codes: dict[Number, ServiceState]
+
+
+class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the lift tells us.
+
+    A hazard takes the lift away from RMF at once. A door has one contact or two. Motion is one of:
+    `moving`, `stopped`, `up` with `down`, or a code.
+
+    `fire_alarm`: fire, shown as MODE_FIRE; latched with `fire_reset: manual`.
+    `code_blue`, `earthquake`, `emergency`: shown as MODE_EMERGENCY.
+    `out_of_service`, `manual_mode`: shown as MODE_OFFLINE; the second is the key switch.
+    `overload`: delays the ride, and nothing else.
+    `agv_mode`: AGV mode is on; or one state of `service`.
+    `service`: the lift's service state as a code.
+    `door`, `rear_door`: the door's only contact.
+    `door_opened`, `rear_door_opened`: the contact at the open end, with one at the closed end.
+    `door_closed`, `rear_door_closed`: the contact at the closed end, with one at the open end.
+    `moving`: the car moves, whichever way.
+    `stopped`: the car stands.
+    `up`, `down`: the car moves that way; neither is standing still.
+    `motion`: motion as a code.
+    """
+
+    fire_alarm: LiftInput | None = None
+    code_blue: LiftInput | None = None
+    earthquake: LiftInput | None = None
+    emergency: LiftInput | None = None
+    out_of_service: LiftInput | None = None
+    manual_mode: LiftInput | None = None
+    overload: LiftInput | None = None
+    agv_mode: LiftInput | None = None
+    service: ServiceCode | None = None
+    door: DoorInput | None = None
+    door_opened: LiftInput | None = None
+    door_closed: LiftInput | None = None
+    rear_door: DoorInput | None = None
+    rear_door_opened: LiftInput | None = None
+    rear_door_closed: LiftInput | None = None
+    moving: LiftInput | None = None
+    stopped: LiftInput | None = None
+    up: LiftInput | None = None
+    down: LiftInput | None = None
+    motion: MotionCode | None = None
+
+
+class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the car is.
+
+    `encoding`: how the lines say it; `one_hot` is one line for each landing.
+    `bits`: the lines that show a number, least significant first.
+    `codes`: number -> landing.
+    `parity`: a line that makes a broken one show.
+    `lines`: with `one_hot`, landing -> its line; none on is between floors.
+    `between_floors`: the numbers that mean no landing. One that is neither this nor a landing's is a
+    fault.
+    """
+
+    encoding: Literal["binary", "gray", "bcd", "one_hot"]
+    bits: list[LiftInput] = msgspec.field(default_factory=list)
+    codes: dict[Number, Name] = msgspec.field(default_factory=dict)
+    parity: ParityInput | None = None
+    lines: dict[Name, LiftInput] = msgspec.field(default_factory=dict)
+    between_floors: list[Number] = msgspec.field(default_factory=lambda: [0])
+
+    def inputs(self) -> Iterator[tuple[str, tuple[str, ...], LiftInput]]:
+        """Each line: its signal, its path below this section, and itself."""
+        for i, bit in enumerate(self.bits):
+            yield f"floor_bit{i}", ("bits", str(i)), bit
+        for level, line in self.lines.items():
+            yield f"floor_{level}", ("lines", level), line
+        if self.parity:
+            yield "floor_parity", ("parity",), self.parity
+
+    def read(self, shown: Mapping[str, bool]) -> tuple[str | None, str]:
+        """The landing (None between floors), and "" or why the code cannot be."""
+        if self.encoding == "one_hot":
+            on = [level for level in self.lines if shown[f"floor_{level}"]]
+            if len(on) > 1:
+                return None, f"the lines of {' and '.join(on)} are on at once"
+            return (on[0] if on else None), ""
+        lines = [shown[f"floor_bit{i}"] for i in range(len(self.bits))]
+        if self.parity and (sum(lines) + shown["floor_parity"]) % 2 != (self.parity.total == "odd"):
+            return None, f"parity is not {self.parity.total}: a line is broken"
+        number = codes.decode(self.encoding, lines)
+        if number is None:
+            return None, "a BCD digit above 9"
+        if number in self.codes:
+            return self.codes[number], ""
+        return None, "" if number in self.between_floors else f"code {number} is no floor's"
+
+    def show(self, level: str | None) -> dict[str, bool]:
+        """The lines that a controller asserts at a landing. ValueError where there is no code."""
+        if self.encoding == "one_hot":
+            return {f"floor_{name}": name == level for name in self.lines}
+        numbers = [n for n, name in self.codes.items() if name == level]
+        if level is None:
+            numbers = self.between_floors
+        if not numbers:
+            raise ValueError(f"no code for {level or 'between floors'}")
+        lines = codes.encode(self.encoding, numbers[0], len(self.bits))
+        shown = {f"floor_bit{i}": on for i, on in enumerate(lines)}
+        if self.parity:
+            shown["floor_parity"] = sum(lines) % 2 != (self.parity.total == "odd")
+        return shown
+
+
+class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Calls as a binary number on several lines; 0 is no call.
+
+    `bits`: least significant first.
+    `codes`: number -> landing.
+    """
+
+    bits: list[Output]
+    codes: dict[Number, Name]
+
+    def lines(self, level: str | None) -> dict[str, bool]:
+        """The lines to assert for a call to this landing."""
+        number = next((n for n, name in self.codes.items() if name == level), 0)
+        return {f"call_bit{i}": bool(number >> i & 1) for i in range(len(self.bits))}
+
+
+class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What we ask of the lift, besides calls. Each is a level, and off is its safe state.
+
+    `agv_mode_request`: asks for AGV mode for as long as a robot holds the lift.
+    `door_open`, `rear_door_open`: holds that door open where the car stands.
+    """
+
+    agv_mode_request: Output | None = None
+    door_open: Output | None = None
+    rear_door_open: Output | None = None
+
+
+class LiftWiring(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A lift on dry contacts, behind GPIO pins or a Modbus I/O module.
+
+    `inputs`: the lines from the lift.
+    `floor_code`: where the car is.
+    `outputs`: the lines to the lift, but for calls.
+    `calls`: landing -> its line; or `call_code`.
+    `call_code`: calls as a number on several lines.
+    """
+
+    inputs: Inputs
+    floor_code: FloorCode
+    outputs: Outputs
+    calls: dict[Name, Output] = msgspec.field(default_factory=dict)
+    call_code: CallCode | None = None
+
+    def levels(self) -> list[str]:
+        """The landings, from the lowest up."""
+        return list(dict.fromkeys(stop.level for stop in self.stops().values()))

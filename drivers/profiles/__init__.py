@@ -1,0 +1,91 @@
+"""Profiles: a make's registers and habits as a file, drivers/profiles/NAME.yaml, for `profile: NAME`.
+
+    for: door_register       what reads it
+    hardware: untried        has somebody `tried` it on the hardware? `none`: an example of no make
+    source: "..."            where its numbers are from
+    map: {...}               what it says, under the key that would hold it in a device YAML
+
+It is read like a device YAML, and a problem has its file, line and column.
+"""
+
+import functools
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+from msgspec.inspect import LiteralType
+
+from bridges.core.fields import Name
+from bridges.settings.nodes import Page, SettingsError, compose, either, read, unknown
+from bridges.settings.values import BROKEN, Spot, Values
+
+FOLDER: Final = Path(__file__).parent
+
+
+class Profile:
+    """One sort of profile. `reader`: its `for:`; `key`: where its content is; `content`: a struct."""
+
+    def __init__(self, reader: str, key: str, content: type[msgspec.Struct]) -> None:
+        self.reader = reader
+        self.key = key
+        self._content = content
+
+    def names(self, folder: Path = FOLDER) -> list[str]:
+        """The profiles of this sort that there are."""
+        first = f"for: {self.reader}"
+        files = sorted(folder.glob("*.yaml"))
+        return [f.stem for f in files if first in f.read_text("utf-8").splitlines()]
+
+    def load(self, name: str, folder: Path = FOLDER) -> Any:
+        """What a profile says. Raises SettingsError with every problem of the file."""
+        return self._read(folder / f"{name}.yaml")[self.key]
+
+    def untried(self, name: str) -> bool:
+        """Is it of a make, and nobody has tried it?"""
+        return bool(self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried")
+
+    def _read(self, file: Path) -> dict[str, Any]:
+        return _read(file, self.reader, self.key, self._content)
+
+
+@functools.cache
+def _read(file: Path, reader: str, key: str, content: type[msgspec.Struct]) -> dict[str, Any]:
+    page = Page(str(file))
+    root = compose(page, read(page.file))
+    spot, values = Spot(root, root, "the file"), Values(page)
+    types: dict[str, Any] = {
+        "for": LiteralType((reader,)),
+        "hardware": LiteralType(("tried", "untried", "none")),
+        "source": Name,
+        key: content,
+    }
+    found = values.known(values.entries(spot), spot, dict.fromkeys(types, "see drivers/profiles/"))
+    made = {name: values.make(types[name], entry.spot()) for name, entry in found.items()}
+    page.check()
+    assert BROKEN not in made.values()
+    return made
+
+
+def profile_problems(
+    sort: Profile, name: str | None, inline: object
+) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What is wrong about `profile:` and the key that stands in its place."""
+    if name is None and inline is None:
+        text = f"needs '{sort.key}', or a profile: {either(sort.names())}"
+        yield ("profile",), text
+    elif name is not None and inline is not None:
+        yield ("profile",), f"'{sort.key}' is written out as well: delete one of the two"
+    elif name is not None:
+        yield from _named(sort, name)
+
+
+def _named(sort: Profile, name: str) -> Iterator[tuple[tuple[str, ...], str]]:
+    if name not in sort.names():
+        yield ("profile",), unknown("profile", name, sort.names())
+        return
+    try:
+        sort.load(name)
+    except SettingsError as error:
+        for problem in error.problems:
+            yield ("profile",), f"the profile is not right: {problem}"

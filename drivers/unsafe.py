@@ -1,0 +1,49 @@
+"""Wiring that works and is not safe: what a cut wire is taken for, and relays that pull in at boot.
+
+An unsafe choice is a problem unless `accept_unsafe: {signal: reason}` accepts it.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from drivers.hal import gpio
+from drivers.hal.points import Wire
+
+Unsafe = tuple[str, tuple[str, ...], str]
+"""A signal, where the YAML has it, and what is unsafe about it."""
+
+
+def cut_must_read(wire: Wire, asserted: bool, meaning: str) -> Iterator[Unsafe]:
+    """Unsafe unless a cut wire reads as this; `meaning` is what is said of one that does not."""
+    reads = wire.broken_reads()
+    if reads is None:
+        yield wire.signal, wire.path, f"a cut wire floats (pull: none), and {meaning}"
+    elif reads != asserted:
+        yield wire.signal, wire.path, f"with its wire cut, {meaning}"
+
+
+def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
+    """Outputs whose relay would be on from power-on until the daemon claims them."""
+    for wire in wires:
+        if wire.direction == "in":
+            continue
+        try:
+            level = gpio.boot_level(wire.point)
+        except ValueError:
+            continue  # not a pin of the header
+        if wire.asserted(level):
+            pulled, use = ("high", "BCM9 to 27") if level else ("low", "BCM4 to 8")
+            yield (
+                wire.signal,
+                wire.path,
+                f"{gpio.describe(wire.point)} is pulled {pulled} from power-on until the daemon"
+                f" starts, and its relay is on at {pulled}: use {use}, or the other active level",
+            )
+
+
+def unaccepted(
+    found: Iterable[Unsafe], accepted: Mapping[str, str]
+) -> Iterator[tuple[tuple[str, ...], str]]:
+    """The unsafe choices that nobody has taken responsibility for, each with the two ways out."""
+    for signal, path, text in found:
+        if signal not in accepted:
+            yield path, f"unsafe: {text}; or accept_unsafe: {{{signal}: <why it is safe here>}}"

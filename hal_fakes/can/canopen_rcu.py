@@ -1,0 +1,132 @@
+"""Xnergy's receiver as a CANopen node: `canopen.LocalNode`, with a plant behind its objects.
+
+Failing parts, beside those of the plant and the bus:
+
+|           | off    | stuck              | slow              | garbage        | wrong                |
+| node      | silent | no SDO is answered | answers come late | of five bytes  | about another object |
+| heartbeat | none   | none               | each second       | of three bytes | it says `stopped`    |
+
+A node that is switched off loses `enable`, and says that it starts when it is back.
+"""
+
+import time
+from typing import Any, Final, cast
+
+import can
+import canopen
+from canopen.objectdictionary import ODRecord, ODVariable, datatypes
+
+from drivers.charger import xnergy
+from hal_fakes.can.side import Send
+from hal_fakes.plants.pad import PadReading
+from hal_fakes.plants.plant import Plant
+from hal_fakes.plants.xnergy_rcu import words
+
+TYPES: Final = {1: datatypes.UNSIGNED8, 2: datatypes.UNSIGNED16}
+BEAT: Final = {None: xnergy.HEARTBEAT_S, "slow": 1.0}
+STARTING, STOPPED, OPERATIONAL = 0, 4, 5
+
+
+class CanOpenRcu:
+    """A station (`hal_fakes.can.side.Station`). `slow_s`: how late a slow answer comes."""
+
+    def __init__(self, plant: Plant, node: int, slow_s: float) -> None:
+        self.plant = plant
+        self._id = node
+        self._slow_s = slow_s
+        self._latched = 0
+        self._beat_at = float("-inf")
+        self._was_off = False
+        self._network = _Network(self)
+        self._node = canopen.LocalNode(node, dictionary())
+        self._node.associate_network(self._network)
+        self._node.add_read_callback(self._read)  # type: ignore[no-untyped-call]
+        self._node.add_write_callback(self._write)  # type: ignore[no-untyped-call]
+        self._send: Send = lambda message: None
+
+    def hear(self, message: can.Message, now: float, send: Send) -> None:
+        """A request, if it is for this node."""
+        if self.plant.failures.get("node") in ("off", "stuck") or message.is_extended_id:
+            return
+        self._send = send
+        self._network.notify(message.arbitration_id, bytearray(message.data), now)
+
+    def tick(self, now: float, send: Send) -> None:
+        """The heartbeat."""
+        off = self.plant.failures.get("node") == "off"
+        if off and not self._was_off:
+            self.plant.drive("enable", False, now)
+        if off:
+            self._was_off = True
+            return
+        mode = self.plant.failures.get("heartbeat")
+        if mode in ("off", "stuck") or now < self._beat_at + BEAT.get(mode, xnergy.HEARTBEAT_S):
+            return
+        self._beat_at = now
+        state = STARTING if self._was_off else STOPPED if mode == "wrong" else OPERATIONAL
+        self._was_off = False
+        beat = bytes((state, 0, 0)) if mode == "garbage" else bytes((state,))
+        send(frame(0x700 + self._id, beat))
+
+    def reply(self, can_id: int, answer: bytes) -> None:
+        """What the library answers goes out, spoiled as it is told."""
+        mode = self.plant.failures.get("node")
+        if mode == "garbage":
+            answer = answer[:5]
+        elif mode == "wrong":
+            answer = answer[:3] + bytes((answer[3] ^ 0x40,)) + answer[4:]
+        message = frame(can_id, answer)
+        if mode == "slow":
+            message.timestamp = time.monotonic() + self._slow_s
+        self._send(message)
+
+    def _reading(self) -> PadReading:
+        self.plant.advance(time.monotonic())
+        return cast(PadReading, self.plant.sense("reading"))
+
+    def _read(self, index: int, subindex: int, od: Any) -> int | None:
+        at = (index, subindex)
+        for name, where in xnergy.READS.items():
+            if where.sdo and (where.sdo.index, where.sdo.subindex) == at:
+                found = words(self._reading(), self._latched)
+                self._latched = found["latched_high"] << 16 | found["latched_low"]
+                return found[name]
+        return None
+
+    def _write(self, index: int, subindex: int, od: Any, data: bytes) -> None:
+        for signal, where in (("enable", xnergy.ENABLE), ("check_range", xnergy.CHECK_RANGE)):
+            assert where.sdo
+            if (index, subindex) == (where.sdo.index, where.sdo.subindex):
+                self.plant.drive(signal, bool(data[0]), time.monotonic())
+
+
+class _Network(canopen.Network):
+    """The library's network without its bus and its threads."""
+
+    def __init__(self, rcu: CanOpenRcu) -> None:
+        super().__init__()
+        self._rcu = rcu
+
+    def send_message(self, can_id: int, data: Any, remote: bool = False) -> None:
+        """An answer of the node's."""
+        self._rcu.reply(can_id, bytes(data))
+
+
+def frame(can_id: int, payload: bytes) -> can.Message:
+    """A frame with an id of eleven bits."""
+    return can.Message(arbitration_id=can_id, is_extended_id=False, data=payload)
+
+
+def dictionary() -> Any:
+    """The RCU's published objects."""
+    made = canopen.ObjectDictionary()  # type: ignore[no-untyped-call]
+    for where in (xnergy.ENABLE, xnergy.CHECK_RANGE, *xnergy.READS.values()):
+        if where.sdo is None:
+            continue
+        if where.sdo.index not in made:
+            made.add_object(ODRecord(f"objects {where.sdo.index:04X}", where.sdo.index))
+        variable = ODVariable(str(where.sdo), where.sdo.index, where.sdo.subindex)
+        variable.data_type = TYPES[where.sdo.octets]
+        record: Any = made[where.sdo.index]
+        record.add_member(variable)
+    return made

@@ -1,0 +1,152 @@
+"""A charger that speaks frames of its maker's, by the same map as the driver's, with a plant behind.
+
+It charges while it is fed: while every frame that its map wants comes, at the pace of the map, and says
+what `on` means. It stops when one says what `off` means, and when one stays away for three periods.
+
+Failing part `node`, beside those of the plant and the bus: `off` is silent, `stuck` says what it said
+before, `slow` says it every two seconds, `garbage` sends frames of six bytes, `wrong` a state of no
+list.
+"""
+
+import time
+from collections.abc import Mapping
+from typing import Any, Final, cast
+
+import can
+
+from bridges.charger.signals import Activity
+from drivers.charger import dbc
+from drivers.charger.can_frames import frame_map
+from drivers.charger.can_map import FrameMap, Sent
+from hal_fakes.can.side import Send
+from hal_fakes.plants.pad import PadReading
+from hal_fakes.plants.plant import Plant
+
+STATUS_S: Final = 0.1
+SLOW_S: Final = 2.0
+PERIODS: Final = 3
+RECEIVER: Final = 4711
+STRANGER: Final = 815
+"""The receivers of `robot` (the first of the YAML's `receivers`, if there are any) and `stranger`."""
+FLAGS: Final = {
+    "authentication": "CommTimeout",
+    "contact_lost": "CommTimeout",
+    "over_temperature": "OverTemperature",
+    "thermometer": "BatteryTemperature",
+    "transmitter_fault": "GridError",
+    "foreign_object": "StationOverTemperature",
+    "too_far": "BadCoilPosition",
+    "too_near": "BadCoilPosition",
+}
+"""Which error signal shows what is wrong with the plant; none is published for foreign objects."""
+
+
+class FrameCharger:
+    """A station (`hal_fakes.can.side.Station`)."""
+
+    def __init__(self, plant: Plant, settings: Any) -> None:
+        self.plant = plant
+        self._map: FrameMap = frame_map(settings)
+        self._dbc = dbc.load(self._map.dbc)
+        self._setpoints: Mapping[str, float] = settings.setpoints
+        known = (int(receiver) for receiver in settings.receivers if receiver.isdecimal())
+        self._receiver = next(known, RECEIVER)
+        self._wanted = {self._dbc.id(sent.frame): sent for sent in self._map.send}
+        self._fed_at: dict[str, float] = {}
+        self._status_at = float("-inf")
+        self._status: list[can.Message] = []
+
+    def hear(self, message: can.Message, now: float, send: Send) -> None:
+        """A frame that feeds it, or that takes its power away."""
+        extended = dbc.EXTENDED if message.is_extended_id else 0
+        sent = self._wanted.get(message.arbitration_id | extended)
+        if sent is None or self.plant.failures.get("node") == "off":
+            return
+        if self._says(sent, bytes(message.data), on=True):
+            self._fed_at[sent.frame] = now
+        elif self._says(sent, bytes(message.data), on=False):
+            self._fed_at.clear()
+        self.plant.drive("enable", self._fed(now), now)
+
+    def tick(self, now: float, send: Send) -> None:
+        """Hunger, and the status."""
+        mode = self.plant.failures.get("node")
+        self.plant.drive("enable", self._fed(now) and mode != "off", now)
+        period_s = SLOW_S if mode == "slow" else STATUS_S
+        if mode == "off" or now < self._status_at + period_s:
+            return
+        self._status_at = now
+        if mode != "stuck" or not self._status:
+            self._status = [self._message(name, mode == "wrong") for name in self._map.frames()]
+        for message in self._status:
+            send(_short(message) if mode == "garbage" else message)
+
+    def _fed(self, now: float) -> bool:
+        needed = (sent for sent in self._map.send if sent.on is not None)
+        return all(
+            now - self._fed_at.get(sent.frame, float("-inf")) < PERIODS * sent.every_s
+            for sent in needed
+        )
+
+    def _says(self, sent: Sent, payload: bytes, on: bool) -> bool:
+        values = sent.values(on, self._setpoints)
+        return values is not None and self._dbc.encode(sent.frame, values) == payload
+
+    def _message(self, frame: str, wrong: bool) -> can.Message:
+        self.plant.advance(time.monotonic())
+        reading = cast(PadReading, self.plant.sense("reading"))
+        values = dict.fromkeys(self._dbc.signals(frame), 0.0) | {
+            signal.split(".")[1]: value
+            for signal, value in self._values(reading, wrong).items()
+            if signal.split(".")[0] == frame
+        }
+        found = self._dbc.id(frame)
+        return can.Message(
+            arbitration_id=found & ~dbc.EXTENDED,
+            is_extended_id=bool(found & dbc.EXTENDED),
+            data=self._dbc.encode(frame, values),
+        )
+
+    def _values(self, reading: PadReading, wrong: bool) -> dict[str, float]:
+        known = self._map
+        values = {known.state.at: float(self._unknown() if wrong else self._code(reading))}
+        for signal, value in (
+            (known.volts, reading.volts),
+            (known.amps, reading.amps),
+            (known.receiver, float(self._seen(reading))),
+        ):
+            if signal:
+                values[signal] = round(value, 1)
+        shown = {FLAGS[fault] for fault in reading.faults}
+        for signal in (*known.errors.station, *known.errors.robot):
+            values[signal] = float(signal.split(".")[1] in shown)
+        if known.out_of_range:
+            values[known.out_of_range] = float(reading.robot and not reading.in_range)
+        return values
+
+    def _seen(self, reading: PadReading) -> int:
+        """Whose receiver it is; 0 where nobody stands there."""
+        return STRANGER if reading.stranger else self._receiver if reading.robot else 0
+
+    def _code(self, reading: PadReading) -> int:
+        """The first number of what the plant does, or of what comes nearest to it."""
+        lists = self._map.state.codes.lists()
+        nearest = {
+            Activity.HANDSHAKE: Activity.IDLE,
+            Activity.STOPPING: Activity.CHARGING,
+            Activity.RELEASED: Activity.IDLE,
+        }
+        codes = lists[reading.activity] or lists[nearest.get(reading.activity, Activity.ERROR)]
+        return codes[0]
+
+    def _unknown(self) -> int:
+        known = self._map.state.codes.meanings()
+        return next(code for code in range(15, -1, -1) if code not in known)
+
+
+def _short(message: can.Message) -> can.Message:
+    return can.Message(
+        arbitration_id=message.arbitration_id,
+        is_extended_id=message.is_extended_id,
+        data=bytes(message.data)[:6],
+    )

@@ -1,0 +1,164 @@
+"""What stands on the far side of a CAN bus: a medium, and stations on it, in a thread of their own.
+
+The medium is python-can's `virtual` bus within one process, or an slcan adapter on a pseudo-terminal
+across processes (`hal_fakes/can/slcan_port.py`). A part `bus` of any plant on it fails as buses do:
+
+- `off`: the adapter is pulled out; a virtual bus is silent
+- `stuck`: nothing passes in either direction
+- `slow`: everything from the far side comes too late
+- `garbage`: noise: bytes that are no slcan, or frames of anybody with any content
+- `wrong`: the controller reports bus-off; an adapter, which cannot, hears others' frames only
+"""
+
+import heapq
+import itertools
+import random
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, Final, Protocol
+
+import can
+
+from hal_fakes.plants.plant import FailureMode, Plant
+
+LOOK_S: Final = 0.02
+"""How soon a failure that is told shows, and heartbeats and status frames come on time."""
+BUS_OFF: Final = 0x40
+
+
+class Medium(Protocol):
+    """How frames come and go. `replace`: what must stand in the bus's settings instead."""
+
+    replace: dict[str, Any]
+
+    def receive(self, wait_s: float) -> can.Message | None:
+        """The next frame from the daemon, if one comes in time."""
+
+    def send(self, message: can.Message) -> None:
+        """To the daemon; lost when nobody has it open."""
+
+    def fail(self, mode: FailureMode | None) -> None:
+        """Be well, or `off` or `garbage` or `wrong`, from now on. Called often."""
+
+    def close(self) -> None:
+        """End. May be called twice."""
+
+
+Send = Callable[[can.Message], None]
+
+
+class Station(Protocol):
+    """One controller on the bus; its plant is behind it."""
+
+    plant: Plant
+
+    def hear(self, message: can.Message, now: float, send: Send) -> None:
+        """A frame from the daemon. What is sent goes out at its `timestamp` (monotonic s), if later."""
+
+    def tick(self, now: float, send: Send) -> None:
+        """Send what is due; called often."""
+
+
+class VirtualBus:
+    """python-can's `virtual` bus: `channel` names it for whoever opens it as well."""
+
+    def __init__(self, channel: str) -> None:
+        self.replace: dict[str, Any] = {}
+        self._bus: can.BusABC | None = can.Bus(channel, interface="virtual")
+        self._noise = random.Random("can")
+        self._off_told = False
+
+    def receive(self, wait_s: float) -> can.Message | None:
+        """The next frame."""
+        return self._bus.recv(wait_s) if self._bus else None
+
+    def send(self, message: can.Message) -> None:
+        """To whoever has the channel open."""
+        if self._bus:
+            self._bus.send(message)
+
+    def fail(self, mode: FailureMode | None) -> None:
+        """Noise while told so; bus-off once, and once that it is over."""
+        if mode == "garbage":
+            self.send(any_frame(self._noise))
+        if (mode == "wrong") != self._off_told:
+            self._off_told = mode == "wrong"
+            found = BUS_OFF if self._off_told else 0x100
+            self.send(can.Message(arbitration_id=found, is_error_frame=True, dlc=8, data=bytes(8)))
+
+    def close(self) -> None:
+        """Leave the channel."""
+        bus, self._bus = self._bus, None
+        if bus:
+            bus.shutdown()
+
+
+def any_frame(noise: random.Random) -> can.Message:
+    """A frame of anybody."""
+    extended = noise.random() < 0.5
+    return can.Message(
+        arbitration_id=noise.randrange(1 << (29 if extended else 11)),
+        is_extended_id=extended,
+        data=noise.randbytes(noise.randrange(9)),
+    )
+
+
+class CanSide:
+    """The running far side. `replace`: what must stand in the bus's settings instead.
+
+    `slow_s`: how late a slow bus's frames come.
+    """
+
+    def __init__(self, medium: Medium, stations: Sequence[Station], slow_s: float) -> None:
+        self.replace = medium.replace
+        self._medium = medium
+        self._stations = stations
+        self._slow_s = slow_s
+        self._order = itertools.count()
+        self._due: list[tuple[float, int, can.Message]] = []
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="can", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End. May be called twice."""
+        self._closed.set()
+        self._thread.join()
+        self._medium.close()
+
+    def _run(self) -> None:
+        while not self._closed.is_set():
+            mode = self._failure()
+            self._medium.fail(mode)
+            message = self._medium.receive(self._idle_s())
+            now = time.monotonic()
+            passes = mode not in ("off", "stuck", "wrong")
+            if message is not None and passes:
+                for station in self._stations:
+                    station.hear(message, now, self._post(mode, now))
+            for station in self._stations:
+                station.tick(now, self._post(mode, now))
+            self._say(passes)
+
+    def _failure(self) -> FailureMode | None:
+        modes = (station.plant.failures.get("bus") for station in self._stations)
+        return next((mode for mode in modes if mode is not None), None)
+
+    def _idle_s(self) -> float:
+        next_at = self._due[0][0] if self._due else float("inf")
+        return min(LOOK_S, max(0.0, next_at - time.monotonic()))
+
+    def _post(self, mode: FailureMode | None, now: float) -> Send:
+        at = now + (self._slow_s if mode == "slow" else 0.0)
+        return lambda message: self.put(message, max(at, message.timestamp))
+
+    def put(self, message: can.Message, at: float) -> None:
+        """Have it sent at this time (monotonic s)."""
+        heapq.heappush(self._due, (at, next(self._order), message))
+
+    def _say(self, passes: bool) -> None:
+        while self._due and self._due[0][0] <= time.monotonic():
+            message = heapq.heappop(self._due)[2]
+            if passes:
+                self._medium.send(message)

@@ -1,0 +1,111 @@
+"""An slcan adapter behind a pseudo-terminal (LAWICEL): frames as lines of text, for another process.
+
+    t123 2 0102 CR     frame 0x123 with two bytes; T and eight digits: with 29 bits
+    Sn CR, O CR, C CR  bitrate, open, close
+
+It answers a frame that it takes with `z` or `Z`, and passes frames only while it is open.
+"""
+
+import os
+import random
+import select
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+import can
+
+from hal_fakes.can.side import any_frame
+from hal_fakes.modbus.rtu import Adapter
+from hal_fakes.plants.plant import FailureMode
+
+DIGITS: Final = {"t": 3, "T": 8}
+
+
+class SlcanPort:
+    """A medium (`hal_fakes.can.side.Medium`). `settings`: the bus's own `slcan`, if it has one."""
+
+    def __init__(self, settings: Mapping[str, Any]) -> None:
+        self._directory = tempfile.TemporaryDirectory(prefix="rmf-slcan-")
+        self.adapter = Adapter(Path(self._directory.name) / "adapter")
+        self.adapter.plug()
+        place = {"bitrate": 250_000, **settings, "port": str(self.adapter.path)}
+        self.replace = {"socketcan": None, "slcan": place}
+        self._noise = random.Random("slcan")
+        self._others = False
+        self._heard = b""
+        self._open = False
+
+    def receive(self, wait_s: float) -> can.Message | None:
+        """The next frame from the daemon; commands are obeyed."""
+        while b"\r" not in self._heard:
+            wire = self.adapter.wire
+            readable = select.select([wire] if wire is not None else [], [], [], wait_s)[0]
+            read = b""
+            with suppress(OSError):
+                read = os.read(wire, 4096) if readable and wire is not None else b""
+            if not read:
+                return None
+            self._heard += read
+        line, _, self._heard = self._heard.partition(b"\r")
+        return self._obey(line.decode("ascii", "replace"))
+
+    def send(self, message: can.Message) -> None:
+        """To the daemon."""
+        if self._open and not self._others:
+            self._write(encoded(message))
+
+    def fail(self, mode: FailureMode | None) -> None:
+        """Pulled out, noisy, or among strangers."""
+        if (mode == "off") != (self.adapter.wire is None):
+            self._heard, self._open = b"", False
+            (self.adapter.pull if mode == "off" else self.adapter.plug)()
+        if mode == "garbage":
+            self._write(self._noise.randbytes(self._noise.randrange(1, 30)))
+        self._others = mode == "wrong"
+        if self._others and self._open:
+            self._write(encoded(any_frame(self._noise)))
+
+    def close(self) -> None:
+        """Pull it out for good. May be called twice."""
+        self.adapter.pull()
+        self._directory.cleanup()
+
+    def _obey(self, line: str) -> can.Message | None:
+        if line[:1] in ("O", "C"):
+            self._open = line[0] == "O"
+        if line[:1] not in DIGITS:
+            self._write(b"\r")
+            return None
+        with suppress(ValueError, IndexError):
+            message = decoded(line)
+            self._write(b"Z\r" if message.is_extended_id else b"z\r")
+            return message if self._open else None
+        return None
+
+    def _write(self, text: bytes) -> None:
+        wire = self.adapter.wire
+        with suppress(OSError):  # nobody reads: lost, as on a bus
+            if wire is not None:
+                os.write(wire, text)
+
+
+def encoded(message: can.Message) -> bytes:
+    """A frame as an adapter says it."""
+    letter = "T" if message.is_extended_id else "t"
+    digits = f"{message.arbitration_id:0{DIGITS[letter]}X}"
+    return f"{letter}{digits}{message.dlc}{bytes(message.data).hex().upper()}\r".encode()
+
+
+def decoded(line: str) -> can.Message:
+    """A line as a frame. Raises ValueError, IndexError."""
+    size = DIGITS[line[0]]
+    count = int(line[1 + size])
+    data = bytes.fromhex(line[2 + size : 2 + size + 2 * count])
+    if len(data) != count:
+        raise ValueError(line)
+    return can.Message(
+        arbitration_id=int(line[1 : 1 + size], 16), is_extended_id=line[0] == "T", data=data
+    )

@@ -1,0 +1,149 @@
+"""The far side of a `modbus` bus: a real pymodbus TCP server on 127.0.0.1, as a gateway with units.
+
+A bus on a serial line has its own far side, `hal_fakes/modbus/rtu.py`.
+
+Each device's points are bits of its units, with the plant behind them; an address that nobody has
+answers exception 2, a unit that nobody has exception 11, as a gateway does. On command (`fail DEVICE
+unit|server MODE`) one unit, or the server with all of them, is
+
+- `off`: the unit is silent; the server refuses and drops connections
+- `stuck`: the unit's inputs stay as they were; the server takes requests and never answers
+- `slow`: the reply comes after the client has stopped waiting
+- `garbage`: bytes that are no Modbus, or half a reply
+- `wrong`: the unit answers exception 4, the server for another transaction, or as another unit
+"""
+
+import asyncio
+import itertools
+import random
+import threading
+from collections.abc import Coroutine, Iterable, Mapping
+from typing import Any, Final
+
+from pymodbus.server import ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+from drivers.hal.modbus.points import canonical
+from hal_fakes.modbus.dead_man import DeadMan
+from hal_fakes.modbus.flash import CoilRequest
+from hal_fakes.modbus.register_door import RegisterDoor
+from hal_fakes.modbus.rtu import RtuLine
+from hal_fakes.modbus.units import FarSide, Units
+from hal_fakes.plants.plant import Plant
+from hal_fakes.plants.xnergy_rcu import ModbusRcu
+from hal_fakes.wiring import devices_on, wirings
+
+CELLS: Final = {("door", "register"): RegisterDoor, ("charger", "modbus"): ModbusRcu}
+"""What a unit consists of that has more than contacts, by kind and driver."""
+TRANSACTION: Final = 0
+UNIT: Final = 6
+"""Where a reply on TCP has them."""
+LOOK_S: Final = 0.02
+"""How soon a server that is told to be off is off."""
+READY_S: Final = 10.0
+
+
+def serve(
+    settings: Any, plants: Mapping[str, Plant], config: Any, bus_name: str
+) -> "ModbusServer | RtuLine":
+    """Serve the devices of this bus on a free port of 127.0.0.1, or on a line of their own."""
+    devices = far_sides(settings, plants, config, bus_name)
+    if settings.serial:
+        slow_s = (settings.retries + 1.2) * settings.timeout_s
+        return RtuLine(devices, settings.serial, slow_s)
+    return ModbusServer(devices, slow_s=1.5 * settings.timeout_s)
+
+
+def far_sides(
+    settings: Any, plants: Mapping[str, Plant], config: Any, bus_name: str
+) -> list[FarSide]:
+    """What the units of this bus consist of."""
+    dog = settings.module_watchdog
+    dead_men = [DeadMan(unit) for unit in dog.units] if dog else []
+    made: Any = CELLS.get((config.kind, config.driver))
+    if made:
+        on_bus = devices_on(config, bus_name).items()
+        return [*dead_men, *(made(plants[name], one) for name, one in on_bus)]
+    return [*dead_men, *wirings(config, bus_name, plants, canonical)]
+
+
+class ModbusServer:
+    """The running server, with an asyncio loop in a thread of its own.
+
+    `replace`: what must stand in the bus's settings instead.
+    """
+
+    def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
+        self._units = Units(devices, slow_s)
+        self._noise = random.Random("modbus")
+        self._kinds = itertools.cycle((0, 1))
+        self._port = 0
+        self._server: Any = None
+        self._closed = False
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="modbus", daemon=True)
+        self._thread.start()
+        self._run(self._listen())
+        self._watch = asyncio.run_coroutine_threadsafe(self._look(), self._loop)
+        self.replace = {"tcp": {"host": "127.0.0.1", "port": self._port}}
+
+    def close(self) -> None:
+        """Hang up on everybody. May be called twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._watch.cancel()
+        self._run(self._hang_up())
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    def _run(self, work: Coroutine[Any, Any, None]) -> None:
+        asyncio.run_coroutine_threadsafe(work, self._loop).result(READY_S)
+
+    async def _listen(self) -> None:
+        self._server = ModbusTcpServer(
+            _placeholder(),
+            address=("127.0.0.1", self._port),
+            ignore_missing_devices=True,
+            custom_pdu=[CoilRequest],
+            trace_packet=self._send,
+        )
+        self._server.context = self._units
+        await self._server.serve_forever(background=True)
+        self._port = self._server.transport.sockets[0].getsockname()[1]
+
+    async def _hang_up(self) -> None:
+        if self._server is not None:
+            server, self._server = self._server, None
+            await server.shutdown()
+        await asyncio.sleep(0)  # the connections close in the loop's next round
+
+    async def _look(self) -> None:
+        """Be off while told so, and let watchdogs trip."""
+        while True:
+            self._units.tick()
+            off = self._units.failure("server") == "off"
+            if off and self._server is not None:
+                await self._hang_up()
+            elif not off and self._server is None:
+                await self._listen()
+            await asyncio.sleep(LOOK_S)
+
+    def _send(self, sending: bool, packet: bytes) -> bytes:
+        """What really goes onto the wire."""
+        if not sending:
+            return packet
+        server = self._units.failure("server")
+        if "garbage" in (server, self._units.failure("unit", packet[6])):
+            noise = self._noise.randbytes(self._noise.randrange(1, 30))
+            return packet[: len(packet) // 2] if next(self._kinds) else noise
+        if server == "wrong":
+            at = UNIT if next(self._kinds) else TRANSACTION
+            return packet[:at] + bytes((packet[at] ^ 0x55,)) + packet[at + 1 :]
+        return packet
+
+
+def _placeholder() -> SimDevice:
+    """pymodbus wants to hold the registers itself; ours are the plants'."""
+    return SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS))

@@ -1,0 +1,61 @@
+"""The watchdog of a simulated I/O module, as couplers of the WAGO 750 series have it.
+
+Holding registers: 0x1000 its time (x 100 ms), 0x1003 trigger, 0x1006 state (0 stopped, 1 running,
+2 tripped), 0x1007 starts it again. A trigger counts when its value differs from the last; the first
+one starts the watchdog. When it trips the module's coils go off, and writes to them are refused with
+exception 4 until it is started again.
+"""
+
+from typing import Final
+
+from drivers.hal.modbus.points import Point
+
+TIME, TRIGGER, STATE, RESTART = 0x1000, 0x1003, 0x1006, 0x1007
+STOPPED, RUNNING, TRIPPED = 0, 1, 2
+TIME_AT_POWER_ON: Final = 100
+
+
+class DeadMan:
+    """One unit's watchdog. Times are monotonic seconds."""
+
+    def __init__(self, unit: int) -> None:
+        self.unit = unit
+        self.points = frozenset(
+            Point(unit, "holding register", a) for a in (TIME, TRIGGER, STATE, RESTART)
+        )
+        self.outputs = self.points
+        self._registers = {TIME: TIME_AT_POWER_ON, TRIGGER: 0, STATE: STOPPED, RESTART: 0}
+        self._due_at = float("inf")
+
+    @property
+    def tripped(self) -> bool:
+        """Are the outputs off, and refused?"""
+        return self._registers[STATE] == TRIPPED
+
+    def get(self, point: Point, now: float) -> int:
+        """What is read there."""
+        return self._registers[point.address]
+
+    def set(self, point: Point, value: int, now: float) -> bool:
+        """A write; False where nothing can be written, or not now."""
+        state = self._registers[STATE]
+        if point.address == STATE or (point.address == TIME and state == RUNNING):
+            return False
+        differs = value != self._registers[point.address]
+        self._registers[point.address] = value
+        starts = point.address == RESTART and value == 1 and state == TRIPPED
+        if starts or (point.address == TRIGGER and differs and state != TRIPPED):
+            self._registers[STATE] = RUNNING
+            self._due_at = now + self._registers[TIME] / 10
+        return True
+
+    def expire(self) -> None:
+        """Be late: the next look at it finds it tripped."""
+        self._due_at = 0.0
+
+    def trips(self, now: float) -> bool:
+        """Does it trip at `now`? Once for each time."""
+        if self._registers[STATE] != RUNNING or now < self._due_at:
+            return False
+        self._registers[STATE] = TRIPPED
+        return True

@@ -1,0 +1,182 @@
+"""What pymodbus's servers ask of the units: bits and registers with plants behind them, and how
+they fail.
+
+The same for a gateway (`hal_fakes/modbus.py`) and a serial line (`hal_fakes/modbus/rtu.py`).
+"""
+
+import asyncio
+import time
+from collections.abc import Iterable
+from typing import Final, Literal, TypeAlias
+
+from pymodbus.constants import ExcCodes
+from pymodbus.exceptions import NoSuchIdException
+
+from drivers.hal.modbus.points import Point, Range, Table, parse
+from hal_fakes.modbus.dead_man import DeadMan
+from hal_fakes.modbus.register_door import RegisterDoor
+from hal_fakes.plants.plant import FailureMode, Plant
+from hal_fakes.plants.xnergy_rcu import ModbusRcu
+from hal_fakes.wiring import Wiring
+
+Part = Literal["unit", "server"]
+
+Cells: TypeAlias = RegisterDoor | ModbusRcu | DeadMan
+FarSide: TypeAlias = Wiring | Cells
+"""What units can consist of."""
+
+TABLES: Final[dict[int, Table]] = {
+    1: "coil",
+    2: "discrete input",
+    3: "holding register",
+    4: "input register",
+    5: "coil",
+    6: "holding register",
+    15: "coil",
+    16: "holding register",
+}
+"""The functions that are served, and the table that each is about."""
+
+
+class Units:
+    """What pymodbus's server asks for and sets: all units. `slow_s`: a slow reply's delay.
+
+    Coils keep what was written; inputs are what the plants' contacts show.
+    """
+
+    def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
+        self._slow_s = slow_s
+        self._at: dict[Point, tuple[Wiring, str]] = {}
+        self._cells: dict[Point, Cells] = {}
+        self._dead_men: list[DeadMan] = []
+        self._plants: dict[int | None, list[Plant]] = {None: []}
+        self._coils: dict[Point, bool] = {}
+        self._flashes: dict[Point, Point] = {}
+        self._off_at: dict[Point, float] = {}
+        self._before: dict[Point, int] = {}
+        for device in devices:
+            if isinstance(device, Wiring):
+                self._add_wiring(device)
+            else:
+                self._add_cells(device)
+
+    def _add_wiring(self, wiring: Wiring) -> None:
+        points = {parse(name): name for name in (*wiring.inputs, *wiring.outputs)}
+        self._at.update({point: (wiring, name) for point, name in points.items()})
+        self._flashes.update({parse(at): parse(name) for at, name in wiring.flashes.items()})
+        for unit in (None, *{point.unit for point in points}):
+            self._plants.setdefault(unit, []).append(wiring.plant)
+
+    def _add_cells(self, device: Cells) -> None:
+        self._cells.update(dict.fromkeys(device.points, device))
+        self._plants.setdefault(device.unit, [])
+        if isinstance(device, DeadMan):
+            self._dead_men.append(device)
+            return
+        for unit in (None, device.unit):
+            self._plants[unit].append(device.plant)
+
+    def tick(self) -> None:
+        """Let the modules' watchdogs trip, and their pulses end, when it is time; called often."""
+        now = time.monotonic()
+        for coil in [coil for coil, at in self._off_at.items() if at <= now]:
+            self._set(coil, False)
+        for dead_man in self._dead_men:
+            if dead_man.trips(now):
+                for point, (wiring, name) in self._at.items():
+                    if point.unit == dead_man.unit and self._coils.pop(point, False):
+                        wiring.drive(name, False, now)
+
+    def failure(self, part: Part, unit: int | None = None) -> FailureMode | None:
+        """How the server, or this unit, is told to fail."""
+        modes = (plant.failures.get(part) for plant in self._plants.get(unit, ()))
+        return next((mode for mode in modes if mode is not None), None)
+
+    def has(self, unit: int) -> bool:
+        """Does anybody have this unit?"""
+        return unit in self._plants
+
+    async def async_getValues(
+        self, device_id: int, func_code: int, address: int, count: int = 1
+    ) -> list[int] | ExcCodes:
+        """The bits or registers of a read request, or of a write's echo."""
+        points = await self._points(device_id, func_code, address, count)
+        if isinstance(points, ExcCodes):
+            return points
+        return [self._value(point) for point in points]
+
+    async def async_setValues(
+        self, device_id: int, func_code: int, address: int, values: list[int]
+    ) -> ExcCodes | None:
+        """A write to coils or registers."""
+        points = await self._points(device_id, func_code, address, len(values))
+        if isinstance(points, ExcCodes):
+            return points
+        for point, value in zip(points, values, strict=True):
+            if refusal := self._set(point, value):
+                return refusal
+        return None
+
+    async def flash(self, unit: int, address: int, tenths: int) -> ExcCodes | None:
+        """Switch a coil on for so long; exception 3 where no pulse can be asked for."""
+        coil = self._flashes.get(Point(unit, "coil", address))
+        points = await self._points(unit, 5, coil.address if coil else address, 1)
+        if isinstance(points, ExcCodes):
+            return points
+        if coil is None:
+            return ExcCodes.ILLEGAL_VALUE
+        if refusal := self._set(coil, True):
+            return refusal
+        self._off_at[coil] = time.monotonic() + tenths / 10
+        return None
+
+    def _set(self, point: Point, value: int) -> ExcCodes | None:
+        now = time.monotonic()
+        if point in self._cells:
+            taken = self._cells[point].set(point, int(value), now)
+            return None if taken else ExcCodes.ILLEGAL_VALUE
+        if any(d.unit == point.unit and d.tripped for d in self._dead_men):
+            return ExcCodes.DEVICE_FAILURE
+        wiring, name = self._at[point]
+        self._off_at.pop(point, None)
+        self._coils[point] = bool(value)
+        if name in wiring.outputs:
+            wiring.drive(name, bool(value), now)
+        return None
+
+    async def _points(
+        self, unit: int, function: int, address: int, count: int
+    ) -> list[Point] | ExcCodes:
+        """The points that a request is about; or the exception, or the silence, that answers it."""
+        table = TABLES.get(function)
+        if table is None:
+            return ExcCodes.ILLEGAL_FUNCTION
+        failures = (self.failure("server"), self.failure("unit", unit))
+        if failures[0] == "stuck" or failures[1] == "off":
+            raise NoSuchIdException("silent")
+        if "slow" in failures:
+            await asyncio.sleep(self._slow_s)
+        if failures[1] == "wrong":
+            return ExcCodes.DEVICE_FAILURE
+        points = Range(unit, table, address, count).points()
+        if unit not in self._plants:
+            return ExcCodes.GATEWAY_NO_RESPONSE
+        if any(point not in self._at and point not in self._cells for point in points):
+            return ExcCodes.ILLEGAL_ADDRESS
+        return points
+
+    def _value(self, point: Point) -> int:
+        if point in self._at and self._at[point][1] in self._at[point][0].outputs:
+            return self._coils.get(point, False)
+        if point in self._cells and point in self._cells[point].outputs:
+            return self._now_at(point)
+        if self.failure("unit", point.unit) != "stuck":
+            self._before[point] = self._now_at(point)
+        return self._before.get(point, 0)
+
+    def _now_at(self, point: Point) -> int:
+        now = time.monotonic()
+        if point in self._cells:
+            return self._cells[point].get(point, now)
+        wiring, name = self._at[point]
+        return wiring.levels(now)[name]

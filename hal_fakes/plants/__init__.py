@@ -1,0 +1,1 @@
+"""Plants: the physics of lifts, doors and chargers in virtual time."""

@@ -1,0 +1,76 @@
+"""One wire between a plant and a bus, and the ways in which wires fail.
+
+The same five for every bus, so that a story told on GPIO can be told on Modbus:
+
+- `off`: cut. An input falls to its pull (or reads 0 at a module, or floats where nothing pulls it);
+  the relay behind a cut output never energises.
+- `stuck`: holds what it had (a welded relay, a jammed contact).
+- `slow`: everything arrives SLOW_S late.
+- `garbage`: random, another value every GARBAGE_S at the most, the same ones in each run.
+- `wrong`: inverted (normally open taken for normally closed).
+"""
+
+import random
+from collections import deque
+
+from drivers.hal.points import Wire
+from hal_fakes.plants.plant import FailureMode
+
+SLOW_S = 2.0
+GARBAGE_S = 0.1
+
+
+class Contact:
+    """One wire: `feed` what is true at one end, and `shows` is what the other end sees.
+
+    For an input the plant feeds and the bus sees; for an output we feed and the relay sees.
+    Asserted or not, never levels.
+    """
+
+    def __init__(self, wire: Wire, seed: str) -> None:
+        self.wire = wire
+        self.shows = False
+        self.mode: FailureMode | None = None
+        self._fed = False
+        self._late: deque[tuple[float, bool]] = deque()
+        self._noise = random.Random(seed)
+        self._noise_at = 0.0
+
+    def feed(self, asserted: bool, now: float) -> None:
+        """What the near end has at `now` (s)."""
+        if asserted != self._fed and self.mode == "slow":
+            self._late.append((now + SLOW_S, asserted))
+        self._fed = asserted
+        self._settle(now)
+
+    def fail(self, mode: FailureMode | None, now: float) -> None:
+        """Fail this way from `now` on; None mends it."""
+        self.mode = mode
+        self._late.clear()
+        self._noise_at = now
+        self._settle(now)
+
+    def next_at(self) -> float:
+        """When `shows` may change though nothing is fed: s, or inf."""
+        if self._late:
+            return self._late[0][0]
+        return self._noise_at if self._noisy() else float("inf")
+
+    def _noisy(self) -> bool:
+        floats = self.mode == "off" and self.wire.broken_reads() is None
+        return floats or self.mode == "garbage"
+
+    def _settle(self, now: float) -> None:
+        while self._late and self._late[0][0] <= now:
+            self.shows = self._late.popleft()[1]
+        if self.mode is None or self.mode == "wrong":
+            self.shows = self._fed != (self.mode == "wrong")
+        elif self._noisy():
+            self._draw(now)
+        elif self.mode == "off":
+            self.shows = bool(self.wire.broken_reads())
+
+    def _draw(self, now: float) -> None:
+        while self._noise_at <= now:
+            self.shows = self._noise.random() < 0.5
+            self._noise_at += GARBAGE_S

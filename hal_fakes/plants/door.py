@@ -1,0 +1,125 @@
+"""A pedestrian door with an operator: it opens while it is held or pushed, and closes by itself.
+
+Contacts: `opened` and `closed` at its limits, `obstruction` (light curtain), `fire` (the building's).
+Relay: `hold_open`. To press: `push` (a person's button or hand), `obstruction`, `fire`.
+Failing part `operator`: `off` and `stuck` stand still, `slow` takes five times as long, `wrong` turns
+each command round, `garbage` stops half-way. At a Modbus module `unit` and `server` fail as well
+(`hal_fakes/modbus.py`).
+"""
+
+from collections.abc import Iterable
+from typing import Any, Final
+
+from drivers.hal.points import Wire
+from hal_fakes.plants.machine import Machine
+
+OPEN_S: Final = 2.0
+CLOSE_S: Final = 3.0
+AUTO_CLOSE_S: Final = 1.0
+SLOWNESS: Final = 5.0
+
+
+def build(name: str, settings: Any) -> "DoorPlant":
+    """The door that these settings are wired to."""
+    from drivers.door import dry_contact as door_dry_contact
+    from drivers.door import register as door_register
+    from hal_fakes.modbus.register_door import contacts
+
+    wired = door_dry_contact.wires
+    wires = contacts if isinstance(settings, door_register.Settings) else wired
+    every_s = settings.pulse.every_s if settings.pulse else 0.0
+    return DoorPlant(name, wires(settings), auto_close_s=max(AUTO_CLOSE_S, every_s))
+
+
+class DoorPlant(Machine):
+    """The door: `position` is 0 when closed and 1 when open.
+
+    `open_s`, `close_s`: the time of a whole travel. `auto_close_s`: how long the operator waits
+    before it closes when nothing holds the door any longer.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        wires: Iterable[Wire] = (),
+        *,
+        open_s: float = OPEN_S,
+        close_s: float = CLOSE_S,
+        auto_close_s: float = AUTO_CLOSE_S,
+    ) -> None:
+        wires = list(wires)
+        at_module = any(w.point.strip().lower().startswith("unit") for w in wires)
+        super().__init__(name, wires, ("operator", *(("unit", "server") if at_module else ())))
+        self.position = 0.0
+        self._seconds = {1: open_s, -1: close_s}
+        self._auto_close_s = auto_close_s
+        self._held = False
+        self._pressed = dict.fromkeys(("push", "obstruction", "fire"), False)
+        self._wanted = False
+        self._close_at = 0.0
+        self._course = (0, 0.0)
+        self._moved_at = 0.0
+        self._arrives_at = float("inf")
+
+    def contact(self, signal: str) -> bool:
+        """Is this contact asserted, in truth? A limit lets go as soon as the door leaves it."""
+        direction, _ = self._course
+        if signal == "opened":
+            return self.position == 1.0 and direction == 0
+        if signal == "closed":
+            return self.position == 0.0 and direction == 0
+        return self._pressed[signal]
+
+    def actuate(self, signal: str, energised: bool) -> None:
+        """The hold relay."""
+        self._held = energised
+
+    def act(self, signal: str, asserted: bool) -> None:
+        """Push the door, stand in the doorway, or let the fire alarm go off."""
+        if signal not in self._pressed:
+            known = ", ".join(sorted(self._pressed))
+            raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
+        self._pressed[signal] = asserted
+
+    def run(self) -> None:
+        """Move to where the door is now, and see whether it goes on."""
+        self._move()
+        in_the_way = self._pressed["obstruction"] and self.position > 0
+        wanted = self._held or self._pressed["push"] or in_the_way
+        if self._wanted and not wanted:
+            self._close_at = self.now + self._auto_close_s
+        self._wanted = wanted
+        self._steer(1 if wanted or self.now < self._close_at else -1)
+
+    def event_at(self) -> float:
+        """When it arrives at a limit, or begins to close."""
+        waits = not self._wanted and self.now < self._close_at
+        return min(self._arrives_at, self._close_at if waits else float("inf"))
+
+    def _move(self) -> None:
+        direction, seconds = self._course
+        if self.now >= self._arrives_at:
+            self.position = self._limit(direction)
+        elif direction:
+            moved = (self.now - self._moved_at) / seconds
+            self.position = min(1.0, max(0.0, self.position + direction * moved))
+        self._moved_at = self.now
+
+    def _limit(self, direction: int) -> float:
+        if self.failures.get("operator") == "garbage":
+            return 0.5
+        return 1.0 if direction > 0 else 0.0
+
+    def _steer(self, direction: int) -> None:
+        """Go this way, as well as the operator still can."""
+        failure = self.failures.get("operator")
+        if failure == "wrong":
+            direction = -direction
+        left = (self._limit(direction) - self.position) * direction
+        if failure in ("off", "stuck") or left <= 0:
+            self._course, self._arrives_at = (0, 0.0), float("inf")
+            return
+        seconds = self._seconds[direction] * (SLOWNESS if failure == "slow" else 1.0)
+        if (direction, seconds) != self._course or self._arrives_at <= self.now:
+            self._arrives_at = self.now + left * seconds
+        self._course = (direction, seconds)

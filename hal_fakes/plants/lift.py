@@ -1,0 +1,297 @@
+"""A lift with its controller: car, doors, AGV key logic, people, and what takes it away from RMF.
+
+- AGV mode is granted some time after it is asked for, once people's calls are done, and never under
+  a hazard; it goes when the request goes or a hazard comes.
+- In AGV mode a call takes the car to that landing; there the door opens, stays for its dwell time,
+  and longer while its open relay is on. The car leaves with its doors closed.
+- Fire: the car goes to the lowest landing and stands there open. Emergency, earthquake: it stops at
+  the next landing and opens. Code blue, out of service, manual: it is only no longer RMF's.
+- AGV mode lost on the way: it stops at the next landing and opens for its dwell time.
+- Overload: it stays where it is, open.
+
+To press: each wired hazard, `hall_<landing>` (a person's call), `obstruction`, `rear_obstruction`.
+Parts that fail: `car` (`off`, `stuck`: stands where it is; `slow`; `wrong`: goes a floor too far),
+`door_operator` and `rear_door_operator` (`off`, `stuck`: stands; `slow`; `wrong`: turned round),
+`controller` (`off`: no AGV mode; `stuck`: AGV mode stays as it is; `slow`). Wires fail as in
+`hal_fakes/plants/contact.py`.
+"""
+
+from dataclasses import dataclass
+
+from bridges.lift.signals import Hazard, Side
+from drivers.lift.dry_contact import Settings, wires
+from drivers.lift.table import input_rows
+from hal_fakes.plants.lift_car import NEVER, Car, CarDoor
+from hal_fakes.plants.machine import Machine
+from hal_fakes.plants.plant import FailureMode
+
+CALL_SETTLES_S = 0.05
+SLOWNESS = 5.0
+PREFIX = {Side.FRONT: "", Side.REAR: "rear_"}
+OPENS_UP = (Hazard.EMERGENCY, Hazard.EARTHQUAKE)
+
+FAILS: dict[str, tuple[FailureMode, ...]] = {
+    "car": ("off", "stuck", "slow", "wrong"),
+    "door_operator": ("off", "stuck", "slow", "wrong"),
+    "rear_door_operator": ("off", "stuck", "slow", "wrong"),
+    "controller": ("off", "stuck", "slow"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How long things take (s): a floor, a door's travel, AGV mode, a door's stay at a landing."""
+
+    floor_s: float = 2.0
+    door_s: float = 1.0
+    agv_s: float = 0.5
+    dwell_s: float = 3.0
+
+
+def build(name: str, settings: Settings) -> "LiftPlant":
+    """The lift that these settings are wired to."""
+    return LiftPlant(name, settings)
+
+
+class LiftPlant(Machine):
+    """One lift, standing at its lowest landing with its doors closed."""
+
+    def __init__(self, name: str, settings: Settings, pace: Pace | None = None) -> None:
+        self.car = Car()
+        self.agv = False
+        self._wiring = settings
+        self._pace = pace or Pace()
+        self._levels = settings.levels()
+        self._sides = {level: _sides(settings, level) for level in self._levels}
+        self.doors = {side: CarDoor() for sides in self._sides.values() for side in sides}
+        parts = [p for p in FAILS if p != "rear_door_operator" or Side.REAR in self.doors]
+        super().__init__(name, wires(settings), parts)
+        self._only_in_agv = {s for s, _, line in input_rows(settings) if line.valid_when}
+        self._pressed = dict.fromkeys(_buttons(settings, self.doors), False)
+        self._on: set[str] = set()
+        self._people: list[int] = []
+        self._let_out = False
+        self._call: int | None = None
+        self._seen: int | None = None
+        self._seen_at = NEVER
+        self._grant_at = NEVER
+        self._code: dict[str, bool] = {}
+        self._asserted: dict[str, bool] = {}
+
+    # ---- what Machine asks for
+
+    def contact(self, signal: str) -> bool:
+        """Is this contact asserted, in truth?"""
+        return self._asserted.get(signal, False)
+
+    def actuate(self, signal: str, energised: bool) -> None:
+        """A relay of ours; a call counts when it has stood still for a moment."""
+        (self._on.add if energised else self._on.discard)(signal)
+        if signal.startswith("call_"):
+            self._seen, self._seen_at = self._called(), self.now + CALL_SETTLES_S
+
+    def act(self, signal: str, asserted: bool) -> None:
+        """A person or the building."""
+        if signal not in self._pressed:
+            known = ", ".join(self._pressed)
+            raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
+        self._pressed[signal] = asserted
+        if signal.startswith("hall_") and asserted and not self.agv:
+            self._people.append(self._levels.index(signal.removeprefix("hall_")))
+
+    def fail(self, part: str, mode: FailureMode | None) -> None:
+        """Make a wire or part fail; None mends it. ValueError names what there is."""
+        if mode is not None and mode not in FAILS.get(part, (mode,)):
+            raise ValueError(f"{part} does not fail by {mode!r}, but by {', '.join(FAILS[part])}")
+        super().fail(part, mode)
+
+    def run(self) -> None:
+        """Everything that is due now, then what follows from it."""
+        for door in self.doors.values():
+            door.run(self.now)
+        self._take_call()
+        self.car.run(self.now, self._goal(), self._floor_s())
+        self._arrive()
+        self._grant()  # may follow from the arrival, and may bring a call to where the car stands
+        self._arrive()
+        for side, door in self.doors.items():
+            turned = self.failures.get(f"{PREFIX[side]}door_operator") == "wrong"
+            opens = self._open(side) != (turned and self.car.standing)
+            door.steer(self.now, opens, self._door_s(side))
+        self._depart()
+        self._asserted = self._lines()
+
+    def event_at(self) -> float:
+        """When the car, a door or the controller does something next by itself."""
+        dwells = [d.dwell_until for d in self.doors.values() if d.dwell_until > self.now]
+        doors = [d.due_at for d in self.doors.values()]
+        return min([self.car.event_at(), self._grant_at, self._seen_at, *doors, *dwells])
+
+    # ---- the controller
+
+    def _hazard(self, *hazards: Hazard) -> bool:
+        return any(self._pressed.get(h, False) for h in hazards)
+
+    def _called(self) -> int | None:
+        """The landing whose call is on; None for none, or for a code that means none."""
+        code = self._wiring.call_code
+        for i, level in enumerate(self._levels):
+            lines = code.lines(level) if code else {f"call_{level}": True}
+            on = {s for s in self._on if s.startswith("call_")}
+            if on and on == {s for s, asserted in lines.items() if asserted}:
+                return i
+        return None
+
+    def _take_call(self) -> None:
+        if self._seen_at <= self.now:
+            self._seen_at = NEVER
+            if self._seen is not None:  # it counts while AGV mode is on, which starts anew with it
+                self._call = self._seen
+
+    def _grant(self) -> None:
+        """AGV mode comes after a while, and goes at once."""
+        failure = self.failures.get("controller")
+        taken = self._hazard(*(h for h in Hazard if h is not Hazard.OVERLOAD))
+        asked = "agv_mode_request" in self._on and not taken and failure != "off"
+        if failure == "stuck":
+            self._grant_at = NEVER
+        elif self.agv and not asked:
+            self.agv = False
+            self._let_out = not self.car.standing
+        elif self.agv or not asked or self._people or not self.car.standing:
+            self._grant_at = NEVER
+        elif self._grant_at == NEVER:
+            slowness = SLOWNESS if failure == "slow" else 1.0
+            self._grant_at = self.now + self._pace.agv_s * slowness
+        elif self._grant_at <= self.now:
+            self.agv, self._call, self._grant_at = True, self._called(), NEVER
+
+    def _goal(self) -> int | None:
+        """The landing where the car should be; None: wherever it stops next."""
+        if self._hazard(Hazard.FIRE):
+            return 0
+        if self._hazard(*OPENS_UP):
+            return None
+        goal = self._call if self.agv else next(iter(self._people), None)
+        if goal is not None and self.failures.get("car") == "wrong":
+            return goal + 1 if goal + 1 < len(self._levels) else goal - 1
+        return goal
+
+    def _arrive(self) -> None:
+        """Standing at the goal: the call is done, and the landing's door opens for its dwell time."""
+        goal = self._goal()
+        if not self.car.standing or not (self._let_out or self.car.floor == goal):
+            return
+        self._let_out = False
+        if self._hazard(Hazard.FIRE):
+            return
+        if self.car.floor == goal:
+            self._call = None
+            del self._people[:1]
+        sides = self._sides[self._levels[self.car.floor]]
+        if len(sides) == 1 or not self.agv:  # with two doors, the open relays choose
+            for side in sides:
+                self.doors[side].dwell_until = self.now + self._pace.dwell_s
+
+    def _open(self, side: Side) -> bool:
+        """Should this door be open, or opening?"""
+        door = self.doors[side]
+        here = self.car.standing and side in self._sides[self._levels[self.car.floor]]
+        if not here:
+            return False
+        if not door.closed and self._pressed[f"{PREFIX[side]}obstruction"]:
+            return True
+        if self._hazard(Hazard.FIRE):
+            return self.car.floor == 0
+        if self._hazard(*OPENS_UP) or (self._hazard(Hazard.OVERLOAD) and not door.closed):
+            return True
+        held = self.agv and f"{PREFIX[side]}door_open" in self._on
+        return held or self.now < door.dwell_until
+
+    def _depart(self) -> None:
+        goal = self._goal()
+        ready = self.car.standing and all(d.closed for d in self.doors.values())
+        if ready and goal not in (None, self.car.floor) and not self._hazard(Hazard.OVERLOAD):
+            assert goal is not None
+            self.car.depart(self.now, goal, self._floor_s())
+
+    def _floor_s(self) -> float | None:
+        return _slowed(self._pace.floor_s, self.failures.get("car"))
+
+    def _door_s(self, side: Side) -> float | None:
+        return _slowed(self._pace.door_s, self.failures.get(f"{PREFIX[side]}door_operator"))
+
+    # ---- its contacts
+
+    def _lines(self) -> dict[str, bool]:
+        """Every input signal as the controller shows it."""
+        lines = {h.value: self._hazard(h) for h in Hazard} | {"agv_mode": self.agv}
+        for side, door in self.doors.items():
+            lines |= self._door_lines(f"{PREFIX[side]}door", door)
+        lines |= {"moving": not self.car.standing, "stopped": self.car.standing}
+        lines |= {"up": self.car.course > 0, "down": self.car.course < 0}
+        lines |= self._motion_lines() | self._service_lines() | self._floor_lines()
+        if not self.agv:
+            lines |= dict.fromkeys(self._only_in_agv, False)
+        return lines
+
+    def _door_lines(self, prefix: str, door: CarDoor) -> dict[str, bool]:
+        single = getattr(self._wiring.inputs, prefix)
+        proven = door.closed if single and single.proves == "closed" else door.opened
+        return {prefix: proven, f"{prefix}_opened": door.opened, f"{prefix}_closed": door.closed}
+
+    def _motion_lines(self) -> dict[str, bool]:
+        code = self._wiring.inputs.motion
+        if code is None:
+            return {}
+        course = {0: "stopped", 1: "up", -1: "down"}[self.car.course]
+        states = (course,) if self.car.standing else (course, "moving")
+        return _bits(
+            "motion", len(code.bits), next(n for n, s in code.codes.items() if s in states)
+        )
+
+    def _service_lines(self) -> dict[str, bool]:
+        code = self._wiring.inputs.service
+        if code is None:
+            return {}
+        states = [h.value for h in Hazard if self._hazard(h)]
+        states += ["agv_mode"] if self.agv else []
+        states += ["normal", *(s for s in code.codes.values() if s != "agv_mode")]
+        numbers = {str(state): number for number, state in reversed(code.codes.items())}
+        return _bits("service", len(code.bits), next(numbers[s] for s in states if s in numbers))
+
+    def _floor_lines(self) -> dict[str, bool]:
+        """A controller that has no code for between floors shows the last one on."""
+        shown = self.car.shown
+        try:
+            self._code = self._wiring.floor_code.show(
+                None if shown is None else self._levels[shown]
+            )
+        except ValueError:
+            assert shown is None
+        return self._code
+
+
+def _sides(settings: Settings, level: str) -> set[Side]:
+    return {stop.side for stop in settings.stops().values() if stop.level == level}
+
+
+def _buttons(settings: Settings, doors: dict[Side, CarDoor]) -> list[str]:
+    inputs = settings.inputs
+    states = set(inputs.service.codes.values()) if inputs.service else set()
+    hazards = [h.value for h in Hazard if getattr(inputs, h) or h in states]
+    return [
+        *hazards,
+        *(f"hall_{level}" for level in settings.levels()),
+        *(f"{PREFIX[side]}obstruction" for side in doors),
+    ]
+
+
+def _slowed(seconds: float, failure: FailureMode | None) -> float | None:
+    if failure in ("off", "stuck"):
+        return None
+    return seconds * SLOWNESS if failure == "slow" else seconds
+
+
+def _bits(prefix: str, width: int, number: int) -> dict[str, bool]:
+    return {f"{prefix}_bit{i}": bool(number >> i & 1) for i in range(width)}

@@ -1,0 +1,138 @@
+"""What the plants have in common: a record of edges, wires that fail, parts that fail, a clock.
+
+A kind's plant derives from Machine and adds its physics. Edges are those of the terminal block: the
+relay as we drove it, the contact as its wire showed it, so a cut wire is an edge like any other.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from typing import Literal
+
+from drivers.hal.points import Wire
+from hal_fakes.plants.contact import Contact
+from hal_fakes.plants.plant import FAILURE_MODES, Edge, FailureMode
+
+EDGES_KEPT = 100_000
+
+
+class Machine(ABC):
+    """A plant (`hal_fakes.plants.plant.Plant`) but for its physics.
+
+    `wires`: the driver's wiring table of this device; empty where the controller has no contacts.
+    `parts`: what can fail besides wires (`car`, `door_operator`); the plant looks at `failures`.
+    Wires to an I/O module bring its parts along, `unit` and `server`: `hal_fakes/modbus.py` has those.
+    """
+
+    def __init__(self, name: str, wires: Iterable[Wire] = (), parts: Iterable[str] = ()) -> None:
+        self.name = name
+        self.edges: list[Edge] = []
+        self.on_edge: Callable[[Edge], None] | None = None
+        self.now = 0.0
+        self.failures: dict[str, FailureMode] = {}
+        contacts = [Contact(w, f"{name} {w.signal}") for w in wires]
+        at_module = any(c.wire.point.startswith("unit ") for c in contacts)
+        self._parts = frozenset((*parts, *(("unit", "server") if at_module else ())))
+        self._sensors = {c.wire.signal: c for c in contacts if c.wire.direction == "in"}
+        self._relays = {c.wire.signal: c for c in contacts if c.wire.direction == "out"}
+        self._sees = dict.fromkeys(self._relays, False)
+        self._driven = dict.fromkeys(self._relays, False)
+        self._shown: dict[str, bool] = {}
+
+    # ---- what a kind's plant adds
+
+    @abstractmethod
+    def contact(self, signal: str) -> bool:
+        """Is this contact of the controller asserted, in truth?"""
+
+    @abstractmethod
+    def actuate(self, signal: str, energised: bool) -> None:
+        """A relay of ours has changed at the controller's side; `self.now` is the time."""
+
+    @abstractmethod
+    def run(self) -> None:
+        """Physics at `self.now`: every own event that is due happens. May be called at any time."""
+
+    @abstractmethod
+    def event_at(self) -> float:
+        """When the next own event is due: s, or inf. `run` at that time must use it up."""
+
+    @abstractmethod
+    def act(self, signal: str, asserted: bool) -> None:
+        """Somebody presses or releases this. ValueError names what there is."""
+
+    # ---- the Plant protocol
+
+    def drive(self, signal: str, asserted: bool, now: float) -> None:
+        """A relay of ours changes."""
+        self.advance(now)
+        if asserted != self._driven[signal]:
+            self._driven[signal] = asserted
+            self.note("relay", signal, asserted)
+        self._relays[signal].feed(asserted, self.now)
+        self._settle()
+
+    def advance(self, now: float) -> None:
+        """Let everything due until `now` happen, each at its own time. Time never goes back."""
+        while (at := self.next_at()) <= now:
+            self.now = max(self.now, at)
+            self._settle()
+        self.now = max(self.now, now)
+        self._settle()
+
+    def sense(self, signal: str) -> bool:
+        """Is this contact asserted, as the wire shows it?"""
+        return self._sensors[signal].shows
+
+    def next_at(self) -> float:
+        """When something will change if nothing is driven: s, or inf."""
+        contacts = (*self._sensors.values(), *self._relays.values())
+        return min([self.event_at(), *(c.next_at() for c in contacts)])
+
+    def fail(self, part: str, mode: FailureMode | None) -> None:
+        """Make a wire or part fail from now on; None mends it. ValueError names what there is."""
+        contact = self._sensors.get(part) or self._relays.get(part)
+        if contact is None and part not in self._parts:
+            known = ", ".join(sorted({*self._parts, *self._sensors, *self._relays}))
+            raise ValueError(f"{self.name} has no part {part!r}; there are {known}")
+        if mode not in (None, *FAILURE_MODES):
+            raise ValueError(f"no failure {mode!r}; there are {', '.join(FAILURE_MODES)}")
+        self.failures.pop(part, None)
+        if mode is not None:
+            self.failures[part] = mode
+        self._settle()
+        if contact is not None:
+            contact.fail(mode, self.now)
+        self._settle()
+
+    def press(self, signal: str, asserted: bool, now: float) -> None:
+        """A person or the building acts. ValueError names what can be pressed."""
+        self.advance(now)
+        self.act(signal, asserted)
+        self._settle()
+
+    # ---- inside
+
+    def note(
+        self, what: Literal["relay", "sensor"], signal: str, value: bool | int | str | float
+    ) -> None:
+        """Record an edge at `self.now` and tell who listens."""
+        edge = Edge(self.now, self.name, what, signal, value)
+        self.edges.append(edge)
+        if len(self.edges) > EDGES_KEPT:
+            del self.edges[: EDGES_KEPT // 2]
+        if self.on_edge is not None:
+            self.on_edge(edge)
+
+    def _settle(self) -> None:
+        """Relays reach the controller, its physics runs, its contacts reach us."""
+        for signal, relay in self._relays.items():
+            relay.feed(self._driven[signal], self.now)
+            if relay.shows != self._sees[signal]:
+                self._sees[signal] = relay.shows
+                self.actuate(signal, relay.shows)
+        self.run()
+        for signal, sensor in self._sensors.items():
+            sensor.feed(self.contact(signal), self.now)
+            if sensor.shows != self._shown.setdefault(signal, sensor.shows):
+                self._shown[signal] = sensor.shows
+                self.note("sensor", signal, sensor.shows)

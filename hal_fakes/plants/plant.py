@@ -1,0 +1,56 @@
+"""What every plant is: physics driven by commands and time, that records each edge and can fail.
+
+`machine.py` has all of it but the physics. A kind's plants are in `<kind>.py`, which
+holds `build(name, settings) -> Plant`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+FailureMode = Literal["off", "stuck", "slow", "garbage", "wrong"]
+FAILURE_MODES: tuple[FailureMode, ...] = ("off", "stuck", "slow", "garbage", "wrong")
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """One change at `at` (monotonic or virtual s): a relay that we drove, a sensor that moved."""
+
+    at: float
+    device: str
+    what: Literal["relay", "sensor"]
+    signal: str
+    value: bool | int | str | float
+
+
+class Plant(Protocol):
+    """One lift, door or charger. Signals are logical here (asserted or not); levels are the wire's.
+
+    Not thread-safe: whoever puts it on a wire serialises the calls.
+    """
+
+    name: str
+    edges: list[Edge]
+    on_edge: Callable[[Edge], None] | None
+
+    @property
+    def failures(self) -> Mapping[str, FailureMode]:
+        """What has been told to fail, and how; the far side of a bus looks for its own parts here."""
+
+    def drive(self, signal: str, asserted: bool, now: float) -> None:
+        """A relay of ours changes."""
+
+    def advance(self, now: float) -> None:
+        """Let the physics run until `now`."""
+
+    def sense(self, signal: str) -> bool:
+        """Is this contact asserted, as the wire shows it (failures included)?"""
+
+    def next_at(self) -> float:
+        """When something will change if nothing is driven: monotonic seconds, or inf."""
+
+    def fail(self, part: str, mode: FailureMode | None) -> None:
+        """Make a signal or part fail this way; None mends it. ValueError names the known parts."""
+
+    def press(self, signal: str, asserted: bool, now: float) -> None:
+        """A person or the building acts: a fire alarm, a key switch, an obstruction."""

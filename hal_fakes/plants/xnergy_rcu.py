@@ -1,0 +1,96 @@
+"""What Xnergy's receiver (RCU) shows of the plant: its numbers, whether on CANopen or on Modbus."""
+
+from typing import Any, Final, cast
+
+from bridges.charger.signals import Activity
+from drivers.charger.xnergy import CHECK_RANGE, ENABLE, IN_RANGE, READS, TICKS_PER_UNIT
+from drivers.hal.modbus.points import Point
+from drivers.hal.modbus.registers import at
+from hal_fakes.plants.pad import PadReading
+from hal_fakes.plants.plant import Plant
+
+HANDSHAKE: Final = (1, 2, 3, 4)
+STATES: Final = {
+    Activity.IDLE: 0,
+    Activity.CHARGING: 5,
+    Activity.STOPPING: 11,
+    Activity.RELEASED: 7,
+    Activity.ERROR: 238,
+}
+ERRORS: Final = {
+    "authentication": 0x0000_0008,
+    "too_far": 0x0000_0040,
+    "too_near": 0x0000_0080,
+    "contact_lost": 0x0000_0100,
+    "over_temperature": 0x0000_4000,
+    "transmitter_fault": 0x0001_0000,
+    "foreign_object": 0x0002_0000,
+    "thermometer": 0x0010_0000,
+}
+RANGES: Final = {"none": 0, "ongoing": 0, "in": IN_RANGE, "out": 2, "failed": 240}
+
+
+def words(reading: PadReading, latched: int = 0) -> dict[str, int]:
+    """The words by the names of `drivers.charger.xnergy.READS`. `latched`: errors before this one."""
+    now = sum(ERRORS[fault] for fault in reading.faults)
+    shadow = now | latched
+    return {
+        "state": state(reading),
+        "error_low": now & 0xFFFF,
+        "error_high": now >> 16,
+        "latched_low": shadow & 0xFFFF,
+        "latched_high": shadow >> 16,
+        "volts": round(reading.volts * TICKS_PER_UNIT),
+        "amps": round(reading.amps * TICKS_PER_UNIT),
+        "range": RANGES[reading.range_result],
+        "device_c": round(reading.coil_c) - 5,
+        "coil_c": round(reading.coil_c),
+    }
+
+
+def state(reading: PadReading) -> int:
+    """The state code; a handshake has four."""
+    if reading.activity is Activity.HANDSHAKE:
+        return HANDSHAKE[min(int(reading.progress * len(HANDSHAKE)), len(HANDSHAKE) - 1)]
+    return STATES[reading.activity]
+
+
+class ModbusRcu:
+    """The registers and coils of one receiver, with a plant behind them (`hal_fakes.modbus.units`).
+
+    `points`: what it has, `outputs` among it; `unit`: where.
+    """
+
+    def __init__(self, plant: Plant, settings: Any) -> None:
+        self.plant = plant
+        self.unit: int = settings.unit
+        self._reads = {self._point(where.modbus): name for name, where in READS.items()}
+        self._signals = {
+            self._point(where.modbus): signal
+            for signal, where in (("enable", ENABLE), ("check_range", CHECK_RANGE))
+        }
+        self._coils = dict.fromkeys(self._signals, 0)
+        self._latched = 0
+        self.points = frozenset((*self._reads, *self._signals))
+        self.outputs = frozenset(self._signals)
+
+    def get(self, point: Point, now: float) -> int:
+        """What is read there at `now` (monotonic s)."""
+        if point in self._coils:
+            return self._coils[point]
+        self.plant.advance(now)
+        found = words(cast(PadReading, self.plant.sense("reading")), self._latched)
+        self._latched = found["latched_high"] << 16 | found["latched_low"]
+        return found[self._reads[point]] & 0xFFFF
+
+    def set(self, point: Point, value: int, now: float) -> bool:
+        """A write; False where nothing can be written."""
+        if point not in self._signals:
+            return False
+        self._coils[point] = value
+        self.plant.drive(self._signals[point], bool(value), now)
+        return True
+
+    def _point(self, place: str | None) -> Point:
+        assert place
+        return at(self.unit, place)

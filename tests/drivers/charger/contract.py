@@ -1,0 +1,189 @@
+"""What every driver of a charger that is switched has to do, on whatever it stands.
+
+A test class derives from `ChargerContract` and says how its benches are built.
+"""
+
+import contextlib
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Any, ClassVar, Literal
+
+import pytest
+
+from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerOutputs, ChargerSample
+from drivers import Driver, DriverError
+from hal_fakes.plants.plant import Plant
+from tests.drivers.hal.modbus.module import Time
+from tests.waiting import wait_until
+
+ON, OFF, AS_IT_IS = ChargerOutputs(True), ChargerOutputs(False), ChargerOutputs(None)
+PACE = 20.0
+"""A charger that is not worth waiting for."""
+
+ChargerDriver = Driver[ChargerSample, ChargerOutputs]
+OnDeath = Literal["stop", "keep"]
+
+
+class Bench:
+    """A charger behind a bus. `clock`: the bus's, for its pauses. `new`: another driver for it."""
+
+    switch: ClassVar[str] = "power"
+
+    def __init__(self, new: Any, plant: Plant, clock: Time) -> None:
+        self.new = new
+        self.driver: ChargerDriver = new("stop")
+        self.plant = plant
+        self.clock = clock
+
+    def press(self, signal: str, there: bool = True) -> None:
+        """Somebody comes or goes."""
+        self.plant.press(signal, there, time.monotonic())
+
+    def switched(self, signal: str = "") -> list[Any]:
+        """Every command about the power so far, or about this."""
+        wanted = signal or self.switch
+        return [e.value for e in self.plant.edges if e.what == "relay" and e.signal == wanted]
+
+    def scan(self, outputs: ChargerOutputs) -> Activity:
+        """One scan; what the station does."""
+        activity = self.driver.read().activity
+        self.driver.write(outputs)
+        return activity
+
+    def until(self, activity: Activity, outputs: ChargerOutputs) -> None:
+        """Scans, until the station reads that."""
+        wait_until(lambda: self.scan(outputs) is activity, f"the station is {activity}")
+
+    def patiently(self) -> Activity | str:
+        """What it reads with all pauses over; or why it cannot be read."""
+        self.clock.now += 60.0
+        try:
+            return self.driver.read().activity
+        except DriverError as error:
+            return str(error)
+
+
+class ChargerContract(ABC):
+    """On any bus."""
+
+    link: ClassVar[str]
+    """The part of the plant that is the wire."""
+    cut: ClassVar[str] = ""
+    """The part whose `off` leaves the station alone, where that is another one."""
+    foreign_object: ClassVar[str] = "foreign object"
+    """How the station calls it."""
+
+    @abstractmethod
+    def benches(self) -> contextlib.AbstractContextManager[Bench]:
+        """A bench with an empty pad; nothing is open yet."""
+
+    @pytest.fixture
+    def bench(self) -> Iterator[Bench]:
+        with self.benches() as bench:
+            yield bench
+            bench.driver.close()
+
+    def test_an_idle_station_is_sent_nothing(self, bench: Bench) -> None:
+        bench.driver.open()
+        assert [bench.scan(outputs) for outputs in (AS_IT_IS, OFF, AS_IT_IS)] == [Activity.IDLE] * 3
+        assert True not in bench.switched()
+
+    def test_a_robot_is_charged_while_the_power_is_on_and_not_a_moment_longer(
+        self, bench: Bench
+    ) -> None:
+        bench.driver.open()
+        bench.press("robot")
+        bench.until(Activity.CHARGING, ON)
+        assert bench.driver.read().measured.amps
+        bench.until(Activity.IDLE, OFF)
+        assert bench.switched() == [True, False]
+
+    def test_the_same_level_again_is_no_new_command(self, bench: Bench) -> None:
+        bench.driver.open()
+        bench.press("robot")
+        bench.until(Activity.CHARGING, ON)
+        for _ in range(3):
+            bench.scan(ON)
+        assert bench.switched() == [True]
+
+    def test_no_level_leaves_a_charge_as_it_is(self, bench: Bench) -> None:
+        bench.driver.open()
+        bench.press("robot")
+        bench.until(Activity.CHARGING, ON)
+        assert [bench.scan(AS_IT_IS) for _ in range(3)] == [Activity.CHARGING] * 3
+        assert bench.switched() == [True]
+
+    def test_a_new_daemon_finds_a_charge_and_can_stop_it(self, bench: Bench) -> None:
+        bench.press("robot")
+        bench.until(Activity.CHARGING, ON)
+        bench.driver = bench.new("stop")
+        bench.driver.open()
+        assert bench.scan(AS_IT_IS) is Activity.CHARGING
+        assert bench.scan(ON) is Activity.CHARGING
+        assert bench.switched() == [True]
+        bench.until(Activity.IDLE, OFF)
+        assert bench.switched() == [True, False]
+
+    def test_the_daemons_end_stops_a_charge_or_keeps_it_as_the_yaml_says(
+        self, bench: Bench
+    ) -> None:
+        bench.press("robot")
+        bench.until(Activity.CHARGING, ON)
+        keeps = bench.new("keep")
+        keeps.open()
+        keeps.make_safe()
+        keeps.close()
+        assert bench.scan(AS_IT_IS) is Activity.CHARGING
+        bench.driver.make_safe()
+        bench.driver.close()
+        bench.until(Activity.IDLE, AS_IT_IS)
+        assert bench.switched() == [True, False]
+
+    def test_an_error_is_read_with_its_text(self, bench: Bench) -> None:
+        bench.driver.open()
+        bench.press("robot")
+        bench.until(Activity.CHARGING, ON)
+        bench.press("foreign_object")
+        bench.until(Activity.ERROR, OFF)
+        assert self.foreign_object in bench.driver.read().error_text
+        assert bench.switched()[-1] is False
+
+    def test_a_check_of_the_range_is_sent_once_for_a_rise(self, bench: Bench) -> None:
+        bench.driver.open()
+        for checks in (0, 1, 1, 2, 2):
+            bench.driver.read()
+            bench.driver.write(ChargerOutputs(False, range_checks=checks))
+        assert len(self.checks(bench)) == 2
+
+    def checks(self, bench: Bench) -> list[Any]:
+        """The range checks that the station has been asked for."""
+        return bench.switched("range_check")
+
+    @pytest.mark.parametrize("mode", ["off", "slow", "garbage", "wrong"])
+    def test_each_way_of_failing_is_a_driver_error_and_never_charging(
+        self, bench: Bench, mode: Any
+    ) -> None:
+        bench.driver.open()
+        bench.plant.fail(self.link, mode)
+        seen: list[Activity | str] = []
+
+        def failing() -> bool:
+            seen.append(bench.patiently())
+            return seen[-1] not in set(Activity) - {Activity.UNKNOWN}
+
+        wait_until(failing, mode)
+        assert not CURRENT_FLOWS & set(seen)
+        bench.plant.fail(self.link, None)
+        wait_until(lambda: bench.patiently() is Activity.IDLE, "back")
+
+    def test_a_charge_survives_a_link_that_goes_away_and_comes_back(self, bench: Bench) -> None:
+        bench.driver.open()
+        bench.press("robot")
+        bench.until(Activity.CHARGING, ON)
+        bench.plant.fail(self.cut or self.link, "off")
+        wait_until(lambda: not isinstance(bench.patiently(), Activity), "gone")
+        bench.plant.fail(self.cut or self.link, None)
+        wait_until(lambda: bench.patiently() is Activity.CHARGING, "back")
+        bench.scan(ON)
+        assert bench.switched() == [True]

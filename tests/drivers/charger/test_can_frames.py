@@ -1,0 +1,403 @@
+"""The driver of makers' frames: published bytes, the pace of what is sent, maps that are wrong."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import can
+import msgspec
+import pytest
+
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
+from bridges.settings.load import SettingsError, load
+from drivers.charger import dbc
+from drivers.charger.can_frames import (
+    BUSES,
+    FrameDriver,
+    Settings,
+    create,
+    describe,
+    warnings,
+    wires,
+)
+from drivers.charger.can_map import PROFILE, FrameMap
+from drivers.hal import can as hal
+from tests.drivers.hal.can.far_end import Reactive, failure
+
+EXAMPLE = Path(__file__).parents[3] / "config" / "charger_wiferion.yaml"
+SETPOINTS = {"max_volts": 29.4, "volts": 29.2, "amps": 30.0}
+OFF, ON, LEFT = (ChargerOutputs(power) for power in (False, True, None))
+CONTROL, DISABLE = 0x1806E5F4, 0x1806E6F4
+FED = [(CONTROL, "0126012c01240000"), (DISABLE, "0000000000000000")]
+KEPT_OFF = [(CONTROL, "0000000000000000"), (DISABLE, "aa00000000000000")]
+
+
+class Charger:
+    """Wiferion's, in virtual time: its frames as we send them, and a log of those that it gets."""
+
+    def __init__(self) -> None:
+        self.far = Reactive()
+        self.far.react = self._hear
+        self.got: list[tuple[int, str]] = []
+        self.bus = self.far.bus()
+        settings = Settings(profile="wiferion", setpoints=SETPOINTS)
+        self.driver: FrameDriver = create("c", settings, self.bus)
+
+    def _hear(self, message: can.Message) -> list[can.Message]:
+        assert message.is_extended_id
+        self.got.append((message.arbitration_id, bytes(message.data).hex()))
+        return []
+
+    def says(self, frame_id: int, payload: str) -> None:
+        """A frame of the charger's."""
+        data = bytes.fromhex(payload)
+        self.far.coming.append(can.Message(arbitration_id=frame_id, is_extended_id=True, data=data))
+
+    def status(self, state: int = 0) -> None:
+        """All of a status, with no volts and amps."""
+        self.says(0x1FFD0101, "0000126700000000")
+        self.says(0x18FF50E5, f"00000000000000{state:02x}")
+
+    def scan(self, outputs: ChargerOutputs, for_s: float = 0.05) -> list[tuple[int, str]]:
+        """A status, a reading, a writing, and a scan's time; what was sent."""
+        self.status()
+        self.driver.read()
+        self.driver.write(outputs)
+        self.far.now += for_s
+        sent, self.got = self.got, []
+        return sent
+
+
+@pytest.fixture
+def charger() -> Iterator[Charger]:
+    made = Charger()
+    made.bus.take()
+    made.driver.open()
+    yield made
+    made.bus.close()
+
+
+def test_the_driver_stands_on_can_and_has_no_wires() -> None:
+    assert BUSES == ("can",)
+    assert wires(Settings(profile="wiferion", setpoints=SETPOINTS)) == []
+
+
+def test_a_published_status_frame_is_what_it_says(charger: Charger) -> None:
+    charger.says(0x1FFD0101, "0000126700000000")
+    charger.says(0x18FF50E5, "01c8014100000002")  # 456 is 45.6 V, 321 is 32.1 A
+    assert charger.driver.read() == ChargerSample(
+        Activity.CHARGING, 2, "", Measured(receiver_id="4711", volts=45.6, amps=32.1)
+    )
+
+
+def test_only_the_low_half_of_the_last_byte_is_the_state(charger: Charger) -> None:
+    charger.status(0xF0)
+    assert charger.driver.read().activity is Activity.IDLE
+
+
+def test_published_temperatures_are_scaled() -> None:
+    frames = dbc.load("wiferion.dbc")
+    found = frames.decode("MobileHeatsink", bytes.fromhex("0000000056000000"))
+    assert found == {"HeatsinkTemperature": 24.5}
+    found = frames.decode("StationStatus", bytes.fromhex("0000000000005a00"))
+    assert found == {"GridVoltage": 230.4}
+
+
+@pytest.mark.parametrize(
+    ("payload", "side", "text"),
+    [
+        ("0008000000000000", "robot", "the receiver is too hot"),
+        ("0000010000000000", "robot", "the receiver has lost the station"),
+        ("0000000100000000", "robot", "the receiver misses our frames"),
+        ("0000000000010000", "station", "the station's grid supply is not right"),
+        ("0000000000000100", "station", "the pad is not connected to the station"),
+        (
+            "0008000000000840",
+            "station",
+            "the station is too hot; the receiver is too hot",
+        ),
+        ("0000000000000010", "", ""),  # kept off by our frames: no error
+    ],
+)
+def test_published_error_bits_name_what_is_wrong_and_whose_it_is(
+    charger: Charger, payload: str, side: str, text: str
+) -> None:
+    charger.says(0x1FFD2304, payload)
+    charger.status(8)
+    sample = charger.driver.read()
+    assert (sample.activity, sample.side, sample.error_text) == (Activity.ERROR, side, text)
+
+
+def test_an_error_whose_signals_come_after_its_state_has_its_side_from_the_first(
+    charger: Charger,
+) -> None:
+    charger.says(0x1FFD2304, "0000000000000000")
+    charger.status(8)
+    charger.far.later = [
+        can.Message(arbitration_id=0x1FFD2304, data=bytes.fromhex("0008000000000000"))
+    ]
+    sample = charger.driver.read()
+    assert (sample.side, sample.error_text) == ("robot", "the receiver is too hot")
+
+
+def test_an_error_without_a_sign_is_waited_for_once(charger: Charger) -> None:
+    charger.says(0x1FFD2304, "0000000000000000")
+    for waits in (True, False, False):
+        charger.status(8)
+        begun_at = charger.far.now
+        assert charger.driver.read().side == ""
+        assert (charger.far.now - begun_at > 0.04) == waits
+
+
+def test_bad_positioning_is_out_of_range(charger: Charger) -> None:
+    charger.status()
+    charger.says(0x1FFD2304, "0000000000004000")
+    assert charger.driver.read().measured.in_range is False
+    charger.says(0x1FFD2304, "0000000000000000")
+    charger.status()
+    assert charger.driver.read().measured.in_range is True
+
+
+# ---- what is sent, and how often
+
+
+def test_power_is_the_published_frames_at_their_pace(charger: Charger) -> None:
+    sent = [charger.scan(ON) for _ in range(31)]
+    assert [n for n, frames in enumerate(sent) if frames] == [0, 10, 20, 30]
+    assert [frames for frames in sent if frames] == [FED] * 4
+
+
+def test_a_change_is_sent_at_once(charger: Charger) -> None:
+    levels = [ON, ON, OFF, OFF, ON]
+    assert [charger.scan(level) for level in levels] == [FED, [], KEPT_OFF, [], FED]
+
+
+def test_no_level_sends_nothing_before_there_was_one(charger: Charger) -> None:
+    assert [charger.scan(LEFT) for _ in range(20)] == [[]] * 20
+
+
+def test_no_level_goes_on_with_the_last_one(charger: Charger) -> None:
+    assert [charger.scan(OFF, 0.5), charger.scan(LEFT, 0.5), charger.scan(LEFT)] == [KEPT_OFF] * 3
+
+
+def test_a_charger_that_is_not_seen_is_kept_off_but_not_fed(charger: Charger) -> None:
+    charger.scan(ON)
+    charger.far.now += 2
+    assert failure(charger.driver.read)
+    for level in (ON, LEFT):
+        charger.driver.write(level)
+    assert charger.got == []
+    charger.driver.write(OFF)
+    assert charger.got == KEPT_OFF
+
+
+def test_the_end_takes_the_power_away(charger: Charger) -> None:
+    charger.scan(ON)
+    charger.driver.make_safe()
+    assert charger.got == KEPT_OFF
+    charger.driver.close()
+    assert charger.got == KEPT_OFF
+
+
+def test_closing_takes_away_what_was_given_and_nothing_else(charger: Charger) -> None:
+    charger.driver.close()
+    assert charger.got == []
+    charger.scan(ON)
+    charger.driver.close()
+    assert charger.got == KEPT_OFF
+
+
+# ---- what is not seen
+
+
+def test_a_status_that_stays_away_is_no_state(charger: Charger) -> None:
+    charger.scan(OFF)
+    charger.far.now += 0.9
+    charger.driver.read()
+    charger.far.now += 0.2
+    assert failure(charger.driver.read) == (
+        "no ChargerStatus (0x18FF50E5) at can0 within 1 s: nothing else is heard on the bus"
+        " either: power, cable, termination, bitrate?"
+    )
+
+
+def test_without_its_receiver_there_is_no_reading(charger: Charger) -> None:
+    charger.says(0x18FF50E5, "0000000000000000")
+    assert failure(charger.driver.read) == (
+        "no MobileSerial (0x1FFD0001) at can0 within 5 s: nothing else is heard on the bus either:"
+        " power, cable, termination, bitrate?"
+    )
+
+
+def test_frames_of_another_length_are_named_and_never_read(charger: Charger) -> None:
+    charger.says(0x1FFD0101, "0000126700000000")
+    charger.says(0x18FF50E5, "000000000005")
+    charger.says(0x1FFD0104, "00")
+    assert failure(charger.driver.read) == (
+        "no ChargerStatus (0x18FF50E5) at can0 within 1 s, but one (0x18FF50E5) of"
+        " 6 bytes, where the map has 8: is it another make?"
+    )
+
+
+def test_frames_of_others_are_named(charger: Charger) -> None:
+    charger.says(0x18FF50E6, "0000000000000005")
+    charger.says(0x1FFE0101, "0000126700000000")
+    assert failure(charger.driver.read) == (
+        "no ChargerStatus (0x18FF50E5) at can0 within 1 s: the bus works, and others are heard:"
+        " 0x18FF50E6, 0x1FFE0101"
+    )
+
+
+def test_a_scan_that_cannot_keep_the_pace_is_refused() -> None:
+    bus = hal.CanBus(hal.Settings(socketcan="can0", scan_s=1.0))
+    driver = create("c", Settings(profile="wiferion", setpoints=SETPOINTS), bus)
+    assert failure(driver.open) == (
+        "ChargerControl must be sent every 0.5 s, and a scan is every 1 s: set the bus's scan_s"
+        " to 0.5 or less"
+    )
+
+
+# ---- settings
+
+
+def problems(**changed: Any) -> list[tuple[tuple[str, ...], str]]:
+    made = {"profile": "wiferion", "setpoints": SETPOINTS} | changed
+    return list(msgspec.convert(made, Settings).problems())
+
+
+def test_the_example_is_right_and_says_what_is_untried() -> None:
+    texts = " ".join(map(str, load(EXAMPLE).warnings))
+    assert "nobody has tried the profile wiferion" in texts
+    assert "after how long without frames it stops" in texts
+
+
+def test_setpoints_are_those_that_the_map_takes() -> None:
+    assert problems() == []
+    [(path, text)] = problems(setpoints={"max_volts": 29.4, "volts": 29.2})
+    assert (path, text) == (
+        ("setpoints",),
+        "needs 'amps', which the charger is told while it charges",
+    )
+    [(path, text)] = problems(setpoints=SETPOINTS | {"ampere": 1.0})
+    assert (path, text) == (
+        ("setpoints", "ampere"),
+        "unknown setpoint 'ampere': did you mean 'amps'? known here: amps, max_volts, volts",
+    )
+
+
+@pytest.mark.parametrize("amps", [-1.0, 4000.0])
+def test_a_setpoint_that_the_frame_cannot_say_is_a_problem(amps: float) -> None:
+    [(path, text)] = problems(setpoints=SETPOINTS | {"amps": amps})
+    assert path == ("setpoints",)
+    assert text.startswith('ChargerControl: Expected signal "RefCurrent" value')
+
+
+def test_what_is_fed_cannot_be_kept() -> None:
+    [(path, _)] = problems(on_death="keep")
+    assert path == ("on_death",)
+
+
+def test_a_map_or_a_profile_is_needed_and_not_both() -> None:
+    [(path, _)] = problems(profile=None)
+    assert path == ("profile",)
+    plain = msgspec.to_builtins(PROFILE.load("wiferion"))
+    [(path, _)] = problems(map=plain)
+    assert path == ("profile",)
+    assert problems(profile=None, map=plain) == []
+
+
+def map_problems(**changed: Any) -> list[tuple[tuple[str, ...], str]]:
+    plain = msgspec.to_builtins(PROFILE.load("wiferion")) | changed
+    return list(msgspec.convert(plain, FrameMap).problems())
+
+
+@pytest.mark.parametrize(
+    ("changed", "path", "text"),
+    [
+        ({"dbc": "other.dbc"}, ("dbc",), "No such file or directory"),
+        ({"dbc": "wiferion.yaml"}, ("dbc",), "is no DBC file"),
+        ({"volts": "ChargerStatus.Voltage"}, ("volts",), "'OutputVoltage'"),
+        ({"amps": "ChargeStatus.Amps"}, ("amps",), "'ChargerStatus'"),
+        ({"masks": {"Mobile": 1}}, ("masks", "Mobile"), "unknown frame 'Mobile'"),
+        (
+            {"send": [{"frame": "Control", "every_s": 1, "on": {}}]},
+            ("send", "0", "frame"),
+            "unknown frame 'Control'",
+        ),
+        (
+            {"send": [{"frame": "DisableCharging", "every_s": 1, "off": {"Sign": 1}}]},
+            ("send", "0", "off", "Sign"),
+            "'Signature'",
+        ),
+    ],
+)
+def test_a_map_that_its_dbc_file_does_not_bear_out_is_a_problem_at_its_place(
+    changed: dict[str, Any], path: tuple[str, ...], text: str
+) -> None:
+    found = map_problems(**changed)
+    assert [p for p, t in found if text in t] == [path]
+
+
+def test_a_frame_that_is_never_sent_is_a_problem() -> None:
+    sent = [{"frame": "DisableCharging", "every_s": 1}]
+    made = msgspec.convert(msgspec.to_builtins(PROFILE.load("wiferion")) | {"send": sent}, FrameMap)
+    assert list(made.send[0].problems()) == [((), "is never sent: give on, or off, or both")]
+
+
+def test_a_map_in_the_yaml_is_read_like_a_profile(tmp_path: Path) -> None:
+    text = EXAMPLE.read_text("utf-8")
+    profile = (dbc.FOLDER / "wiferion.yaml").read_text("utf-8")
+    inline = profile[profile.index("map:") :].replace("\n", "\n    ")
+    file = tmp_path / "charger.yaml"
+    file.write_text(text.replace("profile: wiferion", inline.rstrip()), "utf-8")
+    assert load(file).devices["charger_c"].map == PROFILE.load("wiferion")
+    file.write_text(
+        text.replace("profile: wiferion", inline.rstrip()).replace("wiferion.dbc", "x.dbc"), "utf-8"
+    )
+    with pytest.raises(SettingsError) as caught:
+        load(file)
+    assert "x.dbc cannot be read" in str(caught.value.problems[0])
+
+
+def test_two_chargers_that_send_the_same_frames_need_two_buses(tmp_path: Path) -> None:
+    text = EXAMPLE.read_text("utf-8")
+    device = text[text.index("  charger_c:") :]
+    file = tmp_path / "two.yaml"
+    file.write_text(text + device.replace("charger_c", "charger_d"), "utf-8")
+    with pytest.raises(SettingsError) as caught:
+        load(file)
+    taken = [
+        f"frame {frame} is taken by charger_c profile" for frame in ("0x18FF50E5", "0x1806E5F4")
+    ]
+    assert all(text in str(caught.value) for text in taken)
+
+
+def test_check_prints_frames_bytes_and_meanings() -> None:
+    settings = Settings(profile="wiferion", setpoints=SETPOINTS)
+    rows = describe(settings, hal.Settings(socketcan="can0"))
+    assert ("state", "ChargerStatus.ChargerState (0x18FF50E5)") in rows
+    assert (
+        "sent, power on",
+        "ChargerControl (0x1806E5F4) every 0.5 s: MaxVoltage 29.4, RefCurrent 30, RefVoltage 29.2",
+    ) in rows
+    assert ("sent, power off", "DisableCharging (0x1806E6F4) every 0.5 s: Signature 170") in rows
+    assert ("state charging", "1, 2, 3, 4, 5") in rows
+
+
+def test_a_map_without_a_receiver_verifies_nobody() -> None:
+    plain = msgspec.to_builtins(PROFILE.load("wiferion")) | {"receiver": None}
+    limits = {"peer_internal_timeout_s": 2}
+    made = {"map": plain, "setpoints": SETPOINTS, "receivers": {"7": "tiny/r1"}, "limits": limits}
+    assert [path for path, _ in warnings(msgspec.convert(made, Settings))] == [("receivers",)]
+
+
+# ---- DBC files
+
+
+@pytest.mark.parametrize(
+    "text", ["", "hello", 'VERSION ""\nBO_ 1 A: 8 X\n SG_ B : 0|99@1+ (1,0) [0|1] "" X\n']
+)
+def test_what_is_no_dbc_file_is_a_value_error_on_one_line(text: str) -> None:
+    with pytest.raises(ValueError, match="is no DBC file") as caught:
+        dbc.Dbc(text)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,127 @@
+"""A CAN bus of python-can's `virtual` sort, and hands on the other end of it."""
+
+import itertools
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import can
+
+from drivers import DriverError
+from drivers.hal.can import CanBus, Settings
+from tests.drivers.hal.modbus.module import Time
+
+_numbers = itertools.count()
+
+
+def channel() -> str:
+    """A virtual bus that nobody else is on."""
+    return f"test-{next(_numbers)}"
+
+
+class Clock(Time):
+    """Real time that can be made to jump ahead: `now` is by how much."""
+
+    def __call__(self) -> float:
+        return time.monotonic() + self.now
+
+
+class FarEnd:
+    """Whoever else is on the bus: sends anything, and has heard what we sent."""
+
+    def __init__(self, channel: str) -> None:
+        self._bus = can.Bus(channel, interface="virtual")
+
+    def send(self, frame_id: int, payload: str = "", extended: bool = False) -> None:
+        """A data frame; its payload in hex digits."""
+        data = bytes.fromhex(payload)
+        self._bus.send(can.Message(arbitration_id=frame_id, is_extended_id=extended, data=data))
+
+    def trouble(self, error_id: int) -> None:
+        """An error frame, as SocketCAN makes them of its controller's troubles."""
+        data = bytes(8)
+        self._bus.send(can.Message(arbitration_id=error_id, is_error_frame=True, data=data, dlc=8))
+
+    def put(self, message: can.Message) -> None:
+        """Any frame at all."""
+        self._bus.send(message)
+
+    def heard(self, wait_s: float = 0.0) -> list[tuple[int, str]]:
+        """What we sent so far: (id, payload in hex)."""
+        found = []
+        while (message := self._bus.recv(wait_s)) is not None:
+            found.append((message.arbitration_id, bytes(message.data).hex()))
+        return found
+
+    def recv(self) -> can.Message | None:
+        """The next frame of ours, if there is one soon."""
+        return self._bus.recv(0.02)
+
+    def close(self) -> None:
+        """Leave."""
+        self._bus.shutdown()
+
+
+def bus_on(
+    channel: str, clock: Callable[[], float] | None = None, *, timeout_s: float = 0.1
+) -> CanBus:
+    """Ours, whose pauses follow the clock and have no jitter."""
+    settings = Settings(socketcan="can0", timeout_s=timeout_s, scan_s=0.05)
+    vendor = lambda: can.Bus(channel, interface="virtual")  # noqa: E731
+    return CanBus(settings, clock or time.monotonic, lambda: 0.0, vendor)
+
+
+@contextmanager
+def two_ends(timeout_s: float = 0.05) -> Iterator[tuple[CanBus, FarEnd, Clock]]:
+    """A bus with somebody at the far end."""
+    name, clock = channel(), Clock()
+    far, bus = FarEnd(name), bus_on(name, clock, timeout_s=timeout_s)
+    bus.take()
+    try:
+        yield bus, far, clock
+    finally:
+        bus.close()
+        far.close()
+
+
+class Reactive(can.BusABC):
+    """A bus in virtual time: who is on it answers at once, and waiting is only a number.
+
+    `later`: what comes only when it is waited for.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("reactive")
+        self.now = 0.0
+        self.react: Callable[[can.Message], list[can.Message]] = lambda message: []
+        self.coming: deque[can.Message] = deque()
+        self.later: list[can.Message] = []
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        if self.coming:
+            return self.coming.popleft()
+        if timeout and self.later:
+            return self.later.pop(0)
+        self.now += (timeout or 0.0) + 1e-6
+        return None
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self.coming.extend(self.react(msg))
+
+    def bus(self) -> CanBus:
+        place = Settings(socketcan="can0", timeout_s=0.05, scan_s=0.05)
+        return CanBus(place, lambda: self.now, lambda: 0.0, lambda: self)
+
+    def shutdown(self) -> None:
+        """It stays, and the next opening finds it again."""
+        self._is_shutdown = True
+
+
+def failure(call: Callable[[], object]) -> str:
+    """The text of the DriverError that this raises; "" when it raises none."""
+    try:
+        call()
+    except DriverError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,253 @@
+"""A CANopen node: whose answer an answer is, and whether the node lives."""
+
+import struct
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from drivers.hal.can import CanBus, Wanted
+from drivers.hal.can.canopen import CanOpenNode
+from tests.drivers.hal.can.far_end import Clock, FarEnd, failure, two_ends
+
+NODE = 10
+STATE = (0x2002, 0x0A, 2)
+ENABLE = (0x2000, 1, 1)
+Answer = Callable[[bytes], list[str]]
+
+
+def value(request: bytes, number: int, command: int = 0x4B) -> str:
+    """The reply to a read: an expedited number of two octets."""
+    return (bytes((command,)) + request[1:4] + struct.pack("<I", number)).hex()
+
+
+class Node:
+    """What answers the requests to node 10; each answer is a list of payloads in hex."""
+
+    def __init__(self, far: FarEnd) -> None:
+        self.answer: Answer = lambda request: [value(request, 5)]
+        self.asked: list[str] = []
+        self._far = far
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._ended.is_set():
+            message = self._far.recv()
+            if message is None:
+                continue
+            self.asked.append(bytes(message.data).hex())
+            for payload in self.answer(bytes(message.data)):
+                self._far.send(0x580 + NODE, payload)
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join()
+
+
+Side = tuple[CanOpenNode, Node, FarEnd, CanBus, Clock]
+
+
+@pytest.fixture
+def side() -> Iterator[Side]:
+    with two_ends() as (bus, far, clock):
+        node = Node(far)
+        yield CanOpenNode(bus, NODE, 0.5), node, far, bus, clock
+        node.close()
+
+
+NAME = "CANopen node 10 at can0"
+
+
+def test_a_number_is_read_and_written_as_the_makers_frames_are(side: Side) -> None:
+    ours, node, *_ = side
+    assert ours.read(*STATE) == 5
+    node.answer = lambda request: ["60" + request[1:4].hex() + "00000000"]
+    ours.write(*ENABLE, 1)
+    assert node.asked == ["4002200a00000000", "2f00200101000000"]
+
+
+@pytest.mark.parametrize("command", [0x4B, 0x43, 0x42])
+def test_a_number_may_come_in_four_octets_whose_rest_is_zero(side: Side, command: int) -> None:
+    ours, node, *_ = side
+    node.answer = lambda request: [value(request, 238, command)]
+    assert ours.read(*STATE) == 238
+
+
+def test_a_number_that_is_too_short_or_too_great_is_none(side: Side) -> None:
+    ours, node, *_ = side
+    node.answer = lambda request: [value(request, 5, 0x4F)]
+    assert failure(lambda: ours.read(*STATE)) == (
+        f"{NAME}, read 0x2002:0A: 1 bytes (05) for a number of 2"
+    )
+    node.answer = lambda request: [value(request, 0x10005, 0x43)]
+    assert failure(lambda: ours.read(*STATE)) == (
+        f"{NAME}, read 0x2002:0A: 4 bytes (05 00 01 00) for a number of 2"
+    )
+
+
+def test_a_refusal_is_named_and_is_no_reason_to_pause(side: Side) -> None:
+    ours, node, *_ = side
+    node.answer = lambda request: ["80" + request[1:4].hex() + "00000206"]
+    for _ in range(2):
+        assert failure(lambda: ours.read(*STATE)) == (
+            f"{NAME}, read 0x2002:0A: refused: Code 0x06020000, Object does not exist"
+        )
+    assert len(node.asked) == 2
+
+
+def test_no_answer_is_no_number_and_pauses_the_node(side: Side) -> None:
+    ours, node, _, _, clock = side
+    node.answer = lambda request: []
+    text = f"{NAME}, read 0x2002:0A: no reply within 0.05 s"
+    assert [failure(lambda: ours.read(*STATE)) for _ in range(3)] == [text] * 3
+    assert len(node.asked) == 1
+    node.answer = lambda request: [value(request, 7)]
+    clock.now += 0.6
+    assert ours.read(*STATE) == 7
+
+
+@pytest.mark.parametrize(
+    ("odd", "text"),
+    [
+        (lambda r: "4b0220050500", "a reply of 6 bytes"),
+        (lambda r: "", "a reply of 0 bytes"),
+        (lambda r: "4b02200505000000", "a reply about 0x2002:05"),
+        (lambda r: "8000200100000206", "a reply about 0x2000:01"),
+    ],
+)
+def test_a_reply_of_another_length_or_about_another_object_is_named_and_never_taken(
+    side: Side, odd: Callable[[bytes], str], text: str
+) -> None:
+    ours, node, _, _, clock = side
+    node.answer = lambda request: [odd(request)]
+    assert failure(lambda: ours.read(*STATE)) == (
+        f"{NAME}, read 0x2002:0A: no reply within 0.05 s, but {text}"
+    )
+    clock.now += 1
+    node.answer = lambda request: [odd(request), value(request, 9), odd(request)]
+    assert ours.read(*STATE) == 9
+
+
+def test_an_answer_of_another_sort_is_no_number(side: Side) -> None:
+    ours, node, *_ = side
+    node.answer = lambda request: ["60" + request[1:4].hex() + "05000000"]
+    assert failure(lambda: ours.read(*STATE)) == (
+        f"{NAME}, read 0x2002:0A: no SDO reply to it (Unexpected response 0x60)"
+    )
+
+
+def test_a_write_is_done_only_when_the_node_says_so(side: Side) -> None:
+    ours, node, *_ = side
+    node.answer = lambda request: [value(request, 1)]
+    assert failure(lambda: ours.write(*ENABLE, 1)) == (
+        f"{NAME}, write 0x2000:01: no SDO reply to it (Unexpected response 0x4B)"
+    )
+
+
+def test_a_late_answer_is_never_the_answer_to_the_next_question(side: Side) -> None:
+    ours, node, far, _, clock = side
+    node.answer = lambda request: []
+    assert failure(lambda: ours.read(*STATE))
+    clock.now += 0.6
+    far.send(0x580 + NODE, "4b02200a05000000")  # state 5, of before
+    node.answer = lambda request: [value(request, 238)]
+    assert ours.read(*STATE) == 238
+
+
+def test_a_node_that_owes_an_answer_is_asked_nothing(side: Side) -> None:
+    ours, node, _, _, clock = side
+    node.answer = lambda request: []
+    assert failure(lambda: ours.read(*STATE))
+    ours._sdo_pause.mended()  # no pause keeps us from asking
+    assert failure(lambda: ours.read(*STATE)) == (f"{NAME}, read 0x2002:0A: no reply within 0.05 s")
+    assert len(node.asked) == 1
+    clock.now += 0.2
+    node.answer = lambda request: [value(request, 1)]
+    assert ours.read(*STATE) == 1
+
+
+def test_what_switches_off_before_the_end_is_sent_whatever_the_pause(side: Side) -> None:
+    ours, node, _, bus, _ = side
+    node.answer = lambda request: []
+    assert failure(lambda: ours.write(*ENABLE, 1))
+    node.answer = lambda request: ["60" + request[1:4].hex() + "00000000"]
+    assert failure(lambda: ours.write(*ENABLE, 0))
+    bus.insist()
+    ours.write(*ENABLE, 0)
+    assert node.asked == ["2f00200101000000", "2f00200100000000"]
+
+
+# ---- heartbeat
+
+
+def test_a_heartbeat_that_is_there_or_comes_soon_is_life(side: Side) -> None:
+    ours, _, far, _, _ = side
+    far.send(0x70A, "05")
+    ours.alive()
+    threading.Timer(0.01, lambda: far.send(0x70A, "05")).start()
+    ours.alive()
+
+
+def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side) -> None:
+    ours, _, far, _, clock = side
+    far.send(0x70A, "05")
+    ours.alive()
+    clock.now += 0.55
+    assert failure(ours.alive) == (
+        f"{NAME}: no heartbeat within 0.5 s: nothing else is heard on the bus either: power,"
+        " cable, termination, bitrate?"
+    )
+    far.send(0x70A, "05")
+    assert failure(ours.alive) == ""
+
+
+def test_another_nodes_heartbeat_is_no_life_and_is_named(side: Side) -> None:
+    ours, _, far, _, _ = side
+    far.send(0x70B, "05")
+    far.send(0x70A, "05", extended=True)
+    assert failure(ours.alive) == (
+        f"{NAME}: no heartbeat within 0.5 s, but of node 11: is 'node' right?"
+    )
+
+
+@pytest.mark.parametrize("payload", ["", "0500", "0505050505050505"])
+def test_a_heartbeat_of_another_length_is_none(side: Side, payload: str) -> None:
+    ours, _, far, _, _ = side
+    far.send(0x70A, payload)
+    assert failure(ours.alive) == (
+        f"{NAME}: no heartbeat within 0.5 s, but one of {len(payload) // 2} bytes:"
+        " is it a CANopen node?"
+    )
+
+
+@pytest.mark.parametrize(
+    ("state", "text"),
+    [("00", "starting"), ("04", "stopped"), ("7f", "pre-operational"), ("03", "in state 3")],
+)
+def test_a_node_that_is_not_operational_is_not_asked(side: Side, state: str, text: str) -> None:
+    ours, _, far, _, _ = side
+    far.send(0x70A, state)
+    assert failure(ours.alive) == f"{NAME} is {text}, not operational: look at the node"
+
+
+def test_a_start_is_counted_and_ends_the_pause(side: Side) -> None:
+    ours, node, far, _, _ = side
+    node.answer = lambda request: []
+    assert failure(lambda: ours.read(*STATE))
+    far.send(0x70A, "00")
+    far.send(0x70A, "05")
+    ours.alive()
+    assert ours.starts == 1
+
+
+def test_a_node_without_a_heartbeat_is_alive_as_long_as_it_answers() -> None:
+    with two_ends() as (bus, far, _):
+        ours = CanOpenNode(bus, NODE, None)
+        ours.alive()
+        heard: list[object] = []
+        bus.listen([Wanted(1)], lambda frame, at: heard.append(frame))
+        far.send(1)
+        ours.alive()
+        assert len(heard) == 1

@@ -1,0 +1,192 @@
+"""An slcan adapter on a pseudo-terminal: the way onto the bus with all that serial ports do."""
+
+import os
+import threading
+from collections.abc import Iterator
+
+import can
+import pytest
+
+from drivers.hal.can import EXTENDED, CanBus, Frame, Settings, Slcan, Wanted
+from hal_fakes.can.side import CanSide, Send
+from hal_fakes.can.slcan_port import SlcanPort, decoded, encoded
+from hal_fakes.plants.pad import PadPlant
+from hal_fakes.plants.plant import Plant
+from tests.drivers.hal.can.far_end import Clock, failure
+from tests.waiting import wait_until
+
+
+class Echo:
+    """A station that sends back each frame, its id one higher."""
+
+    def __init__(self) -> None:
+        self.plant: Plant = PadPlant("echo")
+        self.heard = 0
+
+    def hear(self, message: can.Message, now: float, send: Send) -> None:
+        self.heard += 1
+        message.arbitration_id += 1
+        message.timestamp = 0.0
+        send(message)
+
+    def tick(self, now: float, send: Send) -> None:
+        """Says nothing by itself."""
+
+
+class Desk:
+    """Our bus at an adapter, and what came of it."""
+
+    def __init__(self) -> None:
+        self.echo = Echo()
+        self.port = SlcanPort({})
+        self.side = CanSide(self.port, [self.echo], slow_s=0.2)
+        self.clock = Clock()
+        self.bus = self.opened()
+        self.heard: list[Frame] = []
+        wanted = [Wanted(0x124), Wanted(0x18FF50E6 | EXTENDED)]
+        self.bus.listen(wanted, lambda frame, at: self.heard.append(frame))
+
+    def opened(self) -> CanBus:
+        place = Slcan(port=str(self.port.adapter.path), bitrate=250_000)
+        return CanBus(Settings(slcan=place, timeout_s=0.3), self.clock, lambda: 0.0)
+
+    def passes(self) -> bool:
+        """Does a frame come back?"""
+        self.clock.now += 60
+        self.heard.clear()
+        if failure(self.bus.take) or failure(lambda: self.bus.send(Frame(0x123, b"\1"))):
+            return False
+        return failure(lambda: self.bus.wait(lambda: bool(self.heard), 0.1)) == "" and bool(
+            self.heard
+        )
+
+    def text(self) -> str:
+        """Why it does not work, if it says so."""
+        return failure(self.bus.take)
+
+    def close(self) -> None:
+        self.bus.close()
+        self.side.close()
+
+
+@pytest.fixture
+def desk() -> Iterator[Desk]:
+    made = Desk()
+    yield made
+    made.close()
+
+
+def test_frames_go_there_and_back(desk: Desk) -> None:
+    desk.bus.send(Frame(0x123, b"\1\2"))
+    desk.bus.send(Frame(0x18FF50E5 | EXTENDED, bytes(8)))
+    assert desk.bus.wait(lambda: len(desk.heard) == 2, 20.0)
+    assert desk.heard == [Frame(0x124, b"\1\2"), Frame(0x18FF50E6 | EXTENDED, bytes(8))]
+
+
+def test_a_line_is_a_frame_and_a_frame_a_line() -> None:
+    for line in ("t12320102", "T18FF50E580000000000000000", "t0000"):
+        assert encoded(decoded(line)) == line.encode() + b"\r"
+
+
+def test_acknowledgements_between_frames_hide_none(desk: Desk) -> None:
+    for n in range(50):
+        desk.bus.send(Frame(0x123, bytes((n,))))
+    assert desk.bus.wait(lambda: len(desk.heard) == 50, 20.0)
+    assert [frame.payload[0] for frame in desk.heard] == list(range(50))
+
+
+def test_an_adapter_that_is_pulled_is_a_failure_and_is_found_again_when_it_is_back(
+    desk: Desk,
+) -> None:
+    assert desk.passes()
+    desk.echo.plant.fail("bus", "off")
+    wait_until(lambda: desk.text() != "", "it is missed")
+    desk.clock.now += 60
+    wait_until(lambda: "the adapter is not there; is it plugged in?" in desk.text(), "it is named")
+    desk.echo.plant.fail("bus", None)
+    wait_until(desk.passes, "it passes frames again")
+
+
+def test_noise_that_is_no_slcan_is_a_failure_and_ends_with_it(desk: Desk) -> None:
+    assert desk.passes()
+    desk.echo.plant.fail("bus", "garbage")
+    wait_until(lambda: desk.text() != "", "it is noticed")
+    desk.echo.plant.fail("bus", None)
+    wait_until(desk.passes, "it passes frames again")
+
+
+def test_a_bus_that_passes_nothing_is_silent_and_no_failure(desk: Desk) -> None:
+    assert desk.passes()
+    desk.echo.plant.fail("bus", "stuck")
+    wait_until(lambda: not desk.passes(), "nothing comes back")
+    assert desk.text() == ""
+
+
+def test_an_adapter_that_another_program_has_is_named(desk: Desk) -> None:
+    desk.bus.take()
+    other = desk.opened()
+    assert failure(other.take).endswith("another program has it open")
+    other.close()
+
+
+def test_an_adapter_that_takes_nothing_costs_its_time_and_no_more() -> None:
+    leader, follower = os.openpty()
+    place = Slcan(port=os.ttyname(follower), bitrate=250_000)
+    bus = CanBus(Settings(slcan=place, timeout_s=0.05))
+    ended = threading.Event()
+
+    def fill() -> None:
+        while not failure(lambda: bus.send(Frame(0x123, bytes(8)))):
+            pass
+        ended.set()
+
+    threading.Thread(target=fill, daemon=True).start()
+    assert ended.wait(20)
+    bus.close()
+    os.close(leader)
+    os.close(follower)
+
+
+JUNK: list[bytes] = [
+    b"\r",
+    b"\a",
+    b"t\r",
+    b"T123\r",
+    b"tXYZ10\r",
+    b"t1239\r",
+    b"t12380102\r",
+    b"t1231zz\r",
+    b"\xff\xfe\r",
+    b"r1230\r",
+    b"d1239" + b"00" * 12 + b"\r",
+    b"z\r",
+    b"V1013\r",
+    b"t1240\rt",
+]
+
+
+@pytest.mark.parametrize("junk", JUNK)
+def test_whatever_an_adapter_says_is_a_frame_or_a_failure_and_never_breaks_us(
+    junk: bytes,
+) -> None:
+    leader, follower = os.openpty()
+    place = Slcan(port=os.ttyname(follower), bitrate=250_000)
+    clock = Clock()
+    bus = CanBus(Settings(slcan=place, timeout_s=0.05), clock, lambda: 0.0)
+    heard: list[Frame] = []
+    bus.listen([Wanted(0x321)], lambda frame, at: heard.append(frame))
+    bus.take()
+    os.write(leader, junk)
+
+    def again() -> bool:
+        clock.now += 60
+        failure(bus.take)
+        os.write(leader, b"\rt32110A\r")
+        failure(lambda: bus.wait(lambda: bool(heard), 0.05))
+        return bool(heard)
+
+    wait_until(again, "a good frame after it")
+    assert set(heard) == {Frame(0x321, b"\x0a")}
+    bus.close()
+    os.close(leader)
+    os.close(follower)

@@ -1,0 +1,26 @@
+"""lgpio, recorded: the pin factory of the real hardware runs against a stand-in module."""
+
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+import drivers.hal
+from tests.drivers.hal.gpio.lgpio_stand_in import StandIn
+
+
+@pytest.fixture
+def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
+    """A stand-in that the real factory imports; those who imported another forget it."""
+    stand_in = StandIn()
+    monkeypatch.setitem(sys.modules, "lgpio", stand_in)
+    forget()
+    yield stand_in
+    forget()
+
+
+def forget() -> None:
+    """Nobody has imported lgpio."""
+    for module in ("gpiozero.pins.lgpio", "drivers.hal.gpio.pins"):
+        sys.modules.pop(module, None)
+    vars(drivers.hal).pop("_gpio_pins", None)

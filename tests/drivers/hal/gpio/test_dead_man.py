@@ -1,0 +1,60 @@
+"""The dead-man beside the loop, in virtual time but for its thread."""
+
+import pytest
+
+from drivers.hal.gpio.dead_man import AFTER_S, DeadMan
+from drivers.hal.points import HalError
+from tests.drivers.hal.gpio.test_bus import Bench
+from tests.waiting import wait_until
+
+
+@pytest.fixture
+def bench() -> Bench:
+    made = Bench()
+    made.points.open()
+    made.points.write({"call": True, "hold": True})
+    return made
+
+
+def test_outputs_drop_when_scans_stop_and_stay_dropped_until_an_operator_resets() -> None:
+    now, drops = [0.0], []
+    dead_man = DeadMan(lambda: drops.append(now[0]), lambda: now[0])
+    assert not dead_man.check()  # nothing is watched before the first scan
+    dead_man.fed()
+    now[0] = AFTER_S
+    assert not dead_man.check()
+    now[0] = AFTER_S + 0.1
+    wait_until(lambda: drops == [AFTER_S + 0.1], "the thread drops the outputs, once")
+    now[0] = 100.0
+    assert not dead_man.check()
+    assert drops == [AFTER_S + 0.1]
+    dead_man.close()
+
+
+def test_the_relays_fall_and_neither_reads_nor_writes_work_until_a_reset(bench: Bench) -> None:
+    bench.bus.scanned()
+    bench.now += AFTER_S + 0.1
+    fallen = [("call", False), ("hold", False)]
+    wait_until(lambda: sorted(bench.relays()[-2:]) == fallen, "the dead-man drops the outputs")
+    with pytest.raises(HalError, match="no scan finished for 2 s"):
+        bench.points.read()
+    with pytest.raises(HalError, match="no scan finished for 2 s"):
+        bench.points.write({"call": False, "hold": True})
+    edges = len(bench.relays())
+    bench.points.make_safe()
+    bench.points.open()  # what an operator's reset does
+    bench.points.read()
+    bench.points.write({"call": True})
+    assert bench.relays()[edges:] == [("call", True)]
+    bench.points.close()
+    bench.bus.close()
+
+
+def test_a_loop_that_goes_on_is_left_alone(bench: Bench) -> None:
+    for _ in range(50):
+        bench.bus.scanned()
+        bench.now += AFTER_S / 2
+    bench.points.write({"call": True, "hold": True})
+    assert sorted(bench.relays()) == [("call", True), ("hold", True)]
+    bench.points.close()
+    bench.bus.close()

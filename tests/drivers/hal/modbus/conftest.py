@@ -1,0 +1,39 @@
+"""Modules and buses that are closed after each test."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.drivers.hal.modbus.line import SerialModule
+from tests.drivers.hal.modbus.module import Module, opened
+
+
+@pytest.fixture
+def module() -> Iterator[Module]:
+    """A module that answers as the specification says."""
+    started = Module()
+    yield started
+    started.close()
+
+
+@pytest.fixture(params=[Module, SerialModule], ids=["tcp", "rtu"])
+def either(request: pytest.FixtureRequest) -> Iterator[Module]:
+    """A module on TCP, and one on a serial line."""
+    started: Module = request.param()
+    yield started
+    started.close()
+
+
+@pytest.fixture
+def line() -> Iterator[SerialModule]:
+    """A module on a serial line."""
+    started = SerialModule()
+    yield started
+    started.close()
+
+
+@pytest.fixture(autouse=True)
+def _hang_up() -> Iterator[None]:
+    yield
+    while opened:
+        opened.pop().close()

@@ -1,0 +1,173 @@
+"""An I/O module in fifty lines of sockets, written from the Modbus specification and not from pymodbus.
+
+It shows what was really asked (`asked`: each request's bytes) and can answer anything at all.
+"""
+
+import socket
+import struct
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+
+import pytest
+
+from drivers.hal.modbus import ModbusBus, Serial, Settings, Tcp
+from drivers.hal.points import HalError
+
+Reply = Callable[[bytes], bytes | None]
+"""A request's bytes to what is sent; None hangs up."""
+
+
+class Module:
+    """Units with coils and inputs behind one listening socket. `reply` may be replaced.
+
+    `hangs_up`: after each reply. `where`: how the bus's texts call it.
+    """
+
+    def __init__(self, reply: Reply | None = None) -> None:
+        self.reply: Reply = reply or self.answer
+        self.asked: list[bytes] = []
+        self.connections = 0
+        self.hangs_up = False
+        self.units: set[int] = {1}
+        self.coils: dict[tuple[int, int], bool] = {}
+        self.inputs: dict[tuple[int, int], bool] = {}
+        self._ends: list[socket.socket] = []
+        self._listen()
+
+    def _listen(self) -> None:
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port: int | str = self._listener.getsockname()[1]
+        self.where = f"127.0.0.1:{self.port}"
+        self._threads = [self._started(self._accept)]
+
+    def functions(self) -> list[int]:
+        """The function of each request so far."""
+        return [request[7] for request in self.asked]
+
+    def units_asked(self) -> list[int]:
+        """The unit of each request so far."""
+        return [request[6] for request in self.asked]
+
+    def answer(self, request: bytes) -> bytes:
+        """What a module says: Modbus Application Protocol V1.1b3, 6.1, 6.2 and 6.5; else silence."""
+        unit, function, address, value = struct.unpack(">BBHH", request[6:12])
+        if unit not in self.units:
+            return b""
+        if function == 5:
+            self.coils[unit, address] = value == 0xFF00
+            return frame(request, request[7:12])
+        table = self.coils if function == 1 else self.inputs
+        bits = [table.get((unit, address + i)) for i in range(value)]
+        if None in bits:
+            return frame(request, bytes((function | 0x80, 2)))
+        packed = sum(bool(bit) << i for i, bit in enumerate(bits))
+        return bits_reply(request, packed.to_bytes((value + 7) // 8, "little"))
+
+    def hang_up(self) -> None:
+        """Close every connection, and go on listening."""
+        for end in self._ends:
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """End it all."""
+        with suppress(OSError):
+            self._listener.shutdown(socket.SHUT_RDWR)
+        self._threads[0].join()
+        self.hang_up()
+        for thread in self._threads:
+            thread.join()
+        for end in (self._listener, *self._ends):
+            end.close()
+
+    def _started(self, work: Callable[..., None], *args: object) -> threading.Thread:
+        thread = threading.Thread(target=work, args=args, daemon=True)
+        thread.start()
+        return thread
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                end, _ = self._listener.accept()
+            except OSError:
+                return
+            self.connections += 1
+            self._ends.append(end)
+            self._threads.append(self._started(self._serve, end))
+
+    def _serve(self, end: socket.socket) -> None:
+        with suppress(OSError):
+            while request := end.recv(260):
+                self.asked.append(request)
+                reply = self.reply(request)
+                if reply is None:
+                    break
+                end.sendall(reply)
+                if self.hangs_up:
+                    break
+        with suppress(OSError):
+            end.shutdown(socket.SHUT_RDWR)
+        end.close()
+
+
+def frame(request: bytes, pdu: bytes) -> bytes:
+    """A reply to this request: its MBAP header with the right length, and this PDU."""
+    return request[:4] + struct.pack(">H", len(pdu) + 1) + request[6:7] + pdu
+
+
+def bits_reply(request: bytes, packed: bytes) -> bytes:
+    """The reply to a read of bits."""
+    return frame(request, bytes((request[7], len(packed))) + packed)
+
+
+class Time:
+    """A clock that stands still until it is told to go."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def door(module: Module, unit: int = 1) -> None:
+    """Give this unit a door's two inputs and one coil."""
+    module.units.add(unit)
+    module.inputs.update({(unit, 0): False, (unit, 1): True})
+    module.coils.update({(unit, 0): False})
+
+
+def fails(bus: ModbusBus, point: str) -> str:
+    """The text of the HalError that reading this point raises."""
+    with pytest.raises(HalError) as caught:
+        bus.lines({point: None}, {}).read()
+    return str(caught.value)
+
+
+def serial(port: str, ignore_echo: bool = False) -> Serial:
+    """A quick line."""
+    return Serial(port=port, baudrate=115200, parity="none", stopbits=1, ignore_echo=ignore_echo)
+
+
+opened: list[ModbusBus] = []
+"""By `bus_to`; the conftest closes them after each test."""
+
+
+def bus_to(
+    port: int | str,
+    clock: Time | None = None,
+    *,
+    timeout_s: float = 2.0,
+    retries: int = 1,
+    ignore_echo: bool = False,
+) -> ModbusBus:
+    """A bus to this port of this machine, whose pauses follow the clock and have no jitter."""
+    settings = Settings(
+        tcp=Tcp(host="127.0.0.1", port=port) if isinstance(port, int) else None,
+        serial=serial(port, ignore_echo) if isinstance(port, str) else None,
+        timeout_s=timeout_s,
+        retries=retries,
+    )
+    opened.append(ModbusBus(settings, clock or Time(), lambda: 0.0))
+    return opened[-1]

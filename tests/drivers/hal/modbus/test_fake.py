@@ -1,0 +1,255 @@
+"""The real driver and bus against the fake gateway: a door that moves, and each way of failing."""
+
+import queue
+from collections.abc import Iterator
+
+import msgspec
+import pytest
+
+from bridges.door.signals import DoorOutputs, DoorSample
+from drivers import DriverError
+from drivers.door.dry_contact import DryContactDoor, Settings, create, wires
+from drivers.hal import modbus
+from drivers.hal.points import HalError
+from hal_fakes.modbus import ModbusServer
+from hal_fakes.modbus.rtu import RtuLine
+from hal_fakes.plants.door import DoorPlant
+from hal_fakes.plants.plant import FAILURE_MODES, Edge, FailureMode
+from hal_fakes.realtime import RealTime
+from hal_fakes.wiring import Wiring
+from tests.drivers.hal.modbus.module import Time
+from tests.waiting import PATIENCE_S, wait_until
+
+TIMEOUT_S = 0.2
+CLOSED = DoorSample(opened=False, closed=True)
+OPEN = DoorSample(opened=True, closed=False)
+HOLD, RELEASE = DoorOutputs(hold_open=True), DoorOutputs(hold_open=False)
+
+
+def door_at(unit: int) -> Settings:
+    """A door's settings at this unit."""
+    return msgspec.convert(
+        {
+            "inputs": {
+                "opened": {"point": f"unit {unit} discrete input 0", "active": "high"},
+                "closed": {"point": f"unit {unit} discrete input 4", "active": "high"},
+            },
+            "outputs": {"hold_open": {"point": f"unit {unit} coil 16", "active": "high"}},
+        },
+        Settings,
+    )
+
+
+class Site:
+    """Two doors at units 1 and 2 of one gateway or line, and one bus to it with its own clock."""
+
+    def __init__(self, serial: modbus.Serial | None) -> None:
+        self.settings = {"front": door_at(1), "ward": door_at(2)}
+        self.world = RealTime(
+            {
+                name: DoorPlant(name, wires(s), open_s=0.05, close_s=0.05, auto_close_s=0.05)
+                for name, s in self.settings.items()
+            }
+        )
+        self.plants = self.world.plants
+        wired = [
+            Wiring(self.plants[name], wires(s), modbus.canonical)
+            for name, s in self.settings.items()
+        ]
+        self.server = (
+            RtuLine(wired, serial, slow_s=2.2 * TIMEOUT_S)
+            if serial
+            else ModbusServer(wired, slow_s=1.5 * TIMEOUT_S)
+        )
+        plain = {"type": "modbus", "timeout_s": TIMEOUT_S, **self.server.replace}
+        self.clock = Time()
+        self.bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), self.clock)
+        self.doors: dict[str, DryContactDoor] = {
+            name: create(name, s, self.bus) for name, s in self.settings.items()
+        }
+
+    def patiently(self, name: str) -> DoorSample | str:
+        """A reading with all pauses over: the sample, or why there is none."""
+        self.clock.now += 60.0
+        try:
+            return self.doors[name].read()
+        except DriverError as error:
+            return str(error)
+
+    def close(self) -> None:
+        for door in self.doors.values():
+            door.close()
+        self.bus.close()
+        self.server.close()
+        self.server.close()
+        self.world.close()
+
+
+SERIAL = {
+    "tcp": None,
+    "rtu": modbus.Serial(port="/dev/null", baudrate=57600, parity="even", stopbits=1),
+    "rtu with echo": modbus.Serial(
+        port="/dev/null", baudrate=57600, parity="none", stopbits=2, ignore_echo=True
+    ),
+}
+
+
+@pytest.fixture(params=SERIAL)
+def site(request: pytest.FixtureRequest) -> Iterator[Site]:
+    built = Site(SERIAL[request.param])
+    for door in built.doors.values():
+        door.open()
+    yield built
+    built.close()
+
+
+def test_a_held_door_opens_and_a_released_one_closes_by_itself(site: Site) -> None:
+    edges: queue.SimpleQueue[Edge] = queue.SimpleQueue()
+    site.plants["front"].on_edge = edges.put
+    front = site.doors["front"]
+    assert front.read() == CLOSED
+    front.write(HOLD)
+    seen = [edges.get(timeout=PATIENCE_S) for _ in range(3)]
+    assert front.read() == OPEN
+    front.write(RELEASE)
+    seen += [edges.get(timeout=PATIENCE_S) for _ in range(3)]
+    assert front.read() == CLOSED
+    assert [(edge.what, edge.signal, edge.value) for edge in seen] == [
+        ("relay", "hold_open", True),
+        ("sensor", "closed", False),
+        ("sensor", "opened", True),
+        ("relay", "hold_open", False),
+        ("sensor", "opened", False),
+        ("sensor", "closed", True),
+    ]
+    assert site.doors["ward"].read() == CLOSED
+
+
+def test_make_safe_and_close_leave_every_relay_off(site: Site) -> None:
+    for door in site.doors.values():
+        door.write(HOLD)
+    site.doors["front"].make_safe()
+    site.doors["ward"].close()
+    relays = {
+        name: [e.value for e in plant.edges if e.what == "relay"]
+        for name, plant in site.plants.items()
+    }
+    assert relays == {"front": [True, False], "ward": [True, False]}
+
+
+def test_an_address_that_nobody_has_is_refused_and_a_unit_by_a_gateway_alone(site: Site) -> None:
+    def refusal(point: str) -> str:
+        with pytest.raises(HalError) as caught:
+            site.bus.lines({point: None}, {}).read()
+        return str(caught.value).partition(": exception ")[2][:2]
+
+    assert refusal("unit 1 discrete input 9") == "2,"
+    assert refusal("unit 9 discrete input 0") == ("11" if "tcp" in site.server.replace else "")
+
+
+FAILING = [
+    (part, mode)
+    for part in ("server", "unit")
+    for mode in FAILURE_MODES
+    if (part, mode) != ("unit", "stuck")
+]
+
+REASONS = {
+    ("server", "off"): ("no Modbus TCP connection to", "no serial port"),
+    ("server", "stuck"): ("no reply within",),
+    ("server", "slow"): ("no reply within",),
+    ("server", "garbage"): ("no ",),
+    ("server", "wrong"): ("no reply within",),
+    ("unit", "off"): ("no reply within",),
+    ("unit", "slow"): ("no reply within",),
+    ("unit", "garbage"): ("no ",),
+    ("unit", "wrong"): ("exception 4, server device failure", "no reply within"),
+}
+
+
+@pytest.mark.parametrize(("part", "mode"), FAILING)
+def test_each_failure_is_a_hal_error_and_the_door_is_back_afterwards(
+    site: Site, part: str, mode: FailureMode
+) -> None:
+    site.plants["front"].fail(part, mode)
+    found: list[str] = []
+
+    def failing() -> bool:
+        found.append(str(site.patiently("front")))
+        return any(reason in found[-1] for reason in REASONS[part, mode])
+
+    wait_until(failing, f"{part} {mode}")
+    site.plants["front"].fail(part, None)
+    wait_until(lambda: site.patiently("front") == CLOSED, "the door is back")
+    assert site.patiently("ward") == CLOSED
+
+
+WAYS: dict[str, dict[FailureMode, tuple[str, ...]]] = {
+    "tcp": {"wrong": ("no reply within",), "garbage": ("no reply within",)},
+    "rtu": {
+        "wrong": ("of another unit", "exception 4", "does the adapter echo?"),
+        "garbage": ("half a frame", "CRC of "),
+    },
+}
+"""What is said of the far side as a whole in each of its ways to be wrong, or garbled."""
+
+
+@pytest.mark.parametrize("mode", ["wrong", "garbage"])
+@pytest.mark.parametrize("framing", WAYS)
+def test_a_far_side_fails_in_several_ways_and_each_is_named(
+    framing: str, mode: FailureMode
+) -> None:
+    site = Site(SERIAL[framing])
+    try:
+        site.plants["front"].fail("server", mode)
+        found: list[str] = []
+
+        def all_seen() -> bool:
+            found.append(str(site.patiently("front")))
+            return all(any(way in text for text in found) for way in WAYS[framing][mode])
+
+        wait_until(all_seen, mode)
+        assert str(CLOSED) not in found
+    finally:
+        site.close()
+
+
+@pytest.mark.parametrize("mode", ["off", "slow", "garbage", "wrong"])
+def test_a_failing_unit_does_not_keep_the_other_from_being_read(
+    site: Site, mode: FailureMode
+) -> None:
+    site.plants["front"].fail("unit", mode)
+    read = {
+        name: [_sample_or_none(site.doors[name]) for _ in range(20)] for name in ("front", "ward")
+    }
+    assert read == {"front": [None] * 20, "ward": [CLOSED] * 20}
+
+
+def test_the_inputs_of_a_stuck_unit_stay_as_they_were(site: Site) -> None:
+    front, plant = site.doors["front"], site.plants["front"]
+    front.read()
+    plant.fail("unit", "stuck")
+    front.write(HOLD)
+    wait_until(lambda: plant.sense("opened"), "the door is open")
+    assert front.read() == CLOSED
+    plant.fail("unit", None)
+    assert front.read() == OPEN
+
+
+def test_a_hold_survives_a_server_that_was_away_without_an_edge(site: Site) -> None:
+    front, plant = site.doors["front"], site.plants["front"]
+    front.write(HOLD)
+    wait_until(lambda: front.read() == OPEN, "the door is open")
+    plant.fail("server", "off")
+    wait_until(lambda: isinstance(site.patiently("front"), str), "the server is off")
+    plant.fail("server", None)
+    wait_until(lambda: site.patiently("front") == OPEN, "the server is back")
+    front.write(HOLD)
+    assert [e.value for e in plant.edges if e.what == "relay"] == [True]
+
+
+def _sample_or_none(door: DryContactDoor) -> DoorSample | None:
+    try:
+        return door.read()
+    except DriverError:
+        return None

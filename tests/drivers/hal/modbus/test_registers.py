@@ -1,0 +1,131 @@
+"""Registers on the wire: what is asked, byte for byte, and what is taken for an answer."""
+
+import struct
+
+import pytest
+
+from drivers.hal.modbus.points import Point
+from drivers.hal.modbus.registers import (
+    READ_REGISTERS,
+    REGISTERS,
+    TABLES,
+    WRITABLE,
+    RegisterLines,
+    at,
+    place,
+    read,
+    write,
+)
+from drivers.hal.points import HalError
+from tests.drivers.hal.modbus.module import Module, Time, bus_to, frame
+
+H0, H1, H9 = (Point(1, "holding register", a) for a in (0, 1, 9))
+I0, COIL = Point(1, "input register", 0), Point(1, "coil", 4)
+
+
+def registers(module: Module, *words: int) -> None:
+    """Answer every read of registers with these."""
+    pdu = bytes((2 * len(words),)) + struct.pack(f">{len(words)}H", *words)
+    module.reply = lambda request: frame(request, request[7:8] + pdu)
+
+
+def test_neighbours_are_asked_for_together_and_nothing_besides(either: Module) -> None:
+    either.reply = lambda request: frame(
+        request, bytes((request[7], 2 * request[11], *(0x12, 0x34) * request[11]))
+    )
+    image = read(bus_to(either.port), [I0, H9, H1, H0])
+    assert image == dict.fromkeys((H0, H1, H9, I0), 0x1234)
+    asked = [request[6:].hex() for request in either.asked]
+    assert asked == ["010300000002", "010300090001", "010400000001"]
+
+
+def test_a_register_is_written_with_function_6(either: Module) -> None:
+    either.reply = lambda request: frame(request, request[7:12])
+    write(bus_to(either.port), H9, 0xABCD)
+    assert [request[6:].hex() for request in either.asked] == ["01060009abcd"]
+
+
+def test_a_coil_is_written_and_read_as_one(either: Module) -> None:
+    either.coils[1, 4] = False
+    bus = bus_to(either.port)
+    write(bus, COIL, 1)
+    assert read(bus, [COIL]) == {COIL: 1}
+    assert [request[6:].hex() for request in either.asked] == ["01050004ff00", "010100040001"]
+
+
+@pytest.mark.parametrize(
+    "pdu",
+    [
+        "030400010002",  # two registers for one
+        "0300",
+        "03020001ff",  # a byte more than it says
+        "03030001ff",  # an odd number of bytes
+        "04020001",  # of another table
+        "0602000900",
+        "060009abcd",
+    ],
+)
+def test_a_reply_that_does_not_answer_is_no_reading(module: Module, pdu: str) -> None:
+    module.reply = lambda request: frame(request, bytes.fromhex(pdu))
+    with pytest.raises(HalError, match=r"no Modbus reply to it|no reply within"):
+        read(bus_to(module.port, Time(), timeout_s=0.05, retries=0), [H0])
+
+
+@pytest.mark.parametrize(
+    "pdu", ["060009abce", "060009abcd00", "06000aabcd", "0600", "050009ff00", "0302abcd"]
+)
+def test_the_echo_of_another_write_is_no_success(module: Module, pdu: str) -> None:
+    module.reply = lambda request: frame(request, bytes.fromhex(pdu))
+    with pytest.raises(HalError):
+        write(bus_to(module.port, Time(), timeout_s=0.05, retries=0), H9, 0xABCD)
+
+
+def test_closing_what_was_never_claimed_sends_nothing(module: Module) -> None:
+    RegisterLines(bus_to(module.port), {}, H9, 0).close()
+    assert module.asked == []
+
+
+def test_an_exception_is_named(module: Module) -> None:
+    module.reply = lambda request: frame(request, bytes((0x83, 2)))
+    with pytest.raises(
+        HalError, match="read holding register 0: exception 2, illegal data address"
+    ):
+        read(bus_to(module.port), [H0])
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("holding register 0", ("holding register", 0)),
+        ("Input_Register 0x1F", ("input register", 31)),
+        ("coil 7", ("coil", 7)),
+        ("discrete input 65535", ("discrete input", 65535)),
+        ("holding register 0x9c41", ("holding register", 40001)),
+    ],
+)
+def test_a_place_has_a_table_and_an_address(text: str, found: tuple[str, int]) -> None:
+    assert place(text) == found
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("40001", "'40001': write 'coil 0' or"),
+        ("register 5", "'register 5': write 'coil 0' or"),
+        ("holding register", "'holding register': write 'coil 0' or"),
+        ("holding register 65536", "address 65536 does not exist"),
+        (
+            "holding register 40011",
+            "40011 looks like a number of the data model, which begins at 1",
+        ),
+    ],
+)
+def test_what_is_no_place_is_refused_with_what_to_write(text: str, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        place(text)
+
+
+def test_a_base_moves_every_address() -> None:
+    assert at(3, "input register 2", 100) == Point(3, "input register", 102)
+    assert {*REGISTERS, *WRITABLE} <= {*TABLES}
+    assert set(READ_REGISTERS) == set(REGISTERS)

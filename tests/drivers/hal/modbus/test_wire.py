@@ -1,0 +1,178 @@
+"""The connection: why there is none, what it costs in memory, and what a YAML may say of it."""
+
+import errno
+import re
+import socket
+import struct
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from bridges.settings.load import load
+from drivers.hal.modbus import Serial, Settings, Tcp, warnings
+from drivers.hal.modbus.wire import Connection, NoReply, Unreachable
+from tests.drivers.hal.modbus.module import Module, door
+
+
+def unreachable(failure: OSError) -> str:
+    def resolve(*asked: object, **more: object) -> list[Any]:
+        raise failure
+
+    with pytest.raises(Unreachable) as caught:
+        Connection("gateway", 502, 0.3, resolve).connect()
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("failure", "text"),
+    [
+        (socket.gaierror(-2, "unknown"), "its name is not known; write its address"),
+        (TimeoutError(), "nobody answers within 0.3 s; check power and cable"),
+        (OSError(errno.ENETUNREACH, "Network is unreachable"), "Network is unreachable"),
+        (ConnectionRefusedError(), "it is refused; is this the module, and does it take more"),
+        (OSError("odd"), "odd"),
+    ],
+)
+def test_a_connection_that_cannot_be_made_says_what_to_look_at(failure: OSError, text: str) -> None:
+    assert unreachable(failure).startswith(f"no Modbus TCP connection to gateway:502: {text}")
+
+
+def test_a_connection_that_is_reset_is_no_reply() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        connection = Connection("127.0.0.1", listener.getsockname()[1], 5.0)
+        connection.connect()
+        far_end, _ = listener.accept()
+
+        def ask_and_lose(client: Any) -> Any:
+            far_end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            far_end.close()
+            return client.read_coils(0, count=1, device_id=1)
+
+        with pytest.raises(NoReply, match="the connection broke"):
+            connection.ask(1, ask_and_lose)
+        connection.close()
+
+
+@pytest.mark.parametrize(
+    ("host", "problems"),
+    [
+        ("192.168.1.50", []),
+        ("module.ward-3", []),
+        ("fe80::1", []),
+        ("192.168.1.50:502", ["write the host alone; its port goes into port"]),
+        ("tcp://a", ["'tcp://a' is no host: write its address, 192.168.1.50 say"]),
+        ("a b", ["'a b' is no host: write its address, 192.168.1.50 say"]),
+    ],
+)
+def test_a_host_is_an_address_or_a_name(host: str, problems: list[str]) -> None:
+    assert [text for _, text in Tcp(host=host).problems()] == problems
+
+
+LINE = {"port": "/dev/serial/by-id/a", "baudrate": 19200, "parity": "none", "stopbits": 1}
+
+
+@pytest.mark.parametrize(
+    ("places", "problems"),
+    [
+        ({"tcp": {"host": "a"}}, []),
+        ({"serial": LINE}, []),
+        ({}, ["says not where the units are: write tcp: {host: …} or serial: {port: …}"]),
+        (
+            {"tcp": {"host": "a"}, "serial": LINE},
+            ["a bus has tcp or serial: write a second bus for the other"],
+        ),
+    ],
+)
+def test_a_bus_is_at_one_place(places: dict[str, Any], problems: list[str]) -> None:
+    settings = msgspec.convert({"type": "modbus", **places}, Settings)
+    assert [text for _, text in settings.problems()] == problems
+
+
+def test_a_serial_line_says_all_of_its_settings() -> None:
+    for key in LINE:
+        with pytest.raises(msgspec.ValidationError, match=key):
+            msgspec.convert({k: v for k, v in LINE.items() if k != key}, Serial)
+
+
+def test_a_port_is_a_path_and_best_a_stable_one() -> None:
+    def found(port: str) -> tuple[list[Any], list[Any]]:
+        line = msgspec.convert({**LINE, "port": port}, Serial)
+        settings = Settings(serial=line)
+        return list(line.problems()), list(warnings(settings))
+
+    text = "'COM3' is no serial port: write the whole path, as `ls /dev/serial/by-id/*` prints it"
+    assert found("COM3") == ([(("port",), text)], [])
+    assert found("/dev/serial/by-id/x") == ([], [])
+    assert found("/dev/ttyAMA0") == ([], [])
+    text = "may be another adapter after the next start: write its /dev/serial/by-id path"
+    assert found("/dev/ttyUSB0") == ([], [(("serial", "port"), f"/dev/ttyUSB0 {text}")])
+
+
+@pytest.mark.parametrize(
+    ("baudrate", "parity", "stopbits", "bits", "gap_s"),
+    [
+        (9600, "none", 1, 10, 35 / 9600),
+        (9600, "even", 1, 11, 38.5 / 9600),
+        (19200, "none", 2, 11, 38.5 / 19200),
+        (38400, "odd", 2, 12, 0.00175),
+        (115200, "none", 1, 10, 0.00175),
+    ],
+)
+def test_frames_are_three_and_a_half_characters_apart_and_never_nearer_than_1750_us_when_fast(
+    baudrate: int, parity: Any, stopbits: Any, bits: int, gap_s: float
+) -> None:
+    line = Serial(port="/dev/a", baudrate=baudrate, parity=parity, stopbits=stopbits)
+    assert (line.character_s * baudrate, line.gap_s) == pytest.approx((bits, gap_s))
+
+
+def test_check_warns_of_a_port_that_may_become_another(tmp_path: Path) -> None:
+    shipped = Path(__file__).parents[4] / "config" / "door_rs485.yaml"
+    file = tmp_path / "door.yaml"
+    file.write_text(re.sub(r"/dev/serial/by-id/\S+", "/dev/ttyUSB0", shipped.read_text()))
+    assert load(shipped).warnings == ()
+    assert [str(warning) for warning in load(file).warnings] == [
+        f"{file}:14:13: warning: bus 'line': /dev/ttyUSB0 may be another adapter after the next"
+        " start: write its /dev/serial/by-id path"
+    ]
+
+
+def test_the_defaults_bound_what_a_dead_module_can_cost() -> None:
+    plain = {"type": "modbus", "tcp": {"host": "192.168.1.50"}}
+    assert msgspec.convert(plain, Settings) == Settings(
+        tcp=Tcp(host="192.168.1.50", port=502), timeout_s=0.3, retries=1, scan_s=0.1
+    )
+
+
+def loaded(code: str) -> set[str]:
+    """The vendor's modules that a fresh interpreter has after running this."""
+    show = "import sys; print(*[m for m in sys.modules if m.split('.')[0] in WATCHED])"
+    watched = "WATCHED = {'pymodbus', 'aiohttp', 'gpiozero', 'requests', 'serial'}"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{watched}; {code}; {show}"], capture_output=True, check=True
+    )
+    return set(done.stdout.decode().split())
+
+
+def test_loading_the_vendors_library_costs_the_first_request_none_of_its_time(
+    either: Module,
+) -> None:
+    """It takes longer than a try may last."""
+    door(either)
+    loaded(
+        "from tests.drivers.hal.modbus.module import bus_to;"
+        f"bus = bus_to({either.port!r}, timeout_s=0.1, retries=0);"
+        "bus.lines({'unit 1 coil 0': None}, {}).read()"
+    )
+    assert either.functions() == [1]
+
+
+def test_the_vendors_library_is_loaded_with_the_first_connection_and_its_server_never() -> None:
+    before = "import drivers.hal.modbus, drivers.door.dry_contact"
+    assert loaded(before) == set()
+    after = loaded(f"{before}; from drivers.hal.modbus.wire import _client_class; _client_class()")
+    assert "pymodbus.client" in after
+    assert {m for m in after if m.startswith(("pymodbus.server", "aiohttp"))} == set()

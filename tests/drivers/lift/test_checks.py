@@ -1,0 +1,366 @@
+"""What a lift's wiring is refused for, what must be accepted by name, and what is only warned of."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridges.lift.signals import Hazard
+from bridges.settings.load import load
+from drivers.lift.dry_contact import Settings, warnings
+from tests.drivers.lift.wirings import alarm, bits, coil, inputs, line, settings, whole
+
+CONFIG = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
+
+
+def found(wired: Settings) -> list[tuple[str, str]]:
+    return [(".".join(path), text) for path, text in wired.problems()]
+
+
+def warned(wired: Settings) -> list[tuple[str, str]]:
+    return [(".".join(path), text) for path, text in warnings(wired)]
+
+
+def test_the_shipped_example_is_right_and_warns_of_nothing() -> None:
+    assert load(CONFIG).warnings == ()
+
+
+def test_a_wiring_that_is_right_has_no_problem_and_no_warning() -> None:
+    assert (found(settings()), warned(settings())) == ([], [])
+
+
+def binary(**changes: Any) -> dict[str, Any]:
+    code = {"encoding": "binary", "bits": bits(3), "codes": {1: "B1", 2: "G", 4: "1"}}
+    return {"floor_code": {**code, **changes}}
+
+
+TWO_FLOORS = {"B1": {}, "G": {}, "1": {}, "G_r": {"level": "G", "side": "rear"}}
+REAR = {"rear_door_opened": line(50), "rear_door_closed": line(51)}
+SERVICE_CODES = {0: "normal", 1: "agv_mode", 2: "fire_alarm"}
+SERVICE = {"bits": bits(2, 60), "codes": SERVICE_CODES}
+
+WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
+    (
+        {"floors": {**TWO_FLOORS, "Ground": {"level": "G"}}, "inputs": inputs(**REAR)},
+        [
+            ("floors.Ground", "Ground and G are the same door of landing G"),
+            ("outputs", "no rear_door_open, and some floors have side: rear"),
+        ],
+    ),
+    (
+        {"floors": [], "calls": {}, "floor_code": {"encoding": "gray"}},
+        [
+            ("floors", "no floors: name those of RMF's map that this lift serves"),
+            ("floor_code", "no bits: list the lines, least significant first"),
+        ],
+    ),
+    ({"floors": ["B1", "G", "1", "G"]}, [("floors", "a floor is named twice: delete one")]),
+    (
+        {"floor_code": {"encoding": "one_hot", "lines": {"B1": line(20), "L9": line(21)}}},
+        [
+            ("floor_code.lines", "'L9' is no landing of this lift, which has B1, G, 1"),
+            ("floor_code.lines", "no line for G"),
+            ("floor_code.lines", "no line for 1"),
+        ],
+    ),
+    (
+        {"floor_code": {**whole()["floor_code"], "bits": bits(2)}},
+        [("floor_code", "one_hot has lines, and no bits, codes or parity")],
+    ),
+    (
+        binary(lines={"B1": line(40)}),
+        [("floor_code.lines", "binary has bits and codes; lines are for one_hot")],
+    ),
+    (
+        binary(codes={1: "B1", 2: "G", 3: "L9"}),
+        [
+            ("floor_code.codes", "'L9' is no landing of this lift, which has B1, G, 1"),
+            ("floor_code.codes", "no code for 1"),
+        ],
+    ),
+    (
+        binary(codes={1: "B1", 2: "G", 8: "1"}),
+        [("floor_code.codes.8", "8 does not fit on 3 lines in binary")],
+    ),
+    (
+        binary(codes={0: "B1", 2: "G", 4: "1"}, between_floors=[0, 9]),
+        [
+            ("floor_code.between_floors.9", "9 does not fit on 3 lines in binary"),
+            (
+                "floor_code.codes.0",
+                "0 is B1 here and means between floors as well: write between_floors: [9]",
+            ),
+        ],
+    ),
+    ({"calls": {"B1": coil(2), "G": coil(3)}}, [("calls", "no call for 1")]),
+    (
+        {"call_code": {"bits": [coil(20), coil(21)], "codes": {1: "B1", 2: "G", 3: "1"}}},
+        [("calls", "calls and call_code are two ways of calling: keep one")],
+    ),
+    (
+        {"calls": {}, "call_code": {"bits": [coil(20)], "codes": {0: "B1", 1: "G", 2: "1"}}},
+        [
+            ("call_code.codes.0", "0 is no call"),
+            ("call_code.codes.2", "2 does not fit on the bits"),
+        ],
+    ),
+    (
+        {"inputs": inputs(door_opened=None, door_closed=None)},
+        [("inputs", "no door contact: door, or door_opened and _closed")],
+    ),
+    (
+        {"inputs": inputs(door_closed=None)},
+        [("inputs.door_opened", "with one contact, write door: {…, proves: open}")],
+    ),
+    (
+        {"inputs": inputs(door=line(40, proves="open"))},
+        [("inputs.door", "door is the only contact: delete the others, or this")],
+    ),
+    (
+        {"inputs": inputs(**REAR)},
+        [("inputs", "a rear door is wired, and no floor has side: rear")],
+    ),
+    (
+        {"floors": TWO_FLOORS, "outputs": {"rear_door_open": coil(5)}},
+        [("inputs", "no rear_door contact: rear_door, or rear_door_opened and _closed")],
+    ),
+    (
+        {"inputs": inputs(up=line(40))},
+        [
+            (
+                "inputs.up",
+                "motion is moving, or stopped, or up with down, or motion; not up",
+            )
+        ],
+    ),
+    (
+        {"inputs": inputs(motion={"bits": bits(1, 40), "codes": {0: "stopped", 2: "up"}})},
+        [
+            ("inputs.motion.codes", "needs a code for stopped, and for moving or up and down"),
+            ("inputs.motion.codes.2", "2 does not fit on the bits"),
+        ],
+    ),
+    (
+        {"inputs": inputs(service={**SERVICE, "codes": {**SERVICE_CODES, 3: "normal"}})},
+        [("inputs.agv_mode", "service shows agv_mode too: keep one")],
+    ),
+    (
+        {"inputs": inputs(agv_mode=None, service=SERVICE)},
+        [("inputs.service.codes", "3 is missing: say what it means")],
+    ),
+    (
+        {"inputs": inputs(agv_mode=None, service={**SERVICE, "bits": bits(1, 60)})},
+        [("inputs.service.codes.2", "2 does not fit on the bits")],
+    ),
+    (
+        {"inputs": inputs(agv_mode=line(1, valid_when="agv_mode"))},
+        [("inputs.agv_mode", "agv_mode itself tells AGV mode: delete valid_when")],
+    ),
+    (
+        {"inputs": inputs(agv_mode=None, moving=line(40, valid_when="agv_mode"))},
+        [("inputs.moving", "valid_when: agv_mode needs an agv_mode input")],
+    ),
+]
+
+
+@pytest.mark.parametrize(("changes", "problems"), WRONG)
+def test_a_wiring_that_cannot_be_right_is_refused(
+    changes: dict[str, Any], problems: list[tuple[str, str]]
+) -> None:
+    assert found(settings(**changes)) == problems
+
+
+def pin(point: str, active: str, **more: Any) -> dict[str, Any]:
+    return {"point": point, "active": active, **more}
+
+
+def floating(number: int) -> dict[str, Any]:
+    return pin(f"BCM{number}", "high", pull="none")
+
+
+def one_door(proves: str, **more: Any) -> dict[str, Any]:
+    return inputs(door_opened=None, door_closed=None, door={"proves": proves, **more})
+
+
+UNSAFE: list[tuple[str, dict[str, Any], str, str]] = [
+    (
+        "fire_alarm",
+        {"inputs": inputs(fire_alarm=line(0))},
+        "inputs.fire_alarm",
+        "with its wire cut, a fire alarm reads clear",
+    ),
+    (
+        "fire_alarm",
+        {"inputs": inputs(fire_alarm=floating(4))},
+        "inputs.fire_alarm",
+        "a cut wire floats (pull: none), and a fire alarm reads clear",
+    ),
+    (
+        "agv_mode",
+        {"inputs": inputs(agv_mode=alarm(1))},
+        "inputs.agv_mode",
+        "with its wire cut, AGV mode reads on",
+    ),
+    (
+        "door",
+        {"inputs": one_door("open", **alarm(2))},
+        "inputs.door",
+        "with its wire cut, the door reads open",
+    ),
+    (
+        "door",
+        {"inputs": one_door("closed", **line(2))},
+        "inputs.door",
+        "with its wire cut, the door reads open",
+    ),
+    (
+        "door_opened",
+        {"inputs": inputs(door_opened=alarm(2))},
+        "inputs.door_opened",
+        "with its wire cut, the door reads open",
+    ),
+    (
+        "rear_door_opened",
+        {
+            "floors": TWO_FLOORS,
+            "inputs": inputs(**{**REAR, "rear_door_opened": alarm(50)}),
+            "outputs": {"rear_door_open": coil(5)},
+        },
+        "inputs.rear_door_opened",
+        "with its wire cut, the rear_door reads open",
+    ),
+    (
+        "floor_bit0",
+        binary(codes={0: "B1", 1: "G", 2: "1"}, between_floors=[]),
+        "floor_code",
+        "with the floor code's cable cut, the car reads at B1",
+    ),
+    (
+        "door_open",
+        {"outputs": {"door_open": pin("J8:36", "low")}},
+        "outputs.door_open",
+        "BCM16 = J8:36 is pulled low from power-on until the daemon starts, and its relay is on at"
+        " low: use BCM4 to 8, or the other active level",
+    ),
+    (
+        "call_G",
+        {"calls": {"B1": coil(2), "G": pin("BCM5", "high"), "1": coil(4)}},
+        "calls.G",
+        "BCM5 = J8:29 is pulled high from power-on until the daemon starts, and its relay is on at"
+        " high: use BCM9 to 27, or the other active level",
+    ),
+]
+
+
+@pytest.mark.parametrize(("signal", "changes", "path", "text"), UNSAFE)
+def test_unsafe_wiring_is_refused_unless_it_is_accepted_by_name(
+    signal: str, changes: dict[str, Any], path: str, text: str
+) -> None:
+    advice = f"unsafe: {text}; or accept_unsafe: {{{signal}: <why it is safe here>}}"
+    assert found(settings(**changes)) == [(path, advice)]
+    assert found(settings(**changes, accept_unsafe={signal: "tested on site"})) == []
+
+
+def test_a_safe_choice_of_pins_is_not_refused() -> None:
+    outputs = {"door_open": pin("BCM16", "high"), "agv_mode_request": pin("BCM5", "low")}
+    assert found(settings(outputs=outputs)) == []
+    closed = one_door("closed", **pin("BCM4", "low", pull="down"))
+    assert found(settings(inputs=closed)) == []
+
+
+def test_the_first_public_wiring_is_possible_when_its_two_unsafe_places_are_accepted() -> None:
+    """The door contact reads open when cut; the door opens on low, where its pin is from boot on."""
+    literal = {
+        "floors": ["L1", "L2", "L3", "L4"],
+        "inputs": {
+            "fire_alarm": pin("J8:7", "low", pull="down"),
+            "code_blue": pin("J8:11", "low", pull="down"),
+            "agv_mode": pin("J8:13", "high", pull="down"),
+            "door": pin("J8:35", "high", pull="down", proves="closed"),
+        },
+        "floor_code": {
+            "encoding": "binary",
+            "bits": [pin(f"J8:{at}", "high", pull="down") for at in (29, 31, 32, 33)],
+            "codes": {0: "L1", 1: "L2", 2: "L3", 3: "L4"},
+            "between_floors": [],
+        },
+        "outputs": {
+            "agv_mode_request": pin("J8:12", "high"),
+            "door_open": pin("J8:36", "low"),
+        },
+        "calls": {f"L{i + 1}": pin(f"J8:{at}", "high") for i, at in enumerate((15, 16, 18, 22))},
+    }
+    reason = "as the lift maker wired it; the door's own safety edge is independent"
+    accepted = dict.fromkeys(("door", "door_open", "floor_bit0"), reason)
+    assert [path for path, _ in found(settings(**literal))] == [
+        "inputs.door",
+        "floor_code",
+        "outputs.door_open",
+    ]
+    assert found(settings(**literal, accept_unsafe=accepted)) == []
+
+
+def test_an_acceptance_of_nothing_is_pointed_out() -> None:
+    wired = settings(accept_unsafe={"door_closed": "why"})
+    assert warned(wired) == [
+        ("accept_unsafe.door_closed", "nothing is unsafe about door_closed: delete this")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        (
+            {"inputs": inputs(agv_mode=None, fire_alarm=None)},
+            [
+                ("inputs", "no agv_mode: the lift cannot confirm that it obeys"),
+                ("inputs", "no fire_alarm: a fire recall would not be seen"),
+            ],
+        ),
+        (
+            {"inputs": inputs(code_blue=line(40), earthquake=alarm(41), emergency=floating(4))},
+            [
+                ("inputs.code_blue", "with its wire cut, code_blue reads clear"),
+                ("inputs.emergency", "a cut wire floats (pull: none), and emergency reads clear"),
+            ],
+        ),
+        ({"inputs": inputs(code_blue=alarm(40), overload=line(41), manual_mode=line(42))}, []),
+        (
+            {"inputs": inputs(moving=line(40))},
+            [("inputs.moving", "with its wire cut, the car reads standing")],
+        ),
+        ({"inputs": inputs(moving=alarm(40))}, []),
+        ({"inputs": inputs(stopped=line(40))}, []),
+        (
+            binary(codes={1: "B1", 3: "G", 4: "1"}),
+            [
+                (
+                    "floor_code",
+                    "with floor_bit1 cut, G reads as B1: ask for a parity line, or for codes two"
+                    " lines apart",
+                )
+            ],
+        ),
+        (binary(codes={1: "B1", 3: "G", 4: "1"}, parity=line(41, total="even")), []),
+        (binary(codes={3: "B1", 5: "G", 6: "1"}), []),
+        (
+            binary(bits=[alarm(20), *bits(2, 21)], codes={2: "B1", 3: "G", 4: "1"}),
+            [
+                (
+                    "floor_code",
+                    "with floor_bit0 cut, B1 reads as G: ask for a parity line, or for codes two"
+                    " lines apart",
+                )
+            ],
+        ),
+    ],
+)
+def test_what_works_and_deserves_a_second_look(
+    changes: dict[str, Any], expected: list[tuple[str, str]]
+) -> None:
+    assert warned(settings(**changes)) == expected
+
+
+def test_every_hazard_has_a_line_of_its_name() -> None:
+    names = {h.value for h in Hazard}
+    assert names <= set(settings().inputs.__struct_fields__)

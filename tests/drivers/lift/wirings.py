@@ -1,0 +1,56 @@
+"""Lift wirings to test with. Points are numbered as they come, so that only meanings matter."""
+
+from typing import Any
+
+import msgspec
+
+from drivers.lift.dry_contact import Settings
+
+FLOORS = ["B1", "G", "1"]
+
+
+def line(number: int, **more: Any) -> dict[str, Any]:
+    """An input whose cut wire reads not asserted."""
+    return {"point": f"unit 1 discrete input {number}", "active": "high", **more}
+
+
+def alarm(number: int) -> dict[str, Any]:
+    """An input whose cut wire reads asserted."""
+    return line(number) | {"active": "low"}
+
+
+def coil(number: int) -> dict[str, Any]:
+    return {"point": f"unit 1 coil {number}", "active": "high"}
+
+
+def whole(**changes: Any) -> dict[str, Any]:
+    """A wiring that is right; `changes` replace whole sections."""
+    return {
+        "floors": FLOORS,
+        "inputs": {
+            "fire_alarm": alarm(0),
+            "agv_mode": line(1),
+            "door_opened": line(2),
+            "door_closed": line(3),
+        },
+        "floor_code": {
+            "encoding": "one_hot",
+            "lines": {f: line(10 + i) for i, f in enumerate(FLOORS)},
+        },
+        "outputs": {"agv_mode_request": coil(0), "door_open": coil(1)},
+        "calls": {f: coil(10 + i) for i, f in enumerate(FLOORS)},
+        **changes,
+    }
+
+
+def settings(**changes: Any) -> Settings:
+    return msgspec.convert(whole(**changes), Settings)
+
+
+def inputs(**more: Any) -> dict[str, Any]:
+    """The inputs of `whole` with more; None takes one away."""
+    return {k: v for k, v in {**whole()["inputs"], **more}.items() if v is not None}
+
+
+def bits(count: int, first: int = 20) -> list[dict[str, Any]]:
+    return [line(first + i) for i in range(count)]

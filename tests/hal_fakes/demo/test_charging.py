@@ -1,0 +1,88 @@
+"""The charging demo itself: real processes on real DDS, and its verdict."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bridges.rmf import definitions as d
+from hal_fakes.demo.charging_verdict import CHARGED, problems
+from hal_fakes.demo.journal import Journal
+from tests.hal_fakes.demo.test_demo import directory, running
+
+__all__ = ["directory"]
+
+
+def demo(directory: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "hal_fakes.demo.charging"],
+        env={"TMPDIR": str(directory), "PATH": "/usr/bin:/bin"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+@pytest.mark.timeout(180)
+def test_five_situations_are_dealt_with_by_three_daemons_on_one_graph(directory: Path) -> None:
+    process = demo(directory)
+    try:
+        out, _ = process.communicate()
+    finally:
+        process.kill()
+    assert process.returncode == 0, out
+    assert "\nRIGHT: five situations, each dealt with; never two robots at one charger.\n" in out
+    assert "A robot cannot be charged: tiny/AMR02 failed at charger_a and at charger_b" in out
+    assert "tiny/AMR01 stands at charger_b, it is expected at charger_a" in out
+    assert (running(directory), list(directory.iterdir())) == ([], [])
+
+
+def test_ctrl_c_in_the_middle_leaves_nothing_behind(directory: Path) -> None:
+    process = demo(directory)
+    assert process.stdout is not None
+    for line in process.stdout:
+        if "wait at wait_1" in line:
+            break
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate()
+    assert process.returncode == 130, out
+    assert out.endswith("interrupted; every daemon has been stopped\n")
+    assert (running(directory), list(directory.iterdir())) == ([], [])
+
+
+def journal(*told: tuple[str, str, str]) -> Journal:
+    """Of (charger, robot it charges, request id) one after the other, IDLE between."""
+    made = Journal(0.0, lambda text: None, colour=False)
+    for charger, robot, request_id in told:
+        value = int(d.ChargerStateValue.CHARGER_CHARGING)
+        state = d.ChargerState(d.Time(), value, charger, "", request_id, "tiny", robot)
+        made.state(state, 0.0)
+        made.state(d.ChargerState(charger_name=charger, state=1), 0.0)
+    return made
+
+
+OURS = "charger_coordinator/1"
+RIGHT = [(charger, who, OURS) for charger, robots in CHARGED.items() for who in robots]
+
+
+def test_a_day_in_order_has_no_problems_and_one_that_lacks_a_charge_has() -> None:
+    assert problems(journal(*RIGHT)) == []
+    assert problems(journal(*RIGHT[:-1])) == [
+        "charger_b charged AMR01 AMR03, expected AMR01 AMR03 AMR01"
+    ]
+
+
+def test_a_charge_that_nobody_asked_for_is_a_problem() -> None:
+    told = [*RIGHT[:-1], ("charger_b", "AMR01", "unrequested/charger_b")]
+    assert problems(journal(*told)) == ["charger_b charged for unrequested/charger_b"]
+
+
+def test_a_robot_at_two_chargers_is_a_problem() -> None:
+    day = journal(*RIGHT)
+    value = int(d.ChargerStateValue.CHARGER_CHARGING)
+    for charger in ("charger_a", "charger_b"):
+        day.state(d.ChargerState(d.Time(), value, charger, "", OURS, "tiny", "AMR01"), 0.0)
+    assert "AMR01 was charged at two chargers at once" in problems(day)

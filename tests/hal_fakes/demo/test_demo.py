@@ -1,0 +1,113 @@
+"""The demo itself: real processes on real DDS."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from hal_fakes.demo.daemons import Daemon, Wrong, stop_all
+from hal_fakes.domain import free_domain
+from tests.waiting import wait_until
+
+CONFIG = Path(__file__).parents[3] / "config"
+
+
+@contextmanager
+def demo(directory: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hal_fakes.demo", *options],
+        env={"TMPDIR": str(directory), "PATH": "/usr/bin:/bin"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.communicate(timeout=30)
+
+
+def running(directory: Path) -> list[str]:
+    """The command lines of all processes that were told of this directory."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):  # it has just ended
+            line = path.read_bytes().decode(errors="replace")
+            if str(directory) in line:
+                found.append(line)
+    return found
+
+
+@pytest.fixture
+def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short one: the name of a socket has 107 characters at the most."""
+    return tmp_path_factory.mktemp("d")
+
+
+@pytest.mark.timeout(120)
+def test_a_robot_goes_through_the_door_rides_the_lift_and_charges(directory: Path) -> None:
+    with demo(directory) as process:
+        out, _ = process.communicate()
+    assert process.returncode == 0, out
+    assert "\nRIGHT: the robot went through the door, rode from L1 to L3 and charged" in out
+    assert (running(directory), list(directory.iterdir())) == ([], [])
+
+
+def test_a_failure_makes_it_wrong_with_the_reason_and_the_logs(directory: Path) -> None:
+    with demo(directory, "--fail", "ward_door", "flux_capacitor", "off") as process:
+        out, _ = process.communicate()
+    assert process.returncode == 1, out
+    assert "WRONG: fail ward_door flux_capacitor off: error ward_door has no part" in out
+    assert out.count("--- the end of ") == 3
+    assert running(directory) == []
+
+
+def test_a_device_that_the_demo_does_not_have_is_a_usage_error(directory: Path) -> None:
+    with demo(directory, "--fail", "Lift9", "car", "off") as process:
+        out, _ = process.communicate()
+    assert process.returncode == 2
+    assert "there are Lift1, ward_door, charger_a" in out
+
+
+def test_ctrl_c_stops_every_process_and_leaves_nothing_behind(directory: Path) -> None:
+    with demo(directory) as process:
+        assert process.stdout is not None
+        wait_until(lambda: len(running(directory)) >= 3, "three daemons run")
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=30)
+    assert process.returncode == 130, out
+    assert (running(directory), list(directory.iterdir())) == ([], [])
+
+
+def test_a_daemon_that_cannot_start_is_noticed_and_its_log_says_why(directory: Path) -> None:
+    daemon = Daemon(CONFIG / "none_such.yaml", directory, free_domain())
+    try:
+        wait_until(lambda: died(daemon), "the death is noticed")
+        assert "none_such.yaml" in daemon.tail()
+    finally:
+        stop_all([daemon])
+
+
+def died(daemon: Daemon) -> bool:
+    try:
+        daemon.check()
+    except Wrong:
+        return True
+    return False
+
+
+def test_a_daemon_that_hangs_is_killed_with_its_fake(directory: Path) -> None:
+    daemon = Daemon(CONFIG / "door_modbus.yaml", directory, free_domain())
+    try:
+        wait_until(lambda: "ready " in daemon.tail(), "the daemon is ready")
+        assert len(running(directory)) == 2
+        daemon._process.send_signal(signal.SIGSTOP)
+    finally:
+        stop_all([daemon], within_s=0.2)
+    wait_until(lambda: running(directory) == [], "nobody is left", patience_s=5)

@@ -1,0 +1,163 @@
+"""The control socket, with a running world behind it."""
+
+import json
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers import DriverError
+from hal_fakes.control import Control
+from hal_fakes.plants.lift import LiftPlant, Pace
+from hal_fakes.realtime import RealTime
+from tests.hal_fakes.virtual_lift import shipped
+from tests.waiting import PATIENCE_S
+
+QUICK = Pace(floor_s=0.02, door_s=0.02, agv_s=0.02, dwell_s=0.02)
+
+
+class Caller:
+    """One connection to a control socket."""
+
+    def __init__(self, path: Path) -> None:
+        self._end = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._end.settimeout(PATIENCE_S)
+        self._end.connect(str(path))
+        self._lines = self._end.makefile("r", encoding="utf-8")
+
+    def say(self, line: str) -> str:
+        """Send a line, and return the next one that comes."""
+        self._end.sendall(line.encode() + b"\n")
+        return self.hear()
+
+    def hear(self) -> str:
+        return self._lines.readline().rstrip("\n")
+
+    def edge(self) -> dict[str, Any]:
+        edge: dict[str, Any] = json.loads(self.hear())
+        return edge
+
+    def close(self) -> None:
+        self._lines.close()
+        self._end.close()
+
+
+class World:
+    """A lift that runs, and its control socket."""
+
+    def __init__(self, path: Path) -> None:
+        self.lift = LiftPlant("Lift1", shipped(), QUICK)
+        self.running = RealTime({"Lift1": self.lift})
+        self.control = Control(path, self.running.plants)
+        self.callers: list[Caller] = []
+
+    def call(self) -> Caller:
+        self.callers.append(Caller(self.control.path))
+        return self.callers[-1]
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    made = World(tmp_path / "plant.sock")
+    yield made
+    for caller in made.callers:
+        caller.close()
+    made.control.close()
+    made.running.close()
+
+
+def test_whoever_follows_hears_every_edge_from_then_on(world: World) -> None:
+    caller = world.call()
+    assert caller.say("follow") == "ok"
+    before = time.monotonic()
+    world.running.plants["Lift1"].drive("agv_mode_request", True, before)
+    relay, sensor = caller.edge(), caller.edge()
+    times = [relay.pop("at"), sensor.pop("at")]
+    assert [relay, sensor] == [
+        {"device": "Lift1", "what": "relay", "signal": "agv_mode_request", "value": True},
+        {"device": "Lift1", "what": "sensor", "signal": "agv_mode", "value": True},
+    ]
+    assert times == pytest.approx([before, before + QUICK.agv_s])
+
+
+def test_people_press_and_wires_fail_on_command(world: World) -> None:
+    caller = world.call()
+    assert caller.say("press Lift1 fire_alarm on") == "ok"
+    assert world.running.plants["Lift1"].sense("fire_alarm")
+    assert caller.say("press Lift1 fire_alarm off") == "ok"
+    assert not world.running.plants["Lift1"].sense("fire_alarm")
+    assert caller.say("fail Lift1 fire_alarm off") == "ok"
+    assert world.running.plants["Lift1"].sense("fire_alarm")
+    assert caller.say("fail Lift1 fire_alarm ok") == "ok"
+    assert not world.running.plants["Lift1"].sense("fire_alarm")
+
+
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        ("press Lift2 fire_alarm on", "error no device 'Lift2'; there are Lift1"),
+        (
+            "press Lift1 fire on",
+            "error Lift1 has no 'fire' to press; there are fire_alarm, code_blue, hall_L1, hall_L2,"
+            " hall_L3, hall_L4, obstruction",
+        ),
+        (
+            "fail Lift1 door odd",
+            "error no failure 'odd'; there are off, stuck, slow, garbage, wrong",
+        ),
+        ("press 'Lift1 fire_alarm on", "error No closing quotation"),
+        *(
+            (
+                line,
+                "error not understood; say: follow | fail DEVICE PART"
+                " off|stuck|slow|garbage|wrong|ok | press DEVICE SIGNAL on|off",
+            )
+            for line in ("", "press Lift1 fire_alarm yes", "follow me", "\x00\xff")
+        ),
+    ],
+)
+def test_what_cannot_be_done_is_answered_with_why(world: World, line: str, answer: str) -> None:
+    assert world.call().say(line) == answer
+
+
+def test_a_caller_who_leaves_or_never_reads_does_not_stop_the_plants(world: World) -> None:
+    gone, deaf, well = world.call(), world.call(), world.call()
+    assert (gone.say("follow"), deaf.say("follow"), well.say("follow")) == ("ok", "ok", "ok")
+    gone.close()
+    world.callers.remove(gone)
+    plant = world.running.plants["Lift1"]
+    told = 0
+    while told < 2000:  # many times what a socket keeps for a caller who does not read
+        for i in range(50):
+            plant.drive("door_open", i % 2 == 0, time.monotonic())
+        told += len([well.edge() for _ in range(50)])
+    assert len(list(iter(deaf.hear, ""))) < told
+
+
+def test_closing_hangs_up_and_removes_the_socket(world: World) -> None:
+    caller = world.call()
+    caller.say("follow")
+    world.control.close()
+    world.control.close()
+    assert (caller.hear(), world.control.path.exists()) == ("", False)
+
+
+def test_a_socket_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "no such directory" / "plant.sock"
+    with pytest.raises(DriverError, match=f"^cannot make the plant's control socket {path}: "):
+        Control(path, {})
+
+
+def test_a_socket_left_behind_by_a_dead_daemon_is_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "plant.sock"
+    left = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    left.bind(str(path))
+    left.close()
+    control = Control(path, {})
+    caller = Caller(path)
+    assert caller.say("follow") == "ok"
+    caller.close()
+    control.close()

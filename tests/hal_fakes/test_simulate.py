@@ -1,0 +1,117 @@
+"""`run --simulate` below the daemon: real buses, with fakes on the far side, in real time."""
+
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Side
+from bridges.settings.load import Config, load
+from drivers.lift.dry_contact import LiftDryContact, create
+from hal_fakes.plants import lift as lift_plant
+from hal_fakes.simulate import Simulation
+from tests.hal_fakes.test_control import Caller
+from tests.hal_fakes.virtual_lift import SHIPPED
+from tests.waiting import PATIENCE_S
+
+CONFIG = SHIPPED.parent
+
+
+class SimulatedLift:
+    """The shipped lift, at a quick pace, as the daemon has it."""
+
+    def __init__(self, simulation: Simulation, config: Config) -> None:
+        self.bus = simulation.open_bus("header", config.buses["header"])
+        self._edge = threading.Event()
+        self.bus.on_edge(self._edge.set)
+        self.driver: LiftDryContact = create("Lift1", config.devices["Lift1"], self.bus)
+        self.driver.open()
+
+    def until(self, reached: Callable[[LiftSample], bool]) -> LiftSample:
+        """Read at each edge, as the loop does, until this is seen."""
+        while not reached(sample := self.driver.read()):
+            assert self._edge.wait(PATIENCE_S), f"no edge for long after {sample}"
+            self._edge.clear()
+        return sample
+
+    def close(self) -> None:
+        self.driver.close()
+        self.bus.close()
+
+
+@pytest.fixture
+def simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Simulation]:
+    quick = lift_plant.Pace(floor_s=0.1, door_s=0.05, agv_s=0.05, dwell_s=0.1)
+    monkeypatch.setattr(lift_plant, "Pace", lambda: quick)
+    made = Simulation(load(SHIPPED), tmp_path)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def lift(simulation: Simulation) -> Iterator[SimulatedLift]:
+    made = SimulatedLift(simulation, load(SHIPPED))
+    yield made
+    made.close()
+
+
+def test_a_ride_on_simulated_hardware(lift: SimulatedLift) -> None:
+    lift.driver.write(LiftOutputs(agv_request=True))
+    lift.until(lambda seen: seen.agv is True)
+    lift.driver.write(LiftOutputs(agv_request=True, call="L3"))
+    lift.until(lambda seen: seen.level == "L2")
+    lift.until(lambda seen: seen.door is Door.OPEN)
+    lift.driver.write(LiftOutputs(agv_request=True, hold_door=Side.FRONT))
+    assert lift.driver.read() == LiftSample(level="L3", door=Door.OPEN, agv=True)
+    lift.driver.write(LiftOutputs())
+    assert lift.until(lambda seen: seen.door is Door.NOT_OPEN) == LiftSample(
+        level="L3", door=Door.NOT_OPEN, agv=False
+    )
+
+
+def test_a_story_told_on_the_socket_reaches_the_pins(
+    lift: SimulatedLift, simulation: Simulation
+) -> None:
+    caller = Caller(simulation.socket_path("header"))
+    assert caller.say("press Lift1 fire_alarm on") == "ok"
+    lift.until(lambda seen: seen.hazards == {Hazard.FIRE})
+    assert caller.say("press Lift1 fire_alarm off") == "ok"
+    lift.until(lambda seen: not seen.hazards)
+    assert caller.say("fail Lift1 code_blue off") == "ok"
+    lift.until(lambda seen: seen.hazards == {Hazard.CODE_BLUE})
+    assert caller.say("fail Lift1 door wrong") == "ok"
+    lift.until(lambda seen: seen.door is Door.OPEN)
+    caller.close()
+
+
+def test_closing_leaves_no_thread_and_no_socket(simulation: Simulation, tmp_path: Path) -> None:
+    before = set(threading.enumerate())
+    SimulatedLift(simulation, load(SHIPPED)).close()
+    simulation.close()
+    simulation.close()
+    assert set(threading.enumerate()) - before == set()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_each_of_several_buses_has_a_socket_of_its_own(tmp_path: Path) -> None:
+    text = SHIPPED.read_text().replace(
+        "  header: {type: gpio}", "  header: {type: gpio}\n  other: {type: gpio}"
+    )
+    second = text[text.index("  Lift1:") :].replace("Lift1:", "Lift2:\n    bus: other")
+    text = text.replace("Lift1:", "Lift1:\n    bus: header") + second
+    file = tmp_path / "two.yaml"
+    file.write_text(text)
+    config = load(file)
+    simulation = Simulation(config, tmp_path)
+    buses = [simulation.open_bus(name, config.buses[name]) for name in config.buses]
+    callers = [Caller(tmp_path / f"plant-{name}.sock") for name in config.buses]
+    assert [c.say("press Lift2 fire_alarm on") for c in callers] == [
+        "error no device 'Lift2'; there are Lift1",
+        "ok",
+    ]
+    for caller in callers:
+        caller.close()
+    for bus in buses:
+        bus.close()
+    simulation.close()

@@ -1,0 +1,41 @@
+"""What colcon and `ros2 launch` read agrees with the project; building it takes ROS's own tools."""
+
+import ast
+import xml.etree.ElementTree as ElementTree
+from configparser import ConfigParser
+from pathlib import Path
+
+from bridges import __version__
+from bridges.rmf.definitions import PACKAGES
+from bridges.settings import names as named
+
+ROS = Path(__file__).parents[2] / "ros"
+PACKAGE = ElementTree.parse(ROS / "package.xml").getroot()
+NAME = "rmf_bridges"
+
+
+def test_the_package_has_the_projects_version() -> None:
+    assert (PACKAGE.findtext("name"), PACKAGE.findtext("version")) == (NAME, __version__)
+
+
+def test_every_ros_package_whose_messages_we_speak_is_a_dependency() -> None:
+    named_there = {depend.text for depend in PACKAGE.findall("exec_depend")}
+    assert {*PACKAGES.values(), "rclpy", "launch_ros"} - {"builtin_interfaces"} <= named_there
+
+
+def test_ros_finds_the_package_and_its_executable() -> None:
+    assert PACKAGE.findtext("export/build_type") == "ament_python"
+    assert (ROS / "resource" / NAME).read_bytes() == b""
+    places = ConfigParser(interpolation=None)
+    places.read(ROS / "setup.cfg")
+    assert places["install"]["install_scripts"] == f"$base/lib/{NAME}"
+
+
+def test_every_kind_has_a_launch_file_that_starts_that_kind() -> None:
+    started = {}
+    for file in (ROS / "launch").iterdir():
+        calls = [
+            node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.Call)
+        ]
+        started[file.name] = [ast.unparse(call) for call in calls]
+    assert started == {f"{kind}.launch.py": [f"daemon('{kind}')"] for kind in named.kind_names()}

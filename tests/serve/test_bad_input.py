@@ -1,0 +1,109 @@
+"""What a lift's daemon makes of requests that cannot be right: a real process, on each wire."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridges.rmf.dds import DdsTransport
+from bridges.rmf.definitions import LiftMode, LiftRequest, LiftState
+from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
+from hal_fakes.domain import free_domain
+from tests.rmf import peer
+from tests.rmf.conftest import ROS2
+from tests.serve.site import Daemon, daemon, shipped
+from tests.waiting import wait_until
+
+RIGHT = LiftRequest(
+    "Lift1", session_id="fleet/robot", request_type=1, destination_floor="L3", door_state=2
+)
+WRONG = {
+    "empty session_id": replace(RIGHT, session_id=""),
+    "unknown request_type": replace(RIGHT, request_type=7),
+    "unknown door_state": replace(RIGHT, door_state=1),
+    "floor not served": replace(RIGHT, destination_floor="L9"),
+}
+
+
+class Lift:
+    """A simulated lift's daemon, and an RMF that sends it anything."""
+
+    def __init__(self, running: Daemon, status: Path, domain: int) -> None:
+        self.running = running
+        self.domain = domain
+        self.states: list[LiftState] = []
+        self._status = status
+        self.transport = DdsTransport("rmf", domain, loopback=True)
+        self._requests = self.transport.publisher(LIFT_REQUESTS)
+        self.transport.subscribe(LIFT_STATES, self.states.append)
+        wait_until(self._requests.matched, "the node listens")
+        wait_until(lambda: self.states, "the node is heard")
+
+    def send(self, request: LiftRequest) -> None:
+        self._requests.publish(request)
+
+    def status(self) -> dict[str, Any]:
+        wait_until(self._status.exists, "a status file")
+        told: dict[str, Any] = json.loads(self._status.read_text())
+        return told
+
+    def refused(self) -> dict[str, int]:
+        refused: dict[str, int] = self.status()["devices"]["Lift1"]["refused"]
+        return refused
+
+
+@pytest.fixture(params=["dds", ROS2])
+def lift(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Lift]:
+    file = shipped("lift_dry_contact.yaml", tmp_path, request.param)
+    domain = free_domain()
+    options = ("--simulate", "--domain-id", str(domain))
+    with daemon(file, tmp_path / "run", *options) as running:
+        running.wait_for("ready")
+        made = Lift(running, tmp_path / "run" / "status.json", domain)
+        yield made
+        made.transport.close()
+
+
+def test_every_wrong_request_is_refused_by_name_counted_logged_once_and_moves_nothing(
+    lift: Lift,
+) -> None:
+    for _ in range(3):
+        for request in WRONG.values():
+            lift.send(request)
+    lift.send(replace(RIGHT, lift_name="Lift2"))
+    counted = dict.fromkeys(WRONG, 3)
+    wait_until(lambda: lift.refused() == counted, "all are counted")
+    log = lift.running.log.read_text()
+    assert [log.count(f'refused device=Lift1 kind="{kind}"') for kind in WRONG] == [1, 1, 1, 1]
+    assert "outputs device=Lift1" not in log
+    assert {state.session_id for state in lift.states} == {""}
+    wait_until(lambda: lift.status()["requests_for_others"] == 1, "the other lift's is counted")
+
+
+def test_a_flood_ends_with_the_last_valid_request_and_states_go_on(lift: Lift) -> None:
+    for n in range(5000):
+        lift.send(replace(RIGHT, session_id=f"fleet/{n % 7}", destination_floor=f"L{n % 12}"))
+    wait_until(lambda: any(s.session_id for s in lift.states), "one was granted")
+    holder = next(s.session_id for s in lift.states if s.session_id)
+    lift.send(replace(RIGHT, session_id=holder, request_type=0, destination_floor=""))
+    wait_until(lambda: lift.states[-1].session_id == "", "its END has ended it")
+    before = len(lift.states)
+    wait_until(lambda: len(lift.states) > before + 1, "states go on")
+    edges = [
+        line for line in lift.running.log.read_text().splitlines() if " outputs device" in line
+    ]
+    assert len(edges) <= 4
+
+
+def test_samples_that_are_no_requests_are_dropped_and_the_next_good_one_is_obeyed(
+    lift: Lift,
+) -> None:
+    with peer.running("hostile", lift.domain):
+        wait_until(lambda: lift.status()["samples_dropped"], "hostile samples are counted")
+    lift.send(replace(RIGHT, request_type=0))
+    lift.send(RIGHT)
+    wait_until(lambda: lift.states[-1].session_id == "fleet/robot", "the robot holds the lift")
+    wait_until(lambda: lift.states[-1].current_mode == LiftMode.MODE_AGV, "AGV mode is on")

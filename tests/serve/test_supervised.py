@@ -1,0 +1,64 @@
+"""A lift and its supervisor as daemons of their own, and an operator's commands, on DDS."""
+
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from hal_fakes.domain import free_domain
+from tests.serve.site import Daemon, command, daemon, environment
+
+CONFIG = Path(__file__).parents[2] / "config"
+
+
+@dataclass
+class Building:
+    """Where they meet, and what they say."""
+
+    domain: int
+    supervisor: Daemon
+    lift: Daemon
+
+    def operator(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
+        """One command at the laptop."""
+        graph = ("--localhost", "--domain-id", str(self.domain), "--timeout", "30")
+        return subprocess.run(
+            command(*arguments, *graph), env=environment(), capture_output=True, text=True
+        )
+
+
+@pytest.fixture
+def building(tmp_path: Path) -> Iterator[Building]:
+    domain = free_domain()
+    options = ("--simulate", "--domain-id", str(domain))
+    supervisor = daemon(CONFIG / "lift_supervisor.yaml", tmp_path / "supervisor", *options)
+    lift = daemon(CONFIG / "lift_dry_contact.yaml", tmp_path / "lift", *options)
+    with supervisor as serving, lift as moving:
+        serving.wait_for("active kind=lift_supervisor")
+        moving.wait_for("ready")
+        yield Building(domain, serving, moving)
+
+
+def test_a_lift_is_asked_for_through_the_supervisor_and_released_by_an_operator(
+    building: Building,
+) -> None:
+    asked = building.operator(
+        "send", "lift", "Lift1", "L1", "--session", "fleet/a", "--granted-only"
+    )
+    assert asked.returncode == 0, asked.stdout + asked.stderr
+    building.supervisor.wait_for('holder="fleet/a')
+    released = building.operator("release", "Lift1")
+    assert released.returncode == 0, released.stdout + released.stderr
+    building.lift.wait_for('outputs="LiftOutputs(agv_request=False')
+
+
+def test_two_supervisors_are_never_two_opinions(building: Building, tmp_path: Path) -> None:
+    file = CONFIG / "lift_supervisor.yaml"
+    options = ("--simulate", "--domain-id", str(building.domain))
+    with daemon(file, tmp_path / "second", *options) as second:
+        second.wait_for("passive kind=lift_supervisor")
+        asked = building.operator("send", "lift", "Lift1", "L1", "--session", "b", "--granted-only")
+        assert asked.returncode == 0, asked.stdout + asked.stderr
+        assert "active" not in second.log.read_text()

@@ -1,0 +1,86 @@
+"""A driver with wires, and with a field of every sort that a struct may have."""
+
+from collections.abc import Iterable
+from enum import Enum
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from bridges.core.fields import DeviceSettings, Name, Seconds
+from drivers.hal.points import Input, Output, Wire
+
+BUSES = ("pins", "module")
+
+Code = Annotated[int, Meta(ge=0, le=15)]
+
+
+class Side(Enum):
+    """A choice."""
+
+    LEFT = "left"
+    RIGHT = "right"
+
+
+class Lane(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One lane, where it needs more than a name."""
+
+    side: Side = Side.LEFT
+    heights: tuple[Annotated[float, Meta(gt=0, lt=5, extra={"unit": "m"})], ...] = ()
+
+
+class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Numbers of every sort."""
+
+    open_s: Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})] = 5.0
+    close_s: Seconds | None = None
+    tries: Annotated[int, Meta(ge=1)] = 3
+    even: Annotated[int, Meta(multiple_of=2)] = 2
+    gain: float = 1.0
+    loud: bool = False
+    baud: Literal[9600, 19200] = 9600
+    label: Annotated[str, Meta(pattern="^[a-z]+$", extra={"pattern": "a small word"})] | int = 0
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """What the fields cannot say one by one."""
+        if self.close_s is not None and self.close_s > self.open_s:
+            yield ("close_s",), "'close_s' may not be longer than 'open_s'"
+
+
+class Settings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A gate."""
+
+    lanes: list[Name] | dict[Name, Lane]
+    inputs: dict[Name, Input]
+    outputs: dict[Name, Output] = msgspec.field(default_factory=dict)
+    bits: Annotated[list[Input], Meta(max_length=2)] = msgspec.field(default_factory=list)
+    codes: dict[Code, Name] = msgspec.field(default_factory=dict)
+    limits: Limits = Limits()
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """Codes name lanes."""
+        for code, lane in self.codes.items():
+            if lane not in self.lanes:
+                yield ("codes", str(code)), f"code {code} is no lane: '{lane}'"
+
+
+def wires(settings: Settings) -> list[Wire]:
+    """The table."""
+    return [
+        *(_input(name, i, ("inputs", name)) for name, i in settings.inputs.items()),
+        *(_input(f"bit_{n}", i, ("bits", str(n))) for n, i in enumerate(settings.bits)),
+        *(
+            Wire(name, "out", o.point, o.active, path=("outputs", name))
+            for name, o in settings.outputs.items()
+        ),
+    ]
+
+
+def _input(name: str, i: Input, path: tuple[str, ...]) -> Wire:
+    return Wire(name, "in", i.point, i.active, i.pull, i.debounce_s, path)
+
+
+def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+    """Legal, but worth a look."""
+    if settings.limits.loud:
+        yield ("limits", "loud"), "it will be loud"

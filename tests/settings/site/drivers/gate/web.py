@@ -1,0 +1,17 @@
+"""A driver without wires."""
+
+from bridges.core.fields import DeviceSettings, Name
+from tests.settings.site.hal import web
+
+BUSES = ("web",)
+
+
+class Settings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A gate behind a web server."""
+
+    page: Name = "gate"
+
+
+def describe(settings: Settings, bus: web.Settings) -> list[tuple[str, str]]:
+    """What it talks to."""
+    return [("polls", f"http://{bus.host}/{settings.page}"), ("identity", "not verified")]
