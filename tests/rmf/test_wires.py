@@ -19,9 +19,10 @@ from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE, Topic
 from bridges.rmf.transport import Publisher, TransportError
 from hal_fakes.domain import free_domain
-from tests.rmf import peer
+from tests.rmf import golden_qos, peer
 from tests.rmf.conftest import ROS2, Join, joining
 from tests.rmf.domains import domain_of_this_run
+from tests.rmf.golden_qos import GOLDEN
 from tests.rmf.observing import PUBLICATION, SUBSCRIPTION, seen
 from tests.rmf.values import repeatable, values
 from tests.waiting import wait_until
@@ -257,29 +258,35 @@ def test_a_peer_whose_durability_does_not_fit_is_named_once(
 
 
 @ALL_TOPICS
-def test_each_end_has_the_qos_the_type_and_the_type_hash_of_the_table(
+def test_each_end_has_the_type_the_type_hash_and_the_qos_of_the_golden_table(
     join_wire: Join, observer: Any, topic: Topic[Any]
 ) -> None:
     node = join_wire("observed")
     node.publisher(topic)
     node.subscribe(topic, print)
-    written, read = seen(observer, PUBLICATION, topic), seen(observer, SUBSCRIPTION, topic)
+    ends = (seen(observer, PUBLICATION, topic), seen(observer, SUBSCRIPTION, topic))
+    ros_type, *golden = GOLDEN[topic.name]
+    wire_type = ros_type.replace("/", "::msg::dds_::") + "_"
+    assert {end.type_name for end in ends} == {wire_type}
+    assert [as_ros_shows(end.qos) for end in ends] == golden
+    for end in ends:
+        assert end.qos[Policy.DataRepresentation] == Policy.DataRepresentation(True, False)
+        assert end.qos[Policy.Userdata].data.decode() == f"typehash={type_hash(topic.type)};"
+    if golden[0].durability == "TRANSIENT_LOCAL":
+        kept = ends[0].qos[Policy.DurabilityService].history
+        assert kept == Policy.History.KeepLast(golden[0].depth)
 
-    package = d.PACKAGES[topic.type]
-    wire_type = f"{package}::msg::dds_::{topic.type.__name__}_"
-    assert {written.type_name, read.type_name} == {wire_type}
-    for qos in (written.qos, read.qos):
-        assert isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable)
-        assert qos[Policy.DataRepresentation] == Policy.DataRepresentation(True, False)
-        assert qos[Policy.Userdata].data.decode() == f"typehash={type_hash(topic.type)};"
-    durability = {
-        "volatile": Policy.Durability.Volatile,
-        "transient_local": Policy.Durability.TransientLocal,
+
+def as_ros_shows(qos: Any) -> golden_qos.Qos:
+    """Of an end's QoS on DDS, what the golden table has."""
+    names = {
+        "Reliable": "RELIABLE",
+        "Volatile": "VOLATILE",
+        "TransientLocal": "TRANSIENT_LOCAL",
+        "KeepLast": "KEEP_LAST",
     }
-    assert written.qos[Policy.Durability] == durability[topic.publish.durability]
-    assert written.qos[Policy.History] == Policy.History.KeepLast(topic.publish.depth)
-    assert read.qos[Policy.Durability] == durability[topic.subscribe.durability]
-    assert read.qos[Policy.History] == Policy.History.KeepLast(topic.subscribe.depth)
-    if topic.publish.durability == "transient_local":
-        service = written.qos[Policy.DurabilityService]
-        assert service.history == Policy.History.KeepLast(topic.publish.depth)
+    policies = (qos[Policy.Reliability], qos[Policy.Durability], qos[Policy.History])
+    reliability, durability, history = (
+        names[type(policy).__name__.rpartition(".")[2]] for policy in policies
+    )
+    return golden_qos.Qos(reliability, durability, history, qos[Policy.History].depth)
