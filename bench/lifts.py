@@ -19,7 +19,8 @@ from hal_fakes.plants.lift import build
 from hal_fakes.rmf.phases import EndLiftSession, RequestLift
 from hal_fakes.rmf.robot import Phase
 from hal_fakes.wiring import Wiring
-from tests.lift_supervisor.world import LiftNode, OurSupervisor, Rider, World
+from tests.lift_supervisor.world import LiftNode, OurSupervisor, Rider
+from tests.serve.virtual_graph import World
 
 ROUNDS = 100
 DAY_S = 86400.0

@@ -76,7 +76,7 @@ def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
     message = wanted(memory)
     due = now >= _due_at(memory, message)
     if due:
-        memory = replace(memory, sent=message, sent_at=now, prompted=False)
+        memory = replace(memory, sent=message, last_sent=message, sent_at=now, prompted=False)
     may_come = tuple(alarms(memory, now, limits))
     return Decision(
         memory,
@@ -279,6 +279,8 @@ def _due_at(memory: Memory, message: LiftRequest | None) -> float:
     sent = memory.sent
     if message is None:
         return NEVER
+    if sent is None and message == memory.last_sent:  # another turn, the same words
+        return memory.sent_at + REPEAT_S
     if sent is None or (message != sent and message.request_type != END):
         return memory.sent_at + GAP_S
     return memory.sent_at + REPEAT_S if memory.prompted else NEVER

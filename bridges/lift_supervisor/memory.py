@@ -101,7 +101,7 @@ class Memory(msgspec.Struct, frozen=True):
     `claims`: in the order of first requests, the holder's among them. `heard_at`: when an adapter was
     last heard, `voices`: what of each. `shown_at`: when the latest state came; `session_since`: since
     when its session is shown; `flowing_since`: since when states come without a gap. `sent`: the last
-    request of this turn; `prompted`: it is worth repeating.
+    request of this turn, `last_sent` of any; `prompted`: it is worth repeating.
     """
 
     lift: str
@@ -116,6 +116,7 @@ class Memory(msgspec.Struct, frozen=True):
     heard_at: float = -NEVER
     voices: Mapping[str, Voice] = {}
     sent: LiftRequest | None = None
+    last_sent: LiftRequest | None = None
     sent_at: float = -NEVER
     prompted: bool = False
 
