@@ -11,6 +11,7 @@ from bridges.door.core import RIVAL_QUIET_S, CloseDoor, DoorMemory, Event, OpenD
 from bridges.door.settings import DoorLimits, Limits, Pulse
 from bridges.door.signals import DoorSample
 from bridges.rmf.definitions import DoorModeValue
+from tests.depth import examples
 from tests.door.virtual import DEBOUNCED, Decided
 
 CONTACT = st.sampled_from([None, False, True])
@@ -94,7 +95,7 @@ def history(steps: list[tuple[float, Event]], limits: DoorLimits) -> Any:
         yield now, ledger, decided
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_the_hold_is_on_for_a_reason_and_off_without_one(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -107,7 +108,7 @@ def test_the_hold_is_on_for_a_reason_and_off_without_one(
         assert not (obstructed and ledger.wanted)
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_open_is_said_of_fresh_contacts_only(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -121,7 +122,7 @@ def test_open_is_said_of_fresh_contacts_only(
             assert decided.report.mode == DoorModeValue.MODE_OFFLINE
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_the_relay_follows_the_hold_and_nothing_else(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -132,7 +133,7 @@ def test_the_relay_follows_the_hold_and_nothing_else(
             assert decided.outputs.hold_open == decided.report.hold
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_the_stamp_is_the_time_of_the_last_reading(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -141,7 +142,7 @@ def test_the_stamp_is_the_time_of_the_last_reading(
         assert decided.report.read_at == ledger.read_at
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_a_decision_repeated_is_the_same_decision(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -157,7 +158,7 @@ def test_a_decision_repeated_is_the_same_decision(
         memory = once.memory
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_nothing_is_decided_otherwise_before_the_time_it_asked_to_be_woken(
     steps: list[tuple[float, Event]], limits: DoorLimits

@@ -11,6 +11,7 @@ from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from drivers.charger import xnergy
 from drivers.charger.xnergy import Orders, Told, settled, steer
+from tests.depth import examples
 
 WELL = {"state": 0, "error_low": 0, "error_high": 0, "range": 0}
 
@@ -97,7 +98,7 @@ def test_a_temperature_below_zero_is_below_zero() -> None:
 any_word = st.integers(0, 0xFFFF)
 
 
-@settings(derandomize=True, max_examples=300, deadline=None)
+@settings(derandomize=True, max_examples=examples(300), deadline=None)
 @given(
     st.fixed_dictionaries(
         dict.fromkeys(("state", "error_low", "error_high"), any_word),
