@@ -2,11 +2,12 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: help demo demo-charging test test-ros lint format bench flood soak mutate clean
+.PHONY: help demo demo-charging test deep test-ros lint format bench flood soak mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
+	@echo "make deep    all tests, every walk to its full depth: some minutes more"
 	@echo "make test-ros  the tests that need ROS 2, in a shell that has sourced its setup file"
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
@@ -28,8 +29,14 @@ demo: .venv/ready
 demo-charging: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo.charging
 
+# Many tests wait for a process or a wire: more of them than there are cores run side by side.
+SIDE_BY_SIDE := -n 8 --dist load --maxschedchunk 2
 test: .venv/ready lint
-	$(BIN)/pytest
+	$(BIN)/pytest $(SIDE_BY_SIDE)
+
+# Walks to their full depth, and every example: before a release, and after a change to a core.
+deep: .venv/ready
+	DEEP=1 $(BIN)/pytest $(SIDE_BY_SIDE)
 
 # rclpy belongs to ROS's own Python and needs its packages (numpy): an environment of its own, on top.
 ROS_BIN := .venv-ros/bin

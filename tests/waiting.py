@@ -4,8 +4,11 @@ import threading
 import time
 from collections.abc import Callable
 
-PATIENCE_S = 20.0
-"""Long enough for a busy machine; a test that passes never waits for it."""
+PATIENCE_S = 120.0
+"""Long enough for a very busy machine; a test that passes never waits for it."""
+
+LEASE_S = 9.5
+"""Less than DDS takes to miss who has gone without a farewell (10 s)."""
 
 
 def wait_until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:

@@ -42,7 +42,7 @@ def reached(
 def histories(
     state: W, moves: Sequence[M], depth: int, after: Callable[[W, M], W]
 ) -> Iterator[tuple[W, tuple[M, ...]]]:
-    """Every history of `depth` moves: where it ends, and its moves. `after` changes nothing in place."""
+    """Every history of `depth` moves: where it ends and its moves. `after` changes nothing in place."""
     if depth == 0:
         yield state, ()
         return
@@ -72,7 +72,8 @@ class Walker(Generic[W, M]):
 
     def neighbours(self, world: W, seen: Seen = unseen) -> Iterator[W]:
         """Every state one step away."""
-        for step in (*self.moves, *self.waits):
+        steps: list[str | float] = [*self.moves, *self.waits]
+        for step in steps:
             yield self.path(world, step, seen=seen)
 
     def walk(self, roots: Iterable[W], depth: int, seen: Seen = unseen) -> list[W]:

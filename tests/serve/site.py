@@ -15,7 +15,7 @@ from typing import Any
 from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
-from tests.waiting import wait_until
+from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 YAML = """
@@ -77,7 +77,7 @@ class Module:
         assert self._far_side.stdin
         assert self._far_side.stdout
         self._far_side.stdin.close()
-        self._far_side.wait(10)
+        self._far_side.wait(PATIENCE_S)
         self._far_side.stdout.close()
 
 
@@ -121,7 +121,7 @@ class Daemon:
     def end(self, number: signal.Signals) -> int:
         """Send a signal and give the exit code."""
         self.process.send_signal(number)
-        return self.process.wait(20)
+        return self.process.wait(PATIENCE_S)
 
 
 @contextmanager

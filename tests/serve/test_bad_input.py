@@ -11,7 +11,6 @@ import pytest
 from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import LiftMode, LiftRequest, LiftState
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
-from hal_fakes.domain import free_domain
 from tests.rmf import peer
 from tests.rmf.conftest import ROS2
 from tests.serve.site import Daemon, daemon, shipped
@@ -56,9 +55,8 @@ class Lift:
 
 
 @pytest.fixture(params=["dds", ROS2])
-def lift(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Lift]:
+def lift(domain: int, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Lift]:
     file = shipped("lift_dry_contact.yaml", tmp_path, request.param)
-    domain = free_domain()
     options = ("--simulate", "--domain-id", str(domain))
     with daemon(file, tmp_path / "run", *options) as running:
         running.wait_for("ready")

@@ -11,18 +11,17 @@ from pathlib import Path
 import pytest
 
 from bridges.rmf.definitions import DoorModeValue
-from hal_fakes.domain import free_domain
 from tests.rmf.conftest import ROS2
 from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment
-from tests.waiting import wait_until
+from tests.waiting import PATIENCE_S, wait_until
 
 OPEN, CLOSED = DoorModeValue.MODE_OPEN, DoorModeValue.MODE_CLOSED
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(params=["dds", ROS2])
-def module(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, free_domain(), request.param)
+def module(domain: int, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Module]:
+    standing = Module(tmp_path, domain, request.param)
     yield standing
     standing.close()
 
@@ -100,7 +99,7 @@ def test_one_runtime_directory_has_one_daemon(module: Module, tmp_path: Path) ->
     with daemon(module.file, tmp_path / "run") as first:
         first.wait_for("ready")
         second = Daemon(module.file, tmp_path / "run")
-        assert second.process.wait(20) == 69
+        assert second.process.wait(PATIENCE_S) == 69
 
 
 def test_systemd_hears_ready_then_finished_scans_then_stopping(
@@ -171,9 +170,9 @@ def test_a_service_never_simulates_and_a_real_device_needs_no_expose(
     assert why in refused.stderr
 
 
-def test_a_killed_simulation_leaves_no_process_behind(tmp_path: Path) -> None:
+def test_a_killed_simulation_leaves_no_process_behind(domain: int, tmp_path: Path) -> None:
     file = ROOT / "config" / "door_modbus.yaml"
-    options = ("--simulate", "--domain-id", str(free_domain()))
+    options = ("--simulate", "--domain-id", str(domain))
     with daemon(file, tmp_path / "run", *options) as running:
         running.wait_for("ready")
         children = Path(f"/proc/{running.process.pid}/task/{running.process.pid}/children")
@@ -183,9 +182,9 @@ def test_a_killed_simulation_leaves_no_process_behind(tmp_path: Path) -> None:
     wait_until(lambda: not any(_alive(pid) for pid in pids), "the far side has ended")
 
 
-def test_a_simulation_says_so_wherever_it_is_looked_at(tmp_path: Path) -> None:
+def test_a_simulation_says_so_wherever_it_is_looked_at(domain: int, tmp_path: Path) -> None:
     file = ROOT / "config" / "lift_dry_contact.yaml"
-    options = ("--simulate", "--domain-id", str(free_domain()))
+    options = ("--simulate", "--domain-id", str(domain))
     with daemon(file, tmp_path / "run", *options) as running:
         running.wait_for("ready")
         status = tmp_path / "run" / "status.json"

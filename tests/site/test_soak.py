@@ -8,7 +8,7 @@ from tests.site.growth import Look, growth
 MINUTES = 20
 
 
-@pytest.mark.timeout(240)
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_site_lives_through_its_troubles(seed: int) -> None:
     """If this fails: `make soak SEED=… HOURS=0.3333` plays it again, and prints what went before."""
@@ -20,7 +20,7 @@ def test_a_site_lives_through_its_troubles(seed: int) -> None:
     assert sum(site.trouble.counts.values()) > 5
 
 
-@pytest.mark.timeout(240)
+@pytest.mark.long
 def test_the_same_seed_is_the_same_day() -> None:
     days = [Site(5), Site(5)]
     for day in days:

@@ -20,6 +20,7 @@ from drivers.hal.points import HalError
 from tests.depth import examples
 from tests.drivers.hal.modbus.line import SerialModule, crc, rtu
 from tests.drivers.hal.modbus.module import Module, Time, bits_reply, bus_to, frame
+from tests.waiting import wait_until
 
 DOOR = msgspec.convert(
     {
@@ -231,4 +232,5 @@ def test_a_pulse_is_asked_for_once_and_believed_by_its_echo_alone(
         with suppress(HalError):
             ask_for(bus, Point(1, "coil", 0x200), 0.7)
             assert pdu.hex() == "0502000007"
+        wait_until(lambda: module.asked, "the module has read what was asked")
         assert len(module.asked) == 1
