@@ -12,7 +12,7 @@ help:
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again"
-	@echo "make mutate  break the lift's core in every small way, and list what no test noticed (docs/mutation.md)"
+	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make format  rewrite the sources as the linter wants them"
 	@echo "make clean   remove the virtual environment and everything generated"
 
@@ -70,14 +70,14 @@ soak: .venv/ready
 	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED))
 
 # Mutants live in a copy; stopped and started again, only what is not known yet is run. Some of it:
-# make mutate ONLY='bridges.lift.drive.*'; everything afresh: rm -rf the directory first.
+# make mutate ONLY='bridges.door.*' CHILDREN=1; everything afresh: rm -rf the directory first.
 MUTANTS ?= $(or $(TMPDIR),/tmp)/rmf-bridges-mutants-$(shell id -u)
 MUTATED := bridges config drivers hal_fakes tests pyproject.toml
 mutate: .venv/ready
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[mutate]'
 	@mkdir -p $(MUTANTS) && cd $(MUTANTS) && rm -rf $(MUTATED)
 	@cp -Rp $(MUTATED) $(MUTANTS)
-	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut run --max-children 2 $(if $(ONLY),'$(ONLY)')
+	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut run --max-children $(or $(CHILDREN),2) $(if $(ONLY),'$(ONLY)')
 	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut results | grep -v ': not checked' || true
 	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut export-cicd-stats >/dev/null && cat mutants/mutmut-cicd-stats.json && echo
 	@echo "one of them: cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut show NAME"
