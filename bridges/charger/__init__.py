@@ -3,7 +3,9 @@
 from collections.abc import Mapping
 
 from bridges.charger import core, messages
+from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerLimits, ChargerSettings
+from bridges.charger.signals import ChargerOutputs, ChargerSample
 from bridges.core.kind import Kind
 from bridges.rmf.topics import CHARGER_CANCELS, CHARGER_REQUESTS, CHARGER_STATES
 
@@ -13,7 +15,15 @@ def limits(settings: ChargerSettings, debounce_s: Mapping[str, float]) -> Charge
     return ChargerLimits.of(settings)
 
 
-KIND = Kind(
+KIND: Kind[
+    ChargerSettings,
+    ChargerLimits,
+    core.Memory,
+    ChargerSample,
+    core.Requested | core.Cancelled,
+    ChargerOutputs,
+    ChargerReport,
+] = Kind(
     name="charger",
     devices_key="chargers",
     states=CHARGER_STATES,

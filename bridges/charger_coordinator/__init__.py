@@ -2,7 +2,16 @@
 
 from bridges.charger_coordinator import core, keep, messages
 from bridges.charger_coordinator.described import described, warnings
-from bridges.charger_coordinator.settings import Settings, site
+from bridges.charger_coordinator.memory import (
+    Dedicated,
+    FleetSeen,
+    Memory,
+    Shown,
+    Unwanted,
+    Wanted,
+)
+from bridges.charger_coordinator.report import SiteReport
+from bridges.charger_coordinator.settings import Settings, Site, site
 from bridges.core.graph_kind import GraphKind
 from bridges.rmf.topics import (
     ADAPTER_CHARGER_CANCELS,
@@ -21,7 +30,13 @@ def quiet_s(settings: Settings) -> float:
     return settings.quiet_start_s
 
 
-KIND = GraphKind(
+KIND: GraphKind[
+    Settings,
+    Site,
+    Memory,
+    FleetSeen | Shown | Wanted | Unwanted | Dedicated,
+    SiteReport,
+] = GraphKind(
     name="charger_coordinator",
     devices_key="coordinator",
     settings=Settings,

@@ -2,10 +2,19 @@
 
 from bridges.core.kind import Kind
 from bridges.door import core, messages
-from bridges.door.settings import DoorLimits
+from bridges.door.settings import DoorLimits, DoorSettings
+from bridges.door.signals import DoorOutputs, DoorSample
 from bridges.rmf import topics
 
-KIND = Kind(
+KIND: Kind[
+    DoorSettings,
+    DoorLimits,
+    core.DoorMemory,
+    DoorSample,
+    core.OpenDoor | core.CloseDoor,
+    DoorOutputs,
+    core.DoorReport,
+] = Kind(
     name="door",
     devices_key="doors",
     states=topics.DOOR_STATES,

@@ -21,7 +21,13 @@ def quiet_s(settings: Settings) -> float:
     return settings.quiet_start_s
 
 
-KIND = GraphKind(
+KIND: GraphKind[
+    Settings,
+    core.Limits,
+    core.Memory,
+    core.Opens | core.Closes | core.Shown,
+    core.DoorHoldReport,
+] = GraphKind(
     name="door_supervisor",
     devices_key="supervisor",
     settings=Settings,

@@ -25,7 +25,7 @@ from typing import Any, Final
 import msgspec
 from msgspec.structs import replace
 
-from bridges.core.decision import Decision, Fault
+from bridges.core.decision import Decision, Fault, OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.door_supervisor.voice import Voice
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, Message
@@ -75,7 +75,7 @@ class Shown(msgspec.Struct, frozen=True):
     mode: DoorModeValue
 
 
-Event = Opens | Closes | Shown | MaySpeak | Woken
+Event = Opens | Closes | Shown | MaySpeak | Woken | OperatorReset
 
 
 class Holder(msgspec.Struct, frozen=True):

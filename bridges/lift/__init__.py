@@ -3,9 +3,20 @@
 from bridges.core.kind import Kind
 from bridges.lift import core, messages
 from bridges.lift.limits import LiftLimits
+from bridges.lift.report import LiftReport
+from bridges.lift.settings import LiftSettings
+from bridges.lift.signals import LiftOutputs, LiftSample
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 
-KIND = Kind(
+KIND: Kind[
+    LiftSettings,
+    LiftLimits,
+    core.Memory,
+    LiftSample,
+    core.Asked | core.Ended,
+    LiftOutputs,
+    LiftReport,
+] = Kind(
     name="lift",
     devices_key="lifts",
     states=LIFT_STATES,

@@ -94,7 +94,7 @@ class Memory(msgspec.Struct, frozen=True):
     write_failed: bool = False
 
 
-Event = Sampled[Any] | IoFailed | RivalSeen | OperatorReset | Asked | Ended
+Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Asked | Ended
 
 
 def initial(limits: LiftLimits, now: float) -> Memory:

@@ -4,7 +4,8 @@ import math
 
 from bridges.core.graph_kind import GraphKind
 from bridges.lift_supervisor import core, messages
-from bridges.lift_supervisor.memory import Limits
+from bridges.lift_supervisor.memory import Asked, Ended, Limits, Memory, Shown
+from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES
 
@@ -27,7 +28,7 @@ def quiet_s(settings: Settings) -> float:
     return settings.quiet_start_s
 
 
-KIND = GraphKind(
+KIND: GraphKind[Settings, Limits, Memory, Asked | Ended | Shown, SupervisorReport] = GraphKind(
     name="lift_supervisor",
     devices_key="supervisor",
     settings=Settings,

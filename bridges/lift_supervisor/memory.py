@@ -6,6 +6,7 @@ from typing import Final
 
 import msgspec
 
+from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.lift_supervisor.freshness import Voice
 from bridges.rmf.definitions import LiftMode, LiftRequest
@@ -74,7 +75,7 @@ class Shown(msgspec.Struct, frozen=True):
         )
 
 
-Event = Asked | Ended | Shown | MaySpeak | Woken
+Event = Asked | Ended | Shown | MaySpeak | Woken | OperatorReset
 
 
 class Claim(msgspec.Struct, frozen=True):

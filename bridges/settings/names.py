@@ -11,8 +11,7 @@ from types import ModuleType
 import bridges
 import drivers
 import drivers.hal
-from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Kind
+from bridges.core.graph_kind import AnyKind
 
 
 def kind_names() -> list[str]:
@@ -41,9 +40,9 @@ def _found(package: ModuleType, pattern: str, line: str, name: Callable[[Path], 
     return sorted({name(path) for path in found if f"\n{line}" in path.read_text("utf-8")})
 
 
-def kind_called(name: str) -> Kind | GraphKind:
+def kind_called(name: str) -> AnyKind:
     """The kind that `kind:` names; one of `kind_names()`."""
-    kind: Kind | GraphKind = importlib.import_module(f"bridges.{name}").KIND
+    kind: AnyKind = importlib.import_module(f"bridges.{name}").KIND
     return kind
 
 
