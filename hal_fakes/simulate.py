@@ -13,13 +13,13 @@ import json
 import selectors
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
 import msgspec
 
 from bridges.settings.load import Config
+from bridges.settings.names import bus_called
 from drivers.hal import Bus, HalError
 from hal_fakes.control import Control
 from hal_fakes.realtime import RealTime
@@ -41,16 +41,16 @@ class Simulation:
         self._runtime_dir = runtime_dir.resolve()
         self._open = contextlib.ExitStack()
 
-    def open_bus(self, name: str, settings: Any) -> Bus:
+    def open_bus(self, name: str) -> Bus:
         """Start the fake for this bus; returns a real bus in front of it. Raises HalError.
 
         Two buses may be opened one after the other, not at once.
         """
         bus_type = self._config.bus_types[name]
+        settings = self._config.buses[name]
         if bus_type == "gpio":
             return self._inside(name, settings)
-        bus = import_module(f"drivers.hal.{bus_type}")
-        return cast(Bus, bus.open_bus(self._pointed_at_child(name, settings)))
+        return bus_called(bus_type).open_bus(self._pointed_at_child(name, settings))
 
     def close(self) -> None:
         """End every fake. Close the buses first. May be called twice."""

@@ -50,8 +50,6 @@ def wirings(
     config: Config, bus_name: str, plants: Mapping[str, Plant], canonical: Callable[[str], str]
 ) -> list[Wiring]:
     """A Wiring for each device on this bus, from the driver's own wiring table."""
-    driver = import_module(f"drivers.{config.kind}.{config.driver}")
     return [
-        Wiring(plants[name], driver.wires(device), canonical)
-        for name, device in devices_on(config, bus_name).items()
+        Wiring(plants[name], config.wires(name), canonical) for name in devices_on(config, bus_name)
     ]

@@ -119,12 +119,10 @@ def _bus(config: Config, bus: str, devices: Sequence[str]) -> list[str]:
     wires = [(name, wire) for name in devices for wire in config.wires(name)]
     if wires:
         hal = named.bus_called(config.bus_types[bus])
-        describe = getattr(hal, "describe", None) or hal.canonical
         return aligned(
-            [HEADINGS, *(_row(name, wire, describe(wire.point)) for name, wire in wires)]
+            [HEADINGS, *(_row(name, wire, hal.describe(wire.point)) for name, wire in wires)]
         )
-    driver = named.driver_called(config.kind, config.driver)
-    describe = getattr(driver, "describe", lambda settings, bus: [])
+    describe = config.driver_type.describe
     rows = [
         (name, what, text)
         for name in devices
