@@ -72,6 +72,10 @@ class Config:
         named_bus: str | None = self.devices[device_name].bus
         return named_bus or next(iter(self.buses))
 
+    def devices_on(self, bus: str) -> list[str]:
+        """The names of the devices that stand on this bus."""
+        return [name for name in self.devices if self.bus_of(name) == bus]
+
     @property
     def driver_type(self) -> DriverType[Any, Any, Any]:
         """The driver of its devices."""
@@ -81,9 +85,13 @@ class Config:
         """A device's wiring table; empty where its driver has none."""
         return list(self.driver_type.wires(self.devices[device_name]))
 
+    def bus_type(self, name: str) -> BusType[Any]:
+        """What the bus of this name is."""
+        return named.bus_called(self.bus_types[name])
+
     def open_bus(self, name: str) -> Bus:
         """The real bus of this name. Raises HalError."""
-        return named.bus_called(self.bus_types[name]).open_bus(self.buses[name])
+        return self.bus_type(name).open_bus(self.buses[name])
 
 
 def load(path: Path | str) -> Config:

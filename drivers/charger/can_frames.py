@@ -345,4 +345,5 @@ DRIVER = DriverType(
     describe=describe,
     claims=claims,
     warnings=warnings,
+    fake="hal_fakes.can.frame_charger",
 )

@@ -150,4 +150,5 @@ DRIVER = DriverType(
     describe=describe,
     claims=claims,
     warnings=warnings,
+    fake="hal_fakes.can.canopen_rcu",
 )

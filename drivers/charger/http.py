@@ -339,4 +339,5 @@ DRIVER = DriverType(
     create=create,
     describe=describe,
     warnings=warnings,
+    fake="hal_fakes.http_charger",
 )

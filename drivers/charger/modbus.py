@@ -139,4 +139,5 @@ DRIVER = DriverType(
     describe=describe,
     claims=claims,
     warnings=warnings,
+    fake="hal_fakes.plants.xnergy_rcu",
 )

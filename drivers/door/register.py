@@ -227,4 +227,5 @@ DRIVER = DriverType(
     describe=describe,
     claims=claims,
     warnings=warnings,
+    fake="hal_fakes.modbus.register_door",
 )

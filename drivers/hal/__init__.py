@@ -38,12 +38,13 @@ class Bus:
         """Release the bus. Does not raise; may be called twice."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class BusType(Generic[Settings]):
     """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, made without its vendor library.
 
     `settings`: what stands below the bus's name in the YAML. `open_bus(settings)`: raises HalError.
-    `warnings(settings)`: (path, text) of what is legal but worth a look.
+    `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
+    far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated.
 
     A bus with points also has
     `canonical(point)`: one spelling; ValueError says what to write instead;
@@ -54,6 +55,7 @@ class BusType(Generic[Settings]):
     settings: type[Settings]
     open_bus: Callable[[Settings], Bus]
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
+    fake: str = ""
     canonical: Callable[[str], str] = str
     describe: Callable[[str], str] = str
     wire_problems: Callable[[Wire], Iterable[str]] = lambda wire: ()

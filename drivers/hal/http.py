@@ -343,5 +343,6 @@ def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
+    fake="hal_fakes.http",
     warnings=warnings,
 )

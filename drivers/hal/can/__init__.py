@@ -289,5 +289,6 @@ def named(frame_id: int) -> str:
 BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
+    fake="hal_fakes.can",
     warnings=warnings,
 )

@@ -316,6 +316,7 @@ def _hal_errors(point: str) -> Iterator[None]:
 BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
+    fake="hal_fakes.gpio",
     canonical=canonical,
     describe=describe,
     wire_problems=wire_problems,

@@ -350,6 +350,7 @@ class ModbusLines:
 BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
+    fake="hal_fakes.modbus",
     warnings=warnings,
     canonical=canonical,
     describe=describe,
