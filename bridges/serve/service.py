@@ -3,7 +3,6 @@
 Either has threads, subscribes for them, and says how they are.
 """
 
-import importlib
 import logging
 import time
 from collections import Counter
@@ -12,7 +11,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from bridges.core.decision import OperatorReset
-from bridges.core.graph_kind import AnyKind, GraphKind
+from bridges.core.graph_kind import GraphKind
 from bridges.core.kind import AnyDeviceKind
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
@@ -27,18 +26,12 @@ from bridges.serve.outlet import Named, Outlet
 from bridges.serve.serving import Serving
 from bridges.serve.subject import Status
 from bridges.settings.load import Config
+from bridges.settings.names import kind_called
 from drivers.hal import Bus
 
 log = logging.getLogger(__name__)
 
-OpenBus = Callable[[str, Any], Bus]
-
-
-def open_bus(name: str, settings: object) -> Bus:
-    """The real bus that the YAML names."""
-    hal = importlib.import_module(type(settings).__module__)
-    bus: Bus = hal.open_bus(settings)
-    return bus
+OpenBus = Callable[[str], Bus]
 
 
 class Service(Protocol):
@@ -73,7 +66,7 @@ def service(
 
     `kept`: where a kind that has to remembers across restarts; None to forget.
     """
-    kind: AnyKind = importlib.import_module(f"bridges.{config.kind}").KIND
+    kind = kind_called(config.kind)
     named = partial(named_by, config)
     clock = Clock(time.monotonic, transport.wall)  # durations by the machine's, stamps by RMF's
     if isinstance(kind, GraphKind):
@@ -106,7 +99,7 @@ class Devices:
     ) -> None:
         self._config = config
         self._kind = kind
-        self._driver = importlib.import_module(f"drivers.{config.kind}.{config.driver}")
+        self._driver = config.driver_type
         self._transport = transport
         self._clock = clock
         self._named = named
@@ -146,7 +139,7 @@ class Devices:
 
     def _loop(self, bus_name: str, open_bus: OpenBus) -> Loop:
         settings = self._config.buses[bus_name]
-        bus = open_bus(bus_name, settings)
+        bus = open_bus(bus_name)
         nodes = [
             self._node(name, device, bus)
             for name, device in self._config.devices.items()
@@ -155,8 +148,7 @@ class Devices:
         return Loop(bus_name, bus, nodes, settings.scan_s, self._clock)
 
     def _node(self, name: str, device: Any, bus: Bus) -> AnyNode:
-        debounce: Mapping[str, float] = getattr(self._driver, "debounce", lambda _: {})(device)
-        limits = self._kind.limits(device, debounce)
+        limits = self._kind.limits(device, self._driver.debounce(device))
         driver = self._driver.create(name, device, bus)
         return Node(name, self._kind, device, limits, driver, self._outlet.publish, self._clock)
 
