@@ -29,7 +29,8 @@ READY_S = 15.0
 
 
 class Simulation:
-    """The far sides of a file's buses.
+    """The far sides of a file's buses. Those with a process of their own begin at once, while the daemon
+    is still on its way.
 
     Made before the daemon leaves the directory that a relative path of the file is relative to.
     """
@@ -39,9 +40,14 @@ class Simulation:
         self._file = str(Path(config.path).resolve())
         self._runtime_dir = runtime_dir.resolve()
         self._open = contextlib.ExitStack()
+        self._children = {
+            name: self._start(name)
+            for name in config.buses
+            if not isinstance(far_side(config, name), Inside)
+        }
 
     def open_bus(self, name: str) -> Bus:
-        """Start the fake for this bus; returns a real bus in front of it. Raises HalError.
+        """A real bus in front of the fake for it. Raises HalError.
 
         Two buses may be opened one after the other, not at once.
         """
@@ -66,8 +72,7 @@ class Simulation:
         stations = stations_on(self._config, name, world.plants)
         return far.open_bus(self._config.buses[name], stations, world)
 
-    def _pointed_at_child(self, name: str) -> Any:
-        settings = self._config.buses[name]
+    def _start(self, name: str) -> "subprocess.Popen[bytes]":
         socket = self.socket_path(name)
         child = subprocess.Popen(
             [sys.executable, "-m", "hal_fakes", self._file, name, "--socket", str(socket)],
@@ -76,6 +81,11 @@ class Simulation:
             start_new_session=True,  # Ctrl-C in a terminal is for the daemon alone
         )
         self._open.callback(_end, child)
+        return child
+
+    def _pointed_at_child(self, name: str) -> Any:
+        settings = self._config.buses[name]
+        child = self._children.pop(name) if name in self._children else self._start(name)
         replace = _first_line(child, name)
         return msgspec.convert({**msgspec.to_builtins(settings), **replace}, type(settings))
 

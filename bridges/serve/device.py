@@ -77,6 +77,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._has_read = False
         self._io_fault = ""
         self._failing = False
+        self._logged_outputs: O | None = None
 
     @property
     def ready(self) -> bool:
@@ -102,9 +103,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
                 self._open = self._open and not self._io_fault
             self._decide(event)
         self._write()
-        if not self._failing:
-            self._mended()
         self._tell()
+        self._log()
 
     def make_safe(self) -> bool:
         """Every output off; False, and a log line, when that could not be done or verified."""
@@ -153,17 +153,14 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._decide(WriteFailed(self._failed(error)))
 
     def _decide(self, event: DeviceEvent[X, E]) -> None:
-        before = self.subject.decision
-        decision = self.subject.decide(event)
-        if before is not None and before.outputs != decision.outputs:
-            log.info(pairs("outputs", device=self.name, outputs=decision.outputs))
+        outputs = self.subject.decide(event).outputs
+        self._logged_outputs = outputs if self._logged_outputs is None else self._logged_outputs
 
     def _tell(self) -> None:
         """Publish when it is due; never because a request came."""
         subject, now = self.subject, self._clock.monotonic()
         assert subject.decision is not None
         report = subject.decision.report
-        subject.log(report)
         news = report.news()
         if now >= self._pace.due_at(news):
             self._send(report)
@@ -176,6 +173,18 @@ class Node(Generic[S, L, M, X, E, O, R]):
         state = self._kind.state_message(self.name, self._settings, report, at)
         self._publish(self._kind.states, state)
 
+    def _log(self) -> None:
+        """Last of all: a line in the log takes as long as a scan."""
+        decision = self.subject.decision
+        assert decision is not None
+        if decision.outputs != self._logged_outputs:
+            log.info(pairs("outputs", device=self.name, outputs=decision.outputs))
+        self._logged_outputs = decision.outputs
+        self.subject.log(decision.report)
+        if self._io_fault and not self._failing:  # reading and writing
+            log.info(pairs("device_back", device=self.name))
+            self._io_fault = ""
+
     def _failed(self, error: DriverError) -> str:
         """Log once when a device goes, not each scan."""
         if not self._io_fault:
@@ -183,12 +192,6 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._failing = True
         self._io_fault = str(error) or type(error).__name__
         return self._io_fault
-
-    def _mended(self) -> None:
-        """Log once when it is back: reading and writing."""
-        if self._io_fault:
-            log.info(pairs("device_back", device=self.name))
-        self._io_fault = ""
 
 
 AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]
