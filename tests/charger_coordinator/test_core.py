@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from bridges.charger.report import LOST
 from bridges.charger.settings import Robot
-from bridges.charger.told import MESSAGES
 from bridges.charger_coordinator import core, keep
 from bridges.charger_coordinator.diagnosis import Side, on_pad, side
 from bridges.charger_coordinator.memory import (
@@ -337,7 +337,7 @@ def test_the_side_at_fault_is_what_the_station_says(text: str, whose: Side) -> N
 
 
 def test_the_fixed_texts_of_our_own_chargers_say_nothing_against_a_robot() -> None:
-    assert {side(text) for text in MESSAGES.values()} == {Side.LOST}
+    assert {side(text) for text in LOST.values()} == {Side.LOST}
 
 
 def test_who_stands_on_a_pad_is_read_from_its_error() -> None:
