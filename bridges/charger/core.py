@@ -147,7 +147,7 @@ def _served(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
     who = pad.seen(memory.sample, limits).robot
     if limits.unrequested != "serve_known" or who is None or memory.holder:
         return memory
-    wrong = [f for f in report.errors(memory, now, limits) if f.code != "WRONG_DOCKING"]
+    wrong = [f for f in report.errors(memory, now, limits) if f.code != pad.WRONG_DOCKING]
     if wrong:
         return memory
     request = Requested("", who.fleet, who.name)
@@ -196,7 +196,7 @@ def _granted(
 def _in_the_way(memory: Memory, on_pad: bool, now: float, limits: ChargerLimits) -> bool:
     """Is there an error that a request of the robot on the pad would not put right?"""
     found = report.errors(memory, now, limits)
-    return any(not (on_pad and fault.code == "WRONG_DOCKING") for fault in found)
+    return any(not (on_pad and fault.code == pad.WRONG_DOCKING) for fault in found)
 
 
 def _cancel(memory: Memory, cancelled: Cancelled, now: float) -> tuple[Memory, str]:

@@ -19,15 +19,16 @@ from bridges.charger.settings import Robot
 from bridges.charger.signals import CURRENT_FLOWS, ChargerSample
 from bridges.core.decision import Fault
 
-WRONG_DOCKING = "wrong docking: "
-UNKNOWN_RECEIVER = "unknown receiver "
-RECEIVER_NOT_TOLD = "receivers are given, and the charger does not say which one it sees"
+WRONG_DOCKING = "WRONG_DOCKING"
+WRONG_DOCKING_TEXT = "wrong docking: "
+UNKNOWN_RECEIVER_TEXT = "unknown receiver "
+RECEIVER_NOT_TOLD_TEXT = "receivers are given, and the charger does not say which one it sees"
 
 _BARE = r"[^\s\",/\\]+"
 _ID = rf'("(?:[^"\\]|\\.)*"|{_BARE})'
 _ROBOT = f"{_ID}/{_ID}"
 _TEXT = re.compile(
-    rf"(?:{UNKNOWN_RECEIVER}{_ID}|{WRONG_DOCKING}{_ROBOT} (?:stands here|is not assigned here))"
+    rf"(?:{UNKNOWN_RECEIVER_TEXT}{_ID}|{WRONG_DOCKING_TEXT}{_ROBOT} (?:stands here|is not assigned here))"
     rf"(?:, {_ROBOT} is expected)?"
 )
 
@@ -79,9 +80,9 @@ class Misplaced(msgspec.Struct, frozen=True):
         """As ChargerState's error_message has it."""
         expected = f", {_robot(self.expected)} is expected" if self.expected else ""
         if self.robot is None:
-            return f"{UNKNOWN_RECEIVER}{_id(self.receiver)}{expected}"
+            return f"{UNKNOWN_RECEIVER_TEXT}{_id(self.receiver)}{expected}"
         does = "stands here" if self.expected else "is not assigned here"
-        return f"{WRONG_DOCKING}{_robot(self.robot)} {does}{expected}"
+        return f"{WRONG_DOCKING_TEXT}{_robot(self.robot)} {does}{expected}"
 
 
 def misplaced_in(text: str) -> Misplaced | None:
@@ -111,14 +112,14 @@ def misplaced(memory: Memory, limits: ChargerLimits) -> Fault | None:
     pad, holder = seen(memory.sample, limits), memory.holder
     expected = holder.request.who if holder and not holder.over else None
     if pad.sort == "mute":
-        return Fault("RECEIVER_NOT_TOLD", RECEIVER_NOT_TOLD)
+        return Fault("RECEIVER_NOT_TOLD", RECEIVER_NOT_TOLD_TEXT)
     if pad.sort == "stranger":
         return Fault("UNKNOWN_RECEIVER", Misplaced(None, pad.receiver, expected).text)
     if pad.robot is None or (holder and holder.request.who == pad.robot):
         return None
     if memory.adopted and not expected:
         return None
-    return Fault("WRONG_DOCKING", Misplaced(pad.robot, expected=expected).text)
+    return Fault(WRONG_DOCKING, Misplaced(pad.robot, expected=expected).text)
 
 
 def left_alone(memory: Memory, limits: ChargerLimits) -> bool:

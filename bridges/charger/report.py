@@ -56,9 +56,9 @@ _BEGINNINGS = {
     "robot:": Diagnosis.ROBOT,
     "station:": Diagnosis.STATION,
     OUT_OF_SERVICE: Diagnosis.STATION,
-    pad.RECEIVER_NOT_TOLD: Diagnosis.STATION,
-    pad.WRONG_DOCKING: Diagnosis.PAD,
-    pad.UNKNOWN_RECEIVER: Diagnosis.PAD,
+    pad.RECEIVER_NOT_TOLD_TEXT: Diagnosis.STATION,
+    pad.WRONG_DOCKING_TEXT: Diagnosis.PAD,
+    pad.UNKNOWN_RECEIVER_TEXT: Diagnosis.PAD,
     **dict.fromkeys(LOST.values(), Diagnosis.LOST),
 }
 
