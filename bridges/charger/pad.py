@@ -28,7 +28,8 @@ _BARE = r"[^\s\",/\\]+"
 _ID = rf'("(?:[^"\\]|\\.)*"|{_BARE})'
 _ROBOT = f"{_ID}/{_ID}"
 _TEXT = re.compile(
-    rf"(?:{UNKNOWN_RECEIVER_TEXT}{_ID}|{WRONG_DOCKING_TEXT}{_ROBOT} (?:stands here|is not assigned here))"
+    rf"(?:{UNKNOWN_RECEIVER_TEXT}{_ID}"
+    rf"|{WRONG_DOCKING_TEXT}{_ROBOT} (?:stands here|is not assigned here))"
     rf"(?:, {_ROBOT} is expected)?"
 )
 
