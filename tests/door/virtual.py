@@ -154,7 +154,7 @@ class Door:
     def __init__(self, **changes: Any) -> None:
         self.settings = settings(**changes)
         self.limits = DoorLimits.of(self.settings, debounce(self.settings))
-        self.plant = build("door", self.settings)
+        self.plant = build("door", self.settings, wires(self.settings))
         self.bus = MemoryBus(Wiring(self.plant, wires(self.settings), str))
         self.now = 0.0
         self.told: list[tuple[float, str]] = []

@@ -17,7 +17,7 @@ import msgspec
 
 from bridges.core.fields import Period
 from bridges.log import pairs
-from drivers.hal import Bus, HalError
+from drivers.hal import Bus, BusType, HalError
 from drivers.hal.gpio.dead_man import AFTER_S, DeadMan
 from drivers.hal.points import Pull, Wire
 
@@ -311,3 +311,13 @@ def _hal_errors(point: str) -> Iterator[None]:
     except _failures() as error:
         text = getattr(error, "value", error)  # lgpio's errors print in quotes
         raise HalError(f"{describe(point)}: {text}") from error
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    fake="hal_fakes.gpio",
+    canonical=canonical,
+    describe=describe,
+    wire_problems=wire_problems,
+)

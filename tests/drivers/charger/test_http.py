@@ -15,7 +15,7 @@ from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from bridges.settings.load import load
 from drivers import DriverError
-from drivers.charger.http import BUSES, Settings, create, describe, warnings, wires
+from drivers.charger.http import DRIVER, Settings, create, describe, warnings
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
 from drivers.hal import http as bus_file
@@ -48,8 +48,8 @@ def read(answer: Any) -> ChargerSample:
 
 
 def test_the_driver_stands_on_http_and_has_no_wires() -> None:
-    assert BUSES == ("http",)
-    assert wires(SETTINGS) == []
+    assert DRIVER.buses == ("http",)
+    assert list(DRIVER.wires(SETTINGS)) == []
 
 
 @pytest.mark.parametrize(

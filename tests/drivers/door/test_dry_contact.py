@@ -231,7 +231,7 @@ def test_polarity_is_the_wires_and_the_sample_has_none() -> None:
 
 def test_an_output_is_written_when_it_differs_and_again_after_a_failed_reading() -> None:
     built = settings()
-    bus = MemoryBus(Wiring(build("door", built), wires(built), str))
+    bus = MemoryBus(Wiring(build("door", built, wires(built)), wires(built), str))
     driver = create("door", built, bus)
     driver.open()
     bus.written.clear()
