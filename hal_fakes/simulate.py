@@ -29,8 +29,7 @@ READY_S = 15.0
 
 
 class Simulation:
-    """The far sides of a file's buses. Those with a process of their own begin at once, while the daemon
-    is still on its way.
+    """The far sides of a file's buses. Those that have a process begin at once, while the daemon starts.
 
     Made before the daemon leaves the directory that a relative path of the file is relative to.
     """
@@ -41,9 +40,7 @@ class Simulation:
         self._runtime_dir = runtime_dir.resolve()
         self._open = contextlib.ExitStack()
         self._children = {
-            name: self._start(name)
-            for name in config.buses
-            if not isinstance(far_side(config, name), Inside)
+            name: self._start(name) for name in config.buses if self._has_process(name)
         }
 
     def open_bus(self, name: str) -> Bus:
@@ -51,10 +48,9 @@ class Simulation:
 
         Two buses may be opened one after the other, not at once.
         """
-        far = far_side(self._config, name)
-        if isinstance(far, Inside):
-            return self._inside(name, far)
-        return self._config.bus_type(name).open_bus(self._pointed_at_child(name))
+        if self._has_process(name):
+            return self._config.bus_type(name).open_bus(self._pointed_at_child(name))
+        return self._inside(name)
 
     def close(self) -> None:
         """End every fake. Close the buses first. May be called twice."""
@@ -65,7 +61,14 @@ class Simulation:
         several = len(self._config.buses) > 1
         return self._runtime_dir / (f"plant-{name}.sock" if several else "plant.sock")
 
-    def _inside(self, name: str, far: Inside[Any, Any]) -> Bus:
+    def _has_process(self, name: str) -> bool:
+        """Asked without an import of the fake, which would bring its libraries into the daemon."""
+        bus_type = self._config.bus_type(name)
+        return bool(bus_type.fake) and not bus_type.fake_inside
+
+    def _inside(self, name: str) -> Bus:
+        far = far_side(self._config, name)
+        assert isinstance(far, Inside)
         world = RealTime(plants_on(self._config, name))
         self._open.callback(world.close)
         self._open.callback(Control(self.socket_path(name), world.plants).close)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bridges.core.durations import NEVER
+from bridges.core.durations import AGES_AGO
 from bridges.rmf import stamps
 from bridges.rmf.definitions import Time
 
@@ -33,7 +33,7 @@ class Pace:
     """When to tell something that is told each second and at once when it has changed."""
 
     def __init__(self) -> None:
-        self.told_at = -NEVER
+        self.told_at = AGES_AGO
         self._told: object = None
 
     def due_at(self, news: object) -> float:

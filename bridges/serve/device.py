@@ -21,7 +21,7 @@ from bridges.core.decision import (
     WriteFailed,
     X,
 )
-from bridges.core.durations import NEVER
+from bridges.core.durations import AGES_AGO
 from bridges.core.kind import DeviceEvent, E, Kind, L, S
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
@@ -62,7 +62,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         clock: Clock,
     ) -> None:
         self.name = name
-        self.wake_at = -NEVER
+        self.wake_at = AGES_AGO
         self._kind = kind
         self._settings = settings
         self._driver = driver
@@ -82,7 +82,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
     @property
     def ready(self) -> bool:
         """Each input was read, or timed out, once, and the first state is out."""
-        return self._pace.told_at > -NEVER
+        return self._pace.told_at > AGES_AGO
 
     def event(self, topic: Topic[Message], message: Message) -> E | RivalSeen | None:
         """What a message is to the core; None for one that is refused. From every thread."""

@@ -8,7 +8,7 @@ comes.
 import logging
 from collections.abc import Sequence
 
-from bridges.core.durations import NEVER
+from bridges.core.durations import AGES_AGO
 from bridges.log import pairs
 from bridges.serve.clock import Clock
 from bridges.serve.device import AnyNode
@@ -32,7 +32,7 @@ class Loop:
         self._bus = bus
         self._scan_s = scan_s
         self._clock = clock
-        self._due = dict.fromkeys((node.name for node in nodes), -NEVER)
+        self._due = dict.fromkeys((node.name for node in nodes), AGES_AGO)
         self._edge = False
         bus.on_edge(self._on_edge)
 

@@ -8,7 +8,7 @@ import logging
 import random
 from collections.abc import Iterable
 
-from bridges.core.durations import NEVER
+from bridges.core.durations import AGES_AGO, NEVER
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
@@ -28,7 +28,7 @@ class Presence:
     def __init__(self, kind: str, quiet_s: float) -> None:
         self.may_speak = False
         self.rivals = 0
-        self.look_at = -NEVER
+        self.look_at = AGES_AGO
         self._kind = kind
         self._quiet_s = quiet_s
         self._spread_s = 0.0
