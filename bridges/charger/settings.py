@@ -41,7 +41,7 @@ def robot(text: str) -> Robot:
     return Robot(fleet, name)
 
 
-class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations and counts of a charger.
 
     `misses`: failed polls in a row after which the charger is shown as unreachable; failed commands
@@ -76,7 +76,7 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
     `on_death`: what the daemon's end means for a charge under way: `stop` it, or `keep` it.
     """
 
-    limits: Limits = Limits()
+    limits: Durations = Durations()
     receivers: dict[ReceiverId, Name] = msgspec.field(default_factory=dict)
     unrequested: Unrequested = "refuse"
     on_death: Literal["stop", "keep"] = "stop"

@@ -7,13 +7,13 @@ import msgspec
 
 from bridges.core.debounce import Settled
 from bridges.core.durations import NEVER, RIVAL_QUIET_S
-from bridges.door.settings import DoorSettings, Limits, Pulse
+from bridges.door.settings import DoorSettings, Durations, Pulse
 
 
 class DoorLimits(msgspec.Struct, frozen=True):
     """A door's fixed facts as its core needs them. `t`: the durations; `debounce`: s by signal."""
 
-    t: Limits = Limits()
+    t: Durations = Durations()
     debounce: Mapping[str, float] = {}
     estimated: bool = False
     on_fire: Literal["open", "release"] = "release"

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from bridges.core.debounce import Settled
 from bridges.core.decision import Fault
 from bridges.core.durations import AGES_AGO, NEVER
-from bridges.lift.settings import LiftSettings, Limits
+from bridges.lift.settings import Durations, LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, Motion, Side, Stop
 
 T = TypeVar("T")
@@ -26,7 +26,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """
 
     stops: Mapping[str, Stop]
-    t: Limits = Limits()
+    t: Durations = Durations()
     debounce: Mapping[str, float] = {}
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
