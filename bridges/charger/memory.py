@@ -90,5 +90,5 @@ def rivalled(memory: Memory, now: float) -> bool:
 
 
 def unreachable(memory: Memory, limits: ChargerLimits) -> bool:
-    """Does the last good reading say nothing any more, or was there none?"""
+    """Have `misses` polls failed since the last good reading, or was there none?"""
     return memory.sample is None or memory.misses >= limits.t.misses

@@ -86,7 +86,7 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
         return True
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """Robots that are none, and robots with two receivers are fine: one may be a spare."""
+        """Names that are no FLEET/ROBOT. A robot may have two receivers: one may be a spare."""
         for receiver, text in self.receivers.items():
             try:
                 robot(text)
