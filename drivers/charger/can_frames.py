@@ -12,13 +12,7 @@ from typing import Annotated, Final
 import msgspec
 
 from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import (
-    Activity,
-    ChargerOutputs,
-    ChargerSample,
-    Measured,
-    Side,
-)
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
 from bridges.core.fields import Name
 from bridges.settings.nodes import unknown
 from drivers import DriverError
@@ -29,7 +23,7 @@ from drivers.hal import can
 from drivers.profiles import profile_problems
 
 Volume = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
-UNKNOWN: Final[tuple[Activity, Side]] = (Activity.UNKNOWN, "")
+UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -296,8 +290,8 @@ class FrameDriver:
                 values |= {f"{frame}.{signal}": value for signal, value in found.items()}
         return values
 
-    def _errors(self, values: dict[str, float]) -> list[tuple[Side, str]]:
-        sides: tuple[tuple[Side, dict[str, str]], ...] = (
+    def _errors(self, values: dict[str, float]) -> list[tuple[FaultSide, str]]:
+        sides: tuple[tuple[FaultSide, dict[str, str]], ...] = (
             ("station", self._map.errors.station),
             ("robot", self._map.errors.robot),
         )

@@ -21,8 +21,8 @@ from bridges.charger.signals import (
     Activity,
     ChargerOutputs,
     ChargerSample,
+    FaultSide,
     Measured,
-    Side,
 )
 from drivers.charger import json_fields
 from drivers.charger.json_fields import Field
@@ -30,7 +30,7 @@ from drivers.charger.state_codes import CODE_MAX, Code, Codes
 from drivers.driver_type import DriverType
 from drivers.hal import http
 
-UNKNOWN: Final[tuple[Activity, Side]] = (Activity.UNKNOWN, "")
+UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 WORD_MAX: Final = 64
 Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
 Path = Annotated[str, msgspec.Meta(pattern=r"^/[A-Za-z0-9._~/-]*$", max_length=256)]

@@ -6,17 +6,13 @@ from typing import Any
 import msgspec
 
 from bridges.core.decision import Decision, IoFailed, Sampled, WriteFailed
-from bridges.door.core import (
-    CloseDoor,
-    DoorMemory,
-    DoorReport,
-    Event,
-    OpenDoor,
-    decide,
-    initial,
-)
-from bridges.door.settings import DoorLimits
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.door.core import decide, initial
+from bridges.door.memory import DoorLimits
+from bridges.door.memory import Memory as DoorMemory
+from bridges.door.report import DoorReport
+from bridges.door.signals import CloseRequested as CloseDoor
+from bridges.door.signals import DoorOutputs, DoorSample, Event
+from bridges.door.signals import OpenRequested as OpenDoor
 from bridges.rmf.definitions import DoorModeValue
 from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires

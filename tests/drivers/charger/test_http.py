@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridges.charger import core
-from bridges.charger.settings import ChargerLimits
+from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
@@ -76,7 +76,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf_and_none_is_passed_on_raw() -> 
     states: dict[State, set[int]] = {state: set() for state in State}
     for code in range(256):
         sample = create("a", made, Station({"state": code, "error_msg": ""})).read()
-        shown = core.decide(core.Memory(), Sampled(sample), 0.0, ChargerLimits.of(made)).report
+        shown = core.decide(Memory(), Sampled(sample), 0.0, ChargerLimits.of(made)).report
         states[shown.state].add(code)
         assert ("unknown vendor state" in shown.error_message) == (
             sample.activity is Activity.UNKNOWN

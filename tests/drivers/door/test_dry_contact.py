@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from bridges.door.settings import DoorLimits, Limits, Pulse
+from bridges.door.memory import DoorLimits
+from bridges.door.settings import Limits, Pulse
 from bridges.door.signals import DoorOutputs, DoorSample
 from bridges.settings.load import load
 from drivers.door.dry_contact import create, debounce, warnings, wires
