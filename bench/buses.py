@@ -78,7 +78,7 @@ def _serial(scratch: Path) -> Rows:
 def _cycles(config: Config, scratch: Path) -> list[float]:
     """Seconds of each poll of all doors."""
     simulation = Simulation(config, scratch)
-    bus = cast(ModbusBus, simulation.open_bus("line", config.buses["line"]))
+    bus = cast(ModbusBus, simulation.open_bus("line"))
     drivers = [create(name, settings, bus) for name, settings in config.devices.items()]
     times = []
     for driver in drivers:
