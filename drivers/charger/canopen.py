@@ -12,11 +12,9 @@ import msgspec
 
 from bridges.charger.settings import ChargerSettings
 from drivers.charger import xnergy
+from drivers.driver_type import DriverType
 from drivers.hal import can
 from drivers.hal.can.canopen import CanOpenNode
-from drivers.hal.points import Wire
-
-BUSES: Final = ("can",)
 
 HEARTBEAT_S: Final = 0.1
 
@@ -67,11 +65,6 @@ def claims(settings: Settings) -> Iterable[tuple[str, tuple[str, ...]]]:
     yield f"node {settings.node}", ("node",)
 
 
-def wires(settings: Settings) -> list[Wire]:
-    """None: a receiver on CAN has no contacts."""
-    return []
-
-
 def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, str]]:
     """What `check` prints in place of a wiring table: (what, meaning)."""
     rows = [("bus", f"{can.describe(bus_settings)}; node {settings.node}")]
@@ -119,3 +112,14 @@ class Objects:
         """Acknowledged, or it raises."""
         found = OBJECTS[name]
         self._node.write(found.index, found.subindex, found.octets, value, safe=safe)
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("can",),
+    create=create,
+    describe=describe,
+    claims=claims,
+    warnings=warnings,
+    fake="hal_fakes.can.canopen_rcu",
+)

@@ -9,12 +9,10 @@ from typing import Final
 
 from bridges.charger.settings import ChargerSettings
 from drivers.charger import xnergy
+from drivers.driver_type import DriverType
 from drivers.hal import modbus
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import Unit, at
-from drivers.hal.points import Wire
-
-BUSES: Final = ("modbus",)
 
 PLACES: Final[Mapping[str, str]] = {
     xnergy.ENABLE: "coil 0",
@@ -48,11 +46,6 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """What no other device may use: its coils."""
     for name in (xnergy.ENABLE, xnergy.CHECK_RANGE):
         yield str(points(settings)[name]), ("unit",)
-
-
-def wires(settings: Settings) -> list[Wire]:
-    """None: a receiver on Modbus has no contacts."""
-    return []
 
 
 def describe(settings: Settings, bus_settings: modbus.Settings) -> list[tuple[str, str]]:
@@ -92,3 +85,14 @@ class Registers:
     def write(self, name: str, value: int, safe: bool = False) -> None:
         """Echoed, or it raises."""
         self._bus.write(self._points[name], value, safe)
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("modbus",),
+    create=create,
+    describe=describe,
+    claims=claims,
+    warnings=warnings,
+    fake="hal_fakes.plants.xnergy_rcu",
+)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured, Side
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
 from drivers import DriverError
 
 ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
@@ -58,7 +58,7 @@ CODES: Final[Mapping[int, tuple[Activity, str]]] = {
 }
 """What is published; every other code is UNKNOWN (`activity`)."""
 
-ERROR_BITS: Final[Mapping[int, tuple[Side, str]]] = {
+ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
     0x0000_0001: ("robot", "the receiver's flash memory is not set"),
     0x0000_0002: ("robot", "pairing timeout"),
     0x0000_0004: ("robot", "communication lost after pairing"),
@@ -105,7 +105,7 @@ def sample(words: Words, settled: bool = True) -> ChargerSample:
     )
 
 
-def errors(number: int) -> list[tuple[Side, str]]:
+def errors(number: int) -> list[tuple[FaultSide, str]]:
     """Side and text of each bit that is set: the station's first, the robot's last.
 
     An unpublished bit is nobody's.
@@ -126,7 +126,7 @@ def error_number(words: Words) -> int:
     return words.get("latched_high", 0) << 16 | words.get("latched_low", 0)
 
 
-def _text(words: Words, found: list[tuple[Side, str]]) -> str:
+def _text(words: Words, found: list[tuple[FaultSide, str]]) -> str:
     """The first error's side says it all for its own; another side's has its name before it."""
     if found:
         main = found[0][0]

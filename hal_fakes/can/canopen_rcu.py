@@ -16,9 +16,10 @@ import can
 import canopen
 from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 
-from drivers.charger.canopen import HEARTBEAT_S, OBJECTS
-from hal_fakes.can.side import Send
-from hal_fakes.plants.pad import PadReading
+from drivers.charger.canopen import HEARTBEAT_S, OBJECTS, Settings
+from hal_fakes.can.side import Send, slow_s
+from hal_fakes.fake import Fake
+from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
 from hal_fakes.plants.xnergy_rcu import SIGNALS, words
 
@@ -127,3 +128,9 @@ def dictionary() -> Any:
         record: Any = made[found.index]
         record.add_member(variable)
     return made
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: PadPlant(name),
+    station=lambda plant, settings, bus: CanOpenRcu(plant, settings.node, slow_s(bus)),
+)

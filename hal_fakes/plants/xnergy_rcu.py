@@ -6,7 +6,8 @@ from bridges.charger.signals import Activity
 from drivers.charger.modbus import Settings, points
 from drivers.charger.xnergy import CHECK_RANGE, ENABLE, IN_RANGE, TICKS_PER_UNIT
 from drivers.hal.modbus.points import Point
-from hal_fakes.plants.pad import PadReading
+from hal_fakes.fake import Fake
+from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
 
 SIGNALS: Final = (ENABLE, CHECK_RANGE)
@@ -86,3 +87,9 @@ class ModbusRcu:
         self._coils[point] = value
         self.plant.drive(self._names[point], bool(value), now)
         return True
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: PadPlant(name),
+    station=lambda plant, settings, bus: ModbusRcu(plant, settings),
+)

@@ -10,11 +10,13 @@
 Only link.py and sdo.py import a library, and they are imported when a bus or a node is made.
 """
 
+from drivers.hal import BusType
 from drivers.hal.can.bus import CanBus
 from drivers.hal.can.frames import EXTENDED, Frame, Wanted, named
 from drivers.hal.can.settings import Settings, Slcan, describe, warnings
 
 __all__ = [
+    "BUS",
     "EXTENDED",
     "CanBus",
     "Frame",
@@ -27,9 +29,15 @@ __all__ = [
     "warnings",
 ]
 
-Settings.__module__ = __name__  # whoever has settings finds their `open_bus` by this
-
 
 def open_bus(settings: Settings) -> CanBus:
     """The way onto this bus; nothing is sent or heard yet."""
     return CanBus(settings)
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    fake="hal_fakes.can",
+    warnings=warnings,
+)

@@ -16,11 +16,12 @@ from typing import Annotated, Any
 import msgspec
 
 from bridges.core.fields import Period
-from drivers.hal import HalError
+from drivers.hal import BusType, HalError
 from drivers.hal.gpio.bus import GpioBus
 from drivers.hal.gpio.header import J8, boot_level, canonical, describe, wire_problems
 
 __all__ = [
+    "BUS",
     "J8",
     "GpioBus",
     "Settings",
@@ -73,3 +74,14 @@ def _lgpio_factory(chip: int | None) -> Any:
     except OSError as error:  # lgpio makes a FIFO in the working directory when it is imported
         raise HalError(f"lgpio cannot write in the working directory: {error}") from error
     return pins.open_factory(chip)
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    fake="hal_fakes.gpio",
+    fake_inside=True,
+    canonical=canonical,
+    describe=describe,
+    wire_problems=wire_problems,
+)

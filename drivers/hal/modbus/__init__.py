@@ -11,12 +11,14 @@ Only frames.py (pymodbus) and rtu.py (pyserial) import a library, and they are i
 made that needs them.
 """
 
+from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.points import canonical, describe, wire_problems
 from drivers.hal.modbus.settings import Settings, warnings
 
 __all__ = [
+    "BUS",
     "ModbusBus",
     "Serial",
     "Settings",
@@ -28,9 +30,18 @@ __all__ = [
     "wire_problems",
 ]
 
-Settings.__module__ = __name__  # whoever has settings finds their `open_bus` by this
-
 
 def open_bus(settings: Settings) -> ModbusBus:
     """The way to these units; nothing is sent yet."""
     return ModbusBus(settings)
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    fake="hal_fakes.modbus",
+    warnings=warnings,
+    canonical=canonical,
+    describe=describe,
+    wire_problems=wire_problems,
+)
