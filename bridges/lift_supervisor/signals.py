@@ -2,6 +2,7 @@
 
 import msgspec
 
+from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
 
 
@@ -50,4 +51,4 @@ class StateHeard(msgspec.Struct, frozen=True):
         )
 
 
-Event = Requested | Ended | StateHeard | MaySpeak | Woken
+Event = Requested | Ended | StateHeard | MaySpeak | Woken | OperatorReset

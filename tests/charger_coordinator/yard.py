@@ -21,7 +21,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import duration
-from bridges.serve.device import Clock
+from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from hal_fakes.rmf.fleet import Fleet
 
@@ -218,7 +218,7 @@ class Yard:
     def faults(self) -> list[str]:
         """What the coordinator's status shows."""
         return [
-            f"{f['code']}: {f['detail']}" for s in self.node.nodes for f in s.status()["faults"]
+            f"{f['code']}: {f['detail']}" for s in self.node.devices().values() for f in s["faults"]
         ]
 
     def _scan(self, station: Charger) -> None:

@@ -123,7 +123,7 @@ def open_bus(
 ) -> "GpioBus":
     """The header's pins. Raises HalError with what to look at.
 
-    `factory`: a gpiozero pin factory whose pins claim as those of `_gpio_pins.py` do.
+    `factory`: a gpiozero pin factory whose pins claim as those of `pins.py` do.
     """
     if factory is None:
         factory = _lgpio_factory(settings.chip)
@@ -132,7 +132,7 @@ def open_bus(
 
 def _lgpio_factory(chip: int | None) -> Any:
     try:
-        from drivers.hal.gpio import pins as _gpio_pins
+        from drivers.hal.gpio import pins
     except ImportError as error:
         raise HalError(
             f"GPIO needs lgpio ({error}): apt install python3-lgpio, or pip install"
@@ -140,7 +140,7 @@ def _lgpio_factory(chip: int | None) -> Any:
         ) from error
     except OSError as error:  # lgpio makes a FIFO in the working directory when it is imported
         raise HalError(f"lgpio cannot write in the working directory: {error}") from error
-    return _gpio_pins.open_factory(chip)
+    return pins.open_factory(chip)
 
 
 class GpioBus(Bus):
@@ -317,6 +317,7 @@ BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
     fake="hal_fakes.gpio",
+    fake_inside=True,
     canonical=canonical,
     describe=describe,
     wire_problems=wire_problems,
