@@ -1,7 +1,6 @@
 """LiftRequest in, LiftState out: is it well formed, and can it be asked of this lift?"""
 
 from collections.abc import Mapping
-from typing import Any
 
 from bridges.core.decision import RequestRefused
 from bridges.lift.report import LiftReport
@@ -13,6 +12,7 @@ from bridges.rmf.definitions import (
     LiftRequestDoor,
     LiftRequestType,
     LiftState,
+    Message,
     Time,
 )
 from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
@@ -43,7 +43,7 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
     return Requested(request.session_id, agv, request.destination_floor)
 
 
-def alarm_topics(settings: LiftSettings) -> tuple[Topic[Any], ...]:
+def alarm_topics(settings: LiftSettings) -> tuple[Topic[Message], ...]:
     """Where this lift tells the fleets of a fire, if it does."""
     return tuple(t for t in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL) if t.name == settings.alarm)
 

@@ -13,7 +13,7 @@ LiftState, DoorState and their like have no place for any of this.
 
 from collections.abc import Iterator, Mapping
 from itertools import islice
-from typing import Any, Final
+from typing import Final
 
 from bridges.rmf.definitions import (
     DiagnosticArray,
@@ -23,13 +23,12 @@ from bridges.rmf.definitions import (
     KeyValue,
     Time,
 )
+from bridges.serve.subject import Status
 
 MOST: Final = 100
 """A supervisor learns of its lifts from the network: no flood of names makes us say more than this."""
 SIMULATED: Final = "SIMULATED"
 PASSIVE: Final = "PASSIVE"
-
-Status = Mapping[str, Any]
 
 
 def diagnosis(

@@ -22,8 +22,7 @@ from msgspec.inspect import LiteralType
 from yaml import MappingNode, Node, ScalarNode
 
 from bridges.core.fields import DeviceSettings, Name, Rmf
-from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Kind
+from bridges.core.graph_kind import AnyGraphKind, AnyKind, GraphKind
 from bridges.rmf import topics
 from bridges.settings import names as named
 from bridges.settings.nodes import (
@@ -125,7 +124,7 @@ class _Reading:
         self._page = page
         self._top = Spot(root, root, "the file")
         self._values = Values(page)
-        self._kind: Kind | GraphKind | None = None
+        self._kind: AnyKind | None = None
         self._section: Any = None
         self._kind_name = ""
         self._driver: AnyDriver | None = None
@@ -199,7 +198,7 @@ class _Reading:
                 key = locate(spot, ("topics", name)).key
                 self._page.note(key, unknown("topic", name, TOPICS))
 
-    def _read_section(self, entry: Entry | None, kind: GraphKind) -> None:
+    def _read_section(self, entry: Entry | None, kind: AnyGraphKind) -> None:
         """The settings of a kind without devices; all of them may have defaults."""
         if entry:
             self._section = self._values.make(kind.settings, entry.spot())

@@ -5,6 +5,7 @@ file imports a kind, a driver or a bus by its name.
 """
 
 import importlib
+import re
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -12,8 +13,7 @@ from types import ModuleType
 import bridges
 import drivers
 import drivers.hal
-from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Kind
+from bridges.core.graph_kind import AnyKind
 from drivers.driver_type import AnyDriver
 from drivers.hal import AnyBus
 
@@ -43,12 +43,13 @@ def _found(
     They are searched, not imported: others beside them need a vendor's library.
     """
     found = (path for root in package.__path__ for path in Path(root).glob(pattern))
-    return sorted({name(path) for path in found if f"\n{record} = " in path.read_text("utf-8")})
+    holds = re.compile(rf"^{record}(:| =)", re.MULTILINE).search
+    return sorted({name(path) for path in found if holds(path.read_text("utf-8"))})
 
 
-def kind_called(name: str) -> Kind | GraphKind:
+def kind_called(name: str) -> AnyKind:
     """The kind that `kind:` names; one of `kind_names()`."""
-    kind: Kind | GraphKind = importlib.import_module(f"bridges.{name}").KIND
+    kind: AnyKind = importlib.import_module(f"bridges.{name}").KIND
     return kind
 
 

@@ -14,7 +14,7 @@ import msgspec
 from msgspec import inspect as mi
 
 from bridges.core.fields import Rmf
-from bridges.core.graph_kind import GraphKind
+from bridges.core.graph_kind import AnyGraphKind, GraphKind
 from bridges.settings import names as named
 from bridges.settings.leaves import Extra, choices, wanted_text
 from drivers.driver_type import AnyDriver
@@ -41,7 +41,7 @@ def shapes() -> Iterator[Shape]:
             yield Shape(kind, key, driver, named.driver_called(kind, driver))
 
 
-def graph_kinds() -> list[GraphKind]:
+def graph_kinds() -> list[AnyGraphKind]:
     """Every sort of file without devices."""
     kinds = (named.kind_called(name) for name in named.kind_names())
     return [kind for kind in kinds if isinstance(kind, GraphKind)]
@@ -96,7 +96,7 @@ def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[
     }
 
 
-def _graph_file(kind: GraphKind, by_type: dict[Any, Any]) -> dict[str, Any]:
+def _graph_file(kind: AnyGraphKind, by_type: dict[Any, Any]) -> dict[str, Any]:
     return {
         "type": "object",
         "additionalProperties": False,

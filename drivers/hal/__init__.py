@@ -45,7 +45,8 @@ class BusType(Generic[Settings]):
     `settings`: what stands below the bus's name in the YAML, `scan_s` (how often it is read) among it.
     `open_bus(settings)`: raises HalError.
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
-    far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated.
+    far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it
+    cannot leave the daemon's process, as pins cannot.
 
     A bus with points also has
     `canonical(point)`: one spelling; ValueError says what to write instead;
@@ -57,6 +58,7 @@ class BusType(Generic[Settings]):
     open_bus: Callable[[Settings], Bus]
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
     fake: str = ""
+    fake_inside: bool = False
     canonical: Callable[[str], str] = str
     describe: Callable[[str], str] = str
     wire_problems: Callable[[Wire], Iterable[str]] = lambda wire: ()

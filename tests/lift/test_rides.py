@@ -137,9 +137,9 @@ def test_an_end_is_honoured_whatever_its_fields_say_and_commands_no_car() -> Non
 def test_an_end_of_a_free_lift_changes_nothing() -> None:
     story = Story()
     story.run(1.0)
-    before = story.node._memory
+    before = story.node.subject.memory
     story.ends("A")
-    assert replace(story.node._memory, senses=before.senses) == before
+    assert replace(story.node.subject.memory, senses=before.senses) == before
     assert story.edges == []
 
 

@@ -317,6 +317,7 @@ BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
     fake="hal_fakes.gpio",
+    fake_inside=True,
     canonical=canonical,
     describe=describe,
     wire_problems=wire_problems,
