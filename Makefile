@@ -27,7 +27,7 @@ demo: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo
 
 demo-charging: .venv/ready
-	@$(BIN)/python -m hal_fakes.demo.charging
+	@$(BIN)/python -m hal_fakes.demo charging
 
 # Many tests wait for a process or a wire: more of them than there are cores run side by side.
 SIDE_BY_SIDE := -n 8 --dist load --maxschedchunk 2

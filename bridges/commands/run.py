@@ -13,7 +13,6 @@ from bridges import log
 from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
-from bridges.serve.daemon import Daemon
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
 
@@ -77,12 +76,16 @@ def _serve(config: Config, held: runtime.RuntimeDirectory, args: argparse.Namesp
     if command := ros_setup.sourcing(config.rmf, os.environ, sys.orig_argv):
         os.execvpe(command[0], command, ros_setup.sourced(config.rmf, os.environ))
     if not args.simulate:
+        from bridges.serve.daemon import Daemon
+
         os.chdir(held.path)  # lgpio leaves a FIFO where it is imported
         return Daemon(config, held, ros_args=args.ros_args).serve()
     from hal_fakes.simulate import Simulation
 
     logging.warning("SIMULATED: no hardware moves, and nothing that RMF is told is true")
     simulation = Simulation(config, held.path)
+    from bridges.serve.daemon import Daemon  # the far sides start meanwhile
+
     try:
         return Daemon(
             config,

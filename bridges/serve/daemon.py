@@ -2,7 +2,6 @@
 it is, and on SIGTERM or SIGINT switches every output off and leaves RMF's graph.
 """
 
-import importlib
 import logging
 import os
 import signal
@@ -24,7 +23,7 @@ from bridges.rmf.transport import Publisher, TransportError
 from bridges.serve.diagnostics import diagnosis
 from bridges.serve.directory import KeptFile, RuntimeDirectory, state_file
 from bridges.serve.notify import notify, watchdog_s
-from bridges.serve.service import OpenBus, named_by, open_bus, service
+from bridges.serve.service import OpenBus, named_by, service
 from bridges.settings.load import Config
 from drivers import DriverError
 
@@ -42,7 +41,7 @@ class Daemon:
         config: Config,
         runtime: RuntimeDirectory,
         *,
-        open_bus: OpenBus = open_bus,
+        open_bus: OpenBus | None = None,
         localhost: bool = False,
         simulated: bool = False,
         ros_args: Sequence[str] = (),
@@ -61,7 +60,7 @@ class Daemon:
         if config.buses and not simulated:
             runtime.claim(config.text)  # before anything is: `outputs-off` goes by it
         kept = None if simulated else KeptFile(state_file(config.path))
-        self._service = service(config, self._transport, open_bus, kept)
+        self._service = service(config, self._transport, open_bus or config.open_bus, kept)
         self._loops = self._service.loops
         self._diagnostics: Publisher[DiagnosticArray] | None = None
         if config.rmf.diagnostics:
@@ -146,10 +145,9 @@ def outputs_off(config: Config, timeout_s: float) -> bool:
 
     Bounded: a bus that does not answer is given up after `timeout_s` (s) in all.
     """
-    driver = importlib.import_module(f"drivers.{config.kind}.{config.driver}")
     results: dict[str, bool] = {}
     threads = [
-        threading.Thread(target=_bus_off, args=(config, name, driver, results), daemon=True)
+        threading.Thread(target=_bus_off, args=(config, name, results), daemon=True)
         for name in config.buses
     ]
     deadline = time.monotonic() + timeout_s
@@ -160,11 +158,11 @@ def outputs_off(config: Config, timeout_s: float) -> bool:
     return len(results) == len(config.devices) and all(results.values())
 
 
-def _bus_off(config: Config, bus_name: str, driver: Any, results: dict[str, bool]) -> None:
-    bus = open_bus(bus_name, config.buses[bus_name])
+def _bus_off(config: Config, bus_name: str, results: dict[str, bool]) -> None:
+    bus = config.open_bus(bus_name)
     for name, device in config.devices.items():
         if config.bus_of(name) == bus_name:
-            results[name] = _device_off(name, driver.create(name, device, bus))
+            results[name] = _device_off(name, config.driver_type.create(name, device, bus))
     bus.close()
 
 

@@ -3,7 +3,8 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.door.settings import DoorLimits, Pulse
+from bridges.door.memory import DoorLimits
+from bridges.door.settings import Pulse
 from tests.depth import depth
 from tests.door.invariants import check, nothing_changes_before_wake_at
 from tests.door.virtual import DEBOUNCED

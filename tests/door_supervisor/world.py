@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from bridges.door import messages as door_messages
-from bridges.door_supervisor import KIND, table
+from bridges.door_supervisor import KIND, keep
 from bridges.door_supervisor.settings import Settings
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -28,7 +28,7 @@ def in_order(sender: str, receiver: str) -> Sequence[float]:
 
 def holds(disk: Disk, who: str) -> bool:
     """Would a supervisor that starts now know that this requester holds the door?"""
-    found = table.restore(disk.kept, Settings(), 0.0) if disk.kept else {}
+    found = keep.restore(disk.kept, Settings(), 0.0) if disk.kept else {}
     return WARD in found and found[WARD].holder(who) is not None
 
 

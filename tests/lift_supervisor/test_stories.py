@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import pytest
 
-from bridges.commands.effects import SoFar
-from bridges.commands.wishes import LiftEnd
+from bridges.commands.requests import Seen
+from bridges.commands.requests.lift import LiftEnd
 from bridges.lift.signals import Hazard
 from bridges.lift_supervisor.settings import Settings
 from bridges.rmf.definitions import LiftRequest
@@ -254,10 +254,10 @@ def test_a_second_of_ours_stands_by_and_takes_over() -> None:
     robot = Rider(world, A, UP)
     lift = LiftNode(world)
     world.run(12.5)
-    assert (first.node.may_speak, second.node.may_speak) == (True, False)
+    assert (first.node.presence.may_speak, second.node.presence.may_speak) == (True, False)
     first.leave()
     world.run(60.0)
-    assert second.node.may_speak
+    assert second.node.presence.may_speak
     assert lines(lift) == RIDE_UP
     assert robot.done
 
@@ -275,7 +275,7 @@ def test_an_operator_releases_the_lift_of_a_dead_robot_for_those_who_wait() -> N
     robots[0].die()
     world.run(600.0)
     assert shown(world) == [A]
-    end = LiftEnd("Lift1", A, direct=False).request(SoFar(0.0, 60.0))
+    end = LiftEnd("Lift1", A).message(Seen(0.0, 60.0))
     assert end is not None
     end = replace(end, request_time=stamp(EPOCH + world.now - 60.0))
     world.send("operator", ADAPTER_LIFT_REQUESTS, end)

@@ -6,14 +6,14 @@ served (Node). The fleet adapters are RMF's rules.
 
 from typing import Any
 
-from bridges.core.kind import Kind
 from bridges.lift import KIND as LIFT
 from bridges.lift.settings import LiftSettings
 from bridges.lift_supervisor import KIND as SUPERVISOR
 from bridges.lift_supervisor.settings import Settings
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
-from bridges.serve.device import Clock, Node
+from bridges.serve.clock import Clock
+from bridges.serve.device import Node
 from hal_fakes.rmf.phases import EndLiftSession, RequestLift
 from hal_fakes.rmf.robot import Phase, Robot
 from hal_fakes.rmf.supervisors import LiftSupervisor
@@ -73,12 +73,11 @@ class LiftNode:
 
     def restart(self) -> None:
         """A new daemon: outputs off, nothing remembered."""
-        kind: Kind = LIFT
         clock = Clock(lambda: self.world.now, lambda: EPOCH + self.world.now)
-        limits = kind.limits(self.settings, {})
+        limits = LIFT.limits(self.settings, {})
         self.lift.advance(self.world.now)
         self.lift.make_safe()
-        self.node = Node(self.name, kind, self.settings, limits, self.lift, self._say, clock)
+        self.node = Node(self.name, LIFT, self.settings, limits, self.lift, self._say, clock)
         self._scan_at = self.world.now
         self.wake()
 

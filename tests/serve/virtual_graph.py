@@ -15,7 +15,7 @@ from bridges.core.graph_kind import GraphKind
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Subscription
-from bridges.serve.device import Clock
+from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from hal_fakes.rmf import Party as RmfParty
 from hal_fakes.rmf import Said
@@ -200,7 +200,7 @@ class Served:
     def __init__(
         self,
         world: World,
-        kind: GraphKind,
+        kind: GraphKind[Any, Any, Any, Any, Any],
         settings: Any,
         name: str,
         wall_skew: float = 0.0,
@@ -244,11 +244,11 @@ class Served:
     @property
     def subjects(self) -> list[str]:
         """The lifts or doors that it knows."""
-        return [subject.name for subject in self.node.nodes]
+        return list(self.node.devices())
 
     def faults(self) -> dict[str, list[str]]:
         """What its status shows, by lift or door, where anything is wrong."""
-        shown = {s.name: s.status()["faults"] for s in self.node.nodes}
+        shown = {name: status["faults"] for name, status in self.node.devices().items()}
         return {
             name: [f"{fault['code']}: {fault['detail']}" for fault in faults]
             for name, faults in shown.items()
