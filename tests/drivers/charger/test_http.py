@@ -37,7 +37,9 @@ class Station:
         self.calls.append(f"GET {path}")
         return self.answer  # type: ignore[no-any-return]
 
-    def send(self, path: str, method: str = "POST", body: str | None = None) -> None:
+    def send(
+        self, path: str, method: str = "POST", body: str | None = None, safe: bool = False
+    ) -> None:
         self.calls.append(f"{method} {path}" + (f" {body}" if body else ""))
         if self.fails:
             raise HalError("the answer is lost")
