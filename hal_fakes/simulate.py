@@ -29,7 +29,7 @@ READY_S = 15.0
 
 
 class Simulation:
-    """The far sides of a file's buses; those with a process begin at once, while the daemon starts.
+    """The far sides of a file's buses. Those in a process of their own start while the daemon does.
 
     Made before the daemon leaves the directory that a relative path of the file is relative to.
     """

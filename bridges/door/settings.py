@@ -12,7 +12,7 @@ StaleAfter = Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})]
 PulseSeconds = Annotated[float, Meta(ge=0.05, le=600, extra={"unit": "s"})]
 
 
-class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations of a door.
 
     `stale_after_s`: without a good reading for this long the door is OFFLINE and its hold off.
@@ -54,7 +54,7 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     `pulse`: re-trigger an operator that closes by itself; absent, the relay stays on.
     """
 
-    limits: Limits = Limits()
+    limits: Durations = Durations()
     feedback: Literal["sensors", "estimated"] = "sensors"
     on_fire: Literal["open", "release"] | None = None
     pulse: Pulse | None = None

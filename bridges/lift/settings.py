@@ -23,7 +23,7 @@ class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     side: Side = Side.FRONT
 
 
-class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations and counts of a lift.
 
     `stale_after_s`: without a good reading, or without a good write, for this long the lift is
@@ -68,7 +68,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     """
 
     floors: list[Name] | dict[Name, Floor]
-    limits: Limits = Limits()
+    limits: Durations = Durations()
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
 

@@ -6,7 +6,7 @@ meaning is the line of its struct's docstring that begins with it.
 
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from msgspec import inspect as mi
 from bridges.core.fields import Rmf
 from bridges.core.graph_kind import AnyGraphKind, GraphKind
 from bridges.settings import names as named
+from bridges.settings.leaves import choices, wanted_text
 from drivers.driver_type import DriverType
 
 KEYS = r"(?:^|(?<=[.;]\s))((?:`\w+`(?:,\s)?)+): "
@@ -184,37 +185,21 @@ def _inner(info: mi.Type) -> list[type]:
     return []
 
 
-def _type(info: mi.Type, unit: str = "") -> str:
+def _type(info: mi.Type, extra: Mapping[str, Any] | None = None) -> str:
     match info:
-        case mi.Metadata(type=part, extra=extra):
-            return _type(part, str((extra or {}).get("unit", "")))
+        case mi.Metadata(type=part, extra=more):
+            return _type(part, more)
         case mi.StructType():
             return "a mapping, below"
         case mi.UnionType(types=types):
-            return " or ".join(_type(part, unit) for part in types if part != mi.NoneType())
+            return " or ".join(_type(part, extra) for part in types if part != mi.NoneType())
         case mi.DictType(value_type=part):
             return f"name: {_type(part)}"
         case mi.ListType(item_type=part) | mi.VarTupleType(item_type=part):
             return f"list of {_type(part)}"
-        case mi.LiteralType(values=values):
-            return ", ".join(f"`{value}`" for value in values)
-        case mi.EnumType(cls=cls):
-            return ", ".join(f"`{member.value}`" for member in cls)
-        case mi.IntType() | mi.FloatType():
-            return _number(info, unit)
-        case mi.BoolType():
-            return "true, false"
-        case mi.StrType():
-            return "text"
-    return type(info).__name__.removesuffix("Type").lower()
-
-
-def _number(info: mi.IntType | mi.FloatType, unit: str) -> str:
-    what = "whole number" if isinstance(info, mi.IntType) else "number"
-    least = info.ge if info.ge is not None else info.gt
-    most = info.le if info.le is not None else info.lt
-    bounds = f" {least:g} to {most:g}" if least is not None and most is not None else ""
-    return f"{what}{bounds}{f' {unit}' if unit else ''}"
+        case mi.LiteralType() | mi.EnumType():
+            return ", ".join(f"`{choice}`" for choice in choices(info))
+    return wanted_text(info, extra).removeprefix("a ")
 
 
 def _default(field: mi.Field) -> str:

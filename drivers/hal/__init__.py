@@ -42,7 +42,8 @@ class Bus:
 class BusType(Generic[Settings]):
     """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, made without its vendor library.
 
-    `settings`: what stands below the bus's name in the YAML. `open_bus(settings)`: raises HalError.
+    `settings`: what stands below the bus's name in the YAML, `scan_s` (how often it is read) among it.
+    `open_bus(settings)`: raises HalError.
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
     far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it
     cannot leave the daemon's process, as pins cannot.

@@ -7,7 +7,8 @@ from typing import Any
 from bridges.charger import core as charger
 from bridges.charger import messages as charger_messages
 from bridges.charger.memory import ChargerLimits
-from bridges.charger.settings import ChargerSettings, Limits, Robot
+from bridges.charger.settings import ChargerSettings, Robot
+from bridges.charger.settings import Durations as Limits
 from bridges.charger.signals import Activity, ChargerSample, Measured
 from bridges.charger.signals import FaultSide as Side
 from bridges.charger_coordinator import KIND

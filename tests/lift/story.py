@@ -14,7 +14,8 @@ from bridges.core.decision import OperatorReset
 from bridges.core.kind import AnyDeviceKind
 from bridges.lift import KIND
 from bridges.lift.memory import LiftLimits
-from bridges.lift.settings import Floor, LiftSettings, Limits
+from bridges.lift.settings import Durations as Limits
+from bridges.lift.settings import Floor, LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.rmf.definitions import (
     LiftDoor,

@@ -377,6 +377,7 @@ def test_without_a_session_either_door_is_the_door() -> None:
     [
         (LiftRequest("Lift1", Time(), "", 1, "L1", 2), "empty session_id"),
         (LiftRequest("Lift1", Time(), "", 0, "L1", 2), "empty session_id"),
+        (LiftRequest("Lift1", Time(), "x" * 257, 1, "L1", 2), "impossible session_id"),
         (LiftRequest("Lift1", Time(), "A", 3, "L1", 2), "unknown request_type"),
         (LiftRequest("Lift1", Time(), "A", 1, "L1", 1), "unknown door_state"),
         (LiftRequest("Lift1", Time(), "A", 2, "", 2), "floor not served"),
