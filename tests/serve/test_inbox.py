@@ -18,11 +18,11 @@ def test_a_flood_drops_the_oldest_and_counts_them() -> None:
     assert inbox.dropped == 3
 
 
-def test_of_several_from_one_sender_the_last_counts_in_the_place_of_the_first() -> None:
-    inbox: Inbox[int] = Inbox()
-    for event, sender in ((1, "a"), (2, "b"), (3, "a")):
+def test_of_several_from_one_sender_the_last_counts_after_what_came_before_it() -> None:
+    inbox: Inbox[str] = Inbox()
+    for event, sender in (("OPEN by a", "a"), ("OPEN by b", "b"), ("CLOSE by a", "a")):
         inbox.put("A", event, sender)
-    assert inbox.take() == {"A": [3, 2]}
+    assert inbox.take() == {"A": ["OPEN by b", "CLOSE by a"]}
     assert inbox.dropped == 0
 
 
