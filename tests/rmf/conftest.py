@@ -17,13 +17,14 @@ Join = Callable[[str], Transport]
 ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
 
 
-@pytest.fixture(params=["memory", "dds", ROS2])
+@pytest.fixture(params=["memory", "dds", "zenoh", ROS2])
 def join(request: pytest.FixtureRequest) -> Iterator[Join]:
     """One graph for the test, on each transport in turn; its nodes leave at the end."""
     network = MemoryNetwork()
     on: dict[str, Join] = {
         "memory": lambda name: MemoryTransport(network, name),
         "dds": joining("dds", domain_of_this_run()),
+        "zenoh": joining("zenoh", domain_of_this_run()),
         "ros2": joining("ros2", domain_of_this_run()),
     }
     yield from _graph(on[request.param])
@@ -63,7 +64,9 @@ def joining(transport: str, domain: int) -> Join:
     def join(name: str) -> Transport:
         # Imported here: there may be no ROS.
         module = importlib.import_module(f"bridges.rmf.{transport}")
-        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
+        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport", "zenoh": "ZenohTransport"}[
+            transport
+        ]
         node: Transport = getattr(module, kind)(name, domain, loopback=True)
         return node
 
