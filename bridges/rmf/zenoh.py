@@ -160,7 +160,7 @@ class ZenohTransport:
         """Close the session; the ends keep nothing of it."""
         session, self._session = self._session, None
         if session:
-            session.close()
+            session.close()  # type: ignore[no-untyped-call]
         for end in self._ends:  # not before: a declaration that is only forgotten may block us
             end.place = None
         self._deaf.clear()

@@ -5,7 +5,6 @@ Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's D
 """
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -77,7 +76,7 @@ def _mode(zenoh: Zenoh) -> str:
     return "peer" if near else "client"
 
 
-def _tls(tls: ZenohTls | None) -> Mapping[str, Any]:
+def _tls(tls: ZenohTls | None) -> dict[str, Any]:
     if tls is None:
         return {}
     wanted: dict[str, Any] = {}
@@ -101,7 +100,7 @@ def _readable(name: str, file: str) -> str:
         raise TransportError(f"{name} {file} cannot be read: {error.strerror}") from None
 
 
-def _user(zenoh: Zenoh) -> Mapping[str, Any]:
+def _user(zenoh: Zenoh) -> dict[str, Any]:
     if zenoh.user is None or zenoh.password_file is None:
         return {}
     password = secret_file.one_line("password_file", zenoh.password_file, "password")

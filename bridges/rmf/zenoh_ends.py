@@ -77,8 +77,8 @@ class Place:
     def leave(self) -> None:
         """Take the token back."""
         if self._alive:
-            self._alive.undeclare()
-        self._watching.undeclare()
+            self._alive.undeclare()  # type: ignore[no-untyped-call]
+        self._watching.undeclare()  # type: ignore[no-untyped-call]
 
     def _look(self, sample: Sample) -> None:
         """A token has come or gone; on zenoh's thread."""
