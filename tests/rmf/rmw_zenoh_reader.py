@@ -79,7 +79,7 @@ def tell_sample(sample: zenoh.Sample) -> None:
         sample=bytes(sample.payload).hex(),
         attachment_bytes=len(bytes(attached)) if attached is not None else None,
         number=parts and int(parts[0]),
-        age_s=parts and abs(time.time() - int(parts[1]) * 1e-9),
+        sent_ns=parts and int(parts[1]),
         gid=parts and parts[2].hex(),
     )
 
@@ -107,7 +107,8 @@ def say(session: zenoh.Session, key: str, token: str, payload: str, depth: str =
         while not publisher.matching_status:
             time.sleep(0.01)
     attachment = ext.z_serialize((ext.Int64(1), ext.Int64(time.time_ns()), gid(token)))
-    publisher.put(bytes.fromhex(payload), attachment=attachment)
+    is_bridge = token.startswith("@/")  # whose DDS samples have none
+    publisher.put(bytes.fromhex(payload), attachment=None if is_bridge else attachment)
     tell(said=key)
     return publisher, alive
 
