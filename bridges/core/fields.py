@@ -73,9 +73,9 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     `keys`: `rmw_zenoh` for sites whose RMF runs on rmw_zenoh, `ros2dds` for sites with a
     zenoh-bridge-ros2dds beside RMF; the two do not understand each other.
-    `connect`: the routers (or the bridge).
+    `connect`: the router (or the bridge); of several, one is used and the others stand by.
     `mode`: `peer` also speaks to other nodes directly, `client` to a router alone. `auto` is `peer`
-    where a router of `connect` is on this machine or `listen` is reachable from others, else `client`.
+    with one router, if it is on this machine or `listen` is open to others; else `client`.
     `listen`: where other nodes reach a peer; this machine alone when absent.
     `tls`: certificates, for `tls/…` and `quic/…`.
     `user`: the name that the routers know us by.

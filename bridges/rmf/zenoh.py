@@ -16,6 +16,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from itertools import count
 from queue import Empty, SimpleQueue
 from typing import Any, Final, TypeVar
@@ -67,7 +68,12 @@ class ZenohTransport:
         self._linked: bool | None = None
         self._met_router = False
         self._look_at = time.monotonic() + LOOK_EVERY_S
+        self._wants_router = not loopback and zenoh_config.mode(self._settings) == "client"
+        self._trouble = ""
+        self._neighbours: dict[str, zenoh.WhatAmI] = {}
         self._join()
+        if self._session is None and not self._wants_router:
+            raise TransportError(f"cannot open a zenoh session: {self._trouble}")
         # At the end of the interpreter an open session aborts it.
         atexit.register(self.close)
         self._thread = threading.Thread(target=self._listen, name=f"{node_name}-zenoh", daemon=True)
@@ -118,19 +124,26 @@ class ZenohTransport:
     # --- the session ---------------------------------------------------------------------------
 
     def _join(self) -> None:
+        """Open a session, if one can be opened: a client has none before its router answers."""
         self._addresses = network.addresses()
         if self._loopback:
             ways = zenoh_config.on_loopback(self._domain_id)
         else:
             ways = [zenoh_config.on_the_site(self._settings)]
-        self._session = session = _opened(ways)
-        self._keys: Keys = WAYS[self._settings.keys](self._domain_id, str(session.zid()), self.name)
+        try:
+            session = _opened(ways)
+        except zenoh.ZError as error:
+            self._trouble = str(error)
+            return
+        way, name = WAYS[self._settings.keys], str(session.zid())
+        self._keys: Keys = way(self._domain_id, name, self.name)
         self._numbers = count(1)
         self._presence = session.liveliness().declare_token(self._keys.presence())
-        self._neighbours: dict[str, zenoh.WhatAmI] = {}
+        self._neighbours = {}
         self._events = session.info.declare_transport_events_listener(
-            Callback(self._neighbour, indirect=False), history=True
+            Callback(partial(self._neighbour, self._neighbours), indirect=False), history=True
         )
+        self._session = session
 
     def _attach(self, end: ZenohPublisher[Any] | ZenohSubscription[Any]) -> None:
         """Give an end its place in the session, when there is one."""
@@ -141,13 +154,15 @@ class ZenohTransport:
             self._deaf.add(self._keys.token("MS", end.topic, number))
         end.create(self._session, self._keys, number)
 
-    def _neighbour(self, event: zenoh.TransportEvent) -> None:
+    def _neighbour(
+        self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent
+    ) -> None:
         """A router or peer is there, or has gone. On zenoh's thread, which holds what asking the
         session about its neighbours would wait for: so we keep count of them."""
         if event.kind == zenoh.SampleKind.PUT:
-            self._neighbours[str(event.transport.zid)] = event.transport.whatami
+            neighbours[str(event.transport.zid)] = event.transport.whatami
         else:
-            self._neighbours.pop(str(event.transport.zid), None)
+            neighbours.pop(str(event.transport.zid), None)
         self._orders.put(self._look)
 
     def _withdraw(self, publisher: ZenohPublisher[Any]) -> None:
@@ -164,6 +179,7 @@ class ZenohTransport:
         for end in self._ends:  # not before: a declaration that is only forgotten may block us
             end.place = None
         self._deaf.clear()
+        self._neighbours = {}
 
     def _join_anew(self) -> None:
         with self._lock:
@@ -174,9 +190,9 @@ class ZenohTransport:
                 self._join()
                 for end in self._ends:
                     self._attach(end)
-            except (TransportError, zenoh.ZError) as error:
+            except (TransportError, zenoh.ZError) as error:  # a secret that has gone, say
+                self._trouble = str(error)
                 self._leave()
-                log.warning(pairs("not_joined", node=self.name, reason=error))
 
     # --- our thread ----------------------------------------------------------------------------
 
@@ -200,8 +216,10 @@ class ZenohTransport:
         self._look_at = now + LOOK_EVERY_S
         self._look()
         found = network.addresses()
-        if self._session is None or (found != self._addresses and self._reaches_out()):
+        if found != self._addresses and self._reaches_out():
             log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
+            self._join_anew()
+        elif self._session is None:
             self._join_anew()
 
     def _reaches_out(self) -> bool:
@@ -226,7 +244,7 @@ class ZenohTransport:
         if linked:
             log.info(pairs("linked", node=self.name, connect=where))
         else:
-            log.warning(pairs("not_linked", node=self.name, connect=where, reason=NOBODY))
+            log.warning(pairs("not_linked", node=self.name, connect=where, reason=NOBODY, last=self._trouble))
 
     @contextmanager
     def _reporting(self, text: str) -> Iterator[None]:
@@ -239,17 +257,17 @@ class ZenohTransport:
 
 
 def _opened(ways: list[dict[str, Any]]) -> zenoh.Session:
-    """A session by the first of these configurations that serves."""
+    """A session by the first of these configurations that serves. Raises ZError when none does."""
     wanted, *further = ways
     config = zenoh.Config()
+    for key, value in wanted.items():
+        config.insert_json5(key, json.dumps(value))
     try:
-        for key, value in wanted.items():
-            config.insert_json5(key, json.dumps(value))
         return zenoh.open(config)
-    except zenoh.ZError as error:
+    except zenoh.ZError:
         if further:
             return _opened(further)
-        raise TransportError(f"cannot open a zenoh session: {error}") from error
+        raise
 
 
 def _nothing() -> None:

@@ -56,24 +56,26 @@ def on_loopback(domain_id: int) -> list[dict[str, Any]]:
 
 def on_the_site(zenoh: Zenoh) -> dict[str, Any]:
     """As the YAML says. Raises TransportError for a file that is not there, or not secret."""
-    mode = _mode(zenoh)
-    wanted = COMMON | {"mode": mode, "connect/endpoints": list(zenoh.connect)}
-    if mode == "peer":
+    wanted = COMMON | {"mode": mode(zenoh), "connect/endpoints": list(zenoh.connect)}
+    if wanted["mode"] == "peer":
         wanted["listen/endpoints"] = list(zenoh.listen)
         wanted["listen/exit_on_failure"] = True
+    else:
+        wanted["connect/timeout_ms"] = 0  # opening a client's session would wait for a router
     try:
         return wanted | _tls(zenoh.tls) | _user(zenoh)
     except secret_file.SecretError as error:
         raise TransportError(str(error)) from None
 
 
-def _mode(zenoh: Zenoh) -> str:
-    """A router does not carry messages from one peer to another: peers meet directly. Where none
-    could reach us we are its client, for whom it does."""
+def mode(zenoh: Zenoh) -> str:
+    """A router carries no messages from one peer to another, as peers meet directly. Where none could
+    reach us we are its client, for whom it does. With several routers too: a peer would be at all of
+    them, and what it says would come once by each."""
     if zenoh.mode != "auto":
         return zenoh.mode
-    near = any(map(is_local, zenoh.connect)) or not all(map(is_local, zenoh.listen))
-    return "peer" if near else "client"
+    near = is_local(zenoh.connect[0]) or not all(map(is_local, zenoh.listen))
+    return "peer" if near and len(zenoh.connect) == 1 else "client"
 
 
 def _tls(tls: ZenohTls | None) -> dict[str, Any]:
