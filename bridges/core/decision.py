@@ -92,10 +92,17 @@ class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     publish: tuple[Said, ...] = ()
 
 
+LONGEST_DETAIL = 300
+
+
 class RequestRefused(Exception):
-    """A message that is not obeyed. `kind` is a short fixed name to count and to log once by."""
+    """A message that is not obeyed. `kind` is a short fixed name to count and to log once by.
+
+    `detail` may quote the message, which anybody can send: it is cut to LONGEST_DETAIL characters.
+    """
 
     def __init__(self, kind: str, detail: str) -> None:
+        detail = detail[:LONGEST_DETAIL]
         super().__init__(f"{kind}: {detail}")
         self.kind = kind
         self.detail = detail

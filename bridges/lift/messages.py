@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from bridges.core.decision import RequestRefused
+from bridges.core.names import check_length
 from bridges.lift.report import LiftReport
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Ended, Requested
@@ -28,6 +29,7 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
     """
     if not request.session_id:
         raise RequestRefused("empty session_id", "a session needs a name")
+    check_length(session_id=request.session_id)
     if request.request_type == LiftRequestType.REQUEST_END_SESSION:
         return Ended(request.session_id)
     agv = request.request_type == LiftRequestType.REQUEST_AGV_MODE

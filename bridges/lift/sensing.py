@@ -10,6 +10,8 @@ Rules:
   floors faster than a car travels, or (with motion lines) changes while the car stands. Then the
   position is unknown until the code shows the last good floor or another one that can be true, or
   until an operator resets.
+- While the floor code means nothing (`valid_when`, for longer than its debounce) the car may go
+  anywhere unseen. The next floor that it shows is believed.
 - A door is open when the contact that proves it says so. With one contact the other end is estimated
   by the door's travel time, and marked.
 - A car stands when the motion lines say so; without motion lines it is taken to stand.
@@ -96,7 +98,7 @@ def take(senses: Senses, sample: LiftSample, now: float, limits: LiftLimits) -> 
             h: _settle_hazard(senses.hazards.get(h), h, h in sample.hazards, now, limits)
             for h in HAZARDS
         },
-        position=_locate(senses.position, code, sample.motion, now, limits),
+        position=_locate(senses.position, code, sample, now, limits),
     )
 
 
@@ -172,14 +174,16 @@ def _hazard_hold_s(
 def _locate(
     before: Position,
     code: Settled[tuple[str | None, str]],
-    motion: Motion | None,
+    sample: LiftSample,
     now: float,
     limits: LiftLimits,
 ) -> Position:
     """Follow the car from floor to floor; a floor where it cannot have gone is only suspected."""
-    if motion is not Motion.STOPPED:
+    if sample.motion is not Motion.STOPPED:
         before = replace(before, moved_at=now)
     level = code.value[0] if code.value else None
+    if level is None and not sample.floor_valid:
+        return Position(moved_at=before.moved_at)
     if level is None or level == before.suspect:
         return before
     if level == before.trusted or _can_have_come(before, level, now, limits):

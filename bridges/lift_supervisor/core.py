@@ -52,8 +52,12 @@ def initial(lift: str, started_at: float) -> Memory:
 
 
 def idle(memory: Memory, now: float) -> bool:
-    """A lift that has never been heard, and that nobody has asked for in a while."""
-    return memory.shown is None and not memory.claims and now >= memory.heard_at + FORGOTTEN_S
+    """Nobody wants this lift, and nothing has been heard of it in a while.
+
+    A session that is still to be ended is found again in the lift's states, if they come back.
+    """
+    heard_at = max(memory.heard_at, memory.shown_at)
+    return not memory.claims and now >= heard_at + FORGOTTEN_S
 
 
 def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:

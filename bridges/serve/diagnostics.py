@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Final
 
+from bridges.log import plain
 from bridges.rmf.definitions import (
     DiagnosticArray,
     DiagnosticLevel,
@@ -77,6 +78,6 @@ def _pairs(status: Status) -> Iterator[tuple[str, str]]:
         if key == "faults":
             yield from ((fault["code"], fault["detail"]) for fault in value)
         elif isinstance(value, Mapping):
-            yield from ((f"{key} {part}", str(count)) for part, count in value.items())
+            yield from ((f"{key} {part}", plain(count)) for part, count in value.items())
         else:
-            yield key, str(value)
+            yield key, plain(value)

@@ -77,7 +77,7 @@ _NOUNS: dict[type[Type], str] = {
 }
 
 
-def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> Any:
+def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
     """The scalar as the first of these types that it can be. Raises Wrong."""
     *others, last = sorted(types, key=_rank)
     for wanted in others:

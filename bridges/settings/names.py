@@ -9,14 +9,13 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import bridges
 import drivers
 import drivers.hal
 from bridges.core.graph_kind import AnyKind
-from drivers.driver_type import DriverType
-from drivers.hal import BusType
+from drivers.driver_type import AnyDriver
+from drivers.hal import AnyBus
 
 
 def kind_names() -> list[str]:
@@ -54,13 +53,13 @@ def kind_called(name: str) -> AnyKind:
     return kind
 
 
-def driver_called(kind: str, name: str) -> DriverType[Any, Any, Any]:
+def driver_called(kind: str, name: str) -> AnyDriver:
     """The driver that `kind:` and `driver:` name; one of `driver_names(kind)`."""
-    driver: DriverType[Any, Any, Any] = importlib.import_module(f"drivers.{kind}.{name}").DRIVER
+    driver: AnyDriver = importlib.import_module(f"drivers.{kind}.{name}").DRIVER
     return driver
 
 
-def bus_called(name: str) -> BusType[Any]:
+def bus_called(name: str) -> AnyBus:
     """The type of bus that `type:` names; one of `bus_types()`."""
-    bus: BusType[Any] = importlib.import_module(f"drivers.hal.{name}").BUS
+    bus: AnyBus = importlib.import_module(f"drivers.hal.{name}").BUS
     return bus

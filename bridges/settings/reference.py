@@ -6,7 +6,7 @@ meaning is the line of its struct's docstring that begins with it.
 
 import inspect
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,8 +16,8 @@ from msgspec import inspect as mi
 from bridges.core.fields import Rmf
 from bridges.core.graph_kind import AnyGraphKind, GraphKind
 from bridges.settings import names as named
-from bridges.settings.leaves import choices, wanted_text
-from drivers.driver_type import DriverType
+from bridges.settings.leaves import Extra, choices, wanted_text
+from drivers.driver_type import AnyDriver
 
 KEYS = r"(?:^|(?<=[.;]\s))((?:`\w+`(?:,\s)?)+): "
 MEANING = re.compile(rf"{KEYS}(.*?)(?={KEYS}|\Z)", re.M | re.S)
@@ -30,7 +30,7 @@ class Shape:
     kind: str
     devices_key: str
     driver: str
-    type: DriverType[Any, Any, Any]
+    type: AnyDriver
 
 
 def shapes() -> Iterator[Shape]:
@@ -185,7 +185,7 @@ def _inner(info: mi.Type) -> list[type]:
     return []
 
 
-def _type(info: mi.Type, extra: Mapping[str, Any] | None = None) -> str:
+def _type(info: mi.Type, extra: Extra | None = None) -> str:
     match info:
         case mi.Metadata(type=part, extra=more):
             return _type(part, more)

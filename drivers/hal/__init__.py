@@ -8,13 +8,13 @@ more than one timeout a period.
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import msgspec
 
 from drivers.hal.points import HalError, Wire
 
-__all__ = ["Bus", "BusType", "HalError", "Remark"]
+__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Remark"]
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
@@ -62,3 +62,7 @@ class BusType(Generic[Settings]):
     canonical: Callable[[str], str] = str
     describe: Callable[[str], str] = str
     wire_problems: Callable[[Wire], Iterable[str]] = lambda wire: ()
+
+
+AnyBus: TypeAlias = BusType[Any]
+"""One that was found by its name."""

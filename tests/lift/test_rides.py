@@ -377,6 +377,7 @@ def test_without_a_session_either_door_is_the_door() -> None:
     [
         (LiftRequest("Lift1", Time(), "", 1, "L1", 2), "empty session_id"),
         (LiftRequest("Lift1", Time(), "", 0, "L1", 2), "empty session_id"),
+        (LiftRequest("Lift1", Time(), "x" * 257, 1, "L1", 2), "impossible session_id"),
         (LiftRequest("Lift1", Time(), "A", 3, "L1", 2), "unknown request_type"),
         (LiftRequest("Lift1", Time(), "A", 1, "L1", 1), "unknown door_state"),
         (LiftRequest("Lift1", Time(), "A", 2, "", 2), "floor not served"),
@@ -410,7 +411,7 @@ def test_a_person_reads_the_state_in_a_few_words() -> None:
         "motion": "stopped",
         "session": "A",
         "destination": "L2",
-        "outputs": str(LiftOutputs(agv_request=True)),
+        "outputs": "agv_request yes",
         "faults": [],
         "input_age_s": 0.0,
         "refused": {},
