@@ -7,7 +7,7 @@ import importlib
 import logging
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Any, Protocol
 
@@ -18,27 +18,20 @@ from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Transport, TransportError
+from bridges.serve.buses import OpenBus
 from bridges.serve.device import Clock, Node
 from bridges.serve.graph import GraphNode, Kept
 from bridges.serve.loop import Loop
+from bridges.serve.predecessor import SafeFirst
 from bridges.settings.load import Config
 from drivers.hal import Bus
 
 log = logging.getLogger(__name__)
 
-OpenBus = Callable[[str, Any], Bus]
-
 
 def _clock(transport: Transport) -> Clock:
     """Durations by the machine's own clock, stamps by RMF's."""
     return Clock(time.monotonic, transport.wall)
-
-
-def open_bus(name: str, settings: Any) -> Bus:
-    """The real bus that the YAML names."""
-    hal = importlib.import_module(type(settings).__module__)
-    bus: Bus = hal.open_bus(settings)
-    return bus
 
 
 class Serving(Protocol):
@@ -87,11 +80,16 @@ def named_by(config: Config, topic: Topic[Any]) -> Topic[Any]:
 
 
 def service(
-    config: Config, transport: Transport, open_bus: OpenBus, kept: Kept | None = None
+    config: Config,
+    transport: Transport,
+    open_bus: OpenBus,
+    kept: Kept | None = None,
+    unsafe: Collection[str] = (),
 ) -> Service:
     """What serves this YAML. Raises HalError when a bus cannot be opened.
 
-    `kept`: where a kind that has to remembers across restarts; None to forget.
+    `kept`: where a kind that has to remembers across restarts; None to forget. `unsafe`: devices that
+    a dead daemon may have left on.
     """
     kind: Kind | GraphKind = importlib.import_module(f"bridges.{config.kind}").KIND
     named = partial(named_by, config)
@@ -99,7 +97,7 @@ def service(
         return GraphService(
             GraphNode(kind, config.section, transport, _clock(transport), named, kept)
         )
-    return Devices(config, kind, transport, open_bus, named)
+    return Devices(config, kind, transport, open_bus, named, unsafe)
 
 
 class GraphService:
@@ -136,8 +134,10 @@ class Devices:
         transport: Transport,
         open_bus: OpenBus,
         named: Callable[[Topic[Any]], Topic[Any]],
+        unsafe: Collection[str] = (),
     ) -> None:
         self._config = config
+        self._unsafe = unsafe
         self._kind = kind
         self._driver = importlib.import_module(f"drivers.{config.kind}.{config.driver}")
         self._transport = transport
@@ -191,6 +191,8 @@ class Devices:
         debounce: Mapping[str, float] = getattr(self._driver, "debounce", lambda _: {})(device)
         limits = self._kind.limits(device, debounce)
         driver = self._driver.create(name, device, bus)
+        if name in self._unsafe:
+            driver = SafeFirst(name, driver)
         return Node(name, self._kind, device, limits, driver, self._publish, self._clock)
 
     def _to_inbox(self, topic: Topic[Any]) -> Callable[[Any], None]:

@@ -10,7 +10,8 @@ import pytest
 from bridges.rmf.definitions import ChargerState, ChargerStateValue
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import CHARGER_STATES
-from bridges.serve.service import open_bus, service
+from bridges.serve.buses import open_bus
+from bridges.serve.service import service
 from bridges.settings.load import load
 from tests.drivers.hal.http.far_end import Caller, Conversation, FarEnd, always, answer
 from tests.waiting import wait_until
