@@ -77,7 +77,7 @@ def holder(places: Places) -> Holder | None:
     for folder in places.folders:
         try:
             lock = _open(folder / LOCK, os.O_RDONLY)
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             continue
         except OSError as error:
             raise Unknown(_what_to_do(folder, error)) from None
@@ -94,7 +94,7 @@ def _written(path: Path) -> Holder:
     """What a lock says, whoever holds it. Raises Unknown."""
     try:
         lock = _open(path, os.O_RDONLY)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return NOBODY_KNOWN
     except OSError as error:
         raise Unknown(_what_to_do(path.parent, error)) from None
@@ -135,7 +135,7 @@ class KeptFile:
         """What was kept; None when nothing was. Raises OSError."""
         try:
             return self._path.read_bytes()
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
 
     def write(self, kept: bytes) -> None:
@@ -236,7 +236,7 @@ class RuntimeDirectory:
         lock = self._locks.get(folder)
         try:
             return lock is not None and os.path.samestat(os.fstat(lock), os.lstat(folder / LOCK))
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return False
 
     def _take(self, folder: Path) -> bool:

@@ -9,7 +9,7 @@ import logging
 import math
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from bridges.log import pairs
@@ -51,7 +51,7 @@ class Predecessor:
             while self._running() and time.monotonic() < give_up_at:
                 if wait(LOOK_EVERY_S):
                     break
-            self._judge(time.monotonic())
+            self._judge(time.monotonic(), self._own_unsafe())
         return self._own_unsafe()
 
     def left(self) -> list[str]:
@@ -88,7 +88,8 @@ class Predecessor:
     def _running(self) -> bool:
         return self._child is not None and self._child.poll() is None
 
-    def _judge(self, now: float) -> None:
+    def _judge(self, now: float, unsafe: Collection[str] = ()) -> None:
+        """What came of a try. `unsafe`: what is left of our own record, which is not tried again."""
         self.close()
         if left := self.left():
             if self._next_at == math.inf:
@@ -97,7 +98,7 @@ class Predecessor:
             self._pause_s = min(2 * self._pause_s, PAUSE_MOST_S)
             return
         self._next_at = math.inf
-        if not self._own_unsafe():
+        if not unsafe:
             log.info(pairs("predecessor_outputs_off"))
 
 
