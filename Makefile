@@ -26,7 +26,7 @@ demo: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo
 
 demo-charging: .venv/ready
-	@$(BIN)/python -m hal_fakes.demo.charging
+	@$(BIN)/python -m hal_fakes.demo charging
 
 test: .venv/ready lint
 	$(BIN)/pytest

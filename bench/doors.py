@@ -80,7 +80,7 @@ def _wire_s(config: Config) -> float:
 def _cycles(config: Config, scratch: Path) -> list[float]:
     """Seconds of each poll of all doors."""
     simulation = Simulation(config, scratch)
-    bus = cast(ModbusBus, simulation.open_bus("line", config.buses["line"]))
+    bus = cast(ModbusBus, simulation.open_bus("line"))
     doors = [create(name, settings, bus) for name, settings in config.devices.items()]
     times = []
     for door in doors:

@@ -31,7 +31,7 @@ def main(argv: list[str] | None = None) -> int:
         subparser = subparsers.add_parser(name, help=text, description=text)
         if name in arguments:  # only the command that runs is imported
             _module(name).add_arguments(subparser)
-    parsed = parser.parse_args(arguments, argparse.Namespace(ros_args=ros_args))
+    parsed = parser.parse_args(arguments, argparse.Namespace(ros_args=ros_args, typed=arguments))
     try:
         return int(_module(parsed.command).run(parsed))
     except BrokenPipeError:  # the reader of a pipe has gone, as `head` does

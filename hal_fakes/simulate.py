@@ -1,8 +1,8 @@
 """What stands in for the hardware in `rmf-bridge run FILE --simulate`: for each bus of the file, a
 plant for each of its devices and the far side of the bus in front of them.
 
-GPIO pins cannot leave a process, so their fake lives in the daemon's. Every other bus is served
-by a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus is pointed there.
+Where it can, a far side stands in a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real
+bus is pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's.
 
 Each bus has a control socket in the runtime directory: `plant.sock`, or `plant-<bus>.sock` where
 the file has several buses.
@@ -13,7 +13,6 @@ import json
 import selectors
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
@@ -22,8 +21,8 @@ import msgspec
 from bridges.settings.load import Config
 from drivers.hal import Bus, HalError
 from hal_fakes.control import Control
+from hal_fakes.fake import Inside, far_side, plants_on, stations_on
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import plants_on
 
 READY_S = 15.0
 """How long a child may take to serve (a busy Raspberry Pi imports slowly)."""
@@ -41,16 +40,15 @@ class Simulation:
         self._runtime_dir = runtime_dir.resolve()
         self._open = contextlib.ExitStack()
 
-    def open_bus(self, name: str, settings: Any) -> Bus:
+    def open_bus(self, name: str) -> Bus:
         """Start the fake for this bus; returns a real bus in front of it. Raises HalError.
 
         Two buses may be opened one after the other, not at once.
         """
-        bus_type = self._config.bus_types[name]
-        if bus_type == "gpio":
-            return self._inside(name, settings)
-        bus = import_module(f"drivers.hal.{bus_type}")
-        return cast(Bus, bus.open_bus(self._pointed_at_child(name, settings)))
+        far = far_side(self._config, name)
+        if isinstance(far, Inside):
+            return self._inside(name, far)
+        return self._config.bus_type(name).open_bus(self._pointed_at_child(name))
 
     def close(self) -> None:
         """End every fake. Close the buses first. May be called twice."""
@@ -61,15 +59,15 @@ class Simulation:
         several = len(self._config.buses) > 1
         return self._runtime_dir / (f"plant-{name}.sock" if several else "plant.sock")
 
-    def _inside(self, name: str, settings: Any) -> Bus:
-        from hal_fakes import gpio
-
+    def _inside(self, name: str, far: Inside[Any, Any]) -> Bus:
         world = RealTime(plants_on(self._config, name))
         self._open.callback(world.close)
         self._open.callback(Control(self.socket_path(name), world.plants).close)
-        return gpio.open_bus(settings, self._config, name, world)
+        stations = stations_on(self._config, name, world.plants)
+        return far.open_bus(self._config.buses[name], stations, world)
 
-    def _pointed_at_child(self, name: str, settings: Any) -> Any:
+    def _pointed_at_child(self, name: str) -> Any:
+        settings = self._config.buses[name]
         socket = self.socket_path(name)
         child = subprocess.Popen(
             [sys.executable, "-m", "hal_fakes", self._file, name, "--socket", str(socket)],

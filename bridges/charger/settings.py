@@ -1,6 +1,6 @@
 """The part of a charger's YAML that does not depend on how it is reached."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Annotated, Literal, NamedTuple
 
 import msgspec
@@ -94,21 +94,3 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
                 yield ("receivers", receiver), str(error)
         if self.unrequested == "serve_known" and not self.receivers:
             yield ("unrequested",), "serve_known needs receivers: whom does the station know?"
-
-
-class ChargerLimits(msgspec.Struct, frozen=True):
-    """A charger's fixed facts as its core needs them. `t`: durations and counts.
-
-    `receivers`: empty where nobody is verified. `can_stop`: `power` is obeyed.
-    """
-
-    t: Limits = Limits()
-    receivers: Mapping[str, Robot] = {}
-    unrequested: Unrequested = "refuse"
-    can_stop: bool = True
-
-    @classmethod
-    def of(cls, settings: ChargerSettings) -> "ChargerLimits":
-        """From the YAML."""
-        known = {receiver: robot(text) for receiver, text in settings.receivers.items()}
-        return cls(settings.limits, known, settings.unrequested, settings.can_stop())

@@ -24,14 +24,13 @@ ChargerRequest and ChargerCancel, which no part of RMF does. Rules:
 8. Until it may speak, and beside a charging schedule, it only listens.
 """
 
-import math
 from typing import Final
 
 from msgspec.structs import replace
 
+from bridges.charger.report import UNREQUESTED, Diagnosis
 from bridges.charger.settings import Robot
-from bridges.charger_coordinator import voice
-from bridges.charger_coordinator.diagnosis import Side
+from bridges.charger_coordinator import report
 from bridges.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
@@ -39,24 +38,27 @@ from bridges.charger_coordinator.memory import (
     IDLE,
     NODE,
     RELEASED,
-    Dedicated,
-    Event,
-    FleetSeen,
     Grant,
     Memory,
     Seen,
-    Shown,
-    Sighting,
+    Site,
     Standing,
-    Unwanted,
-    Wanted,
     Wish,
     without,
 )
-from bridges.charger_coordinator.queue import UNASKED, allot
-from bridges.charger_coordinator.report import SiteReport, report
-from bridges.charger_coordinator.settings import Site
+from bridges.charger_coordinator.queue import allot
+from bridges.charger_coordinator.report import SiteReport
+from bridges.charger_coordinator.signals import (
+    Dedicated,
+    Event,
+    FleetSeen,
+    Sighting,
+    StateHeard,
+    Unwanted,
+    Wanted,
+)
 from bridges.core.decision import Decision, OperatorReset
+from bridges.core.durations import AGES_AGO, NEVER
 from bridges.core.graph_kind import MaySpeak
 
 SETTLES_S: Final = 2.0
@@ -84,9 +86,9 @@ def decide(memory: Memory, event: Event, now: float, site: Site) -> Decided:
     memory = _in_time(_adopted(memory, now, site), now)
     if memory.may_speak:
         memory = allot(memory, now, site)
-    told = report(memory, now, site)
-    memory, publish = voice.say(memory, told, now, site)
-    return Decision(memory, None, told, _wake_at(memory, now, site), refused, publish)
+    shown = report.report(memory, now, site)
+    memory, publish = report.messages(memory, shown.faults, now, site)
+    return Decision(memory, None, shown, _wake_at(memory, now, site), refused, publish)
 
 
 def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory, str]:
@@ -95,8 +97,8 @@ def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory,
             for sighting in robots:
                 memory = _sighted(memory, sighting, now, site)
             return memory, ""
-        case Shown():
-            return _shown(memory, event, now, site), ""
+        case StateHeard():
+            return _heard(memory, event, now, site), ""
         case Wanted():
             return _wanted(memory, event, site)
         case Unwanted(request_id):
@@ -117,7 +119,7 @@ def _may_speak(memory: Memory, yes: bool, now: float) -> Memory:
         name: grant if grant.shown else replace(grant, made_at=now)
         for name, grant in memory.grants.items()
     }
-    return replace(memory, may_speak=yes, grants=grants, told=())
+    return replace(memory, may_speak=yes, grants=grants, assigned=())
 
 
 # ---- wishes
@@ -214,26 +216,26 @@ def _unwanted(memory: Memory, request_id: str) -> tuple[Memory, str]:
 # ---- stations
 
 
-def _shown(memory: Memory, shown: Shown, now: float, site: Site) -> Memory:
-    name, before = shown.station, memory.stations.get(shown.station)
-    same = before is not None and (before.state, before.error) == (shown.state, shown.error)
+def _heard(memory: Memory, heard: StateHeard, now: float, site: Site) -> Memory:
+    name, before = heard.station, memory.stations.get(heard.station)
+    same = before is not None and (before.state, before.error) == (heard.state, heard.error)
     since = before.since if before is not None and same else now
-    seen = Seen(shown.state, shown.request_id, shown.robot, shown.error, now, since)
+    seen = Seen(heard.state, heard.request_id, heard.robot, heard.error, now, since)
     memory = replace(memory, stations={**memory.stations, name: seen})
     grant = memory.grants.get(name)
     if grant is not None:
-        if shown.state is not IDLE and shown.request_id == grant.request_id:
+        if heard.state is not IDLE and heard.request_id == grant.request_id:
             return _followed(memory, name, grant, seen, site)
-        if not grant.shown and not grant.over and _may_still_come(shown, grant):
+        if not grant.shown and not grant.over and _may_still_come(heard, grant):
             return memory
         memory = _gone(memory, name, grant, site)
     return memory
 
 
-def _may_still_come(shown: Shown, grant: Grant) -> bool:
+def _may_still_come(heard: StateHeard, grant: Grant) -> bool:
     """The station may be about to take the request."""
-    refused_here = shown.state is ERROR and shown.robot == grant.robot
-    return shown.state is IDLE or (refused_here and shown.request_id.startswith(UNASKED))
+    refused_here = heard.state is ERROR and heard.robot == grant.robot
+    return heard.state is IDLE or (refused_here and heard.request_id.startswith(UNREQUESTED))
 
 
 def _followed(memory: Memory, name: str, grant: Grant, seen: Seen, site: Site) -> Memory:
@@ -245,9 +247,9 @@ def _followed(memory: Memory, name: str, grant: Grant, seen: Seen, site: Site) -
     if seen.state is RELEASED:
         memory = _ended(memory, name, grant, site)
         return memory.with_grant(name, replace(grant, over=True))
-    if seen.side in (Side.ROBOT, Side.STATION, Side.UNCLEAR):
-        memory = memory.with_grant(name, replace(grant, over=True, sent_at=-math.inf))
-        return memory if seen.side is Side.STATION else _struck(memory, name, grant.robot)
+    if seen.diagnosis in (Diagnosis.ROBOT, Diagnosis.STATION, Diagnosis.UNCLEAR):
+        memory = memory.with_grant(name, replace(grant, over=True, sent_at=AGES_AGO))
+        return memory if seen.diagnosis is Diagnosis.STATION else _struck(memory, name, grant.robot)
     return memory
 
 
@@ -334,9 +336,9 @@ def _hopeless_at(memory: Memory, name: str, grant: Grant) -> float:
     """When a robot on its way is better off elsewhere: its station is not reached, by its own daemon
     or that one by us, or another robot does not leave the pad."""
     seen, at = memory.stations.get(name), memory.silent_since(name) + LOST_S
-    if seen is not None and seen.side is Side.LOST:
+    if seen is not None and seen.diagnosis is Diagnosis.LOST:
         at = min(at, seen.since + LOST_S)
-    if seen is not None and seen.side is Side.PAD:
+    if seen is not None and seen.diagnosis is Diagnosis.PAD:
         at = min(at, seen.since + max(grant.start_timeout_s, LOST_S))
     return at
 
@@ -345,5 +347,5 @@ def _wake_at(memory: Memory, now: float, site: Site) -> float:
     due = [*memory.shunned.values(), *(memory.silent_since(name) for name in site.places)]
     for name, grant in memory.grants.items():
         due.append(_hopeless_at(memory, name, grant) if grant.shown else grant.made_at + TAKEN_S)
-    due += voice.due(memory, now)
-    return min((at for at in due if at > now), default=math.inf)
+    due += report.due(memory)
+    return min((at for at in due if at > now), default=NEVER)

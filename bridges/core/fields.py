@@ -69,3 +69,17 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
     bus: Name | None = None
     accept_unsafe: dict[Name, Name] = msgspec.field(default_factory=dict)
+
+
+class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every kind without hardware has.
+
+    `quiet_start_s`: how long it only listens at first.
+    """
+
+    quiet_start_s: QuietStart = 3.0
+
+
+def quiet_s(settings: GraphSettings) -> float:
+    """How long it only listens before it sends its first message (s)."""
+    return settings.quiet_start_s

@@ -1,8 +1,8 @@
-"""Doors."""
+"""Doors: RMF's DoorRequest to a relay or register, and the truth about the door as DoorState."""
 
 from bridges.core.kind import Kind
 from bridges.door import core, messages
-from bridges.door.settings import DoorLimits
+from bridges.door.memory import DoorLimits
 from bridges.rmf import topics
 
 KIND = Kind(

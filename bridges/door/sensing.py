@@ -15,32 +15,13 @@ from collections.abc import Iterator
 import msgspec
 from msgspec.structs import replace
 
-from bridges.core.debounce import Settled, forget, settle
-from bridges.door.settings import DoorLimits
+from bridges.core.debounce import forget, settle
+from bridges.core.durations import NEVER
+from bridges.door.memory import Contact, DoorLimits, Senses
 from bridges.door.signals import DoorSample
 
-NEVER = float("inf")
 SIGNALS = ("opened", "closed", "obstruction", "fire")
 HAZARDS = ("obstruction", "fire")
-
-Contact = Settled[bool | None]
-"""One input with its debounce. Where it is not wired, both value and candidate are None."""
-
-
-class Senses(msgspec.Struct, frozen=True):
-    """Each contact (None: not read yet); when all were last read, and since when without a miss.
-
-    `lost`, `errors`: the last reading's (`DoorSample`).
-    """
-
-    opened: Contact | None = None
-    closed: Contact | None = None
-    obstruction: Contact | None = None
-    fire: Contact | None = None
-    read_at: float | None = None
-    linked_since: float | None = None
-    lost: str = ""
-    errors: tuple[str, ...] = ()
 
 
 class View(msgspec.Struct, frozen=True):
@@ -117,6 +98,11 @@ def look(senses: Senses, held: bool, held_since: float, now: float, limits: Door
         lost=senses.lost,
         errors=senses.errors,
     )
+
+
+def released_by_fire(view: View, limits: DoorLimits) -> bool:
+    """Has the fire alarm taken the hold away?"""
+    return view.fresh and view.fire and limits.on_fire == "release"
 
 
 def _hold_s(before: Contact | None, seen: bool | None, signal: str, limits: DoorLimits) -> float:

@@ -1,6 +1,6 @@
-"""The part of a door's YAML that does not depend on how it is wired, and its core's limits."""
+"""The part of a door's YAML that does not depend on how it is wired."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 import msgspec
@@ -79,24 +79,3 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
             )
         if delay_s is not None and delay_s > self.limits.travel_s:
             yield ("limits", "open_delay_s"), "must not be longer than travel_s"
-
-
-class DoorLimits(msgspec.Struct, frozen=True):
-    """A door's fixed facts as its core needs them. `t`: the durations; `debounce`: s by signal."""
-
-    t: Limits = Limits()
-    debounce: Mapping[str, float] = {}
-    estimated: bool = False
-    on_fire: Literal["open", "release"] = "release"
-    pulse: Pulse | None = None
-
-    @classmethod
-    def of(cls, settings: DoorSettings, debounce: Mapping[str, float]) -> "DoorLimits":
-        """From the YAML and the wiring's debounce by signal."""
-        return cls(
-            settings.limits,
-            debounce,
-            settings.feedback == "estimated",
-            settings.on_fire or "release",
-            settings.pulse,
-        )

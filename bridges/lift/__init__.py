@@ -2,7 +2,7 @@
 
 from bridges.core.kind import Kind
 from bridges.lift import core, messages
-from bridges.lift.limits import LiftLimits
+from bridges.lift.memory import LiftLimits
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 
 KIND = Kind(

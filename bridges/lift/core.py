@@ -21,10 +21,8 @@ Rules, in the order in which they are applied:
    that is about to be held and is not yet: its relay may have to rest while the door closes.
 """
 
-import math
 from typing import Any
 
-import msgspec
 from msgspec.structs import replace
 
 from bridges.core.decision import (
@@ -36,17 +34,14 @@ from bridges.core.decision import (
     Sampled,
     WriteFailed,
 )
+from bridges.core.durations import NEVER, RIVAL_QUIET_S
 from bridges.lift import drive
-from bridges.lift.drive import Grace, Relays, Session
-from bridges.lift.limits import LiftLimits
+from bridges.lift.memory import Grace, LiftLimits, Memory, Session
 from bridges.lift.report import LiftReport, report
-from bridges.lift.sensing import HAZARDS, Senses, View, gap, look, take, trust
-from bridges.lift.signals import Hazard, LiftOutputs, LiftSample
+from bridges.lift.sensing import HAZARDS, View, gap, look, take, trust
+from bridges.lift.signals import Event, Hazard, LiftOutputs, LiftSample, Requested
 from bridges.rmf.definitions import Bool, EmergencySignal, Message
 from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
-
-RIVAL_GONE_S = 5.0
-"""A second node for this lift is gone when nothing was heard of it for so long; states come at 1 Hz."""
 
 NOT_RMFS = frozenset(
     {
@@ -59,42 +54,6 @@ NOT_RMFS = frozenset(
     }
 )
 """Hazards that take the lift away; overload only delays it."""
-
-
-class Asked(msgspec.Struct, frozen=True):
-    """A LiftRequest for AGV or HUMAN mode that is ours, well formed and for a floor we serve."""
-
-    session_id: str
-    agv: bool
-    destination: str
-
-
-class Ended(msgspec.Struct, frozen=True):
-    """A LiftRequest for END_SESSION, whatever its other fields say."""
-
-    session_id: str
-
-
-class Memory(msgspec.Struct, frozen=True):
-    """Everything that outlives a scan.
-
-    `io_fault`: what reading or writing said that has just failed. `unwritten_since`: since when
-    each scan's outputs could not be written; `write_failed`: those of the last scan.
-    """
-
-    senses: Senses = Senses()
-    session: Session | None = None
-    grace: Grace | None = None
-    relays: Relays = Relays()
-    fire_latched: bool = False
-    alarmed: bool = False
-    rival_at: float | None = None
-    io_fault: str = ""
-    unwritten_since: float | None = None
-    write_failed: bool = False
-
-
-Event = Sampled[Any] | IoFailed | RivalSeen | OperatorReset | Asked | Ended
 
 
 def initial(limits: LiftLimits, now: float) -> Memory:
@@ -112,14 +71,10 @@ def decide(
     memory = _latch(memory, view, now, limits)
     allowed = not obstacles(memory, view, now, limits)
     memory, outputs = _drive(memory, view, allowed, now, limits)
-    driven = memory.relays.outputs()
-    awaited = outputs.hold_door is not None and driven.hold_door is None
-    faults = _faults(memory, view, now, limits)
-    read_at = memory.senses.read_at
     return Decision(
         memory,
-        driven,
-        report(memory.session, view, read_at, faults, driven.agv_request, awaited, limits),
+        memory.relays.outputs(),
+        report(memory, view, outputs, _faults(memory, view, now, limits), limits),
         _wake_at(memory, view, outputs, now, limits),
         refused,
         _alarms(alarmed_before, memory, limits),
@@ -152,7 +107,7 @@ def obstacles(memory: Memory, view: View, now: float, limits: LiftLimits) -> tup
 def _unwritten_at(memory: Memory, limits: LiftLimits) -> float:
     """When outputs have not been written for so long that it matters."""
     since = memory.unwritten_since
-    return math.inf if since is None else since + limits.t.stale_after_s
+    return NEVER if since is None else since + limits.t.stale_after_s
 
 
 def _drive(
@@ -169,7 +124,7 @@ def _drive(
     elif grace and now >= grace.until:
         grace = None
     elif grace and allowed:
-        outputs = drive.kept(grace, relays, view, now, limits)
+        outputs = drive.stays_on(grace, relays, view, now, limits)
     relays = relays.step(outputs, now, limits)
     if session and relays.call.on and session.call_at is None:
         session = replace(session, call_at=now)
@@ -189,7 +144,7 @@ def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple
             return replace(memory, rival_at=now), ""
         case OperatorReset():
             return _reset(memory, now, limits), ""
-        case Asked():
+        case Requested():
             return _ask(memory, event, now, limits)
     return _end(memory, event.session_id, now, limits)
 
@@ -205,31 +160,31 @@ def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) ->
     )
 
 
-def _ask(memory: Memory, asked: Asked, now: float, limits: LiftLimits) -> tuple[Memory, str]:
+def _ask(memory: Memory, request: Requested, now: float, limits: LiftLimits) -> tuple[Memory, str]:
     held, grace = memory.session, memory.grace
-    if held and held.id != asked.session_id:
+    if held and held.id != request.session_id:
         return memory, f"held by {held.id}"
     if held:
-        return replace(memory, session=_refresh(held, asked, now)), ""
+        return replace(memory, session=_refresh(held, request, now)), ""
     if grace and now < grace.until:
-        if grace.session.id != asked.session_id:
+        if grace.session.id != request.session_id:
             return memory, f"released by {grace.session.id} a moment ago"
-        return replace(memory, session=_grant(asked, now, grace.session.boarded), grace=None), ""
+        return replace(memory, session=_grant(request, now, grace.session.boarded), grace=None), ""
     why_not = obstacles(memory, look(memory.senses, now, limits), now, limits)
     if why_not:
         return memory, why_not[0].code
-    return replace(memory, session=_grant(asked, now, boarded=False), grace=None), ""
+    return replace(memory, session=_grant(request, now, boarded=False), grace=None), ""
 
 
-def _grant(asked: Asked, now: float, boarded: bool) -> Session:
-    return Session(asked.session_id, asked.agv, asked.destination, now, boarded=boarded)
+def _grant(request: Requested, now: float, boarded: bool) -> Session:
+    return Session(request.session_id, request.agv, request.destination, now, boarded=boarded)
 
 
-def _refresh(session: Session, asked: Asked, now: float) -> Session:
+def _refresh(session: Session, request: Requested, now: float) -> Session:
     """A repeat only says that RMF is still there; another destination or mode is a new request."""
-    if (asked.agv, asked.destination) == (session.agv, session.destination):
+    if (request.agv, request.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
-    return _grant(asked, now, session.boarded)
+    return _grant(request, now, session.boarded)
 
 
 def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tuple[Memory, str]:
@@ -269,7 +224,7 @@ def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory
         memory,
         fire_latched=manual and (burning or memory.fire_latched),
         alarmed=memory.alarmed or burning,
-        rival_at=None if rival_at is None or now >= rival_at + RIVAL_GONE_S else rival_at,
+        rival_at=None if rival_at is None or now >= rival_at + RIVAL_QUIET_S else rival_at,
     )
 
 
@@ -309,5 +264,5 @@ def _wake_at(
     if memory.grace:
         due += [drive.let_go_at(memory.grace, limits), memory.grace.until]
     if memory.rival_at is not None:
-        due.append(memory.rival_at + RIVAL_GONE_S)
-    return min((at for at in due if at > now), default=math.inf)
+        due.append(memory.rival_at + RIVAL_QUIET_S)
+    return min((at for at in due if at > now), default=NEVER)

@@ -17,120 +17,15 @@ Rules:
 - Off is immediate. On waits for `min_off_s` and for the relay's cycles of the last minute.
 """
 
-import math
-from typing import Generic, Literal, TypeVar
-
-import msgspec
 from msgspec.structs import replace
 
 from bridges.core.decision import Fault
-from bridges.lift.limits import LiftLimits
+from bridges.core.durations import NEVER
+from bridges.lift.memory import Grace, LiftLimits, Relays, Session, Waiting
 from bridges.lift.sensing import View
-from bridges.lift.signals import Hazard, LiftOutputs, Side
+from bridges.lift.signals import Hazard, LiftOutputs
 
-T = TypeVar("T")
-NEVER = float("inf")
 RETRY_AFTER_S = (10.0, 30.0, 60.0)
-Waiting = Literal["agv", "floor", "door"]
-
-
-class Session(msgspec.Struct, frozen=True):
-    """Who holds the lift, what they asked, and how far we are with it.
-
-    `boarded`: an open door at the destination has been published for this session: a robot may be
-    inside. `agv_seen`: AGV mode is on for our request. `arrived`: the car stood at the destination.
-    `call_at`: when the present call began. `waiting`, `since`: what we wait for. `tries`: how often
-    that has failed; `retry_at`: outputs stay off until then (inf: latched).
-    """
-
-    id: str
-    agv: bool
-    destination: str
-    asked_at: float
-    boarded: bool = False
-    agv_seen: bool = False
-    arrived: bool = False
-    call_at: float | None = None
-    waiting: Waiting | None = None
-    since: float = 0.0
-    tries: int = 0
-    retry_at: float | None = None
-    fault: Fault | None = None
-
-
-class Grace(msgspec.Struct, frozen=True):
-    """After END: whose return is awaited, with what may stay on meanwhile, until when."""
-
-    session: Session
-    until: float
-
-
-class Channel(msgspec.Struct, Generic[T], frozen=True):
-    """One output or one group of exclusive ones: what is on, since when off, recent switchings on."""
-
-    on: T | None = None
-    off_at: float = -NEVER
-    ons: tuple[float, ...] = ()
-
-    def step(
-        self, wanted: T | None, now: float, ready_at: float, limits: LiftLimits
-    ) -> "Channel[T]":
-        """The next state: off at once, on when wear and `ready_at` allow, changed by way of off."""
-        if self.on is not None:
-            return self if wanted == self.on else replace(self, on=None, off_at=now)
-        if wanted is None or now < self.may_switch_on_at(now, ready_at, limits):
-            return self
-        return Channel(wanted, self.off_at, (*self.recent(now), now))
-
-    def recent(self, now: float) -> tuple[float, ...]:
-        """When it was switched on during the last minute."""
-        return tuple(at for at in self.ons if now - at < 60.0)
-
-    def may_switch_on_at(self, now: float, ready_at: float, limits: LiftLimits) -> float:
-        """The earliest time at which it may be energised."""
-        recent = self.recent(now)
-        most = limits.t.max_cycles_per_min
-        rested_at = recent[-most] + 60.0 if len(recent) >= most else -NEVER
-        return max(self.off_at + limits.t.min_off_s, ready_at, rested_at)
-
-
-class Relays(msgspec.Struct, frozen=True):
-    """Every output with its history. A call and a door command exclude each other in time."""
-
-    agv: Channel[bool] = Channel()
-    call: Channel[str] = Channel()
-    hold: Channel[Side] = Channel()
-
-    def outputs(self) -> LiftOutputs:
-        """What the driver is to write."""
-        return LiftOutputs(bool(self.agv.on), self.call.on, self.hold.on)
-
-    def step(self, wanted: LiftOutputs, now: float, limits: LiftLimits) -> "Relays":
-        """Move every output towards what is wanted, as far as is allowed now."""
-        agv = self.agv.step(wanted.agv_request or None, now, -NEVER, limits)
-        rested_at = self._rested_at(limits) if agv.on else NEVER
-        call_ready_at = NEVER if self.hold.on else rested_at
-        call = self.call.step(wanted.call, now, call_ready_at, limits)
-        hold_ready_at = NEVER if self.call.on or call.on else rested_at
-        hold = self.hold.step(wanted.hold_door, now, hold_ready_at, limits)
-        return Relays(agv, call, hold)
-
-    def changes_at(self, wanted: LiftOutputs, now: float, limits: LiftLimits) -> float:
-        """When an output that is wanted and still off may come on; always later than `now`."""
-        agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, -NEVER, limits)
-        ready_at = max(agv_at, self._rested_at(limits))
-        due = []
-        if wanted.agv_request and not self.agv.on:
-            due.append(agv_at)
-        if wanted.call and not self.call.on:
-            due.append(self.call.may_switch_on_at(now, ready_at, limits))
-        if wanted.hold_door and not self.hold.on:
-            due.append(self.hold.may_switch_on_at(now, ready_at, limits))
-        return max(min(due, default=NEVER), math.nextafter(now, NEVER))
-
-    def _rested_at(self, limits: LiftLimits) -> float:
-        """When neither call nor door command has been on for `dead_time_s`."""
-        return max(self.call.off_at, self.hold.off_at) + limits.t.dead_time_s
 
 
 def at_destination(session: Session, view: View, limits: LiftLimits) -> bool:
@@ -202,7 +97,9 @@ def wanted(session: Session, view: View, now: float, limits: LiftLimits) -> Lift
     return LiftOutputs(agv_request=True, call=stop.level)
 
 
-def kept(grace: Grace, relays: Relays, view: View, now: float, limits: LiftLimits) -> LiftOutputs:
+def stays_on(
+    grace: Grace, relays: Relays, view: View, now: float, limits: LiftLimits
+) -> LiftOutputs:
     """After END: what stays on."""
     standing = agv_ok(view) and at_destination(grace.session, view, limits)
     hold = relays.hold.on if standing and now < let_go_at(grace, limits) else None

@@ -22,10 +22,10 @@ from msgspec.structs import replace
 
 from bridges.core.debounce import Settled, forget, settle
 from bridges.core.decision import Fault
-from bridges.lift.limits import LiftLimits
+from bridges.core.durations import AGES_AGO, NEVER
+from bridges.lift.memory import LiftLimits, Position, Senses
 from bridges.lift.signals import Door, Hazard, LiftSample, Motion, Side
 
-NEVER = float("inf")
 HAZARDS = tuple(Hazard)
 
 MOTION_MEMORY_S = 2.0
@@ -33,30 +33,6 @@ MOTION_MEMORY_S = 2.0
 
 RESTLESS_S = 2.0
 """An input that does not keep still for its debounce within this time is broken or torn about."""
-
-
-class Position(msgspec.Struct, frozen=True):
-    """`trusted`: the last floor that can be true, seen last at `seen_at`; `suspect`: one that can't.
-
-    `moved_at`: when the car was last not seen standing.
-    """
-
-    trusted: str | None = None
-    seen_at: float = 0.0
-    suspect: str | None = None
-    moved_at: float | None = None
-
-
-class Senses(msgspec.Struct, frozen=True):
-    """Every input with its debounce, since when it has been so, and when all were last read."""
-
-    read_at: float | None = None
-    code: Settled[tuple[str | None, str]] | None = None
-    doors: tuple[Settled[Door | None] | None, Settled[Door | None] | None] = (None, None)
-    motion: Settled[Motion | None] | None = None
-    agv: Settled[bool | None] | None = None
-    hazards: dict[Hazard, Settled[bool]] = {}
-    position: Position = Position()
 
 
 class DoorSeen(msgspec.Struct, frozen=True):
@@ -174,7 +150,7 @@ def look(senses: Senses, now: float, limits: LiftLimits) -> View:
 
 def stale_at(senses: Senses, limits: LiftLimits) -> float:
     """When the last reading is too old to be a fact; it is when there is none."""
-    return -NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
+    return AGES_AGO if senses.read_at is None else senses.read_at + limits.t.stale_after_s
 
 
 def _settle_hazard(
@@ -216,7 +192,7 @@ def _can_have_come(before: Position, level: str, now: float, limits: LiftLimits)
     memory_s = MOTION_MEMORY_S + limits.debounce_s("floor")
     if before.moved_at is None or now - before.moved_at > memory_s:
         return False
-    skipped = abs(limits.index(level) - limits.index(before.trusted)) - 1
+    skipped = limits.floors_between(level, before.trusted)
     return now - before.seen_at >= skipped * limits.t.floor_travel_min_s
 
 
@@ -272,7 +248,7 @@ def _unsettled(senses: Senses, limits: LiftLimits) -> Iterator[Unsettled]:
 
 def _wait(name: str, seen: Settled[Any] | None, hold_s: float, most_s: float) -> Unsettled:
     if seen is None or seen.steady_at is None or seen.torn_since is None:
-        return Unsettled(name, seen.due_at(hold_s) if seen else -NEVER, -NEVER)
+        return Unsettled(name, seen.due_at(hold_s) if seen else AGES_AGO, AGES_AGO)
     return Unsettled(name, seen.due_at(hold_s), seen.torn_since + most_s + RESTLESS_S)
 
 

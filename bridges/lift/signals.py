@@ -1,8 +1,10 @@
-"""What a lift's driver tells its core, and what the core tells its driver: one scan's image."""
+"""What a lift's driver and its core say to each other in one scan, and the core's events."""
 
 from enum import Enum, StrEnum
 
 import msgspec
+
+from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 
 class Door(Enum):
@@ -82,3 +84,20 @@ class LiftOutputs(msgspec.Struct, frozen=True):
     agv_request: bool = False
     call: str | None = None
     hold_door: Side | None = None
+
+
+class Requested(msgspec.Struct, frozen=True):
+    """A LiftRequest for AGV or HUMAN mode that is ours, well formed and for a floor we serve."""
+
+    session_id: str
+    agv: bool
+    destination: str
+
+
+class Ended(msgspec.Struct, frozen=True):
+    """A LiftRequest for END_SESSION, whatever its other fields say."""
+
+    session_id: str
+
+
+Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Requested | Ended

@@ -2,7 +2,8 @@
 
 It stands in for RMF's own (rmf_ros2, lift_supervisor/Node.cpp): fleet adapters ask on
 `adapter_lift_requests`, one session at a time is passed on to the lift's node on `lift_requests`,
-until the lift's states show that it has been obeyed. Rules:
+until the lift's states show that it has been obeyed. `bridges/core/freshness.py` says which requests
+count. Rules:
 1. Who wants the lift is served in the order of first requests. Who ENDs, or is silent for
    `silent_after_s`, leaves the queue. A silence of the lift itself is nobody's: adapters only repeat
    themselves at its states.
@@ -28,29 +29,16 @@ from typing import Final
 from msgspec.structs import replace
 
 from bridges.core.decision import Decision
+from bridges.core.durations import FORGOTTEN_S, NEVER, SILENT_S, due_at
+from bridges.core.freshness import hear
 from bridges.core.graph_kind import MaySpeak
-from bridges.lift_supervisor.freshness import FUTURE_S, Rules, Voice
-from bridges.lift_supervisor.memory import (
-    FLOWING_S,
-    NEVER,
-    Asked,
-    Claim,
-    Ended,
-    Event,
-    Limits,
-    Memory,
-    Shown,
-    Turn,
-)
+from bridges.lift_supervisor.memory import Claim, Limits, Memory, Turn
 from bridges.lift_supervisor.report import SupervisorReport, alarms, report
+from bridges.lift_supervisor.signals import Ended, Event, Requested, StateHeard
 from bridges.rmf.definitions import LiftRequest, LiftRequestType
 from bridges.rmf.topics import LIFT_REQUESTS
 
-GAP_S: Final = 0.1
-REPEAT_S: Final = 1.0
-FORGOTTEN_S: Final = 60.0
 MAX_CLAIMS: Final = 100
-MAX_VOICES: Final = 200
 
 END: Final = LiftRequestType.REQUEST_END_SESSION
 AGV: Final = LiftRequestType.REQUEST_AGV_MODE
@@ -93,14 +81,14 @@ def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
 
 def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Memory, str]:
     match event:
-        case Asked() | Ended():
-            memory, counts = _listen(memory, event, now, limits)
-            if not counts:
-                return memory, "stale request"
+        case Requested() | Ended():
+            memory, refused = _listen(memory, event, now, limits)
+            if refused:
+                return memory, refused
             if isinstance(event, Ended):
                 return _end(memory, event.session, now), ""
             return _ask(memory, event, now)
-        case Shown():
+        case StateHeard():
             return _see(memory, event, now), ""
         case MaySpeak(yes):
             return _speak(memory, yes), ""
@@ -109,38 +97,34 @@ def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Mem
 
 
 def _listen(
-    memory: Memory, event: Asked | Ended, now: float, limits: Limits
-) -> tuple[Memory, bool]:
-    """Does it count? Voices are kept in the order in which they were last heard."""
-    voices = {k: v for k, v in memory.voices.items() if k != event.session}
-    if len(voices) == MAX_VOICES:
-        del voices[next(iter(voices))]
-    known = memory.voices.get(event.session, Voice())
-    voices[event.session], counts = known.heard(
-        event.stamp, event.age_s, now, _rules(memory, now, limits), ends=isinstance(event, Ended)
+    memory: Memory, event: Requested | Ended, now: float, limits: Limits
+) -> tuple[Memory, str]:
+    """Does it count?"""
+    requesters, refused = hear(
+        memory.requesters,
+        event.session,
+        event.stamp,
+        now,
+        memory.rules(now, limits),
+        age_s=event.age_s,
+        ends=isinstance(event, Ended),
+        holders={claim.session for claim in memory.claims},
     )
-    return replace(memory, heard_at=now, voices=voices), counts
+    return replace(memory, heard_at=now, requesters=requesters), refused
 
 
-def _rules(memory: Memory, now: float, limits: Limits) -> Rules:
-    if limits.clock_synchronised:
-        return Rules(limits.max_request_age_s, known_clocks=False)
-    future_s = NEVER if memory.may_speak else FUTURE_S
-    return Rules(now - memory.started_at, future_s=future_s)
-
-
-def _ask(memory: Memory, asked: Asked, now: float) -> tuple[Memory, str]:
+def _ask(memory: Memory, request: Requested, now: float) -> tuple[Memory, str]:
     """Join the queue, or say the same or something else from one's place in it."""
-    before = memory.claim(asked.session)
+    before = memory.claim(request.session)
     served = memory.shown.floors if memory.shown else ()
-    if served and asked.wish.request_type == AGV and asked.wish.floor not in served:
+    if served and request.target.request_type == AGV and request.target.floor not in served:
         return _still_there(memory, before, now), "floor not served"
     if before is None and len(memory.claims) == MAX_CLAIMS:
         return memory, "queue full"
     since = before.since if before else now
-    claim = Claim(asked.session, asked.wish, since, now)
+    claim = Claim(request.session, request.target, since, now)
     turn = memory.turn
-    holds = turn is not None and turn.session == asked.session and not turn.ends
+    holds = turn is not None and turn.session == request.session and not turn.ends
     return replace(_with(memory, before, claim), prompted=memory.prompted or holds), ""
 
 
@@ -169,9 +153,9 @@ def _without(memory: Memory, session: str) -> Memory:
     return replace(memory, claims=tuple(c for c in memory.claims if c.session != session))
 
 
-def _see(memory: Memory, shown: Shown, now: float) -> Memory:
+def _see(memory: Memory, shown: StateHeard, now: float) -> Memory:
     """A state: it may confirm an END, ask for a repeat, or show somebody else's session."""
-    flowed = now <= memory.shown_at + FLOWING_S
+    flowed = now <= memory.shown_at + SILENT_S
     same = flowed and shown.session == memory.session_shown
     turn, prompted = memory.turn, memory.prompted
     if turn and turn.ends:
@@ -181,7 +165,7 @@ def _see(memory: Memory, shown: Shown, now: float) -> Memory:
         claim = memory.claim(turn.session)
         assert claim is not None
         turn = replace(turn, seen=turn.seen or shown.session == turn.session)
-        prompted = prompted or not shown.satisfies(turn.session, claim.wish)
+        prompted = prompted or not shown.satisfies(turn.session, claim.target)
     return replace(
         memory,
         turn=turn,
@@ -261,33 +245,31 @@ def wanted(memory: Memory) -> LiftRequest | None:
         return LiftRequest(memory.lift, session_id=turn.session, destination_floor=floor)
     claim = memory.claim(turn.session)
     assert claim is not None
-    wish = claim.wish
+    target = claim.target
     somebody_elses = memory.session_shown not in ("", turn.session)
-    if somebody_elses or (wish.request_type == AGV and memory.nobody_is_sent):
+    if somebody_elses or (target.request_type == AGV and memory.nobody_is_sent):
         return None
     return LiftRequest(
         lift_name=memory.lift,
         session_id=turn.session,
-        request_type=wish.request_type,
-        destination_floor=wish.floor,
-        door_state=wish.door,
+        request_type=target.request_type,
+        destination_floor=target.floor,
+        door_state=target.door,
     )
 
 
 def _due_at(memory: Memory, message: LiftRequest | None) -> float:
-    """When to send it: at once if it is new, later if it is only worth repeating."""
-    sent = memory.sent
+    """When to send it. A repeated END may name another floor: that does not make it new."""
     if message is None:
         return NEVER
-    if sent is None or (message != sent and message.request_type != END):
-        return memory.sent_at + GAP_S
-    return memory.sent_at + REPEAT_S if memory.prompted else NEVER
+    new = memory.sent is None or (message != memory.sent and message.request_type != END)
+    return due_at(memory.sent_at, new=new, again=memory.prompted)
 
 
 def _wake_at(memory: Memory, due: list[float], now: float, limits: Limits) -> float:
     """When time alone may change something: what is `due`, or the end of somebody's silence."""
     if memory.shown is not None and memory.flows(now):
-        due.append(math.nextafter(memory.shown_at + FLOWING_S, NEVER))
+        due.append(math.nextafter(memory.shown_at + SILENT_S, NEVER))
     for claim in memory.claims:
         due.append(memory.gone_at(claim, now, limits.silent_after_s))
         due.append(memory.gone_at(claim, now, limits.holder_ttl_s))

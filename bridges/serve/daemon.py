@@ -19,13 +19,12 @@ from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import DIAGNOSTICS
 from bridges.rmf.transport import Publisher, TransportError
 from bridges.serve import guard, record, signals
-from bridges.serve.buses import OpenBus, open_bus
 from bridges.serve.diagnostics import diagnosis
 from bridges.serve.directory import KeptFile, Once, RuntimeDirectory, state_file
 from bridges.serve.guard import Guard
 from bridges.serve.notify import notify, watchdog_s
 from bridges.serve.predecessor import Predecessor
-from bridges.serve.service import named_by, service
+from bridges.serve.service import OpenBus, named_by, service
 from bridges.settings.load import Config
 
 log = logging.getLogger(__name__)
@@ -43,7 +42,7 @@ class Daemon:
         runtime: RuntimeDirectory,
         end: signals.End,
         *,
-        open_bus: OpenBus = open_bus,
+        open_bus: OpenBus | None = None,
         localhost: bool = False,
         simulated: bool = False,
         ros_args: Sequence[str] = (),
@@ -72,6 +71,7 @@ class Daemon:
             runtime.claim(ours)  # before anything is: `outputs-off` goes by it
             self._guard = Guard(outputs_off) if guard.needed() else None
         kept = None if simulated else KeptFile(state_file(config.path))
+        open_bus = open_bus or config.open_bus
         self._service = service(config, self._transport, open_bus, kept, unsafe)
         self._loops = self._service.loops
         self._diagnostics: Publisher[DiagnosticArray] | None = None

@@ -3,7 +3,6 @@
 Either has loops with a thread each, subscribes for them, and says how they are.
 """
 
-import importlib
 import logging
 import time
 from collections import Counter
@@ -18,15 +17,17 @@ from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Transport, TransportError
-from bridges.serve.buses import OpenBus
 from bridges.serve.device import Clock, Node
 from bridges.serve.graph import GraphNode, Kept
 from bridges.serve.loop import Loop
 from bridges.serve.predecessor import SafeFirst
 from bridges.settings.load import Config
+from bridges.settings.names import kind_called
 from drivers.hal import Bus
 
 log = logging.getLogger(__name__)
+
+OpenBus = Callable[[str], Bus]
 
 
 def _clock(transport: Transport) -> Clock:
@@ -91,7 +92,7 @@ def service(
     `kept`: where a kind that has to remembers across restarts; None to forget. `unsafe`: devices that
     a dead daemon may have left on.
     """
-    kind: Kind | GraphKind = importlib.import_module(f"bridges.{config.kind}").KIND
+    kind = kind_called(config.kind)
     named = partial(named_by, config)
     if isinstance(kind, GraphKind):
         return GraphService(
@@ -139,7 +140,7 @@ class Devices:
         self._config = config
         self._unsafe = unsafe
         self._kind = kind
-        self._driver = importlib.import_module(f"drivers.{config.kind}.{config.driver}")
+        self._driver = config.driver_type
         self._transport = transport
         self._clock = _clock(transport)
         self._named = named
@@ -179,7 +180,7 @@ class Devices:
 
     def _loop(self, bus_name: str, open_bus: OpenBus) -> Loop:
         settings = self._config.buses[bus_name]
-        bus = open_bus(bus_name, settings)
+        bus = open_bus(bus_name)
         nodes = [
             self._node(name, device, bus)
             for name, device in self._config.devices.items()
@@ -188,8 +189,7 @@ class Devices:
         return Loop(bus_name, bus, nodes, settings.scan_s, self._clock)
 
     def _node(self, name: str, device: Any, bus: Bus) -> Node:
-        debounce: Mapping[str, float] = getattr(self._driver, "debounce", lambda _: {})(device)
-        limits = self._kind.limits(device, debounce)
+        limits = self._kind.limits(device, self._driver.debounce(device))
         driver = self._driver.create(name, device, bus)
         if name in self._unsafe:
             driver = SafeFirst(name, driver)

@@ -1,16 +1,14 @@
 """Every output of a YAML or of a record off, from a fresh process. Imports only what switches."""
 
-import importlib
 import logging
 import threading
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from bridges.log import pairs
-from bridges.serve.buses import open_bus
 from bridges.settings.load import Config
-from drivers import DriverError
+from drivers import Driver, DriverError
 from drivers.hal import HalError
 
 log = logging.getLogger(__name__)
@@ -21,11 +19,9 @@ def outputs_off(config: Config, timeout_s: float, but: Collection[str] = ()) -> 
 
     Bounded: a bus that does not answer is given up after `timeout_s` (s) in all.
     """
-    driver = importlib.import_module(f"drivers.{config.kind}.{config.driver}")
     results: dict[str, bool] = {}
     left = [name for name in config.devices if name not in but]
-    buses = {config.bus_of(name) for name in left}
-    threads = [_started(config, bus, driver, left, results) for bus in config.buses if bus in buses]
+    threads = [_started(config, bus, left, results) for bus in config.buses]
     deadline = time.monotonic() + timeout_s
     for thread in threads:
         thread.join(max(0.0, deadline - time.monotonic()))
@@ -36,31 +32,34 @@ def outputs_off(config: Config, timeout_s: float, but: Collection[str] = ()) -> 
 
 
 def _started(
-    config: Config, bus_name: str, driver: Any, left: Collection[str], results: dict[str, bool]
+    config: Config, bus_name: str, left: Collection[str], results: dict[str, bool]
 ) -> threading.Thread:
     """One bus that does not answer takes no time from the others."""
-    devices = {name: config.devices[name] for name in left if config.bus_of(name) == bus_name}
-    arguments = (bus_name, config.buses[bus_name], driver, devices, results)
+    devices = [name for name in config.devices_on(bus_name) if name in left]
+    arguments = (config, bus_name, devices, results)
     thread = threading.Thread(target=_bus_off, args=arguments, daemon=True)
     thread.start()
     return thread
 
 
 def _bus_off(
-    bus_name: str, settings: Any, driver: Any, devices: Mapping[str, Any], results: dict[str, bool]
+    config: Config, bus_name: str, devices: Sequence[str], results: dict[str, bool]
 ) -> None:
+    if not devices:
+        return
     try:
-        bus = open_bus(bus_name, settings)
+        bus = config.open_bus(bus_name)
     except HalError as error:
         log.error(pairs("outputs_not_off", bus=bus_name, reason=error))
         results.update(dict.fromkeys(devices, False))
         return
-    for name, device in devices.items():
-        results[name] = _device_off(name, driver.create(name, device, bus))
+    for name in devices:
+        driver = config.driver_type.create(name, config.devices[name], bus)
+        results[name] = _device_off(name, driver)
     bus.close()
 
 
-def _device_off(name: str, driver: Any) -> bool:
+def _device_off(name: str, driver: Driver[Any, Any]) -> bool:
     try:
         driver.open()
         driver.make_safe()

@@ -4,23 +4,17 @@
     driver: dry_contact     a file of drivers/
     rmf: {...}              bridges.core.fields.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
-    lifts: {name: {...}}    the kind's own key; what each holds is the driver's `Settings`
+    lifts: {name: {...}}    the kind's own key; what each holds is the driver's `settings`
 
 A kind that lives on RMF's graph alone has `kind`, `rmf` and one section of its own.
 
 Structs say what may stand in a section (`yaml_values`); what concerns several sections is checked
 here and in `wiring`. The daemon takes nothing else from the file, and checks nothing again.
-
-A driver's file may have, besides what `drivers/__init__.py` says: `warnings(settings)`, as (path,
-text) of what is legal but worth a look; and where there are no wires, `describe(settings, bus's
-settings)`, as (what, text), for `check`; and `claims(settings)`, as (place, path), of what no other
-device of its bus may use.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import msgspec
@@ -43,6 +37,8 @@ from bridges.settings.nodes import (
 )
 from bridges.settings.values import BROKEN, Entry, Spot, Values, below, is_none, locate
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
+from drivers.driver_type import DriverType
+from drivers.hal import Bus, BusType
 from drivers.hal.points import Wire
 
 __all__ = ["Config", "Problem", "SettingsError", "load"]
@@ -54,8 +50,8 @@ MAPPING = "a mapping (key: value)"
 class Config:
     """A file that is right.
 
-    `text`: its bytes as they were read. `buses` and `devices`: name -> the `Settings` of the bus's
-    or driver's file. `bus_types`: name -> `type:`. `warnings`: what is legal but worth a look.
+    `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's
+    or driver's record. `bus_types`: name -> `type:`. `warnings`: what is legal but worth a look.
     `section`: the settings of a kind without devices (`bridges/core/graph_kind.py`): it has no driver
     and no buses.
     """
@@ -76,16 +72,26 @@ class Config:
         named_bus: str | None = self.devices[device_name].bus
         return named_bus or next(iter(self.buses))
 
+    def devices_on(self, bus: str) -> list[str]:
+        """The names of the devices that stand on this bus."""
+        return [name for name in self.devices if self.bus_of(name) == bus]
+
+    @property
+    def driver_type(self) -> DriverType[Any, Any, Any]:
+        """The driver of its devices."""
+        return named.driver_called(self.kind, self.driver)
+
     def wires(self, device_name: str) -> list[Wire]:
         """A device's wiring table; empty where its driver has none."""
-        driver = named.driver_called(self.kind, self.driver)
-        return wires_of(driver, self.devices[device_name])
+        return list(self.driver_type.wires(self.devices[device_name]))
 
+    def bus_type(self, name: str) -> BusType[Any]:
+        """What the bus of this name is."""
+        return named.bus_called(self.bus_types[name])
 
-def wires_of(driver: ModuleType, settings: Any) -> list[Wire]:
-    """A device's wiring table; empty where its driver has none."""
-    table = getattr(driver, "wires", None)
-    return list(table(settings)) if table else []
+    def open_bus(self, name: str) -> Bus:
+        """The real bus of this name. Raises HalError."""
+        return self.bus_type(name).open_bus(self.buses[name])
 
 
 def load(path: Path | str) -> Config:
@@ -109,7 +115,7 @@ class _Bus:
 
     entry: Entry
     type: str | None
-    hal: ModuleType | None
+    hal: BusType[Any] | None
     settings: Any
 
 
@@ -123,7 +129,7 @@ class _Reading:
         self._kind: Kind | GraphKind | None = None
         self._section: Any = None
         self._kind_name = ""
-        self._driver: ModuleType | None = None
+        self._driver: DriverType[Any, Any, Any] | None = None
         self._driver_name = ""
         self._rmf = Rmf()
         self._buses: dict[str, _Bus] = {}
@@ -236,9 +242,8 @@ class _Reading:
         if name is None:
             return _Bus(entry, None, None, BROKEN)
         hal = named.bus_called(name)
-        settings = self._values.make(hal.Settings, entry.spot(), ("type",))
-        warnings = getattr(hal, "warnings", None)
-        for path, text in warnings(settings) if warnings and settings is not BROKEN else ():
+        settings = self._values.make(hal.settings, entry.spot(), ("type",))
+        for path, text in () if settings is BROKEN else hal.warnings(settings):
             self._warn(locate(entry.spot(), path).where(), f"bus '{entry.name}': {text}")
         return _Bus(entry, name, hal, settings)
 
@@ -264,7 +269,7 @@ class _Reading:
     def _allowed_types(self) -> list[str]:
         """The bus types that the driver can stand on; all while the driver is not known."""
         types = named.bus_types()
-        return [t for t in types if t in self._driver.BUSES] if self._driver else types
+        return [t for t in types if t in self._driver.buses] if self._driver else types
 
     def _read_devices(self, spot: Spot) -> None:
         entries = self._names(spot, (self._kind.name if self._kind else ""))
@@ -291,14 +296,14 @@ class _Reading:
             self._page.note(entry.value, unknown("bus", name, self._buses))
         return None
 
-    def _device(self, entry: Entry, bus: str | None, driver: ModuleType) -> Any:
+    def _device(self, entry: Entry, bus: str | None, driver: DriverType[Any, Any, Any]) -> Any:
         """A device's settings, with all that can be said about its wires."""
         spot = Spot(entry.value, entry.key, entry.spot().label)
         hal = self._buses[bus].hal if bus else None
         wiring = Wiring(self._page, entry.name, bus or "", hal)
         values = Values(self._page, wiring.checks)
         before = len(self._page.problems)
-        settings = values.make(driver.Settings, spot)
+        settings = values.make(driver.settings, spot)
         if settings is BROKEN:
             wiring.parts(values.structs, spot)
         else:
@@ -308,22 +313,24 @@ class _Reading:
         self._uses += wiring.uses
         return settings
 
-    def _check_signals(self, settings: Any, spot: Spot, wiring: Wiring, driver: ModuleType) -> None:
+    def _check_signals(
+        self, settings: Any, spot: Spot, wiring: Wiring, driver: DriverType[Any, Any, Any]
+    ) -> None:
         """The wires of a device whose settings are all there and of the right sort."""
-        wires = wires_of(driver, settings)
+        wires = list(driver.wires(settings))
         wiring.wires(wires, spot)
-        claims = getattr(driver, "claims", None)
-        wiring.claims(claims(settings) if claims else (), spot)
+        wiring.claims(driver.claims(settings), spot)
         signals = [wire.signal for wire in wires]
         note_unknown_signals(self._page, settings.accept_unsafe, signals, spot)
 
-    def _collect_warnings(self, settings: Any, spot: Spot, driver: ModuleType) -> None:
+    def _collect_warnings(
+        self, settings: Any, spot: Spot, driver: DriverType[Any, Any, Any]
+    ) -> None:
         """What is to be known of a device that is in order."""
         for signal, reason in settings.accept_unsafe.items():
             key = locate(spot, ("accept_unsafe", signal)).key
             self._warn(key, f"{spot.label}: unsafe wiring of '{signal}' is accepted: {reason}")
-        warnings = getattr(driver, "warnings", None)
-        for path, text in warnings(settings) if warnings else ():
+        for path, text in driver.warnings(settings):
             self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
 
     def _warn(self, node: Node, text: str) -> None:

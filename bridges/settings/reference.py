@@ -8,7 +8,6 @@ import inspect
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
 import msgspec
@@ -17,6 +16,7 @@ from msgspec import inspect as mi
 from bridges.core.fields import Rmf
 from bridges.core.graph_kind import GraphKind
 from bridges.settings import names as named
+from drivers.driver_type import DriverType
 
 KEYS = r"(?:^|(?<=[.;]\s))((?:`\w+`(?:,\s)?)+): "
 MEANING = re.compile(rf"{KEYS}(.*?)(?={KEYS}|\Z)", re.M | re.S)
@@ -29,7 +29,7 @@ class Shape:
     kind: str
     devices_key: str
     driver: str
-    module: ModuleType
+    type: DriverType[Any, Any, Any]
 
 
 def shapes() -> Iterator[Shape]:
@@ -48,9 +48,9 @@ def graph_kinds() -> list[GraphKind]:
 
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of a device YAML, for editors."""
-    buses = {name: named.bus_called(name).Settings for name in named.bus_types()}
+    buses = {name: named.bus_called(name).settings for name in named.bus_types()}
     graph = [kind.settings for kind in graph_kinds()]
-    types = [Rmf, *buses.values(), *(shape.module.Settings for shape in shapes()), *graph]
+    types = [Rmf, *buses.values(), *(shape.type.settings for shape in shapes()), *graph]
     refs, components = msgspec.json.schema_components(types, ref_template="#/$defs/{name}")
     by_type = dict(zip(types, refs, strict=True))
     for bus in buses.values():
@@ -75,7 +75,7 @@ def _allow_type(components: dict[str, Any], ref: dict[str, Any]) -> None:
 def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[str, Any]:
     kinds_of_bus = [
         {"allOf": [by_type[buses[name]], {"properties": {"type": {"const": name}}}]}
-        for name in shape.module.BUSES
+        for name in shape.type.buses
         if name in buses
     ]
     return {
@@ -89,7 +89,7 @@ def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[
             "buses": {"type": "object", "additionalProperties": {"oneOf": kinds_of_bus}},
             shape.devices_key: {
                 "type": "object",
-                "additionalProperties": by_type[shape.module.Settings],
+                "additionalProperties": by_type[shape.type.settings],
             },
         },
     }
@@ -119,10 +119,10 @@ def page() -> str:
         *_sections("`rmf`", Rmf),
     ]
     for name in named.bus_types():
-        sections += _sections(f"Bus of `type: {name}`", named.bus_called(name).Settings)
+        sections += _sections(f"Bus of `type: {name}`", named.bus_called(name).settings)
     for shape in shapes():
         title = f"`{shape.devices_key}` with `driver: {shape.driver}`"
-        sections += _sections(title, shape.module.Settings)
+        sections += _sections(title, shape.type.settings)
     for kind in graph_kinds():
         sections += _sections(f"`{kind.devices_key}` of `kind: {kind.name}`", kind.settings)
     return "\n\n".join(sections) + "\n"

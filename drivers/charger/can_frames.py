@@ -12,26 +12,18 @@ from typing import Annotated, Final
 import msgspec
 
 from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import (
-    Activity,
-    ChargerOutputs,
-    ChargerSample,
-    Measured,
-    Side,
-)
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
 from bridges.core.fields import Name
 from bridges.settings.nodes import unknown
 from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows
+from drivers.driver_type import DriverType
 from drivers.hal import can
-from drivers.hal.points import Wire
 from drivers.profiles import profile_problems
 
-BUSES: Final = ("can",)
-
 Volume = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
-UNKNOWN: Final[tuple[Activity, Side]] = (Activity.UNKNOWN, "")
+UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -99,11 +91,6 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
     frames = dbc.load(found.dbc)
     for name in (found.frames()[0], *(sent.frame for sent in found.send)):
         yield f"frame {can.named(frames.id(name))}", ("map",) if settings.map else ("profile",)
-
-
-def wires(settings: Settings) -> list[Wire]:
-    """None: a charger on CAN has no contacts."""
-    return []
 
 
 def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, str]]:
@@ -303,8 +290,8 @@ class FrameDriver:
                 values |= {f"{frame}.{signal}": value for signal, value in found.items()}
         return values
 
-    def _errors(self, values: dict[str, float]) -> list[tuple[Side, str]]:
-        sides: tuple[tuple[Side, dict[str, str]], ...] = (
+    def _errors(self, values: dict[str, float]) -> list[tuple[FaultSide, str]]:
+        sides: tuple[tuple[FaultSide, dict[str, str]], ...] = (
             ("station", self._map.errors.station),
             ("robot", self._map.errors.robot),
         )
@@ -343,3 +330,14 @@ def _receiver(number: float | None) -> str | None:
 def _rounded(value: float | None) -> float | None:
     """Without what scaling by 0.1 leaves behind."""
     return None if value is None else round(value, 3)
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("can",),
+    create=create,
+    describe=describe,
+    claims=claims,
+    warnings=warnings,
+    fake="hal_fakes.can.frame_charger",
+)

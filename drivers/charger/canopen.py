@@ -15,11 +15,9 @@ from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from drivers import DriverError
 from drivers.charger import xnergy
+from drivers.driver_type import DriverType
 from drivers.hal import can
 from drivers.hal.can.canopen import CanOpenNode
-from drivers.hal.points import Wire
-
-BUSES: Final = ("can",)
 
 ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
 IN_ERROR: Final = ("latched_low", "latched_high")
@@ -43,11 +41,6 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 def claims(settings: Settings) -> Iterable[tuple[str, tuple[str, ...]]]:
     """What no other device of the bus may use: (place, path)."""
     yield f"node {settings.node}", ("node",)
-
-
-def wires(settings: Settings) -> list[Wire]:
-    """None: a receiver on CAN has no contacts."""
-    return []
 
 
 def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, str]]:
@@ -148,3 +141,14 @@ class CanOpenCharger:
         where = xnergy.READS[name].sdo
         assert where
         return self._node.read(where.index, where.subindex, where.octets)
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("can",),
+    create=create,
+    describe=describe,
+    claims=claims,
+    warnings=warnings,
+    fake="hal_fakes.can.canopen_rcu",
+)

@@ -21,18 +21,16 @@ from bridges.charger.signals import (
     Activity,
     ChargerOutputs,
     ChargerSample,
+    FaultSide,
     Measured,
-    Side,
 )
 from drivers.charger import json_fields
 from drivers.charger.json_fields import Field
 from drivers.charger.state_codes import CODE_MAX, Code, Codes
+from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.hal.points import Wire
 
-BUSES = ("http",)
-
-UNKNOWN: Final[tuple[Activity, Side]] = (Activity.UNKNOWN, "")
+UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 WORD_MAX: Final = 64
 Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
 Path = Annotated[str, msgspec.Meta(pattern=r"^/[A-Za-z0-9._~/-]*$", max_length=256)]
@@ -156,11 +154,6 @@ class Calls(Protocol):
 def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
     """The driver of one station."""
     return HttpCharger(settings, bus)
-
-
-def wires(settings: Settings) -> list[Wire]:
-    """None: a station on HTTP has no contacts."""
-    return []
 
 
 def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str, str]]:
@@ -338,3 +331,13 @@ def _in_range(answer: Mapping[str, Any], place: InRange | None) -> bool | None:
     if not isinstance(value, bool):
         raise json_fields.wrong(place.field, value, "true or false")
     return value
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("http",),
+    create=create,
+    describe=describe,
+    warnings=warnings,
+    fake="hal_fakes.http_charger",
+)

@@ -12,12 +12,10 @@ from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from drivers import DriverError
 from drivers.charger import xnergy
+from drivers.driver_type import DriverType
 from drivers.hal import modbus
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import Unit, at, read, write
-from drivers.hal.points import Wire
-
-BUSES: Final = ("modbus",)
 
 ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
 IN_ERROR: Final = ("latched_low", "latched_high")
@@ -37,11 +35,6 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """What no other device may use: its coils."""
     for where in COMMANDS:
         yield str(_point(settings.unit, where)), ("unit",)
-
-
-def wires(settings: Settings) -> list[Wire]:
-    """None: a receiver on Modbus has no contacts."""
-    return []
 
 
 def describe(settings: Settings, bus_settings: modbus.Settings) -> list[tuple[str, str]]:
@@ -137,3 +130,14 @@ def _at(settings: Settings, name: str) -> Point:
 def _point(unit: int, where: xnergy.Where) -> Point:
     assert where.modbus
     return at(unit, where.modbus)
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("modbus",),
+    create=create,
+    describe=describe,
+    claims=claims,
+    warnings=warnings,
+    fake="hal_fakes.plants.xnergy_rcu",
+)

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured, Side
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
 
 Words = Mapping[str, int]
 """Raw unsigned words by the names of `READS`; one that the wire does not have is absent."""
@@ -46,7 +46,7 @@ CODES: Final[Mapping[int, tuple[Activity, str]]] = {
 }
 """What is published; every other code is UNKNOWN (`activity`)."""
 
-ERROR_BITS: Final[Mapping[int, tuple[Side, str]]] = {
+ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
     0x0000_0001: ("robot", "the receiver's flash memory is not set"),
     0x0000_0002: ("robot", "pairing timeout"),
     0x0000_0004: ("robot", "communication lost after pairing"),
@@ -162,7 +162,7 @@ def celsius(word: int) -> int:
     return word - 0x1_0000 if word & 0x8000 else word
 
 
-def errors(number: int) -> list[tuple[Side, str]]:
+def errors(number: int) -> list[tuple[FaultSide, str]]:
     """Side and text of each bit that is set: the station's first, the robot's last.
 
     An unpublished bit is nobody's.
@@ -183,7 +183,7 @@ def error_number(words: Words) -> int:
     return words.get("latched_high", 0) << 16 | words.get("latched_low", 0)
 
 
-def _text(words: Words, found: list[tuple[Side, str]]) -> str:
+def _text(words: Words, found: list[tuple[FaultSide, str]]) -> str:
     """The first error's side says it all for its own; another side's has its name before it."""
     if found:
         main = found[0][0]

@@ -15,10 +15,9 @@ import msgspec
 
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.driver_type import DriverType
 from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire
 from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
-
-BUSES: Final = ("gpio", "modbus")
 
 DEBOUNCE_S: Final = 0.05
 
@@ -198,3 +197,13 @@ def _unsafe(settings: Settings) -> Iterator[Unsafe]:
         if wire.signal in CUT_MUST_READ:
             yield from cut_must_read(wire, *CUT_MUST_READ[wire.signal])
     yield from energised_at_boot(table)
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("gpio", "modbus"),
+    create=create,
+    wires=wires,
+    debounce=debounce,
+    warnings=warnings,
+)

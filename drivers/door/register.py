@@ -12,6 +12,7 @@ from bridges.core.fields import Name
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
 from drivers.door.register_map import DoorMap, Errors, Flag, Parts, Problems, Status
+from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import (
@@ -24,8 +25,6 @@ from drivers.hal.modbus.registers import (
     place,
 )
 from drivers.profiles import Profile, profile_problems
-
-BUSES: Final = ("modbus",)
 
 BITS: Final = 16
 
@@ -219,3 +218,14 @@ def _address(text: str) -> int:
 def _status_text(status: Status) -> str:
     words = [(v, word) for word in ("closed", "moving", "open") for v in getattr(status, word)]
     return ", ".join(f"{v} {word}" for v, word in sorted([*words, *status.faults.items()]))
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("modbus",),
+    create=create,
+    describe=describe,
+    claims=claims,
+    warnings=warnings,
+    fake="hal_fakes.modbus.register_door",
+)

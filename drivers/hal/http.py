@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 import msgspec
 
 from bridges.core.fields import Name, Period
-from drivers.hal import Bus, HalError
+from drivers.hal import Bus, BusType, HalError
 from drivers.hal.deadline import Dialler, Resolve
 
 if TYPE_CHECKING:
@@ -338,3 +338,11 @@ def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) < len(pairs):
         raise ValueError("a name stands twice in one object")
     return found
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    fake="hal_fakes.http",
+    warnings=warnings,
+)

@@ -17,8 +17,10 @@ import canopen
 from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 
 from drivers.charger import xnergy
-from hal_fakes.can.side import Send
-from hal_fakes.plants.pad import PadReading
+from drivers.charger.canopen import Settings
+from hal_fakes.can.side import Send, slow_s
+from hal_fakes.fake import Fake
+from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
 from hal_fakes.plants.xnergy_rcu import words
 
@@ -130,3 +132,9 @@ def dictionary() -> Any:
         record: Any = made[where.sdo.index]
         record.add_member(variable)
     return made
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: PadPlant(name),
+    station=lambda plant, settings, bus: CanOpenRcu(plant, settings.node, slow_s(bus)),
+)

@@ -1,12 +1,14 @@
 """What Xnergy's receiver (RCU) shows of the plant: its numbers, whether on CANopen or on Modbus."""
 
-from typing import Any, Final, cast
+from typing import Final, cast
 
 from bridges.charger.signals import Activity
+from drivers.charger.modbus import Settings
 from drivers.charger.xnergy import CHECK_RANGE, ENABLE, IN_RANGE, READS, TICKS_PER_UNIT
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import at
-from hal_fakes.plants.pad import PadReading
+from hal_fakes.fake import Fake
+from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
 
 HANDSHAKE: Final = (1, 2, 3, 4)
@@ -61,7 +63,7 @@ class ModbusRcu:
     `points`: what it has, `outputs` among it; `unit`: where.
     """
 
-    def __init__(self, plant: Plant, settings: Any) -> None:
+    def __init__(self, plant: Plant, settings: Settings) -> None:
         self.plant = plant
         self.unit: int = settings.unit
         self._reads = {self._point(where.modbus): name for name, where in READS.items()}
@@ -94,3 +96,9 @@ class ModbusRcu:
     def _point(self, place: str | None) -> Point:
         assert place
         return at(self.unit, place)
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: PadPlant(name),
+    station=lambda plant, settings, bus: ModbusRcu(plant, settings),
+)

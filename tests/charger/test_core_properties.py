@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.charger import core
-from bridges.charger.core import Event
+from bridges.charger.signals import Event
 from tests.charger import story as s
 from tests.charger.invariants import check
 from tests.charger.walk import MOVES, SITES, World, moved, waited

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from bridges.charger import KIND
-from bridges.charger.core import Cancelled, Requested
+from bridges.charger.memory import ChargerLimits
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import ChargerLimits, ChargerSettings, Limits
-from bridges.charger.signals import Measured
+from bridges.charger.settings import ChargerSettings, Limits
+from bridges.charger.signals import Cancelled, Measured, Requested
 from bridges.core.decision import RequestRefused
 from bridges.rmf.definitions import (
     ChargerCancel,

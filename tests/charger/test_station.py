@@ -4,11 +4,11 @@ side of each, in virtual time, one poll a second."""
 import pytest
 from msgspec.structs import replace
 
-from bridges.charger.core import Cancelled, Requested
+from bridges.charger.memory import ChargerLimits
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import ChargerLimits, Limits
+from bridges.charger.settings import Limits
 from bridges.charger.signals import Activity as A
-from bridges.charger.signals import ChargerOutputs, ChargerSample, Measured
+from bridges.charger.signals import Cancelled, ChargerOutputs, ChargerSample, Measured, Requested
 from bridges.core.decision import Fault, Sampled, WriteFailed
 from bridges.rmf.definitions import ChargerStateValue as State
 from tests.charger.story import (

@@ -3,8 +3,8 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.charger.core import Requested
-from bridges.charger.settings import ChargerLimits
+from bridges.charger.memory import ChargerLimits
+from bridges.charger.signals import Requested
 from tests.charger.invariants import check
 from tests.charger.walk import MOVES, SITES, Step, World, moved, waited, walk
 

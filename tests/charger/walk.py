@@ -11,10 +11,19 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from bridges.charger.core import Cancelled, Event, Memory, Requested, decide
+from bridges.charger.core import decide
+from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import ChargerLimits, Limits, Robot, robot
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
+from bridges.charger.settings import Limits, Robot, robot
+from bridges.charger.signals import (
+    Activity,
+    Cancelled,
+    ChargerOutputs,
+    ChargerSample,
+    Event,
+    Measured,
+    Requested,
+)
 from bridges.core.decision import Decision, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 
 LIMITS = Limits(

@@ -7,7 +7,8 @@ import pytest
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator import KIND, messages
-from bridges.charger_coordinator.memory import CHARGING, Dedicated, Shown, Sighting
+from bridges.charger_coordinator.memory import CHARGING
+from bridges.charger_coordinator.signals import Dedicated, Sighting, StateHeard
 from bridges.core.decision import RequestRefused
 from bridges.rmf import definitions as d
 from bridges.settings.load import SettingsError, load
@@ -58,7 +59,7 @@ STATE = d.ChargerState(d.Time(), 3, "charger_a", "", "id", "tiny", "AMR01")
 
 
 def test_a_chargers_state_is_what_it_shows() -> None:
-    shown = Shown("charger_a", CHARGING, "id", ONE)
+    shown = StateHeard("charger_a", CHARGING, "id", ONE)
     assert messages.accept_state(STATE, SETTINGS, 0.0) == shown
 
 

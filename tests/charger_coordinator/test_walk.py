@@ -19,23 +19,25 @@ from bridges.charger_coordinator.memory import (
     ERROR,
     IDLE,
     RELEASED,
-    SILENT_S,
+    STATION_SILENT_S,
+    Memory,
+    Site,
+)
+from bridges.charger_coordinator.signals import (
     Dedicated,
     FleetSeen,
-    Memory,
-    Shown,
     Sighting,
+    StateHeard,
     Unwanted,
     Wanted,
 )
-from bridges.charger_coordinator.settings import site
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf import definitions as d
 from tests.charger_coordinator.yard import settings
 
 SETTINGS = settings()
-SITE = site(SETTINGS)
+SITE = Site.of(SETTINGS)
 ONE, TWO = Robot("tiny", "AMR01"), Robot("tiny", "AMR02")
 A, B = "charger_a", "charger_b"
 WAYPOINTS = set(SETTINGS.fleets["tiny"].waypoints)
@@ -77,11 +79,11 @@ class Node:
     def fails(self, error: str) -> None:
         self.state, self.error = ERROR, error
 
-    def shown(self, name: str) -> Shown:
+    def shown(self, name: str) -> StateHeard:
         request_id, who = self.holder or ("", None)
         if not request_id and self.state is not IDLE:
             request_id = f"unrequested/{name}"
-        return Shown(name, self.state, request_id, who, self.error)
+        return StateHeard(name, self.state, request_id, who, self.error)
 
 
 class Ledger:
@@ -265,7 +267,7 @@ IDS = st.sampled_from(
 )
 EVENTS = st.one_of(
     st.builds(
-        Shown,
+        StateHeard,
         STATIONS,
         st.sampled_from([IDLE, ASSIGNED, CHARGING, RELEASED, ERROR]),
         IDS,
@@ -315,7 +317,7 @@ def test_whatever_is_heard_no_two_robots_share_and_nothing_is_said_out_of_turn(
                 assert set(places) <= WAYPOINTS
             if isinstance(message, d.ChargerRequest):
                 seen = memory.stations[message.charger_name]
-                assert now < seen.at + SILENT_S or memory.grants[message.charger_name]
+                assert now < seen.at + STATION_SILENT_S or memory.grants[message.charger_name]
         kept = keep.persist({"site": memory})
         assert keep.persist(keep.restore(kept, SETTINGS, now)) == kept
 

@@ -6,8 +6,10 @@ from typing import Any
 
 from bridges.charger import core as charger
 from bridges.charger import messages as charger_messages
-from bridges.charger.settings import ChargerLimits, ChargerSettings, Limits, Robot
-from bridges.charger.signals import Activity, ChargerSample, Measured, Side
+from bridges.charger.memory import ChargerLimits
+from bridges.charger.settings import ChargerSettings, Limits, Robot
+from bridges.charger.signals import Activity, ChargerSample, Measured
+from bridges.charger.signals import FaultSide as Side
 from bridges.charger_coordinator import KIND
 from bridges.charger_coordinator.settings import (
     Fleet as FleetSettings,

@@ -5,13 +5,14 @@ import math
 from msgspec.structs import replace
 
 from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen
-from bridges.door.core import CloseDoor, DoorReport, OpenDoor
-from bridges.door.settings import DoorLimits, Limits, Pulse
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.door.memory import DoorLimits
+from bridges.door.report import DoorReport
+from bridges.door.settings import Limits, Pulse
+from bridges.door.signals import CloseRequested, DoorOutputs, DoorSample, OpenRequested
 from bridges.rmf.definitions import DoorModeValue
 from tests.door.virtual import BETWEEN, BOTH, CLOSED, DEBOUNCED, OPEN, CoreAlone
 
-OPENS, CLOSES = OpenDoor("door_supervisor"), CloseDoor("door_supervisor")
+OPENS, CLOSES = OpenRequested("door_supervisor"), CloseRequested("door_supervisor")
 
 
 def limits(**durations: float) -> DoorLimits:

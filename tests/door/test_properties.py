@@ -7,9 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
-from bridges.door.core import RIVAL_QUIET_S, CloseDoor, DoorMemory, Event, OpenDoor, decide, initial
-from bridges.door.settings import DoorLimits, Limits, Pulse
-from bridges.door.signals import DoorSample
+from bridges.core.durations import RIVAL_QUIET_S
+from bridges.door.core import decide, initial
+from bridges.door.memory import DoorLimits, Memory
+from bridges.door.settings import Limits, Pulse
+from bridges.door.signals import CloseRequested, DoorSample, Event, OpenRequested
 from bridges.rmf.definitions import DoorModeValue
 from tests.door.virtual import DEBOUNCED, Decided
 
@@ -18,8 +20,8 @@ SAMPLES = st.builds(DoorSample, opened=CONTACT, closed=CONTACT, obstruction=CONT
 EVENTS: st.SearchStrategy[Event] = st.one_of(
     SAMPLES.map(Sampled),
     SAMPLES.map(Sampled),
-    st.just(OpenDoor("a")),
-    st.just(CloseDoor("a")),
+    st.just(OpenRequested("a")),
+    st.just(CloseRequested("a")),
     st.just(IoFailed("no reply")),
     st.just(RivalSeen()),
     st.just(OperatorReset()),
@@ -57,9 +59,9 @@ class Ledger:
         if self.ends_at is not None and now >= self.ends_at:
             self.wanted, self.ends_at = False, None
         match event:
-            case OpenDoor() if not decided.refused:
+            case OpenRequested() if not decided.refused:
                 self.wanted, self.ends_at = True, None
-            case CloseDoor() if self.wanted and self.ends_at is None:
+            case CloseRequested() if self.wanted and self.ends_at is None:
                 self.ends_at = now + self.limits.t.close_grace_s
                 self.wanted = self.ends_at > now
             case Sampled(sample):
@@ -84,7 +86,7 @@ def codes(decided: Decided) -> set[str]:
 
 def history(steps: list[tuple[float, Event]], limits: DoorLimits) -> Any:
     """Each step: its time, the ledger after it, and what was decided."""
-    memory: DoorMemory = initial(limits, 0.0)
+    memory: Memory = initial(limits, 0.0)
     ledger, now = Ledger(limits), 0.0
     for pause_s, event in steps:
         now += pause_s

@@ -3,7 +3,8 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.door.settings import DoorLimits, Pulse
+from bridges.door.memory import DoorLimits
+from bridges.door.settings import Pulse
 from tests.door.invariants import check, nothing_changes_before_wake_at
 from tests.door.virtual import DEBOUNCED
 from tests.door.walk import MOVES, Step, World, limits_of, moved, start, waited, walk

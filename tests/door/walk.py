@@ -13,9 +13,14 @@ from msgspec.structs import replace
 
 from bridges.core.debounce import Settled
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
-from bridges.door.core import RIVAL_QUIET_S, CloseDoor, DoorMemory, Event, OpenDoor, decide, initial
-from bridges.door.settings import DoorLimits, Limits
-from bridges.door.signals import DoorSample
+from bridges.core.durations import RIVAL_QUIET_S
+from bridges.door.core import decide, initial
+from bridges.door.memory import DoorLimits
+from bridges.door.memory import Memory as DoorMemory
+from bridges.door.settings import Limits
+from bridges.door.signals import CloseRequested as CloseDoor
+from bridges.door.signals import DoorSample, Event
+from bridges.door.signals import OpenRequested as OpenDoor
 from tests.door.virtual import Decided
 
 LONG_S = 32.0

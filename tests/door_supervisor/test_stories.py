@@ -1,6 +1,6 @@
 """Whole stories: a door and its daemon, robots as RMF drives them, and the supervisor between."""
 
-from bridges.door_supervisor import table
+from bridges.door_supervisor import keep
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from hal_fakes.rmf import NEVER, Said, door_request
@@ -156,7 +156,7 @@ def test_the_session_of_a_restarted_fleet_adapter_is_cleaned_by_the_next_heartbe
     a.restart(20.5)
     site.net.run(40.0)
     assert site.first_close() == (21.125, "CLOSED")
-    assert site.disk.kept == table.persist({})
+    assert site.disk.kept == keep.persist({})
 
 
 def test_beside_rmfs_own_such_a_session_stays_for_ever() -> None:

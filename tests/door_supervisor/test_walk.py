@@ -10,10 +10,12 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bridges.core.durations import GAP_S, REPEAT_S
 from bridges.core.graph_kind import MaySpeak, Woken
-from bridges.door_supervisor import core, table
-from bridges.door_supervisor.core import Closes, Limits, Memory, Opens, Shown
+from bridges.door_supervisor import core, keep
+from bridges.door_supervisor.memory import OPEN, Limits, Memory
 from bridges.door_supervisor.settings import Settings
+from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
 from bridges.rmf.definitions import DoorModeValue, DoorRequest
 
 LIMITS = Limits(open_alarm_s=30.0)
@@ -48,7 +50,7 @@ class Ledger:
         assert ("DOOR_HELD_OPEN" in codes) == bool(late)
         # Whoever asks is told of soon: a word is under way, or the last one was right.
         if self.speaks and self.holders:
-            assert self.memory.sent == core.OPEN or self.wake_at <= self.now + core.GAP_S
+            assert self.memory.sent == OPEN or self.wake_at <= self.now + GAP_S
 
     def until(self, at: float) -> None:
         while self.wake_at <= at:
@@ -58,10 +60,10 @@ class Ledger:
 
     def _note(self, event: Any) -> None:
         match event:
-            case Opens(who, stamp) if stamp >= self.newest.get(who, 0):
+            case OpenRequested(who, stamp) if stamp >= self.newest.get(who, 0):
                 self.newest[who] = stamp
                 self.holders.add(who)
-            case Closes(who, stamp) if stamp >= self.newest.get(who, 0):
+            case CloseRequested(who, stamp) if stamp >= self.newest.get(who, 0):
                 self.newest[who] = stamp
                 self.holders.discard(who)
             case MaySpeak(yes):
@@ -72,8 +74,8 @@ class Ledger:
         assert word == (DoorModeValue.MODE_OPEN if self.holders else DoorModeValue.MODE_CLOSED)
         if self.sent:
             at, before = self.sent[-1]
-            assert self.now >= at + core.GAP_S
-            assert self.now >= at + core.REPEAT_S or word != before or self.begins
+            assert self.now >= at + GAP_S
+            assert self.now >= at + REPEAT_S or word != before or self.begins
         self.sent.append((self.now, word))
         self.begins = False
 
@@ -83,7 +85,7 @@ def stamp(now: float, aged: float = 0.0) -> int:
 
 
 def test_every_history_of_two_requesters_to_depth_seven() -> None:
-    words = list(product((Opens, Closes), "ab"))
+    words = list(product((OpenRequested, CloseRequested), "ab"))
     for history in product(words, repeat=7):
         ledger = Ledger(speaks=True)
         for step, (word, who) in enumerate(history):
@@ -91,19 +93,19 @@ def test_every_history_of_two_requesters_to_depth_seven() -> None:
             ledger.hears(word(who, stamp(ledger.now)))
         ledger.until(6.0)
         last = {who: word for word, who in history}
-        held = Opens in last.values()
+        held = OpenRequested in last.values()
         words_sent = [word for _, word in ledger.sent]
-        opened = any(word is Opens for word, _ in history)
+        opened = any(word is OpenRequested for word, _ in history)
         assert words_sent[-1:] == ([2] if held else [0] if opened else [])
 
 
 def test_every_history_of_late_requests_states_and_leave_to_speak_to_depth_five() -> None:
     steps: list[Any] = [
-        lambda now: Opens("a", stamp(now)),
-        lambda now: Closes("a", stamp(now)),
-        lambda now: Closes("a", stamp(now, aged=1.0)),
-        lambda now: Opens("a", stamp(now, aged=1.0)),
-        lambda now: Shown(DoorModeValue.MODE_OPEN),
+        lambda now: OpenRequested("a", stamp(now)),
+        lambda now: CloseRequested("a", stamp(now)),
+        lambda now: CloseRequested("a", stamp(now, aged=1.0)),
+        lambda now: OpenRequested("a", stamp(now, aged=1.0)),
+        lambda now: StateHeard(DoorModeValue.MODE_OPEN),
         lambda now: MaySpeak(int(now / 0.75) % 2 == 1),
     ]
     for history in product(steps, repeat=5):
@@ -116,9 +118,11 @@ def test_every_history_of_late_requests_states_and_leave_to_speak_to_depth_five(
 
 EVENTS = st.one_of(
     st.tuples(
-        st.sampled_from([Opens, Closes]), st.sampled_from("abc"), st.sampled_from([0, 0, 2, 5])
+        st.sampled_from([OpenRequested, CloseRequested]),
+        st.sampled_from("abc"),
+        st.sampled_from([0, 0, 2, 5]),
     ),
-    st.sampled_from(list(DoorModeValue)).map(Shown),
+    st.sampled_from(list(DoorModeValue)).map(StateHeard),
     st.booleans().map(MaySpeak),
     st.just(Woken()),
 )
@@ -142,12 +146,12 @@ def told(history: list[tuple[float, Any]]) -> Ledger:
 def _would_be_believed(ledger: Ledger, event: Any) -> bool:
     """Old requests long enough after the last are a clock set back, or of somebody forgotten:
     stories of their own (test_core)."""
-    if not isinstance(event, Opens | Closes) or event.stamp >= ledger.newest.get(
+    if not isinstance(event, OpenRequested | CloseRequested) or event.stamp >= ledger.newest.get(
         event.requester, 0
     ):
         return False
-    voice = ledger.memory.voices[event.requester]
-    return ledger.now > voice.heard_at + 9.0 or voice.doubted_at > voice.doubted_since
+    requester = ledger.memory.requesters[event.requester]
+    return ledger.now > requester.heard_at + 9.0 or requester.doubted_at > requester.doubted_since
 
 
 @settings(max_examples=300, deadline=None, derandomize=True)
@@ -165,11 +169,11 @@ def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
     history: list[tuple[float, Any]],
 ) -> None:
     ledger = told(history)
-    kept = table.persist({"ward": ledger.memory})
-    restored = table.restore(kept, Settings(), 0.0)
+    kept = keep.persist({"ward": ledger.memory})
+    restored = keep.restore(kept, Settings(), 0.0)
     holders = {h.requester for memory in restored.values() for h in memory.holders}
     assert holders == ledger.holders
-    assert table.persist(restored) == kept
+    assert keep.persist(restored) == kept
     if restored:
         spoken = core.decide(restored["ward"], MaySpeak(True), 3.0, LIMITS)
         assert [
@@ -181,7 +185,7 @@ def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
 @given(st.binary(max_size=60))
 def test_no_file_is_taken_by_halves(kept: bytes) -> None:
     try:
-        restored = table.restore(kept, Settings(), 0.0)
+        restored = keep.restore(kept, Settings(), 0.0)
     except ValueError:
         return
     assert all(memory.door == name for name, memory in restored.items())

@@ -12,8 +12,8 @@ from typing import Any
 from bridges.core.decision import RequestRefused
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.door import messages as door_messages
-from bridges.door_supervisor import KIND, core, messages, table
-from bridges.door_supervisor.core import Memory
+from bridges.door_supervisor import KIND, core, keep, messages, report
+from bridges.door_supervisor.memory import Memory
 from bridges.door_supervisor.settings import Settings
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -43,7 +43,7 @@ class Disk:
 
     def holds(self, who: str, door: str = WARD) -> bool:
         """Would a daemon that starts now know that this requester holds the door?"""
-        found = table.restore(self.kept, Settings(), 0.0) if self.kept else {}
+        found = keep.restore(self.kept, Settings(), 0.0) if self.kept else {}
         return door in found and found[door].holder(who) is not None
 
 
@@ -70,7 +70,7 @@ class Shell:
         self._beat: d.Message | None = None
         self._beat_at = -NEVER
         if disk.kept is not None:
-            self.memories.update(table.restore(disk.kept, self.settings, now))
+            self.memories.update(keep.restore(disk.kept, self.settings, now))
         for door in list(self.memories):
             self._decide(door, MaySpeak(False), now)
 
@@ -142,17 +142,17 @@ class Shell:
 
     def _tell(self, now: float) -> list[Said]:
         """Keep the table, then tell it: a heartbeat when it has changed, and each second."""
-        self.disk.write(table.persist(self.memories))
+        self.disk.write(keep.persist(self.memories))
         if now < self._told_next_at():
             return []
-        topic, self._beat = table.heartbeat(self.memories)
+        topic, self._beat = report.heartbeat(self.memories)
         self._beat_at = now
         return [(topic, self._beat)]
 
     def _told_next_at(self) -> float:
         if not self.speaks:
             return NEVER
-        changed = table.heartbeat(self.memories)[1] != self._beat
+        changed = report.heartbeat(self.memories)[1] != self._beat
         return self._beat_at + (GAP_S if changed else EVERY_S)
 
 

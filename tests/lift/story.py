@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from bridges.core.decision import OperatorReset
 from bridges.core.kind import Kind
 from bridges.lift import KIND
-from bridges.lift.limits import LiftLimits
+from bridges.lift.memory import LiftLimits
 from bridges.lift.settings import Floor, LiftSettings, Limits
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.rmf.definitions import (

@@ -3,8 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.lift.drive import Channel, Relays
-from bridges.lift.limits import LiftLimits
+from bridges.lift.memory import Channel, LiftLimits, Relays
 from bridges.lift.settings import LiftSettings, Limits
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from tests.lift.story import Building, Controller, Story

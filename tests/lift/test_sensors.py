@@ -4,8 +4,9 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.core.decision import Fault, Sampled
-from bridges.lift.core import Asked, Memory, decide
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
+from bridges.lift.core import decide
+from bridges.lift.memory import Memory
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Requested
 from bridges.rmf.definitions import LiftMotion
 from bridges.rmf.stamps import in_seconds
 from tests.lift.story import WALL, Building, Controller, Story
@@ -467,7 +468,7 @@ def test_an_estimated_door_that_stirs_is_not_there() -> None:
 
 def test_the_core_says_when_an_input_that_was_seen_for_the_first_time_will_count() -> None:
     rules = Story(Building(OPEN_AT_L1)).limits
-    before = decide(Memory(), Asked("A", True, "L1"), 0.0, rules)
+    before = decide(Memory(), Requested("A", True, "L1"), 0.0, rules)
     assert [fault.detail for fault in before.report.faults] == ["not read yet"]
     first = decide(before.memory, Sampled(OPEN_AT_L1), 10.0, rules)
     assert first.wake_at == 10.0 + rules.debounce_s("door")

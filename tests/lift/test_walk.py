@@ -6,7 +6,7 @@ from math import inf
 import pytest
 from msgspec.structs import replace
 
-from bridges.lift.limits import LiftLimits
+from bridges.lift.memory import LiftLimits
 from bridges.lift.signals import Door, LiftOutputs, Motion
 from tests.lift.invariants import check, nothing_changes_before_wake_at
 from tests.lift.walk import IDLE, MOVES, Step, World, limits_of, moved, start, waited, walk

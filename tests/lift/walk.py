@@ -13,11 +13,11 @@ from msgspec.structs import replace
 
 from bridges.core.debounce import Settled
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
-from bridges.lift.core import Asked, Ended, Event, Memory, decide, initial, published
-from bridges.lift.drive import Channel
-from bridges.lift.limits import LiftLimits
+from bridges.lift.core import decide, initial, published
+from bridges.lift.memory import Channel, LiftLimits, Memory
 from bridges.lift.settings import LiftSettings, Limits
-from bridges.lift.signals import Door, Hazard, LiftSample, Motion
+from bridges.lift.signals import Door, Ended, Event, Hazard, LiftSample, Motion
+from bridges.lift.signals import Requested as Asked
 
 LONG_S = 55.0
 """Without a wake_at, a scan each so many seconds is enough here; below `stale_after_s`."""

@@ -92,7 +92,7 @@ def test_while_another_publishes_it_is_passive_and_says_so_once(
     assert site.sent == []
     site.until(60.25 + 3.0 + SPREAD_MOST_S + 0.3)
     assert [request.session_id for request in site.sent] == ["fleet/a"]
-    ours = [r.getMessage() for r in caplog.records if r.name.startswith("bridges.graph_")]
+    ours = [r.getMessage() for r in caplog.records if r.name.startswith("bridges.serve.")]
     assert [text for text in ours if not text.startswith("state")] == [
         "active kind=lift_supervisor",
         'passive kind=lift_supervisor reason="another node does the same"',

@@ -6,9 +6,9 @@ import pytest
 
 from bridges.core.decision import Fault, RequestRefused
 from bridges.lift_supervisor import messages
-from bridges.lift_supervisor.memory import Asked, Ended, Shown, Wish
 from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings
+from bridges.lift_supervisor.signals import Ended, Requested, StateHeard, Target
 from bridges.rmf.definitions import LiftRequest, LiftState, Time
 
 ANY = Settings()
@@ -16,13 +16,13 @@ AGV = LiftRequest("Lift1", Time(100, 500_000_000), "fleet/a", 1, "L3", 2)
 
 
 def test_an_adapters_request_is_what_it_asks_with_its_stamp_and_age() -> None:
-    asked = Asked("fleet/a", Wish(1, "L3", 2), 100.5, 0.5)
+    asked = Requested("fleet/a", Target(1, "L3", 2), 100.5, 0.5)
     assert messages.accept_request(AGV, ANY, 101.0) == asked
 
 
 def test_human_mode_may_be_asked_without_a_floor() -> None:
     human = replace(AGV, request_type=2, destination_floor="", door_state=0)
-    asked = Asked("fleet/a", Wish(2, "", 0), 100.5, -0.5)
+    asked = Requested("fleet/a", Target(2, "", 0), 100.5, -0.5)
     assert messages.accept_request(human, ANY, 100.0) == asked
 
 
@@ -54,7 +54,7 @@ def test_what_cannot_be_asked_is_refused_by_name(changes: dict[str, object], kin
 
 def test_a_state_is_what_it_shows() -> None:
     state = LiftState(Time(), "Lift1", ("L1", "L3"), "L1", "L3", 1, 1, (1, 2), 2, "fleet/a")
-    shown = Shown("fleet/a", "L1", "L3", 1, 2, ("L1", "L3"))
+    shown = StateHeard("fleet/a", "L1", "L3", 1, 2, ("L1", "L3"))
     assert messages.accept_state(state, ANY, 0.0) == shown
     with pytest.raises(RequestRefused):
         messages.accept_state(state, Settings(lifts=["Lift2"]), 0.0)

@@ -9,9 +9,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from bridges.core.durations import GAP_S, REPEAT_S
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.lift_supervisor import core
-from bridges.lift_supervisor.memory import NOBODY_IS_SENT, Asked, Ended, Limits, Memory, Shown, Wish
+from bridges.lift_supervisor.memory import NOBODY_IS_SENT, Limits, Memory
+from bridges.lift_supervisor.signals import Ended, Requested, StateHeard, Target
 from bridges.rmf.definitions import LiftMode
 from tests.lift_supervisor.alone import words
 from tests.lift_supervisor.world import LiftNode, OurSupervisor, Rider, World
@@ -136,7 +138,7 @@ class Watched:
         message: Any = decided.publish[0][1]
         text = words(message)
         assert memory.may_speak
-        assert self.now >= before.sent_at + core.GAP_S
+        assert self.now >= before.sent_at + GAP_S
         assert memory.turn
         assert message.session_id == memory.turn.session
         if message.request_type != 0:
@@ -144,7 +146,7 @@ class Watched:
         if message.request_type == 1:
             assert not (memory.shown and memory.shown.mode in NOBODY_IS_SENT)
         if before.sent is not None and before.turn == memory.turn and words(before.sent) == text:
-            assert self.now >= before.sent_at + core.REPEAT_S
+            assert self.now >= before.sent_at + REPEAT_S
         return text
 
     def _check_turn(self, before: Memory, after: Memory, event: Any) -> None:
@@ -155,7 +157,7 @@ class Watched:
         if before.turn is None or (after.turn and after.turn.session == before.turn.session):
             return
         if before.turn.ends:
-            assert isinstance(event, Shown)
+            assert isinstance(event, StateHeard)
             assert event.session != before.turn.session
             assert before.sent is not None
         else:
@@ -168,14 +170,14 @@ def events_at(now: float) -> list[Any]:
     """What may happen next."""
     agv, fire = LiftMode.MODE_AGV, LiftMode.MODE_FIRE
     return [
-        Asked("a", Wish(1, "L3", 2), now, 0.0),
-        Asked("b", Wish(1, "L1", 2), now, 0.0),
+        Requested("a", Target(1, "L3", 2), now, 0.0),
+        Requested("b", Target(1, "L1", 2), now, 0.0),
         Ended("a", now, 0.0),
         Ended("b", now, 0.0),
-        Shown("", "L1", "", 0, agv),
-        Shown("a", "L3", "L3", 2, agv),
-        Shown("b", "L1", "L3", 1, agv),
-        Shown("", "L1", "", 2, fire),
+        StateHeard("", "L1", "", 0, agv),
+        StateHeard("a", "L3", "L3", 2, agv),
+        StateHeard("b", "L1", "L3", 1, agv),
+        StateHeard("", "L1", "", 2, fire),
         MaySpeak(True),
         MaySpeak(False),
     ]
@@ -236,8 +238,8 @@ def test_from_wherever_it_is_a_lift_that_obeys_is_given_to_whoever_asks(
     lift = desk.memory.session_shown
     for _ in range(60):
         desk.now += 1.0
-        lift = obeys(lift, desk.hears(Asked("c", Wish(1, "L2", 2), desk.now, 0.0)))
-        shown = Shown(lift, "L2", "L2" * bool(lift), 2, LiftMode.MODE_AGV)
+        lift = obeys(lift, desk.hears(Requested("c", Target(1, "L2", 2), desk.now, 0.0)))
+        shown = StateHeard(lift, "L2", "L2" * bool(lift), 2, LiftMode.MODE_AGV)
         lift = obeys(lift, desk.hears(shown))
     assert lift == "c"
 

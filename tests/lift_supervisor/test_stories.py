@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import pytest
 
-from bridges.commands.effects import SoFar
-from bridges.commands.wishes import LiftEnd
+from bridges.commands.requests import Seen
+from bridges.commands.requests.lift import LiftEnd
 from bridges.lift.signals import Hazard
 from bridges.lift_supervisor.settings import Settings
 from bridges.rmf.definitions import LiftRequest
@@ -276,7 +276,7 @@ def test_an_operator_releases_the_lift_of_a_dead_robot_for_those_who_wait() -> N
     robots[0].die()
     world.run(600.0)
     assert shown(world) == [A]
-    end = LiftEnd("Lift1", A, direct=False).request(SoFar(0.0, 60.0))
+    end = LiftEnd("Lift1", A).message(Seen(0.0, 60.0))
     assert end is not None
     end = replace(end, request_time=stamp(EPOCH + world.now - 60.0))
     world.send("operator", ADAPTER_LIFT_REQUESTS, end)

@@ -31,7 +31,7 @@ HOLD = Wire("hold", "out", "A2", "high", path=("outputs", "hold"))
 
 
 def gate(raw: Any) -> Any:
-    return msgspec.convert(raw, named.driver_called("gate", "contact").Settings, str_keys=True)
+    return msgspec.convert(raw, named.driver_called("gate", "contact").settings, str_keys=True)
 
 
 def test_a_right_file_becomes_a_config(file: Path) -> None:
@@ -41,7 +41,7 @@ def test_a_right_file_becomes_a_config(file: Path) -> None:
         kind="gate",
         driver="contact",
         rmf=Rmf(transport="dds", domain_id=7),
-        buses={"header": named.bus_called("pins").Settings()},
+        buses={"header": named.bus_called("pins").settings()},
         devices={"north": gate(GATE)},
         bus_types={"header": "pins"},
     )

@@ -158,9 +158,9 @@ def leaves(wanted: Type) -> Iterator[Type]:
 
 
 def test_every_field_of_every_driver_and_bus_is_of_a_sort_that_is_read() -> None:
-    structs = [Rmf, *(named.bus_called(name).Settings for name in named.bus_types())]
+    structs = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
     for kind in named.kind_names():
-        structs += [named.driver_called(kind, name).Settings for name in named.driver_names(kind)]
+        structs += [named.driver_called(kind, name).settings for name in named.driver_names(kind)]
     sorts = {type(leaf) for struct in structs for leaf in leaves(type_info(struct))}
     assert sorts <= {BoolType, EnumType, FloatType, IntType, LiteralType, NoneType, StrType}
     assert len(structs) >= 7

@@ -12,7 +12,7 @@ from typing import Any
 from drivers.hal import HalError, points
 from drivers.hal.modbus.points import Point
 from drivers.hal.points import Pull, Wire
-from hal_fakes.http import Station
+from hal_fakes.http_charger import HttpCharger as Station
 from hal_fakes.modbus.register_door import RegisterDoor
 from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.machine import Machine

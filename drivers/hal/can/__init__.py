@@ -18,7 +18,7 @@ from typing import Annotated, Final, NamedTuple
 import msgspec
 
 from bridges.core.fields import Period
-from drivers.hal import Bus, HalError
+from drivers.hal import Bus, BusType, HalError
 from drivers.hal.backoff import Backoff
 from drivers.hal.can.link import (
     BITRATES,
@@ -33,7 +33,7 @@ from drivers.hal.can.link import (
     socketcan,
 )
 
-__all__ = ["EXTENDED", "CanBus", "Frame", "Settings", "Slcan", "Wanted", "named", "open_bus"]
+__all__ = ["BUS", "EXTENDED", "CanBus", "Frame", "Settings", "Slcan", "Wanted", "named", "open_bus"]
 
 FRAMES_AT_ONCE: Final = 20_000
 """A reading takes no more: a bus at 1 Mbit/s has 8,000 a second."""
@@ -284,3 +284,11 @@ class CanBus(Bus):
 def named(frame_id: int) -> str:
     """An id as people write it: 0x58A, 0x18FF50E5."""
     return f"0x{frame_id & ~EXTENDED:08X}" if frame_id & EXTENDED else f"0x{frame_id:03X}"
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    fake="hal_fakes.can",
+    warnings=warnings,
+)

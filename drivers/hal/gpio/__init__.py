@@ -17,7 +17,7 @@ import msgspec
 
 from bridges.core.fields import Period
 from bridges.log import pairs
-from drivers.hal import Bus, HalError
+from drivers.hal import Bus, BusType, HalError
 from drivers.hal.gpio.dead_man import AFTER_S, DeadMan
 from drivers.hal.points import Pull, Wire
 
@@ -123,7 +123,7 @@ def open_bus(
 ) -> "GpioBus":
     """The header's pins. Raises HalError with what to look at.
 
-    `factory`: a gpiozero pin factory whose pins claim as those of `_gpio_pins.py` do.
+    `factory`: a gpiozero pin factory whose pins claim as those of `pins.py` do.
     """
     if factory is None:
         factory = _lgpio_factory(settings.chip)
@@ -132,7 +132,7 @@ def open_bus(
 
 def _lgpio_factory(chip: int | None) -> Any:
     try:
-        from drivers.hal.gpio import pins as _gpio_pins
+        from drivers.hal.gpio import pins
     except ImportError as error:
         raise HalError(
             f"GPIO needs lgpio ({error}): apt install python3-lgpio, or pip install"
@@ -140,7 +140,7 @@ def _lgpio_factory(chip: int | None) -> Any:
         ) from error
     except OSError as error:  # lgpio makes a FIFO in the working directory when it is imported
         raise HalError(f"lgpio cannot write in the working directory: {error}") from error
-    return _gpio_pins.open_factory(chip)
+    return pins.open_factory(chip)
 
 
 class GpioBus(Bus):
@@ -311,3 +311,13 @@ def _hal_errors(point: str) -> Iterator[None]:
     except _failures() as error:
         text = getattr(error, "value", error)  # lgpio's errors print in quotes
         raise HalError(f"{describe(point)}: {text}") from error
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    fake="hal_fakes.gpio",
+    canonical=canonical,
+    describe=describe,
+    wire_problems=wire_problems,
+)

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import msgspec
 
 from bridges.core.fields import Period
-from drivers.hal import Bus, HalError
+from drivers.hal import Bus, BusType, HalError
 from drivers.hal.backoff import Backoff
 from drivers.hal.modbus.flash import ask_for
 from drivers.hal.modbus.places import Serial, Tcp
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from pymodbus.pdu import ModbusPDU
 
 __all__ = [
+    "BUS",
     "EXCEPTIONS",
     "ModbusBus",
     "Serial",
@@ -344,3 +345,14 @@ class ModbusLines:
                     f"{coil} reads {int(not level)} after {int(level)} was written: the module has"
                     " restarted, its watchdog has tripped, or somebody else writes it"
                 )
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    fake="hal_fakes.modbus",
+    warnings=warnings,
+    canonical=canonical,
+    describe=describe,
+    wire_problems=wire_problems,
+)

@@ -12,13 +12,12 @@ from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Mea
 from bridges.settings.load import SettingsError, load
 from drivers.charger import dbc
 from drivers.charger.can_frames import (
-    BUSES,
+    DRIVER,
     FrameDriver,
     Settings,
     create,
     describe,
     warnings,
-    wires,
 )
 from drivers.charger.can_map import PROFILE, FrameMap
 from drivers.hal import can as hal
@@ -79,8 +78,8 @@ def charger() -> Iterator[Charger]:
 
 
 def test_the_driver_stands_on_can_and_has_no_wires() -> None:
-    assert BUSES == ("can",)
-    assert wires(Settings(profile="wiferion", setpoints=SETPOINTS)) == []
+    assert DRIVER.buses == ("can",)
+    assert list(DRIVER.wires(Settings(profile="wiferion", setpoints=SETPOINTS))) == []
 
 
 def test_a_published_status_frame_is_what_it_says(charger: Charger) -> None:

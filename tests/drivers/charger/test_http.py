@@ -9,13 +9,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridges.charger import core
-from bridges.charger.settings import ChargerLimits
+from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from bridges.settings.load import load
 from drivers import DriverError
-from drivers.charger.http import BUSES, Settings, create, describe, warnings, wires
+from drivers.charger.http import DRIVER, Settings, create, describe, warnings
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
 from drivers.hal import http as bus_file
@@ -48,8 +48,8 @@ def read(answer: Any) -> ChargerSample:
 
 
 def test_the_driver_stands_on_http_and_has_no_wires() -> None:
-    assert BUSES == ("http",)
-    assert wires(SETTINGS) == []
+    assert DRIVER.buses == ("http",)
+    assert list(DRIVER.wires(SETTINGS)) == []
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf_and_none_is_passed_on_raw() -> 
     states: dict[State, set[int]] = {state: set() for state in State}
     for code in range(256):
         sample = create("a", made, Station({"state": code, "error_msg": ""})).read()
-        shown = core.decide(core.Memory(), Sampled(sample), 0.0, ChargerLimits.of(made)).report
+        shown = core.decide(Memory(), Sampled(sample), 0.0, ChargerLimits.of(made)).report
         states[shown.state].add(code)
         assert ("unknown vendor state" in shown.error_message) == (
             sample.activity is Activity.UNKNOWN

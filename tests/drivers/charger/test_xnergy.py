@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.charger import core
-from bridges.charger.settings import ChargerLimits
+from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
@@ -23,7 +23,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf() -> None:
     states: dict[State, set[int]] = {state: set() for state in State}
     for code in range(256):
         made = xnergy.sample(words(state=code))
-        shown = core.decide(core.Memory(), Sampled(made), 0.0, ChargerLimits()).report
+        shown = core.decide(Memory(), Sampled(made), 0.0, ChargerLimits()).report
         states[shown.state].add(code)
         unknown = "unknown vendor state" in shown.error_message
         assert unknown == (made.activity is Activity.UNKNOWN) == (code not in xnergy.CODES)

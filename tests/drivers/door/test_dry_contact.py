@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from bridges.door.settings import DoorLimits, Limits, Pulse
+from bridges.door.memory import DoorLimits
+from bridges.door.settings import Limits, Pulse
 from bridges.door.signals import DoorOutputs, DoorSample
 from bridges.settings.load import load
 from drivers.door.dry_contact import create, debounce, warnings, wires
@@ -230,7 +231,7 @@ def test_polarity_is_the_wires_and_the_sample_has_none() -> None:
 
 def test_an_output_is_written_when_it_differs_and_again_after_a_failed_reading() -> None:
     built = settings()
-    bus = MemoryBus(Wiring(build("door", built), wires(built), str))
+    bus = MemoryBus(Wiring(build("door", built, wires(built)), wires(built), str))
     driver = create("door", built, bus)
     driver.open()
     bus.written.clear()

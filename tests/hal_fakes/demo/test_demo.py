@@ -68,6 +68,14 @@ def test_a_failure_makes_it_wrong_with_the_reason_and_the_logs(directory: Path) 
     assert running(directory) == []
 
 
+def test_the_last_state_of_each_device_is_told_in_words(directory: Path) -> None:
+    with demo(directory, "--fail", "ward_door", "operator", "stuck") as process:
+        out, _ = process.communicate()
+    assert process.returncode == 1, out
+    assert "\nlast state of Lift1: car at L1, door closed, mode HUMAN\n" in out
+    assert "WRONG: waited 20 s for ward_door to be open, and the heartbeat to list the robot" in out
+
+
 def test_a_device_that_the_demo_does_not_have_is_a_usage_error(directory: Path) -> None:
     with demo(directory, "--fail", "Lift9", "car", "off") as process:
         out, _ = process.communicate()
