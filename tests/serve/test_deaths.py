@@ -352,3 +352,48 @@ def test_no_descriptor_left_ends_no_daemon(module: Module, graph: Graph, tmp_pat
         assert (running.process.poll(), module.relay()) == (None, [True])
         assert running.end(signal.SIGTERM) == 0
     assert module.relay() == [True, False]
+
+
+def test_a_stranger_is_told_what_to_do_and_switches_nothing(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    with tempfile.TemporaryDirectory(dir="/tmp") as base:
+        os.chmod(base, 0o755)
+        run = Path(base) / "run"
+        run.mkdir(mode=0o700)
+        with daemon(module.file, run, **SERVICE) as running:
+            hold_open(module, graph, running)
+            for name in ("outputs-off", "reset"):
+                stranger = subprocess.run(
+                    command(name, module.file, "--runtime-dir", run),
+                    env=environment(),
+                    capture_output=True,
+                    text=True,
+                    user=65534 if os.geteuid() == 0 else None,
+                )
+                if os.geteuid() == 0:
+                    assert (stranger.returncode, "use sudo" in stranger.stderr) == (69, True)
+                assert "Traceback" not in stranger.stderr
+            assert module.relay() == [True]
+
+
+def test_gpio_without_lgpio_or_permission_is_told_in_a_line(tmp_path: Path) -> None:
+    file = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
+    done = _told("outputs-off", file, "--runtime-dir", tmp_path / "run")
+    assert done.returncode == 1
+    assert "outputs_not_off" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_simulation_needs_no_token(tmp_path: Path) -> None:
+    file = Path(__file__).parents[2] / "config" / "charger_http.yaml"
+    text = file.read_text()
+    with_token = tmp_path / "charger.yaml"
+    with_token.write_text(
+        re.sub(r"( *)(api_base: .*)", r"\1\2\n\1token_file: /none/token", text, count=1)
+    )
+    assert "token_file" in with_token.read_text()
+    options = ("--simulate", "--domain-id", str(free_domain()))
+    with daemon(with_token, tmp_path / "run", *options) as running:
+        running.wait_for("ready")
+        assert "token_file" not in running.log.read_text()
