@@ -108,7 +108,9 @@ def own(places: Places) -> None:
     """Raises PermissionError where a directory is there and belongs to another user."""
     for folder in _existing(places):
         if folder.stat().st_uid != os.geteuid():
-            raise PermissionError(f"{folder} belongs to {owner_of(folder)}: run this as that user")
+            raise PermissionError(
+                f"{folder} belongs to {owner_of(folder)}: sudo -u {owner_of(folder)} does it"
+            )
 
 
 def act_as_owner(places: Places) -> None:

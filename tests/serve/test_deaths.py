@@ -372,7 +372,7 @@ def test_a_stranger_is_told_what_to_do_and_switches_nothing(
                     user=65534 if os.geteuid() == 0 else None,
                 )
                 if os.geteuid() == 0:
-                    assert (stranger.returncode, "use sudo" in stranger.stderr) == (69, True)
+                    assert (stranger.returncode, "sudo" in stranger.stderr) == (69, True)
                 assert "Traceback" not in stranger.stderr
             assert module.relay() == [True]
 
@@ -390,7 +390,7 @@ def test_a_simulation_needs_no_token(tmp_path: Path) -> None:
     text = file.read_text()
     with_token = tmp_path / "charger.yaml"
     with_token.write_text(
-        re.sub(r"( *)(api_base: .*)", r"\1\2\n\1token_file: /none/token", text, count=1)
+        re.sub(r'(api_base: "[^"]*")', r"\1, token_file: /none/token", text, count=1)
     )
     assert "token_file" in with_token.read_text()
     options = ("--simulate", "--domain-id", str(free_domain()))
