@@ -50,6 +50,7 @@ class _OthersOnce(logging.Filter):
         place = record.pathname, record.lineno
         if record.name.partition(".")[0] in self.OURS:
             return True
+        record.exc_info = record.exc_text = None  # where in the library is nobody's first question
         first = place not in self._said
         self._said.add(place)
         return first

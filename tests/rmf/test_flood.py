@@ -53,7 +53,7 @@ def test_a_library_says_each_of_its_lines_once_and_we_say_all_of_ours(tmp_path: 
     text = (
         "import logging; from bridges import log; log.start()\n"
         "for n in range(3):\n"
-        "    logging.getLogger('pymodbus.logging').warning('bad frame %s', n)\n"
+        "    logging.getLogger('pymodbus').warning('bad frame %s', n, exc_info=ValueError())\n"
         "    logging.getLogger('bridges.serve').warning('ours %s', n)\n"
     )
     env = {**os.environ, "JOURNAL_STREAM": "1"}

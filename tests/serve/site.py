@@ -129,7 +129,7 @@ class Daemon:
         """Until the log says so."""
         wait_until(lambda: text in self.log.read_text(), f"{text!r} in {self.log}")
 
-    def end(self, number: signal.Signals) -> int:
+    def end(self, number: int) -> int:
         """Send a signal and give the exit code."""
         self.process.send_signal(number)
         return self.process.wait(20)
@@ -173,6 +173,10 @@ class Graph:
     def ask(self, mode: DoorModeValue) -> None:
         """Send a request once the node has matched."""
         wait_until(self._requests.matched, "the node listens")
+        self.request(mode)
+
+    def request(self, mode: DoorModeValue) -> None:
+        """Send a request, whoever listens."""
         request = DoorRequest(
             door_name="ward_door", requester_id="r", requested_mode=DoorMode(int(mode))
         )
