@@ -1,12 +1,13 @@
 """Where a daemon keeps what is its own, found by one rule for every command.
 
 A directory that was given is the only one; else systemd's, in a unit; else the service's, where that
-is about this very file; else the one of a daemon started by hand. For root that may be anybody's.
+is about this very file; else the one of a daemon started by hand, for root perhaps by who called sudo.
 
 `runtime` goes with a reboot: the lock and the status. `state` outlives it: what is claimed, since a
 Modbus relay outlives a power cut of ours. A directory that was given is both.
 """
 
+import grp
 import os
 import pwd
 import stat
@@ -18,8 +19,9 @@ SERVICE_RUN = Path("/run/rmf-bridge")
 SERVICE_STATE = Path("/var/lib/rmf-bridge")
 USERS_RUN = Path("/run/user")
 TMP = Path("/tmp")
+SERVICE_USER = "rmf-bridge"
 GROUPS = ("gpio", "dialout")
-"""What the unit gives its user beside its own group."""
+"""What the unit gives this user beside its own group."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,21 +70,26 @@ def state_base(environ: Mapping[str, str] = os.environ) -> Path:
 
 
 def everywhere(file: Path) -> Iterator[Places]:
-    """Where a daemon of this file may be, the service's first. Root looks at each user's too."""
+    """Where a daemon of this file may be: the service's, and the one of a daemon by hand, for root
+    also that of the user who has become root by sudo.
+    """
     yield of_service(file)
+    if os.geteuid() == 0 and (uid := os.environ.get("SUDO_UID", "")).isdecimal():
+        yield from _of_user(int(uid), file)
     yield by_hand(file)
-    if os.geteuid() == 0:
-        for base in (*sorted(USERS_RUN.glob("*")), *sorted(TMP.glob("rmf-bridge-*"))):
-            if (runtime := base / "rmf-bridge" / file.stem).is_dir():
-                yield Places(runtime, _state_of_owner(runtime, file))
 
 
-def _state_of_owner(runtime: Path, file: Path) -> Path:
-    try:
-        home = pwd.getpwuid(runtime.lstat().st_uid).pw_dir
-    except (KeyError, OSError):
-        return runtime
-    return Path(home) / ".local/state/rmf-bridge" / file.stem
+def _of_user(uid: int, file: Path) -> Iterator[Places]:
+    """What is in his directories; nobody else has put it there."""
+    for base in (USERS_RUN / str(uid), TMP / f"rmf-bridge-{uid}"):
+        runtime = base / "rmf-bridge" / file.stem
+        try:
+            home = Path(pwd.getpwuid(uid).pw_dir)
+            his = base.lstat().st_uid == uid and runtime.lstat().st_uid == uid
+        except (KeyError, OSError):
+            continue
+        if his:
+            yield Places(runtime, home / ".local/state/rmf-bridge" / file.stem)
 
 
 def distrusted(folder: Path) -> str:
@@ -133,17 +140,21 @@ def _existing(places: Places) -> list[Path]:
 
 
 def _become(uid: int, gid: int) -> None:
-    import grp
-
-    groups = [gid]
-    for name in GROUPS:
-        try:
-            groups.append(grp.getgrnam(name).gr_gid)
-        except KeyError:
-            continue
-    os.setgroups(groups)
+    os.setgroups(_groups(uid, gid))
     os.setgid(gid)
     os.setuid(uid)
+
+
+def _groups(uid: int, gid: int) -> list[int]:
+    """Those that the user has, and for the unit's those that the unit gives it."""
+    try:
+        user = pwd.getpwuid(uid)
+    except KeyError:
+        return [gid]
+    groups = os.getgrouplist(user.pw_name, gid)
+    if user.pw_name == SERVICE_USER:
+        groups += [g.gr_gid for g in grp.getgrall() if g.gr_name in GROUPS]
+    return groups
 
 
 def owner_of(path: Path) -> str:

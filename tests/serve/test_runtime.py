@@ -211,6 +211,19 @@ def test_after_a_power_cut_the_record_alone_shows_the_service(machine: Path) -> 
     assert find(FILE, None) == service
 
 
+def test_root_by_sudo_finds_the_daemon_that_this_user_has_started_by_hand(
+    machine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runtime = machine / "user" / str(os.getuid()) / "rmf-bridge" / "lift"
+    RuntimeDirectory(in_one(runtime), FILE, serves=True).close()
+    assert find(FILE, None).runtime == machine / "user/7/rmf-bridge/lift"
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setenv("SUDO_UID", str(os.getuid()))
+    assert find(FILE, None).runtime == runtime
+    monkeypatch.setenv("SUDO_UID", "65534")
+    assert find(FILE, None).runtime == machine / "user/7/rmf-bridge/lift"
+
+
 def test_without_xdg_a_daemon_by_hand_is_below_tmp(
     machine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
