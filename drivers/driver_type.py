@@ -6,7 +6,7 @@ drivers to edit. Only `bridges/settings/names.py` imports one by its name.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import msgspec
 
@@ -46,3 +46,7 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     claims: Callable[[Settings], Iterable[tuple[str, tuple[str, ...]]]] = lambda settings: ()
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
     fake: str = ""
+
+
+AnyDriver: TypeAlias = DriverType[Any, Any, Any]
+"""One that was found by its name: its settings, sample and outputs are those of its kind."""

@@ -7,7 +7,7 @@ Only this file imports one by its name. A driver that names none has the plant o
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeAlias, TypeVar
 
 from bridges.settings.load import Config
 from drivers.hal import Bus, HalError
@@ -68,6 +68,9 @@ class Inside(Generic[Settings, Station]):
     open_bus: Callable[[Settings, Sequence[Station], RealTime], Bus]
 
 
+FarSide: TypeAlias = Inside[Any, Any] | Outside[Any, Any]
+
+
 def plants_on(config: Config, bus: str) -> dict[str, Plant]:
     """A new plant for each device on this bus."""
     fake = _fake(config)
@@ -91,12 +94,12 @@ def stations_on(config: Config, bus: str, plants: Mapping[str, Plant]) -> list[A
     ]
 
 
-def far_side(config: Config, bus: str) -> Inside[Any, Any] | Outside[Any, Any]:
+def far_side(config: Config, bus: str) -> FarSide:
     """The far side of this bus. Raises HalError where its type has none."""
     name = config.bus_type(bus).fake
     if not name:
         raise HalError(f"a bus of type {config.bus_types[bus]} cannot be simulated: it has no fake")
-    found: Inside[Any, Any] | Outside[Any, Any] = import_module(name).FAKE
+    found: FarSide = import_module(name).FAKE
     return found
 
 

@@ -29,7 +29,7 @@ READY_S = 15.0
 
 
 class Simulation:
-    """The far sides of a file's buses.
+    """The far sides of a file's buses. Those in a process of their own start while the daemon does.
 
     Made before the daemon leaves the directory that a relative path of the file is relative to.
     """
@@ -39,16 +39,18 @@ class Simulation:
         self._file = str(Path(config.path).resolve())
         self._runtime_dir = runtime_dir.resolve()
         self._open = contextlib.ExitStack()
+        self._children = {
+            name: self._start(name) for name in config.buses if self._has_process(name)
+        }
 
     def open_bus(self, name: str) -> Bus:
-        """Start the fake for this bus; returns a real bus in front of it. Raises HalError.
+        """A real bus in front of the fake for it. Raises HalError.
 
         Two buses may be opened one after the other, not at once.
         """
-        far = far_side(self._config, name)
-        if isinstance(far, Inside):
-            return self._inside(name, far)
-        return self._config.bus_type(name).open_bus(self._pointed_at_child(name))
+        if self._has_process(name):
+            return self._config.bus_type(name).open_bus(self._pointed_at_child(name))
+        return self._inside(name)
 
     def close(self) -> None:
         """End every fake. Close the buses first. May be called twice."""
@@ -59,15 +61,21 @@ class Simulation:
         several = len(self._config.buses) > 1
         return self._runtime_dir / (f"plant-{name}.sock" if several else "plant.sock")
 
-    def _inside(self, name: str, far: Inside[Any, Any]) -> Bus:
+    def _has_process(self, name: str) -> bool:
+        """Asked without an import of the fake, which would bring its libraries into the daemon."""
+        bus_type = self._config.bus_type(name)
+        return bool(bus_type.fake) and not bus_type.fake_inside
+
+    def _inside(self, name: str) -> Bus:
+        far = far_side(self._config, name)
+        assert isinstance(far, Inside)
         world = RealTime(plants_on(self._config, name))
         self._open.callback(world.close)
         self._open.callback(Control(self.socket_path(name), world.plants).close)
         stations = stations_on(self._config, name, world.plants)
         return far.open_bus(self._config.buses[name], stations, world)
 
-    def _pointed_at_child(self, name: str) -> Any:
-        settings = self._config.buses[name]
+    def _start(self, name: str) -> "subprocess.Popen[bytes]":
         socket = self.socket_path(name)
         child = subprocess.Popen(
             [sys.executable, "-m", "hal_fakes", self._file, name, "--socket", str(socket)],
@@ -76,6 +84,11 @@ class Simulation:
             start_new_session=True,  # Ctrl-C in a terminal is for the daemon alone
         )
         self._open.callback(_end, child)
+        return child
+
+    def _pointed_at_child(self, name: str) -> Any:
+        settings = self._config.buses[name]
+        child = self._children.pop(name) if name in self._children else self._start(name)
         replace = _first_line(child, name)
         return msgspec.convert({**msgspec.to_builtins(settings), **replace}, type(settings))
 

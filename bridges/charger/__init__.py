@@ -1,11 +1,22 @@
 """Chargers: RMF's ChargerRequest to a station, and the truth about it as ChargerState."""
 
 from bridges.charger import core, messages
-from bridges.charger.memory import ChargerLimits
+from bridges.charger.memory import ChargerLimits, Memory
+from bridges.charger.report import ChargerReport
+from bridges.charger.settings import ChargerSettings
+from bridges.charger.signals import Cancelled, ChargerOutputs, ChargerSample, Requested
 from bridges.core.kind import Kind
 from bridges.rmf.topics import CHARGER_CANCELS, CHARGER_REQUESTS, CHARGER_STATES
 
-KIND = Kind(
+KIND: Kind[
+    ChargerSettings,
+    ChargerLimits,
+    Memory,
+    ChargerSample,
+    Requested | Cancelled,
+    ChargerOutputs,
+    ChargerReport,
+] = Kind(
     name="charger",
     devices_key="chargers",
     states=CHARGER_STATES,

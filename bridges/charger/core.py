@@ -1,26 +1,26 @@
-"""The charger's decision core: whose the station is, what it does, and what RMF is report.
+"""The charger's decision core: whose the station is, what it does, and what RMF is told.
 
-1. IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from anywhere. A request only assigns; what
-   the station does is what it says, reading by reading. Current that still flows, ramping down too,
-   is CHARGING; RELEASED is a station disconnected from its robot, until the pad is clear.
-2. A request is granted while the state is IDLE. Its repeats change nothing, and once it is over they
-   do not start it again. Any other request is refused until the station is IDLE; but the robot that
-   stands on the pad may ask where it is known to stand (`pad.py`).
+1. IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from anywhere. A request only assigns; every
+   other state is what the station's readings say. CHARGING lasts as long as current flows, also while
+   it ramps down. RELEASED is a station disconnected from its robot, until the pad is clear.
+2. A request is granted while the state is IDLE. Its repeats change nothing, and do not start it again
+   once it is over. Other requests are refused until the station is IDLE. The robot that stands on the
+   pad is an exception where the station knows it (`pad.py`).
 3. `start_timeout` counts from acceptance. A request that has not charged by then ends in RELEASED and
-   IDLE; the reason is a fault, as the error message is blank unless the state is ERROR.
+   IDLE. The reason is a fault; RMF's error message is blank unless the state is ERROR.
 4. A cancel ends the request that it names and no other. While current flows it takes the power away,
-   and the state stays CHARGING until the station has stopped. A full battery ends it likewise.
+   and the state stays CHARGING until the station has stopped. A full battery ends a request likewise.
 5. Power is given to the robot that the station is assigned to, when it is seen on the pad and in range.
-   Another robot is refused: no power, ERROR and its name; the request that waits goes on waiting.
-6. A fault takes the power first and is reported second; power comes back only with a new request. A
+   Another robot gets no power; the state is ERROR with its name, and the request goes on waiting.
+6. A fault takes the power away before it is reported. Power comes back only with a new request. A
    station at fault, or one that goes on charging when it is told to stop, is out of service
    (protection): ERROR until its errors have been cleared and a good reading says so. A fault of the
    robot's side takes no station out of service.
-7. Failed polls prove nothing: after `misses` of them the state is ERROR, with the robot and request as
-   they were. A request ends, and a station becomes free, on a good reading only; or by an operator,
-   when the station has switched off by itself for certain.
-8. A charge under way when this daemon came, or came back, is shown as it is. It is neither stopped nor
-   credited to whoever asks next, unless that robot is seen there.
+7. Failed polls prove nothing. After `misses` of them the state is ERROR, and robot and request stay as
+   they were. Only a good reading ends a request or frees a station, or an operator, once the station
+   has certainly switched off by itself.
+8. A charge under way when this daemon starts, or reaches the station again, is shown as it is. It is
+   not stopped, and the next request does not get it unless its robot is seen there.
 9. Errors are cleared when an operator says so, or at most `clear_errors_per_h` times an hour.
 """
 
@@ -109,7 +109,7 @@ def _sampled(memory: Memory, sample: ChargerSample, now: float, limits: ChargerL
 
 
 def _held(memory: Memory, holder: Session | None) -> Memory:
-    """The request goes on, or it is over and its late repeats are remembered."""
+    """The memory with this session; without one, the last request's late repeats are remembered."""
     if holder or not memory.holder:
         return replace(memory, holder=holder)
     ended = memory.holder.request.request_id
@@ -118,7 +118,7 @@ def _held(memory: Memory, holder: Session | None) -> Memory:
 
 
 def _watched(memory: Memory, now: float) -> Memory:
-    """Since when the station charges against the last decision."""
+    """Note since when the station charges although it was told not to."""
     charges = memory.sample and memory.sample.activity is Activity.CHARGING
     if memory.power is not False or not charges:
         return replace(memory, disobeyed_since=None)
@@ -127,7 +127,7 @@ def _watched(memory: Memory, now: float) -> Memory:
 
 
 def _protected(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
-    """Out of service from the station's own fault on, until a clearing is seen to have helped."""
+    """Out of service from a fault of the station until a good reading follows a clearing."""
     sample, since = memory.sample, memory.disobeyed_since
     assert sample
     if not limits.can_stop:

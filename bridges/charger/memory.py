@@ -5,7 +5,7 @@ from typing import Literal
 
 import msgspec
 
-from bridges.charger.settings import ChargerSettings, Limits, Robot, Unrequested, robot
+from bridges.charger.settings import ChargerSettings, Durations, Robot, Unrequested, robot
 from bridges.charger.signals import ChargerSample, Requested
 from bridges.core.durations import AGES_AGO, RIVAL_QUIET_S
 
@@ -16,7 +16,7 @@ class ChargerLimits(msgspec.Struct, frozen=True):
     `receivers`: empty where nobody is verified. `can_stop`: `power` is obeyed.
     """
 
-    t: Limits = Limits()
+    t: Durations = Durations()
     receivers: Mapping[str, Robot] = {}
     unrequested: Unrequested = "refuse"
     can_stop: bool = True
@@ -90,5 +90,5 @@ def rivalled(memory: Memory, now: float) -> bool:
 
 
 def unreachable(memory: Memory, limits: ChargerLimits) -> bool:
-    """Does the last good reading say nothing any more, or was there none?"""
+    """Have `misses` polls failed since the last good reading, or was there none?"""
     return memory.sample is None or memory.misses >= limits.t.misses

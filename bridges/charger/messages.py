@@ -6,6 +6,7 @@ from bridges.charger.report import UNREQUESTED, ChargerReport
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Cancelled, Requested
 from bridges.core.decision import RequestRefused
+from bridges.core.names import check_length
 from bridges.rmf.definitions import (
     ChargerCancel,
     ChargerRequest,
@@ -16,7 +17,6 @@ from bridges.rmf.definitions import (
 )
 from bridges.rmf.stamps import duration, in_seconds
 
-LONGEST_NAME = 256
 LONGEST_TIMEOUT_S = 86400.0
 """A day: whoever asks for more has mistaken the unit."""
 
@@ -53,7 +53,8 @@ def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled
 def _check(field: str, text: str) -> None:
     if not text:
         raise RequestRefused(f"empty {field}", "ChargerState must show it")
-    if len(text) > LONGEST_NAME or not text.isprintable():
+    check_length(**{field: text})
+    if not text.isprintable():
         raise RequestRefused(f"impossible {field}", f"{text[:40]!r}, {len(text)} characters")
 
 

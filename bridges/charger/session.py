@@ -52,7 +52,7 @@ def shown_released(holder: Session, now: float, limits: ChargerLimits) -> bool:
 
 
 def _beside_another(holder: Session, now: float, limits: ChargerLimits) -> Session | None:
-    """Another robot stands on the pad: who waits goes on waiting, who was charged has left."""
+    """Another robot stands on the pad: who waits goes on waiting; who was charged has left."""
     if shown_released(holder, now, limits):
         return None
     if holder.released_at is not None:
@@ -107,7 +107,7 @@ def cleared_to_start(memory: Memory, limits: ChargerLimits) -> bool:
 
 
 def range_checked(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
-    """Ask for the robot's position where only that is missing; an old answer does not count."""
+    """Ask for the robot's position where only that is missing. An answer from before does not count."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or holder.started or holder.over:
         return memory

@@ -95,7 +95,7 @@ class Requested(msgspec.Struct, frozen=True):
 
     @property
     def who(self) -> Robot:
-        """For whom."""
+        """The robot that it is for."""
         return Robot(self.fleet, self.robot)
 
 

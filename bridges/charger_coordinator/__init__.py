@@ -1,8 +1,16 @@
 """The charger coordinator: which robot charges where, and who waits, for all chargers of a site."""
 
 from bridges.charger_coordinator import core, keep, messages
-from bridges.charger_coordinator.memory import Site
+from bridges.charger_coordinator.memory import Memory, Site
+from bridges.charger_coordinator.report import SiteReport
 from bridges.charger_coordinator.settings import Settings, described, warnings
+from bridges.charger_coordinator.signals import (
+    Dedicated,
+    FleetSeen,
+    StateHeard,
+    Unwanted,
+    Wanted,
+)
 from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind
 from bridges.rmf.topics import (
@@ -16,7 +24,13 @@ from bridges.rmf.topics import (
     FLEET_STATES,
 )
 
-KIND = GraphKind(
+KIND: GraphKind[
+    Settings,
+    Site,
+    Memory,
+    FleetSeen | StateHeard | Wanted | Unwanted | Dedicated,
+    SiteReport,
+] = GraphKind(
     name="charger_coordinator",
     devices_key="coordinator",
     settings=Settings,

@@ -6,21 +6,22 @@ ChargerRequest and ChargerCancel, which no part of RMF does. Rules:
    SETTLES_S, and as long as it does, or is on its way in the same task. The mode alone would not do:
    RMF's fleet adapter leaves it CHARGING through the tasks that follow (rmf_ros2 9dedd0f,
    RobotContext::current_mode, set by WaitForCharge and DockRobot only). An operator's wish lasts until
-   it is over, or its robot full.
+   its request is over or its robot full.
 2. Wishes are served first come, first served, among the stations that suit (`queue.py`). One station,
    one robot: a station is nobody else's until it shows that it has let go.
 3. A request is repeated until the station shows it. A station that does not take it for TAKEN_S is
    passed over for SHUNNED_S, and the wish goes to the end.
-4. What becomes of a request is what the station shows. Charged and released: the wish is fulfilled.
-   Released without having charged: the robot did not come; the wish of a robot that stands at a place
-   of ours goes to the end, any other is over. A robot that stands at that very station failed there.
-5. An error of the station's side takes the station from the robot, which is given another and keeps
-   its place. One of the robot's side, or of neither for certain, counts against the robot as well:
-   after the second (at a second station where it has one) it is not tried again, and a technician is
-   told. Another robot on the pad takes nothing from the one assigned, for its start_timeout.
-6. A station that is not reached proves nothing: a robot that was charging there goes on doing so; one
-   that was on its way gets another after LOST_S.
-7. A request that we did not make, for a robot of ours, is that robot's all the same.
+4. The station shows how a request ends. Charged and released: the wish is fulfilled. Released without
+   having charged: the robot did not come. Then the wish of a robot that stands at a place of ours goes
+   to the end of the queue; any other wish is over. A robot that stands at that very station has failed
+   there.
+5. After an error of the station's side the robot gets another station and keeps its place in the queue.
+   An error of the robot's side, or one that nothing tells, counts as a failure of the robot too. After
+   its second failure (at a second station where it has one) it is not tried again, and a technician is
+   told. Another robot on the pad changes nothing for the robot assigned, for its start_timeout.
+6. A station that is not reached proves nothing. A robot that was charging there keeps it; one that was
+   on its way gets another station after LOST_S.
+7. A request for a robot of ours counts as that robot's, even if somebody else has made it.
 8. Until it may speak, and beside a charging schedule, it only listens.
 """
 
@@ -62,7 +63,7 @@ from bridges.core.durations import AGES_AGO, NEVER
 from bridges.core.graph_kind import MaySpeak
 
 SETTLES_S: Final = 2.0
-"""A robot that passes by on another task still shows the mode of its last charging."""
+"""A robot that passes by on another task may still show the mode CHARGING."""
 TAKEN_S: Final = 10.0
 SHUNNED_S: Final = 30.0
 LOST_S: Final = 30.0
@@ -114,7 +115,7 @@ def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory,
 
 
 def _may_speak(memory: Memory, yes: bool, now: float) -> Memory:
-    """What could not be said until now begins anew."""
+    """Requests that no station has shown count from now; assignments are published anew."""
     grants = {
         name: grant if grant.shown else replace(grant, made_at=now)
         for name, grant in memory.grants.items()
@@ -147,7 +148,7 @@ def _sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memo
 
 
 def _is_full(memory: Memory, who: Robot, site: Site) -> bool:
-    """It was being charged, and its fleet says that this is enough."""
+    """It has been charged, and its fleet shows `full_percent`."""
     grant = memory.grants.get(memory.station_of(who) or "")
     percent = memory.robots[who].sighting.battery_percent
     return grant is not None and grant.started and percent >= site.full_percent
@@ -162,7 +163,7 @@ def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standi
 
 
 def _wants(memory: Memory, standing: Standing, wish: Wish | None, now: float, site: Site) -> bool:
-    """Does its fleet show that it is to be charged?"""
+    """Does its fleet show that this robot is to be charged?"""
     sighting = standing.sighting
     if not sighting.charges or sighting.battery_percent >= site.full_percent:
         return False
@@ -287,7 +288,7 @@ def _struck(memory: Memory, name: str, who: Robot) -> Memory:
 
 
 def _adopted(memory: Memory, now: float, site: Site) -> Memory:
-    """Requests that we know nothing of, for robots of ours: they have those stations."""
+    """Take over requests that somebody else has made for robots of ours."""
     for name, seen in memory.stations.items():
         if name not in memory.grants and seen.state in (ASSIGNED, CHARGING):
             memory = _adopt(memory, name, seen, now, site)
@@ -310,7 +311,7 @@ def _adopt(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Mem
 
 
 def _stands_at(memory: Memory, place: str) -> Robot | None:
-    """Who is charged without having asked: who wants to be, and stands there."""
+    """Which robot is charged there without a request: one that wants to be and stands there."""
     here = (w.robot for w in memory.wishes if memory.place_of(w.robot) == place)
     return next((who for who in here if memory.station_of(who) is None), None)
 
@@ -319,7 +320,7 @@ def _stands_at(memory: Memory, place: str) -> Robot | None:
 
 
 def _in_time(memory: Memory, now: float) -> Memory:
-    """What time alone brings about."""
+    """What changes though nothing is heard."""
     for name, grant in list(memory.grants.items()):
         if grant.over or grant.started:
             continue

@@ -128,7 +128,7 @@ class Memory(msgspec.Struct, frozen=True):
     each robot has failed. `served`: robot -> the task in which it was charged. `over`: operators'
     wishes that are, whose late repeats are still known. `count`: requests made so far.
     `robots`, `stations`: as last heard, and when. `shunned`: station -> until when it is given to
-    nobody, as it took no request. `preferred`: robot -> the station somebody else dedicated to it.
+    nobody, because it took no request. `preferred`: robot -> the station somebody else dedicated to it.
     `assigned`: the assignments last published; `alerts`: which faults a person has been told of.
     """
 
@@ -148,7 +148,7 @@ class Memory(msgspec.Struct, frozen=True):
     alerts: frozenset[str] = frozenset()
 
     def wish(self, robot: Robot) -> Wish | None:
-        """This robot's wish."""
+        """This robot's wish; None where it has none."""
         return next((wish for wish in self.wishes if wish.robot == robot), None)
 
     def station_of(self, robot: Robot) -> str | None:
@@ -165,7 +165,7 @@ class Memory(msgspec.Struct, frozen=True):
         return len(self.strikes.get(robot, ())) >= STRIKES
 
     def speaks(self, station: str, now: float) -> bool:
-        """Its states come."""
+        """Has this station's state come lately?"""
         return station in self.stations and now < self.stations[station].at + STATION_SILENT_S
 
     def silent_since(self, station: str) -> float:
@@ -176,12 +176,12 @@ class Memory(msgspec.Struct, frozen=True):
     # ---- changed copies
 
     def with_grant(self, station: str, grant: Grant | None) -> "Memory":
-        """The station given so; None: to nobody."""
+        """The memory with this station granted so; None: to nobody."""
         rest = without(self.grants, station)
         return replace(self, grants=rest | ({} if grant is None else {station: grant}))
 
     def without_wish(self, robot: Robot) -> "Memory":
-        """This robot wants nothing any more."""
+        """The memory without this robot's wish."""
         wish = self.wish(robot)
         if wish is None:
             return self
@@ -189,14 +189,14 @@ class Memory(msgspec.Struct, frozen=True):
         return replace(self, wishes=tuple(w for w in self.wishes if w is not wish), over=over)
 
     def last_in_queue(self, robot: Robot) -> "Memory":
-        """This robot's wish goes to the end."""
+        """The memory with this robot's wish at the end of the queue."""
         wish = self.wish(robot)
         if wish is None:
             return self
         return replace(self, wishes=(*(w for w in self.wishes if w is not wish), wish))
 
     def takes_back(self, robot: Robot) -> "Memory":
-        """The robot's station is to let go of it."""
+        """The memory in which this robot's station is to release it."""
         station = self.station_of(robot)
         if station is None:
             return self
@@ -204,5 +204,5 @@ class Memory(msgspec.Struct, frozen=True):
 
 
 def without(table: Mapping[K, V], key: K) -> dict[K, V]:
-    """The table but for this key."""
+    """A copy of the table without this key."""
     return {k: v for k, v in table.items() if k != key}

@@ -19,6 +19,7 @@ from bridges.charger_coordinator.signals import (
     Wanted,
 )
 from bridges.core.decision import RequestRefused
+from bridges.core.names import LONGEST_TEXT, check_length
 from bridges.rmf import definitions as d
 from bridges.rmf.definitions import Time
 
@@ -43,6 +44,7 @@ def accept_fleet(state: d.FleetState, settings: Settings, wall: float) -> FleetS
 def _sighting(
     fleet_name: str, robot: d.RobotState, fleet: Fleet, places: set[str], near_m: float
 ) -> Sighting:
+    check_length(task_id=robot.task_id)
     return Sighting(
         Robot(fleet_name, robot.name),
         charges=robot.mode.mode in CHARGES,
@@ -69,6 +71,10 @@ def accept_state(state: d.ChargerState, settings: Settings, wall: float) -> Stat
         raise RequestRefused("station not ours", f"{state.charger_name!r}")
     if state.state not in set(d.ChargerStateValue):
         raise RequestRefused("unknown state", f"{state.charger_name}: {state.state}")
+    check_length(
+        request_id=state.request_id, robot_fleet=state.robot_fleet, robot_name=state.robot_name
+    )
+    check_length(LONGEST_TEXT, error_message=state.error_message)
     named = Robot(state.robot_fleet, state.robot_name)
     return StateHeard(
         state.charger_name,

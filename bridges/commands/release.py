@@ -12,7 +12,7 @@ from bridges.commands import send
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The lift, and the options that every sender has."""
-    parser.add_argument("name", metavar="LIFT")
+    parser.add_argument("name", metavar="LIFT", help="the lift, as RMF names it")
     parser.add_argument(
         "--session", default="", metavar="ID", help="only this session (default: whoever has it)"
     )

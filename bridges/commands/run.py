@@ -14,7 +14,6 @@ from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
 from bridges.serve import places, signals
-from bridges.serve.daemon import Daemon
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
 
@@ -100,6 +99,8 @@ def _serve(
     if command := ros_setup.sourcing(config.rmf, os.environ, sys.orig_argv):
         os.execvpe(command[0], command, ros_setup.sourced(config.rmf, os.environ))
     if not args.simulate:
+        from bridges.serve.daemon import Daemon
+
         outputs_off = _outputs_off(args)
         places.work_somewhere(held.places)  # lgpio leaves a FIFO where it is imported
         return Daemon(config, held, end, ros_args=args.ros_args, outputs_off=outputs_off).serve()
@@ -107,6 +108,8 @@ def _serve(
 
     logging.warning("SIMULATED: no hardware moves, and nothing that RMF is told is true")
     simulation = Simulation(config, held.path)
+    from bridges.serve.daemon import Daemon  # the far sides start meanwhile
+
     try:
         return Daemon(
             config,

@@ -38,9 +38,21 @@ LOOK_EVERY_S = 0.1
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """`lift`, `door` and `charger`, each with the options of the graph."""
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="lift|door|charger")
-    _lift_arguments(kinds.add_parser("lift", help="ask for a lift, or end its session"))
-    _door_arguments(kinds.add_parser("door", help="hold a door open, or let it close"))
-    _charger_arguments(kinds.add_parser("charger", help="assign a charger, or cancel that"))
+    for kind, (text, example, add) in {
+        "lift": (
+            "ask for a lift, or end its session",
+            "Lift1 L3 --session fleet/robot",
+            _lift_arguments,
+        ),
+        "door": ("hold a door open, or let it close", "ward_door open", _door_arguments),
+        "charger": (
+            "assign a charger, or cancel that",
+            "any --queue --robot fleet/robot",
+            _charger_arguments,
+        ),
+    }.items():
+        example = f"example: rmf-bridge send {kind} {example}"
+        add(kinds.add_parser(kind, help=text, epilog=example))
 
 
 def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> None:
@@ -70,7 +82,7 @@ def _seconds(text: str) -> float:
 
 
 def _lift_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", metavar="NAME")
+    parser.add_argument("name", metavar="NAME", help="the lift, as RMF names it")
     parser.add_argument("floor", metavar="FLOOR", nargs="?", help="its name in LiftState")
     parser.add_argument("--session", default="", metavar="ID", help="fleet/robot, or any name")
     parser.add_argument(
@@ -85,7 +97,7 @@ def _lift_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _door_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", metavar="NAME")
+    parser.add_argument("name", metavar="NAME", help="the door, as RMF names it")
     parser.add_argument("action", choices=("open", "close"))
     parser.add_argument(
         "--requester", default=NODE_NAME, metavar="ID", help=f"default: {NODE_NAME}"
@@ -94,7 +106,7 @@ def _door_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _charger_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", metavar="NAME")
+    parser.add_argument("name", metavar="NAME", help="the charger, as RMF names it")
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--robot", metavar="FLEET/ROBOT", help="assign the charger to this robot")
     what.add_argument("--cancel", metavar="REQUEST_ID", help="cancel the request of this id")

@@ -1,22 +1,22 @@
 """What a door does and says: one pure decision for each event.
 
 Rules:
-- OPEN latches the hold, whoever asks and however often. CLOSE lets it go after `close_grace_s`,
-  which an OPEN cancels and a repeated CLOSE does not prolong: RMF's supervisor, restarted while a
-  robot stands in the doorway, first sends a CLOSE. Nothing ever drives the door shut, and silence
-  never lets go: RMF is silent while a robot passes.
-- After our hold has ended and until the door is seen closed, an obstruction takes hold again.
-- A fire alarm does what the site chose. `open` holds the door against every CLOSE. `release` lets it
-  go, forgets the latch and refuses OPEN; the state is then UNKNOWN, so that no robot enters a door
-  that is about to close, and RMF's supervisor stops its reminders.
-- Without a fresh reading the state is OFFLINE and the hold off; the latch is kept, and asserted
-  again with the first good reading.
-- OPEN is what the contact of the fully open door says, and nothing else. Both contacts: UNKNOWN.
-  Neither: MOVING, and after `travel_s` UNKNOWN. A controller that does not say: UNKNOWN.
-- While somebody else publishes states under this door's name: OFFLINE and the hold off.
+- OPEN latches the hold, whoever asks and however often. CLOSE releases it after `close_grace_s`. An
+  OPEN cancels that; a repeated CLOSE does not prolong it. (RMF's supervisor, restarted while a robot
+  stands in the doorway, first sends a CLOSE.) Nothing ever drives the door shut. Silence never
+  releases the hold: RMF is silent while a robot passes.
+- From the end of our hold until the door is seen closed, an obstruction switches the hold on again.
+- On a fire alarm the site's `on_fire` counts. `open` holds the door against every CLOSE. `release`
+  switches the hold off, forgets the latch and refuses OPEN. The state is then UNKNOWN: no robot
+  enters a door that is about to close, and RMF's supervisor stops repeating itself.
+- Without a fresh reading the state is OFFLINE and the hold off. The latch is kept, and the hold comes
+  on again with the first good reading.
+- The state is OPEN when the contact of the fully open door says so, and only then. Both contacts:
+  UNKNOWN. Neither: MOVING, and after `travel_s` UNKNOWN. A controller that does not say: UNKNOWN.
+- While another node publishes states under this door's name: OFFLINE and the hold off.
 
-Faults here describe, and change nothing that is driven: each lasts as long as its cause, so there is
-none for an operator to reset.
+Faults only describe; they change no output. Each lasts as long as its cause, so an operator has
+nothing to reset.
 """
 
 from collections.abc import Iterator
@@ -111,7 +111,7 @@ def _look(memory: Memory, now: float, limits: DoorLimits) -> View:
 
 
 def _hold(memory: Memory, view: View, now: float, limits: DoorLimits) -> Memory:
-    """Is the hold on? And what has to be remembered to decide it next time."""
+    """The memory with the hold on or off, and with what the next decision needs."""
     if released_by_fire(view, limits):
         memory = replace(memory, latched_at=None, close_at=None)
     able = view.fresh and not rivalled(memory, now)
@@ -148,7 +148,7 @@ def _pulse_is_on(memory: Memory, now: float, pulse: Pulse | None) -> bool:
 
 
 def _wakes(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterator[float]:
-    """Every time at which something would be decided differently."""
+    """Each time at which the decision may change though nothing happens."""
     yield view.changes_at
     yield NEVER if memory.close_at is None else memory.close_at
     yield NEVER if memory.rival_at is None else memory.rival_at + RIVAL_QUIET_S

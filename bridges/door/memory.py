@@ -7,13 +7,13 @@ import msgspec
 
 from bridges.core.debounce import Settled
 from bridges.core.durations import NEVER, RIVAL_QUIET_S
-from bridges.door.settings import DoorSettings, Limits, Pulse
+from bridges.door.settings import DoorSettings, Durations, Pulse
 
 
 class DoorLimits(msgspec.Struct, frozen=True):
     """A door's fixed facts as its core needs them. `t`: the durations; `debounce`: s by signal."""
 
-    t: Limits = Limits()
+    t: Durations = Durations()
     debounce: Mapping[str, float] = {}
     estimated: bool = False
     on_fire: Literal["open", "release"] = "release"
@@ -54,10 +54,10 @@ class Senses(msgspec.Struct, frozen=True):
 class Memory(msgspec.Struct, frozen=True):
     """Everything that the next decision needs to know of the past. Times are monotonic seconds.
 
-    `latched_at`: RMF wants the door open since then. `close_at`: when a CLOSE becomes true.
+    `latched_at`: since when RMF wants the door open. `close_at`: when a CLOSE releases the hold.
     `held_since`: since when the hold has been as `held` says. `closing`: our hold has ended and the
-    door has not been seen closed since. `between_since`, `shut_since`: since when neither limit, and
-    not the open one, has been believed.
+    door has not been seen closed since. `between_since`: since when the door is at neither limit;
+    `shut_since`: since when it is not fully open.
     """
 
     latched_at: float | None = None
@@ -78,7 +78,7 @@ def rivalled(memory: Memory, now: float) -> bool:
 
 
 def travel_ends_at(memory: Memory, limits: DoorLimits) -> float:
-    """When a door between its limits has been there for too long; turning round starts again."""
+    """When a door at neither limit is overdue; a change of the hold starts the time again."""
     if memory.between_since is None:
         return NEVER
     return max(memory.between_since, memory.held_since) + limits.t.travel_s

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bridges.core.decision import RequestRefused
+from bridges.core.names import check_length
 from bridges.door.report import DoorReport
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import CloseRequested, OpenRequested
@@ -18,6 +19,7 @@ def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | Clos
     """
     if not message.requester_id:
         raise RequestRefused("no requester", "requester_id is empty")
+    check_length(requester_id=message.requester_id)
     mode = message.requested_mode.value
     if mode == DoorModeValue.MODE_OPEN:
         return OpenRequested(message.requester_id)

@@ -6,13 +6,13 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from bridges.core.fields import DeviceSettings, Seconds
+from bridges.core.fields import DeviceSettings, Seconds, Timeout
 
 StaleAfter = Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})]
 PulseSeconds = Annotated[float, Meta(ge=0.05, le=600, extra={"unit": "s"})]
 
 
-class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations of a door.
 
     `stale_after_s`: without a good reading for this long the door is OFFLINE and its hold off.
@@ -26,8 +26,8 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     stale_after_s: StaleAfter = 1.0
     close_grace_s: Seconds = 3.0
-    travel_s: Seconds = 10.0
-    open_timeout_s: Seconds = 15.0
+    travel_s: Timeout = 10.0
+    open_timeout_s: Timeout = 15.0
     hazard_clear_s: Seconds = 1.0
     open_delay_s: Seconds | None = None
     max_hold_s: Seconds | None = None
@@ -54,10 +54,14 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     `pulse`: re-trigger an operator that closes by itself; absent, the relay stays on.
     """
 
-    limits: Limits = Limits()
+    limits: Durations = Durations()
     feedback: Literal["sensors", "estimated"] = "sensors"
     on_fire: Literal["open", "release"] | None = None
     pulse: Pulse | None = None
+
+    def stale_after(self) -> float:
+        """As its limits say."""
+        return self.limits.stale_after_s
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
         """What the fields cannot say one by one."""

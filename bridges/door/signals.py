@@ -34,13 +34,13 @@ class DoorOutputs(msgspec.Struct, frozen=True):
 
 
 class OpenRequested(msgspec.Struct, frozen=True):
-    """Somebody wants the door open. Who, is for the log only."""
+    """A requester wants the door open. `requester_id` is for the log only."""
 
     requester_id: str
 
 
 class CloseRequested(msgspec.Struct, frozen=True):
-    """Nobody wants the door open any longer, says this requester."""
+    """A requester no longer wants the door open."""
 
     requester_id: str
 

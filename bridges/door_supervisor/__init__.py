@@ -3,8 +3,10 @@
 from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind
 from bridges.door_supervisor import core, keep, messages, report
-from bridges.door_supervisor.memory import Limits
+from bridges.door_supervisor.memory import Limits, Memory
+from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.settings import Settings
+from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
 from bridges.rmf.topics import (
     ADAPTER_DOOR_REQUESTS,
     DOOR_REQUESTS,
@@ -12,7 +14,13 @@ from bridges.rmf.topics import (
     DOOR_SUPERVISOR_HEARTBEAT,
 )
 
-KIND = GraphKind(
+KIND: GraphKind[
+    Settings,
+    Limits,
+    Memory,
+    OpenRequested | CloseRequested | StateHeard,
+    DoorHoldReport,
+] = GraphKind(
     name="door_supervisor",
     devices_key="supervisor",
     settings=Settings,

@@ -4,12 +4,11 @@ It stands in for RMF's own (rmf_ros2, door_supervisor/Node.cpp): fleet adapters 
 `adapter_door_requests`; the door's node is told on `door_requests`, by "door_supervisor". Rules:
 1. OPEN enters its requester among the holders, or renews its stamp. CLOSE strikes it off. A stale
    request (`bridges/core/freshness.py`) does neither.
-2. OPEN is what the door should hear while anybody holds it, and CLOSE when nobody does. It is sent
-   when the last word sent was the other one: OPEN for the first holder, CLOSE when the last one
-   goes. It is repeated when a requester repeats OPEN, or when the door's state disagrees: held, but
-   CLOSED or MOVING; not held, but OPEN or MOVING. For INSIST_S after a holder has come OPEN is
-   repeated at every state: the one sent may be lost, and the door about to close by an earlier CLOSE.
-   OFFLINE and UNKNOWN cause nothing.
+2. While anybody holds the door its node is told OPEN, and when nobody does CLOSE: OPEN for the first
+   holder, CLOSE when the last one goes. The request is repeated when a requester repeats OPEN, and
+   when the door's state disagrees: held, but CLOSED or MOVING; not held, but OPEN or MOVING. For
+   INSIST_S after a holder has come, OPEN is repeated at every state: the first one may be lost, and
+   the door about to close by an earlier CLOSE. The states OFFLINE and UNKNOWN cause nothing.
 3. Silence ends nothing: a robot in the doorway is silent. After `open_alarm_s` there is a fault,
    and that is all.
 4. Until it may speak, and beside another supervisor, it only listens. It then begins with OPEN for a
@@ -96,7 +95,7 @@ def _hear(memory: Memory, event: OpenRequested | CloseRequested, now: float) -> 
 
 
 def _enter(memory: Memory, event: OpenRequested, now: float) -> Memory:
-    """One more holder, or one that repeats itself."""
+    """Add a holder, or note that one has repeated its OPEN."""
     before = memory.holder(event.requester)
     if before:
         after = before.repeats(event.stamp, now)
@@ -107,7 +106,7 @@ def _enter(memory: Memory, event: OpenRequested, now: float) -> Memory:
 
 
 def _see(memory: Memory, now: float) -> Memory:
-    """A state: is a word worth repeating?"""
+    """A state has come: is the last request worth repeating?"""
     insists = any(now < holder.since + INSIST_S for holder in memory.holders)
     return replace(memory, prompted=memory.disagrees or insists)
 
@@ -132,7 +131,7 @@ def _due_at(memory: Memory) -> float:
 
 
 def _wake_at(memory: Memory, now: float, limits: Limits) -> float:
-    """When time alone may change something."""
+    """When the decision may change though nothing is heard."""
     due = [_due_at(memory), memory.silent_at]
     due += [holder.since + limits.open_alarm_s for holder in memory.holders]
     return min((at for at in due if at > now), default=NEVER)

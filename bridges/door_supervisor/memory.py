@@ -19,7 +19,7 @@ OPEN: Final = DoorModeValue.MODE_OPEN
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """The duration (s) that the site has set."""
+    """The duration (s) that the site has set for one door."""
 
     open_alarm_s: float = 600.0
 

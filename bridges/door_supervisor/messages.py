@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from bridges.core.decision import RequestRefused
 from bridges.core.freshness import in_ns
+from bridges.core.names import check_length
 from bridges.door_supervisor.core import REQUESTER_ID
 from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.settings import Settings
@@ -24,6 +25,7 @@ def accept_request(
     who = request.requester_id
     if not who:
         raise RequestRefused("no requester", "requester_id is empty")
+    check_length(requester_id=who)
     if who == REQUESTER_ID:
         raise RequestRefused("a supervisor's request", "adapter_door_requests is for adapters")
     stamp = in_ns(request.request_time)
@@ -48,6 +50,7 @@ def accept_state(state: DoorState, settings: Settings, wall: float) -> StateHear
 def _check_door(name: str, settings: Settings) -> None:
     if not name:
         raise RequestRefused("empty door_name", "a door needs a name")
+    check_length(door_name=name)
     if settings.doors is not None and name not in settings.doors:
         raise RequestRefused("not ours", f"{name!r} is none of {', '.join(settings.doors)}")
 

@@ -2,6 +2,7 @@
 
 import msgspec
 
+from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf.definitions import DoorModeValue
 
@@ -26,4 +27,4 @@ class StateHeard(msgspec.Struct, frozen=True):
     mode: DoorModeValue
 
 
-Event = OpenRequested | CloseRequested | StateHeard | MaySpeak | Woken
+Event = OpenRequested | CloseRequested | StateHeard | MaySpeak | Woken | OperatorReset

@@ -1,24 +1,24 @@
 """The lift's decision core: who holds the lift, what its relays do, and what RMF is told.
 
 Rules, in the order in which they are applied:
-1. A session is granted to the first request while the lift is free, unless something forbids every
-   output (an obstacle); its own requests refresh it, those of others are refused. It ends by its own
-   END and by nothing else: never by a hazard, a fault or a timeout. One in HUMAN mode is a session
-   without outputs.
-2. After END the session is gone at once; AGV mode and the door may stay held for `release_grace_s`,
-   in which only the same session is granted, whatever else is wrong (a supervisor that restarts
-   sends END for a robot that is still inside, and it must get out in a fire, too).
-3. A request sets what is wanted; `bridges/lift/drive.py` says what may be energised.
-4. Obstacles switch everything off and never touch the session: fire (and its latch, where an
-   operator must reset it), code blue, earthquake, emergency, out of service, manual mode, a second
-   node for this lift, inputs that cannot be believed, outputs that cannot be written. A gap in
-   reading or writing shorter than `stale_after_s` is none. Overload only delays.
-5. The door is OPEN for RMF when its contact, the floor and the standstill say so freshly. While a
-   session is held and no open door at its destination has been published for it yet (the robot is
-   outside), AGV mode must be on too and nothing may be wrong: RMF's robots look at session, floor
-   and door only, and must not board a lift in a fire. Once it has been published, a robot may be
-   inside, and the true door is shown in any mode, so that it gets out. Neither goes through a door
-   that is about to be held and is not yet: its relay may have to rest while the door closes.
+1. While the lift is free, the first request is granted a session, unless an obstacle forbids every
+   output. The session's own requests refresh it; requests of others are refused. A session ends by
+   its own END only, never by a hazard, a fault or a timeout. A session in HUMAN mode has no outputs.
+2. END ends the session at once. AGV mode and the door's hold may stay on for `release_grace_s`. In
+   that time only the same session is granted, even in a fire: a supervisor that restarts sends END
+   for a robot that is still inside, and that robot must get out.
+3. A request sets what is wanted. `bridges/lift/drive.py` says what may be energised.
+4. Obstacles switch every output off and never change the session. They are: fire (and its latch,
+   where an operator must reset it), code blue, earthquake, emergency, out of service, manual mode, a
+   second node for this lift, inputs that cannot be believed, outputs that cannot be written. A gap
+   in reading or writing that is shorter than `stale_after_s` is no obstacle. Overload only delays.
+5. RMF is told OPEN when fresh inputs show the door open, a floor, and the car standing there.
+   - Before OPEN has been published for a session at its destination, its robot is outside. Then
+     OPEN also needs AGV mode and no fault: a robot looks at session, floor and door only, and must
+     not board a lift in a fire.
+   - After that a robot may be inside. The true door is shown in any mode, so that it gets out.
+   - A door whose hold is wanted but not on yet (the relay must rest) is not shown OPEN: it may
+     close by itself while a robot drives through.
 """
 
 from typing import Any
@@ -64,7 +64,7 @@ def initial(limits: LiftLimits, now: float) -> Memory:
 def decide(
     memory: Memory, event: Event, now: float, limits: LiftLimits
 ) -> Decision[Memory, LiftOutputs, LiftReport]:
-    """One scan: take the event in, look, and derive outputs and report afresh."""
+    """One scan: take in the event, look at the inputs, derive outputs and report afresh."""
     alarmed_before = memory.alarmed
     memory, refused = _take(memory, event, now, limits)
     view = look(memory.senses, now, limits)
@@ -82,7 +82,7 @@ def decide(
 
 
 def published(memory: Memory, shown: LiftReport) -> Memory:
-    """The last report is out: if it offered an open door at the destination, a robot may be inside."""
+    """The memory once this report is out. After OPEN at the destination a robot may be inside."""
     session = memory.session
     if session is None or shown.open_at != session.destination:
         return memory
@@ -113,7 +113,7 @@ def _unwritten_at(memory: Memory, limits: LiftLimits) -> float:
 def _drive(
     memory: Memory, view: View, allowed: bool, now: float, limits: LiftLimits
 ) -> tuple[Memory, LiftOutputs]:
-    """The next outputs, in memory's relays, and what they would be if relays needed no rest."""
+    """The memory with the next state of the relays; and the outputs that are wanted."""
     session, grace, relays = memory.session, memory.grace, memory.relays
     outputs = LiftOutputs()
     if session and drive.serves(session, allowed, now, limits):
@@ -150,7 +150,7 @@ def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple
 
 
 def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) -> Memory:
-    """A reading; and what was written since the one before it, all went well."""
+    """Take in a reading. If no write has failed since the last one, the outputs are written."""
     return replace(
         memory,
         senses=take(memory.senses, sample, now, limits),
@@ -204,7 +204,7 @@ def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
     session = memory.session
     if session and session.fault:
         session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
-    # What is seen to burn latches again in this same decision; what cannot be seen may burn.
+    # A fire that is seen latches again in this decision. Where inputs are stale there may be a fire.
     unseen = not look(memory.senses, now, limits).fresh
     return replace(
         memory,
@@ -216,7 +216,7 @@ def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
 
 
 def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory:
-    """A fire stays until its policy lets it go; a rival until it has been silent long enough."""
+    """A fire stays as `fire_reset` says; a rival until it has been silent for RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
     manual = limits.fire_reset == "manual"
     rival_at = memory.rival_at
@@ -231,7 +231,7 @@ def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory
 def _alarms(
     before: bool, memory: Memory, limits: LiftLimits
 ) -> tuple[tuple[Topic[Any], Message], ...]:
-    """One `true` on the rising edge; `false` only after an operator's reset; each once."""
+    """`true` once when a fire alarm comes; `false` once when an operator resets."""
     if memory.alarmed == before or limits.alarm == "none":
         return ()
     if limits.alarm == FIRE_ALARM_TRIGGER.name:

@@ -1,20 +1,22 @@
 """What the lift's outputs should be: from who holds the lift, what is seen, and what was asked.
 
 Rules:
-- Nothing is newly energised without a session, and nothing at all under an obstacle (`core.py`), for
-  a session in HUMAN mode, while RMF is silent with the robot outside, or while a fault waits for its
-  next try. After END, for the grace, AGV mode and the door's hold stay as far as they are on; the
-  hold ends `dead_time_s` before AGV mode.
-- AGV mode first; then the call to the destination; then, standing there, the door.
-- A call only in AGV mode, away from the destination, not while overloaded. A door command only while
-  standing at the destination's landing. Never both; and neither within `dead_time_s` of the last one.
-- A call is held until the car stands at its destination, or pulsed; it is given again when the car is
-  seen at another floor after it had arrived, and after every interruption; never for a floor code
-  that is just changing, which may say that the car is there.
-- What is waited for (AGV mode, the floor, the open door) has its time; when it is up the outputs go
-  off and a fault is shown; three more tries follow 10, 30 and 60 s later; then the fault latches.
-  So does AGV mode that ends while we ask for it. An overload only stops the clock.
-- Off is immediate. On waits for `min_off_s` and for the relay's cycles of the last minute.
+- Without a session no output is switched on. All are off under an obstacle (`core.py`), for a session
+  in HUMAN mode, while RMF is silent with the robot outside, and while a fault waits for its next try.
+  In the grace after END, AGV mode and the door's hold stay on if they were on; the hold ends
+  `dead_time_s` before AGV mode.
+- AGV mode comes first, then the call to the destination, then, once the car stands there, the door.
+- A call is given only in AGV mode, away from the destination, and without overload. A door command
+  is given only while the car stands at the destination's landing. The two are never on together, and
+  neither comes on within `dead_time_s` of the last one.
+- A call is held until the car stands at its destination, or pulsed. It is given again after every
+  interruption, and when the car had arrived and is seen at another floor. While the floor code is
+  just changing no new call is given: the car may be there.
+- AGV mode, the floor and the open door are each waited for with a timeout. After it the outputs go
+  off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches.
+  AGV mode that ends during the ride is such a fault too. An overload stops the waiting time.
+- Switching off is immediate. Switching on waits for `min_off_s` and for the relay's cycles of the
+  last minute (`Channel` in `memory.py`).
 """
 
 from msgspec.structs import replace
@@ -50,16 +52,16 @@ def serves(session: Session, allowed: bool, now: float, limits: LiftLimits) -> b
 
 
 def paused(session: Session) -> Session:
-    """Outputs are off for another reason than a failure of the lift's: later it starts afresh."""
+    """The session while its outputs are off, but not by a timeout; later its ride starts anew."""
     return replace(session, agv_seen=False, arrived=False, call_at=None, waiting=None)
 
 
 def advance(
     session: Session, view: View, requested: bool, now: float, limits: LiftLimits
 ) -> Session:
-    """Bring the progress of a session that is served up to what is seen: arrivals, waits, retries.
+    """The session's progress after what is seen: arrivals, waits and retries.
 
-    `requested`: AGV mode has been asked of the lift until now.
+    `requested`: our AGV request was on until now.
     """
     if session.retry_at is not None:
         if now < session.retry_at:
@@ -100,7 +102,7 @@ def wanted(session: Session, view: View, now: float, limits: LiftLimits) -> Lift
 def stays_on(
     grace: Grace, relays: Relays, view: View, now: float, limits: LiftLimits
 ) -> LiftOutputs:
-    """After END: what stays on."""
+    """The outputs in the grace after END."""
     standing = agv_ok(view) and at_destination(grace.session, view, limits)
     hold = relays.hold.on if standing and now < let_go_at(grace, limits) else None
     return LiftOutputs(agv_request=bool(relays.agv.on), hold_door=hold)
@@ -123,7 +125,7 @@ def next_at(session: Session, limits: LiftLimits) -> tuple[float, ...]:
 
 
 def _arrive(session: Session, view: View, limits: LiftLimits) -> Session:
-    """Standing at the destination ends the call; seen at another floor, the car is called anew."""
+    """Standing at the destination ends the call. A car that then is seen elsewhere is called again."""
     if at_destination(session, view, limits):
         return replace(session, arrived=True)
     elsewhere = view.level not in (None, limits.stops[session.destination].level)
@@ -155,7 +157,7 @@ def _timeout_fault(session: Session, waiting: Waiting, limits: LiftLimits) -> Fa
 
 
 def _trip(session: Session, fault: Fault, now: float) -> Session:
-    """Outputs off for a while; for good after the third retry."""
+    """Outputs off until the next try; after the third retry the fault latches."""
     latched = session.tries >= len(RETRY_AFTER_S)
     retry_at = NEVER if latched else now + RETRY_AFTER_S[session.tries]
     return replace(paused(session), tries=session.tries + 1, retry_at=retry_at, fault=fault)

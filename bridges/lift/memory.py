@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from bridges.core.debounce import Settled
 from bridges.core.decision import Fault
 from bridges.core.durations import AGES_AGO, NEVER
-from bridges.lift.settings import LiftSettings, Limits
+from bridges.lift.settings import Durations, LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, Motion, Side, Stop
 
 T = TypeVar("T")
@@ -26,7 +26,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """
 
     stops: Mapping[str, Stop]
-    t: Limits = Limits()
+    t: Durations = Durations()
     debounce: Mapping[str, float] = {}
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
@@ -62,7 +62,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 
 
 class Position(msgspec.Struct, frozen=True):
-    """`trusted`: the last floor that can be true, seen last at `seen_at`; `suspect`: one that can't.
+    """`trusted`: the floor last believed, last seen at `seen_at`; `suspect`: one that cannot be.
 
     `moved_at`: when the car was last not seen standing.
     """
@@ -74,7 +74,7 @@ class Position(msgspec.Struct, frozen=True):
 
 
 class Senses(msgspec.Struct, frozen=True):
-    """Every input with its debounce, since when it has been so, and when all were last read."""
+    """Every input with its debounce, and when all were last read."""
 
     read_at: float | None = None
     code: Settled[tuple[str | None, str]] | None = None
@@ -110,7 +110,7 @@ class Session(msgspec.Struct, frozen=True):
 
 
 class Grace(msgspec.Struct, frozen=True):
-    """After END: whose return is awaited, with what may stay on meanwhile, until when."""
+    """After END: the session that may come back, until when."""
 
     session: Session
     until: float
@@ -126,7 +126,7 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
     def step(
         self, wanted: T | None, now: float, ready_at: float, limits: LiftLimits
     ) -> "Channel[T]":
-        """The next state: off at once, on when wear and `ready_at` allow, changed by way of off."""
+        """The next state: off at once, and on, or changed, only after its rest and `ready_at`."""
         if self.on is not None:
             return self if wanted == self.on else replace(self, on=None, off_at=now)
         if wanted is None or now < self.may_switch_on_at(now, ready_at, limits):

@@ -1,9 +1,9 @@
 """LiftRequest in, LiftState out: is it well formed, and can it be asked of this lift?"""
 
 from collections.abc import Mapping
-from typing import Any
 
 from bridges.core.decision import RequestRefused
+from bridges.core.names import check_length
 from bridges.lift.report import LiftReport
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Ended, Requested
@@ -13,6 +13,7 @@ from bridges.rmf.definitions import (
     LiftRequestDoor,
     LiftRequestType,
     LiftState,
+    Message,
     Time,
 )
 from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
@@ -28,6 +29,7 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
     """
     if not request.session_id:
         raise RequestRefused("empty session_id", "a session needs a name")
+    check_length(session_id=request.session_id)
     if request.request_type == LiftRequestType.REQUEST_END_SESSION:
         return Ended(request.session_id)
     agv = request.request_type == LiftRequestType.REQUEST_AGV_MODE
@@ -43,7 +45,7 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
     return Requested(request.session_id, agv, request.destination_floor)
 
 
-def alarm_topics(settings: LiftSettings) -> tuple[Topic[Any], ...]:
+def alarm_topics(settings: LiftSettings) -> tuple[Topic[Message], ...]:
     """Where this lift tells the fleets of a fire, if it does."""
     return tuple(t for t in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL) if t.name == settings.alarm)
 

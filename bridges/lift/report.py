@@ -11,7 +11,7 @@ from bridges.lift.signals import Hazard, LiftOutputs, Motion
 from bridges.rmf.definitions import LiftDoor, LiftMode, LiftMotion
 
 OFFLINE = frozenset({"INPUTS_NOT_FRESH", "OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})
-"""Faults with which we can no longer speak for the lift."""
+"""With one of these faults the lift is shown OFFLINE."""
 
 
 class LiftReport(msgspec.Struct, frozen=True):

@@ -48,7 +48,8 @@ class LiftSample(msgspec.Struct, frozen=True):
     """Every input of one lift, decoded but not debounced.
 
     `level`: the landing that the floor code names, None for no code (between floors).
-    `code_fault`: "" or why the code cannot be (illegal, two of one-hot, parity).
+    `code_fault`: "" or why the code cannot be (illegal, two of one-hot, parity). `floor_valid`: the
+    code means something now; while it does not, the car may go anywhere unseen.
     `motion`, `agv`, `rear_door`: None where not wired; `agv` None also while its line means nothing.
     """
 
@@ -59,6 +60,7 @@ class LiftSample(msgspec.Struct, frozen=True):
     motion: Motion | None = None
     agv: bool | None = None
     hazards: frozenset[Hazard] = frozenset()
+    floor_valid: bool = True
 
 
 class Side(Enum):

@@ -3,11 +3,19 @@
 from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind
 from bridges.lift_supervisor import core, messages
-from bridges.lift_supervisor.memory import Limits
+from bridges.lift_supervisor.memory import Limits, Memory
+from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings
+from bridges.lift_supervisor.signals import Ended, Requested, StateHeard
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES
 
-KIND = GraphKind(
+KIND: GraphKind[
+    Settings,
+    Limits,
+    Memory,
+    Requested | Ended | StateHeard,
+    SupervisorReport,
+] = GraphKind(
     name="lift_supervisor",
     devices_key="supervisor",
     settings=Settings,

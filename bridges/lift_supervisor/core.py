@@ -4,20 +4,20 @@ It stands in for RMF's own (rmf_ros2, lift_supervisor/Node.cpp): fleet adapters 
 `adapter_lift_requests`, one session at a time is passed on to the lift's node on `lift_requests`,
 until the lift's states show that it has been obeyed. `bridges/core/freshness.py` says which requests
 count. Rules:
-1. Who wants the lift is served in the order of first requests. Who ENDs, or is silent for
-   `silent_after_s`, leaves the queue. A silence of the lift itself is nobody's: adapters only repeat
-   themselves at its states.
-2. The lift's states say who has it. A session that they show goes before every queue if its robot
-   asks for it, and is ended if nobody has asked for `orphan_after_s`.
-3. One session at a time has its turn. Its request is sent when it is new or changed; again when the
-   state does not show what was asked, or when the adapter has repeated it (the node takes our silence
-   for RMF's); never while the lift shows another session.
-4. A turn ends by END: the holder's own, wherever the lift is and in whatever mode; or ours, for a
-   holder that the lift never accepted and that has gone silent, and after `holder_ttl_s` where the
-   site wants that. END is repeated until a state that has come after it shows another session, or
-   none. Only then is the next one served.
-5. While the lift is in fire, emergency or offline mode nobody is sent to it and no queue moves; END,
-   and HUMAN mode, which asks for nothing, are passed on.
+1. Sessions are served in the order of their first requests. A session leaves the queue by END, or when
+   it has been silent for `silent_after_s`. While the lift itself is silent this time stands still:
+   adapters repeat their requests only when its states come.
+2. The lift's states say which session has it. That session goes before the queue if its robot asks
+   for it. If nobody has asked for it for `orphan_after_s`, it is ended.
+3. One session at a time has its turn. Its request is sent when it is new or changed. It is sent again
+   when the state does not show what was asked, and when the adapter has repeated it (the node takes
+   our silence for RMF's). It is never sent while the lift shows another session.
+4. A turn ends by END. Either the holder sends it, wherever the lift is and in whatever mode. Or we do:
+   for a holder that is silent and was never accepted by the lift, and after `holder_ttl_s` where the
+   site wants that. END is repeated until a later state shows another session, or none. Only then is
+   the next session served.
+5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the queue stands
+   still. END is passed on, and so is HUMAN mode, which asks for nothing.
 6. Until it may speak, and beside another supervisor, it only listens. It then starts from what the
    states show and who has asked, so a restart ends no ride.
 7. Nothing is sent twice within GAP_S, and nothing again, unchanged, within REPEAT_S.
@@ -52,8 +52,12 @@ def initial(lift: str, started_at: float) -> Memory:
 
 
 def idle(memory: Memory, now: float) -> bool:
-    """A lift that has never been heard, and that nobody has asked for in a while."""
-    return memory.shown is None and not memory.claims and now >= memory.heard_at + FORGOTTEN_S
+    """Nobody wants this lift, and nothing has been heard of it in a while.
+
+    A session that is still to be ended is found again in the lift's states, if they come back.
+    """
+    heard_at = max(memory.heard_at, memory.shown_at)
+    return not memory.claims and now >= heard_at + FORGOTTEN_S
 
 
 def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
@@ -129,7 +133,7 @@ def _ask(memory: Memory, request: Requested, now: float) -> tuple[Memory, str]:
 
 
 def _still_there(memory: Memory, before: Claim | None, now: float) -> Memory:
-    """A request that cannot be obeyed is a sign of life all the same."""
+    """A request that cannot be obeyed still shows that its requester is there."""
     return memory if before is None else _with(memory, before, replace(before, heard_at=now))
 
 
@@ -178,7 +182,7 @@ def _see(memory: Memory, shown: StateHeard, now: float) -> Memory:
 
 
 def _speak(memory: Memory, yes: bool) -> Memory:
-    """Whoever has had the turn, the states will show it when we speak again."""
+    """While we may not speak nobody has a turn; later the lift's states show who has the lift."""
     return replace(memory, may_speak=yes, turn=memory.turn if yes else None)
 
 
@@ -186,7 +190,7 @@ def _speak(memory: Memory, yes: bool) -> Memory:
 
 
 def _forget_silent(memory: Memory, now: float, limits: Limits) -> Memory:
-    """Age-out of those who wait; the holder leaves by END alone."""
+    """Drop the claims of sessions that wait and are silent; a holder leaves by END only."""
     holder = memory.turn.session if memory.turn and not memory.turn.ends else ""
     staying = tuple(
         claim
@@ -214,7 +218,7 @@ def _take_turns(memory: Memory, now: float, limits: Limits) -> Memory:
 
 
 def _obey_the_lift(memory: Memory, shown: str, now: float, limits: Limits) -> Memory:
-    """It has taken a session whose turn it is not: after a restart, or a request past us."""
+    """The lift shows a session that has no turn: after our restart, or by a request not from us."""
     if memory.claim(shown):
         return _begin(memory, Turn(shown, now, seen=True))
     if memory.shown_at >= memory.session_since + limits.orphan_after_s:
@@ -223,7 +227,7 @@ def _obey_the_lift(memory: Memory, shown: str, now: float, limits: Limits) -> Me
 
 
 def _let_go(memory: Memory, turn: Turn, now: float, limits: Limits) -> Memory:
-    """A holder that is heard no more: at once if the lift never took it, else as the site wants."""
+    """End the turn of a silent holder: soon if the lift never took it, else after `holder_ttl_s`."""
     claim = memory.claim(turn.session)
     assert claim is not None
     after_s = limits.holder_ttl_s if turn.seen else limits.silent_after_s
@@ -267,7 +271,7 @@ def _due_at(memory: Memory, message: LiftRequest | None) -> float:
 
 
 def _wake_at(memory: Memory, due: list[float], now: float, limits: Limits) -> float:
-    """When time alone may change something: what is `due`, or the end of somebody's silence."""
+    """When the decision may change though nothing is heard."""
     if memory.shown is not None and memory.flows(now):
         due.append(math.nextafter(memory.shown_at + SILENT_S, NEVER))
     for claim in memory.claims:

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Final
 
 from bridges.core.decision import RequestRefused
 from bridges.core.freshness import SECOND_NS, in_ns
+from bridges.core.names import check_length
 from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings
 from bridges.lift_supervisor.signals import Ended, Requested, StateHeard, Target
@@ -16,6 +18,8 @@ from bridges.rmf.definitions import (
     Time,
 )
 
+MAX_FLOORS: Final = 1000
+
 
 def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Requested | Ended:
     """The event that an adapter's request is; `wall` is our clock (s since the epoch).
@@ -26,6 +30,7 @@ def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Req
     _check_lift(request.lift_name, settings)
     if not request.session_id:
         raise RequestRefused("empty session_id", "a session needs a name")
+    check_length(session_id=request.session_id, destination_floor=request.destination_floor)
     stamp = in_ns(request.request_time) / SECOND_NS
     if request.request_type == LiftRequestType.REQUEST_END_SESSION:
         return Ended(request.session_id, stamp, wall - stamp)
@@ -43,6 +48,14 @@ def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Req
 def accept_state(state: LiftState, settings: Settings, wall: float) -> StateHeard:
     """The event that a lift's state is."""
     _check_lift(state.lift_name, settings)
+    check_length(
+        session_id=state.session_id,
+        current_floor=state.current_floor,
+        destination_floor=state.destination_floor,
+        available_floors=max(state.available_floors, key=len, default=""),
+    )
+    if len(state.available_floors) > MAX_FLOORS:
+        raise RequestRefused("impossible available_floors", f"{len(state.available_floors)} floors")
     return StateHeard(
         session=state.session_id,
         floor=state.current_floor,
@@ -56,6 +69,7 @@ def accept_state(state: LiftState, settings: Settings, wall: float) -> StateHear
 def _check_lift(name: str, settings: Settings) -> None:
     if not name:
         raise RequestRefused("empty lift_name", "a lift needs a name")
+    check_length(lift_name=name)
     if settings.lifts is not None and name not in settings.lifts:
         raise RequestRefused("not ours", f"{name!r} is none of {', '.join(settings.lifts)}")
 

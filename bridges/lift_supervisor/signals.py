@@ -2,6 +2,7 @@
 
 import msgspec
 
+from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
 
 
@@ -41,7 +42,7 @@ class StateHeard(msgspec.Struct, frozen=True):
     floors: tuple[str, ...] = ()
 
     def satisfies(self, session: str, target: Target) -> bool:
-        """Does it show what was asked? As rmf_lift_supervisor judges it."""
+        """Does it show what was asked? The rule is rmf_lift_supervisor's."""
         there = target.floor == self.floor and not self.destination
         return (
             (target.floor == self.destination or there)
@@ -50,4 +51,4 @@ class StateHeard(msgspec.Struct, frozen=True):
         )
 
 
-Event = Requested | Ended | StateHeard | MaySpeak | Woken
+Event = Requested | Ended | StateHeard | MaySpeak | Woken | OperatorReset

@@ -1,6 +1,6 @@
 """What one daemon serves: devices on buses, or a kind that lives on RMF's graph alone.
 
-Either has loops with a thread each, subscribes for them, and says how they are.
+Either has threads, subscribes for them, and says how they are.
 """
 
 import logging
@@ -12,15 +12,20 @@ from typing import Any, Protocol
 
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Kind
+from bridges.core.kind import AnyDeviceKind
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
-from bridges.rmf.transport import Publisher, Transport, TransportError
-from bridges.serve.device import Clock, Node
-from bridges.serve.graph import GraphNode, Kept
+from bridges.rmf.topics import M_co, Topic
+from bridges.rmf.transport import Transport
+from bridges.serve.clock import Clock
+from bridges.serve.device import AnyNode, Node
+from bridges.serve.graph import AnyGraphNode, GraphNode
+from bridges.serve.keeper import Kept
 from bridges.serve.loop import Loop
+from bridges.serve.outlet import Named, Outlet
 from bridges.serve.predecessor import SafeFirst
+from bridges.serve.serving import Serving
+from bridges.serve.subject import Status
 from bridges.settings.load import Config
 from bridges.settings.names import kind_called
 from drivers.hal import Bus
@@ -28,31 +33,6 @@ from drivers.hal import Bus
 log = logging.getLogger(__name__)
 
 OpenBus = Callable[[str], Bus]
-
-
-def _clock(transport: Transport) -> Clock:
-    """Durations by the machine's own clock, stamps by RMF's."""
-    return Clock(time.monotonic, transport.wall)
-
-
-class Serving(Protocol):
-    """One thread of a service, as the daemon sees it. `scans` counts finished rounds."""
-
-    scans: int
-
-    def start(self) -> None:
-        """Begin."""
-
-    def stop(self, timeout_s: float) -> bool:
-        """End after the round under way, outputs off; False if it does not end, or not safely."""
-
-    @property
-    def alive(self) -> bool:
-        """False when it has ended."""
-
-    @property
-    def ready(self) -> bool:
-        """It has been through its first round."""
 
 
 class Service(Protocol):
@@ -68,14 +48,14 @@ class Service(Protocol):
     def reset(self) -> None:
         """An operator says that latched faults may clear."""
 
-    def status(self) -> Mapping[str, Any]:
+    def status(self) -> Status:
         """For the status file: how the service as a whole is."""
 
-    def devices(self) -> Mapping[str, Mapping[str, Any]]:
+    def devices(self) -> Mapping[str, Status]:
         """For the status file: each device, lift or door by name."""
 
 
-def named_by(config: Config, topic: Topic[Any]) -> Topic[Any]:
+def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
     """A topic under the name that the site has given it."""
     return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
@@ -94,47 +74,34 @@ def service(
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
+    clock = Clock(time.monotonic, transport.wall)  # durations by the machine's, stamps by RMF's
     if isinstance(kind, GraphKind):
-        return GraphService(
-            GraphNode(kind, config.section, transport, _clock(transport), named, kept)
-        )
-    return Devices(config, kind, transport, open_bus, named, unsafe)
+        return GraphService(GraphNode(kind, config.section, transport, clock, named, kept), clock)
+    return Devices(config, kind, transport, open_bus, named, clock, unsafe)
 
 
 class GraphService:
     """A supervisor or coordinator: one thread, no bus."""
 
-    def __init__(self, node: GraphNode) -> None:
-        self.loops = [node]
-        self._node = node
-
-    def subscribe(self) -> None:
-        """Begin to hear RMF."""
-        self._node.subscribe()
-
-    def reset(self) -> None:
-        """Its subjects hear of it."""
-        self._node.reset()
-
-    def status(self) -> Mapping[str, Any]:
-        """For the status file."""
-        return self._node.status()
-
-    def devices(self) -> Mapping[str, Mapping[str, Any]]:
-        """For the status file."""
-        return {subject.name: subject.status() for subject in self._node.nodes}
+    def __init__(self, node: AnyGraphNode, clock: Clock) -> None:
+        self.loops = [Serving(node, clock)]
+        self.subscribe = node.subscribe
+        self.reset = node.reset
+        self.status = node.status
+        self.devices = node.devices
 
 
 class Devices:
-    """Lifts, doors or chargers: a loop for each bus, and a node for each device."""
+    """Lifts, doors or chargers: a loop with a thread for each bus, and a node for each device."""
 
     def __init__(
         self,
         config: Config,
-        kind: Kind,
+        kind: AnyDeviceKind,
         transport: Transport,
         open_bus: OpenBus,
-        named: Callable[[Topic[Any]], Topic[Any]],
+        named: Named,
+        clock: Clock,
         unsafe: Collection[str] = (),
     ) -> None:
         self._config = config
@@ -142,14 +109,14 @@ class Devices:
         self._kind = kind
         self._driver = config.driver_type
         self._transport = transport
-        self._clock = _clock(transport)
+        self._clock = clock
         self._named = named
         self._strangers: Counter[str] = Counter()
-        self._publishers: dict[str, Publisher[Any]] = {
-            topic.name: transport.publisher(named(topic)) for topic in self._topics()
-        }
-        self.loops = [self._loop(name, open_bus) for name in config.buses]
-        self._placed = {node.name: (node, loop) for loop in self.loops for node in loop.nodes}
+        self._outlet = Outlet(transport, named)
+        self._outlet.open(self._topics())
+        self._loops = [self._loop(name, open_bus) for name in config.buses]
+        self.loops = [Serving(loop, clock) for loop in self._loops]
+        self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
 
     def subscribe(self) -> None:
         """Begin to hear RMF, and whoever else publishes our devices' states."""
@@ -161,20 +128,20 @@ class Devices:
     def reset(self) -> None:
         """Each device hears of it in its own loop."""
         for device, (_, loop) in self._placed.items():
-            loop.inbox.put((device, OperatorReset()))
+            loop.inbox.put(device, OperatorReset())
 
-    def status(self) -> Mapping[str, Any]:
+    def status(self) -> Status:
         """For the status file."""
         return {
             "requests_for_others": self._strangers["requests"],
-            "events_dropped": sum(loop.inbox.dropped for loop in self.loops),
+            "events_dropped": sum(loop.inbox.dropped for loop in self._loops),
         }
 
-    def devices(self) -> Mapping[str, Mapping[str, Any]]:
+    def devices(self) -> Mapping[str, Status]:
         """For the status file."""
         return {name: node.status() for name, (node, _) in self._placed.items()}
 
-    def _topics(self) -> list[Topic[Any]]:
+    def _topics(self) -> list[Topic[Message]]:
         alarms = {t for d in self._config.devices.values() for t in self._kind.alarm_topics(d)}
         return [self._kind.states, *alarms]
 
@@ -188,25 +155,25 @@ class Devices:
         ]
         return Loop(bus_name, bus, nodes, settings.scan_s, self._clock)
 
-    def _node(self, name: str, device: Any, bus: Bus) -> Node:
+    def _node(self, name: str, device: Any, bus: Bus) -> AnyNode:
         limits = self._kind.limits(device, self._driver.debounce(device))
         driver = self._driver.create(name, device, bus)
         if name in self._unsafe:
             driver = SafeFirst(name, driver)
-        return Node(name, self._kind, device, limits, driver, self._publish, self._clock)
+        return Node(name, self._kind, device, limits, driver, self._outlet.publish, self._clock)
 
-    def _to_inbox(self, topic: Topic[Any]) -> Callable[[Any], None]:
+    def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
         """A callback for the transport's thread. Other nodes' states are not ours to count."""
         states = topic == self._kind.states
 
-        def put(message: Any) -> None:
+        def put(message: Message) -> None:
             device = self._kind.device_name(message)
             if device in self._placed:
                 node, loop = self._placed[device]
                 event = node.event(topic, message)
                 if event is not None:
                     sender = "" if states else self._kind.sender(message)
-                    loop.inbox.put((device, event), (topic.name, sender))
+                    loop.inbox.put(device, event, (topic.name, sender))
             elif not states:
                 self._count_stranger(device)
 
@@ -216,9 +183,3 @@ class Devices:
         if not self._strangers:
             log.info(pairs("not_ours", kind=self._kind.name, name=device))
         self._strangers["requests"] += 1
-
-    def _publish(self, topic: Topic[Any], message: Message) -> None:
-        try:
-            self._publishers[topic.name].publish(message)
-        except TransportError as error:
-            log.error(pairs("not_published", topic=topic.name, reason=error))

@@ -21,9 +21,9 @@ import msgspec
 from msgspec.inspect import LiteralType
 from yaml import MappingNode, Node, ScalarNode
 
-from bridges.core.fields import Name, Rmf
-from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Kind
+from bridges.core.fields import DeviceSettings, Name, Rmf
+from bridges.core.graph_kind import AnyGraphKind, AnyKind, GraphKind
+from bridges.rmf import topics
 from bridges.settings import names as named
 from bridges.settings.nodes import (
     Page,
@@ -35,14 +35,16 @@ from bridges.settings.nodes import (
     read,
     unknown,
 )
+from bridges.settings.plausible import milliseconds, stale_readings
 from bridges.settings.values import BROKEN, Entry, Spot, Values, below, is_none, locate
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
-from drivers.driver_type import DriverType
-from drivers.hal import Bus, BusType
+from drivers.driver_type import AnyDriver
+from drivers.hal import AnyBus, Bus
 from drivers.hal.points import Wire
 
 __all__ = ["Config", "Problem", "SettingsError", "load"]
 
+TOPICS = [topic.name for topic in vars(topics).values() if isinstance(topic, topics.Topic)]
 MAPPING = "a mapping (key: value)"
 
 
@@ -77,7 +79,7 @@ class Config:
         return [name for name in self.devices if self.bus_of(name) == bus]
 
     @property
-    def driver_type(self) -> DriverType[Any, Any, Any]:
+    def driver_type(self) -> AnyDriver:
         """The driver of its devices."""
         return named.driver_called(self.kind, self.driver)
 
@@ -85,7 +87,7 @@ class Config:
         """A device's wiring table; empty where its driver has none."""
         return list(self.driver_type.wires(self.devices[device_name]))
 
-    def bus_type(self, name: str) -> BusType[Any]:
+    def bus_type(self, name: str) -> AnyBus:
         """What the bus of this name is."""
         return named.bus_called(self.bus_types[name])
 
@@ -115,7 +117,7 @@ class _Bus:
 
     entry: Entry
     type: str | None
-    hal: BusType[Any] | None
+    hal: AnyBus | None
     settings: Any
 
 
@@ -126,10 +128,10 @@ class _Reading:
         self._page = page
         self._top = Spot(root, root, "the file")
         self._values = Values(page)
-        self._kind: Kind | GraphKind | None = None
+        self._kind: AnyKind | None = None
         self._section: Any = None
         self._kind_name = ""
-        self._driver: DriverType[Any, Any, Any] | None = None
+        self._driver: AnyDriver | None = None
         self._driver_name = ""
         self._rmf = Rmf()
         self._buses: dict[str, _Bus] = {}
@@ -160,7 +162,7 @@ class _Reading:
             self._read_driver(below(self._top.node, "driver"))
         sections = self._values.known(entries, self._top, self._keys())
         if "rmf" in sections:
-            self._rmf = self._values.make(Rmf, sections["rmf"].spot())
+            self._read_rmf(sections["rmf"].spot())
         if "buses" in sections:
             self._read_buses(sections["buses"].spot())
         if isinstance(self._kind, GraphKind):
@@ -193,7 +195,14 @@ class _Reading:
             self._driver_name = name
             self._driver = named.driver_called(self._kind_name, name)
 
-    def _read_section(self, entry: Entry | None, kind: GraphKind) -> None:
+    def _read_rmf(self, spot: Spot) -> None:
+        self._rmf = self._values.make(Rmf, spot)
+        for name in () if self._rmf is BROKEN else self._rmf.topics:
+            if name not in TOPICS:
+                key = locate(spot, ("topics", name)).key
+                self._page.note(key, unknown("topic", name, TOPICS))
+
+    def _read_section(self, entry: Entry | None, kind: AnyGraphKind) -> None:
         """The settings of a kind without devices; all of them may have defaults."""
         if entry:
             self._section = self._values.make(kind.settings, entry.spot())
@@ -296,7 +305,7 @@ class _Reading:
             self._page.note(entry.value, unknown("bus", name, self._buses))
         return None
 
-    def _device(self, entry: Entry, bus: str | None, driver: DriverType[Any, Any, Any]) -> Any:
+    def _device(self, entry: Entry, bus: str | None, driver: AnyDriver) -> Any:
         """A device's settings, with all that can be said about its wires."""
         spot = Spot(entry.value, entry.key, entry.spot().label)
         hal = self._buses[bus].hal if bus else None
@@ -308,14 +317,15 @@ class _Reading:
             wiring.parts(values.structs, spot)
         else:
             self._check_signals(settings, spot, wiring, driver)
+            self._check_pace(settings, spot, bus)
         if len(self._page.problems) == before:
             self._collect_warnings(settings, spot, driver)
+            for path, text in milliseconds(values.structs):
+                self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
         self._uses += wiring.uses
         return settings
 
-    def _check_signals(
-        self, settings: Any, spot: Spot, wiring: Wiring, driver: DriverType[Any, Any, Any]
-    ) -> None:
+    def _check_signals(self, settings: Any, spot: Spot, wiring: Wiring, driver: AnyDriver) -> None:
         """The wires of a device whose settings are all there and of the right sort."""
         wires = list(driver.wires(settings))
         wiring.wires(wires, spot)
@@ -323,9 +333,12 @@ class _Reading:
         signals = [wire.signal for wire in wires]
         note_unknown_signals(self._page, settings.accept_unsafe, signals, spot)
 
-    def _collect_warnings(
-        self, settings: Any, spot: Spot, driver: DriverType[Any, Any, Any]
-    ) -> None:
+    def _check_pace(self, settings: DeviceSettings, spot: Spot, bus: str | None) -> None:
+        read = self._buses[bus].settings if bus else BROKEN
+        for path, text in () if read is BROKEN else stale_readings(settings, read):
+            self._page.note(locate(spot, path).where(), text)
+
+    def _collect_warnings(self, settings: Any, spot: Spot, driver: AnyDriver) -> None:
         """What is to be known of a device that is in order."""
         for signal, reason in settings.accept_unsafe.items():
             key = locate(spot, ("accept_unsafe", signal)).key

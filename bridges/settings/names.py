@@ -5,18 +5,17 @@ file imports a kind, a driver or a bus by its name.
 """
 
 import importlib
+import re
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import bridges
 import drivers
 import drivers.hal
-from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Kind
-from drivers.driver_type import DriverType
-from drivers.hal import BusType
+from bridges.core.graph_kind import AnyKind
+from drivers.driver_type import AnyDriver
+from drivers.hal import AnyBus
 
 
 def kind_names() -> list[str]:
@@ -44,22 +43,23 @@ def _found(
     They are searched, not imported: others beside them need a vendor's library.
     """
     found = (path for root in package.__path__ for path in Path(root).glob(pattern))
-    return sorted({name(path) for path in found if f"\n{record} = " in path.read_text("utf-8")})
+    holds = re.compile(rf"^{record}(:| =)", re.MULTILINE).search
+    return sorted({name(path) for path in found if holds(path.read_text("utf-8"))})
 
 
-def kind_called(name: str) -> Kind | GraphKind:
+def kind_called(name: str) -> AnyKind:
     """The kind that `kind:` names; one of `kind_names()`."""
-    kind: Kind | GraphKind = importlib.import_module(f"bridges.{name}").KIND
+    kind: AnyKind = importlib.import_module(f"bridges.{name}").KIND
     return kind
 
 
-def driver_called(kind: str, name: str) -> DriverType[Any, Any, Any]:
+def driver_called(kind: str, name: str) -> AnyDriver:
     """The driver that `kind:` and `driver:` name; one of `driver_names(kind)`."""
-    driver: DriverType[Any, Any, Any] = importlib.import_module(f"drivers.{kind}.{name}").DRIVER
+    driver: AnyDriver = importlib.import_module(f"drivers.{kind}.{name}").DRIVER
     return driver
 
 
-def bus_called(name: str) -> BusType[Any]:
+def bus_called(name: str) -> AnyBus:
     """The type of bus that `type:` names; one of `bus_types()`."""
-    bus: BusType[Any] = importlib.import_module(f"drivers.hal.{name}").BUS
+    bus: AnyBus = importlib.import_module(f"drivers.hal.{name}").BUS
     return bus

@@ -14,9 +14,10 @@ import msgspec
 from msgspec import inspect as mi
 
 from bridges.core.fields import Rmf
-from bridges.core.graph_kind import GraphKind
+from bridges.core.graph_kind import AnyGraphKind, GraphKind
 from bridges.settings import names as named
-from drivers.driver_type import DriverType
+from bridges.settings.leaves import Extra, choices, wanted_text
+from drivers.driver_type import AnyDriver
 
 KEYS = r"(?:^|(?<=[.;]\s))((?:`\w+`(?:,\s)?)+): "
 MEANING = re.compile(rf"{KEYS}(.*?)(?={KEYS}|\Z)", re.M | re.S)
@@ -29,7 +30,7 @@ class Shape:
     kind: str
     devices_key: str
     driver: str
-    type: DriverType[Any, Any, Any]
+    type: AnyDriver
 
 
 def shapes() -> Iterator[Shape]:
@@ -40,7 +41,7 @@ def shapes() -> Iterator[Shape]:
             yield Shape(kind, key, driver, named.driver_called(kind, driver))
 
 
-def graph_kinds() -> list[GraphKind]:
+def graph_kinds() -> list[AnyGraphKind]:
     """Every sort of file without devices."""
     kinds = (named.kind_called(name) for name in named.kind_names())
     return [kind for kind in kinds if isinstance(kind, GraphKind)]
@@ -95,7 +96,7 @@ def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[
     }
 
 
-def _graph_file(kind: GraphKind, by_type: dict[Any, Any]) -> dict[str, Any]:
+def _graph_file(kind: AnyGraphKind, by_type: dict[Any, Any]) -> dict[str, Any]:
     return {
         "type": "object",
         "additionalProperties": False,
@@ -184,37 +185,21 @@ def _inner(info: mi.Type) -> list[type]:
     return []
 
 
-def _type(info: mi.Type, unit: str = "") -> str:
+def _type(info: mi.Type, extra: Extra | None = None) -> str:
     match info:
-        case mi.Metadata(type=part, extra=extra):
-            return _type(part, str((extra or {}).get("unit", "")))
+        case mi.Metadata(type=part, extra=more):
+            return _type(part, more)
         case mi.StructType():
             return "a mapping, below"
         case mi.UnionType(types=types):
-            return " or ".join(_type(part, unit) for part in types if part != mi.NoneType())
+            return " or ".join(_type(part, extra) for part in types if part != mi.NoneType())
         case mi.DictType(value_type=part):
             return f"name: {_type(part)}"
         case mi.ListType(item_type=part) | mi.VarTupleType(item_type=part):
             return f"list of {_type(part)}"
-        case mi.LiteralType(values=values):
-            return ", ".join(f"`{value}`" for value in values)
-        case mi.EnumType(cls=cls):
-            return ", ".join(f"`{member.value}`" for member in cls)
-        case mi.IntType() | mi.FloatType():
-            return _number(info, unit)
-        case mi.BoolType():
-            return "true, false"
-        case mi.StrType():
-            return "text"
-    return type(info).__name__.removesuffix("Type").lower()
-
-
-def _number(info: mi.IntType | mi.FloatType, unit: str) -> str:
-    what = "whole number" if isinstance(info, mi.IntType) else "number"
-    least = info.ge if info.ge is not None else info.gt
-    most = info.le if info.le is not None else info.lt
-    bounds = f" {least:g} to {most:g}" if least is not None and most is not None else ""
-    return f"{what}{bounds}{f' {unit}' if unit else ''}"
+        case mi.LiteralType() | mi.EnumType():
+            return ", ".join(f"`{choice}`" for choice in choices(info))
+    return wanted_text(info, extra).removeprefix("a ")
 
 
 def _default(field: mi.Field) -> str:

@@ -6,13 +6,12 @@ What a point may be called and which wires cannot be are the bus's knowledge (`c
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 from yaml import Node
 
 from bridges.settings.nodes import Page, unknown
 from bridges.settings.values import Check, Spot, below, locate
-from drivers.hal import BusType
+from drivers.hal import AnyBus
 from drivers.hal.points import Input, Output, Wire
 
 
@@ -30,7 +29,7 @@ class Use:
 class Wiring:
     """The points of one device as they are met while its settings are read, and then as wires."""
 
-    def __init__(self, page: Page, device: str, bus: str, hal: BusType[Any] | None) -> None:
+    def __init__(self, page: Page, device: str, bus: str, hal: AnyBus | None) -> None:
         self._page = page
         self._device = device
         self._bus = bus
@@ -78,7 +77,7 @@ class Wiring:
             user = f"{self._device} {'.'.join(path)}"
             self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
 
-    def parts(self, structs: Iterable[tuple[tuple[str, ...], Any]], spot: Spot) -> None:
+    def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
         """Judge the wires of a device that is otherwise not in order, so that no table exists."""
         for path, struct in structs:
             if isinstance(struct, Input):

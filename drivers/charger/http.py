@@ -147,8 +147,10 @@ class Calls(Protocol):
     def get_json(self, path: str) -> dict[str, Any]:
         """One JSON object. Raises HalError."""
 
-    def send(self, path: str, method: http.Method = "POST", body: str | None = None) -> None:
-        """Once. Raises HalError."""
+    def send(
+        self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
+    ) -> None:
+        """Once; `safe` where it takes power away. Raises HalError."""
 
 
 def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
@@ -266,7 +268,7 @@ class HttpCharger:
     def make_safe(self) -> None:
         """No power; a station that may go on charging without us is left as it is."""
         if self._settings.on_death == "stop":
-            self._send(self._settings.stop)
+            self._send(self._settings.stop, safe=True)
 
     def close(self) -> None:
         """Nothing to let go."""
@@ -275,7 +277,7 @@ class HttpCharger:
         given, self._power = self._power, None
         on = self._activity in (Activity.HANDSHAKE, Activity.CHARGING)
         if on or (given is not False and self._activity in AT_FAULT):
-            self._send(self._settings.stop)
+            self._send(self._settings.stop, safe=True)
 
     def _start_if_needed(self) -> None:
         given, self._power = self._power, None
@@ -283,9 +285,9 @@ class HttpCharger:
         if waits or (not given and self._activity is Activity.HANDSHAKE):
             self._send(self._settings.start)
 
-    def _send(self, call: Call | None) -> None:
+    def _send(self, call: Call | None, safe: bool = False) -> None:
         if call:
-            self._bus.send(call.path, call.method, call.body)
+            self._bus.send(call.path, call.method, call.body, safe)
 
 
 def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> int | str:

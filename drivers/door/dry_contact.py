@@ -17,7 +17,7 @@ from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
 from drivers.driver_type import DriverType
 from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire
-from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
+from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, slow_alarms, unaccepted
 
 DEBOUNCE_S: Final = 0.05
 
@@ -143,6 +143,7 @@ def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
                 wire.path,
                 "a cut wire may read as a closed door; wire a contact that shuts with it",
             )
+    yield from slow_alarms(w for w in wires(settings) if w.signal in ("fire", "obstruction"))
     for signal in settings.accept_unsafe.keys() - {signal for signal, _, _ in _unsafe(settings)}:
         yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
     if settings.feedback == "estimated":

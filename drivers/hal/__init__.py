@@ -8,13 +8,13 @@ more than one timeout a period.
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import msgspec
 
 from drivers.hal.points import HalError, Wire
 
-__all__ = ["Bus", "BusType", "HalError", "Remark"]
+__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Remark"]
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
@@ -42,9 +42,11 @@ class Bus:
 class BusType(Generic[Settings]):
     """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, made without its vendor library.
 
-    `settings`: what stands below the bus's name in the YAML. `open_bus(settings)`: raises HalError.
+    `settings`: what stands below the bus's name in the YAML, `scan_s` (how often it is read) among it.
+    `open_bus(settings)`: raises HalError.
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
-    far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated.
+    far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it
+    cannot leave the daemon's process, as pins cannot.
 
     A bus with points also has
     `canonical(point)`: one spelling; ValueError says what to write instead;
@@ -56,6 +58,11 @@ class BusType(Generic[Settings]):
     open_bus: Callable[[Settings], Bus]
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
     fake: str = ""
+    fake_inside: bool = False
     canonical: Callable[[str], str] = str
     describe: Callable[[str], str] = str
     wire_problems: Callable[[Wire], Iterable[str]] = lambda wire: ()
+
+
+AnyBus: TypeAlias = BusType[Any]
+"""One that was found by its name."""

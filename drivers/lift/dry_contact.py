@@ -121,6 +121,7 @@ def decode(
         hazards=frozenset(
             h for h in Hazard if h == service or (h not in unknown and shown.get(h, False))
         ),
+        floor_valid="floor" not in unknown,
     )
 
 

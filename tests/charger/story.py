@@ -9,7 +9,8 @@ from msgspec.structs import replace
 from bridges.charger import core
 from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import Limits, robot
+from bridges.charger.settings import Durations as Limits
+from bridges.charger.settings import robot
 from bridges.charger.signals import (
     Activity,
     Cancelled,

@@ -14,7 +14,8 @@ from msgspec.structs import replace
 from bridges.charger.core import decide
 from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import Limits, Robot, robot
+from bridges.charger.settings import Durations as Limits
+from bridges.charger.settings import Robot, robot
 from bridges.charger.signals import (
     Activity,
     Cancelled,

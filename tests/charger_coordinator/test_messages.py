@@ -1,5 +1,6 @@
 """What comes in and what a file may say: ours or refused, by name."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,25 @@ def test_what_is_not_ours_is_refused_by_name(accept: Any, message: Any, kind: st
     with pytest.raises(RequestRefused) as refused:
         accept(message, SETTINGS, 0.0)
     assert refused.value.kind == kind
+
+
+@pytest.mark.parametrize(
+    ("accept", "message", "kind"),
+    [
+        (messages.accept_state, replace(STATE, error_message="x" * 10_001), "error_message"),
+        (messages.accept_state, replace(STATE, request_id="x" * 257), "request_id"),
+        (messages.accept_state, replace(STATE, robot_name="x" * 257), "robot_name"),
+        (
+            messages.accept_fleet,
+            d.FleetState("tiny", (d.RobotState("AMR01", task_id="x" * 257),)),
+            "task_id",
+        ),
+    ],
+)
+def test_endless_texts_are_not_kept(accept: Any, message: Any, kind: str) -> None:
+    with pytest.raises(RequestRefused) as refused:
+        accept(message, SETTINGS, 0.0)
+    assert refused.value.kind == f"impossible {kind}"
 
 
 def test_an_alert_is_sent_once_under_its_id_and_its_time() -> None:

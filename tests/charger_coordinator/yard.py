@@ -7,7 +7,8 @@ from typing import Any
 from bridges.charger import core as charger
 from bridges.charger import messages as charger_messages
 from bridges.charger.memory import ChargerLimits
-from bridges.charger.settings import ChargerSettings, Limits, Robot
+from bridges.charger.settings import ChargerSettings, Robot
+from bridges.charger.settings import Durations as Limits
 from bridges.charger.signals import Activity, ChargerSample, Measured
 from bridges.charger.signals import FaultSide as Side
 from bridges.charger_coordinator import KIND
@@ -20,7 +21,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import duration
-from bridges.serve.device import Clock
+from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from hal_fakes.rmf.fleet import Fleet
 
@@ -217,7 +218,7 @@ class Yard:
     def faults(self) -> list[str]:
         """What the coordinator's status shows."""
         return [
-            f"{f['code']}: {f['detail']}" for s in self.node.nodes for f in s.status()["faults"]
+            f"{f['code']}: {f['detail']}" for s in self.node.devices().values() for f in s["faults"]
         ]
 
     def _scan(self, station: Charger) -> None:

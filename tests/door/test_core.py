@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen
 from bridges.door.memory import DoorLimits
 from bridges.door.report import DoorReport
-from bridges.door.settings import Limits, Pulse
+from bridges.door.settings import Durations, Pulse
 from bridges.door.signals import CloseRequested, DoorOutputs, DoorSample, OpenRequested
 from bridges.rmf.definitions import DoorModeValue
 from tests.door.virtual import BETWEEN, BOTH, CLOSED, DEBOUNCED, OPEN, CoreAlone
@@ -16,7 +16,7 @@ OPENS, CLOSES = OpenRequested("door_supervisor"), CloseRequested("door_superviso
 
 
 def limits(**durations: float) -> DoorLimits:
-    return DoorLimits(t=Limits(**durations), debounce=DEBOUNCED)
+    return DoorLimits(t=Durations(**durations), debounce=DEBOUNCED)
 
 
 def test_before_the_first_reading_a_door_is_offline_and_nothing_is_held() -> None:
@@ -352,7 +352,7 @@ def test_between_two_pulses_the_door_is_still_held() -> None:
 
 
 def test_without_contacts_a_door_is_open_by_the_clock_and_says_that_it_guesses() -> None:
-    core = CoreAlone(DoorLimits(t=Limits(open_delay_s=4.0, travel_s=6.0), estimated=True))
+    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=4.0, travel_s=6.0), estimated=True))
     core.sees(DoorSample(), until=10.0)
     core.hears(OPENS)
     opened = core.sees(DoorSample(), until=15.0)
@@ -370,7 +370,7 @@ def test_without_contacts_a_door_is_open_by_the_clock_and_says_that_it_guesses()
 
 
 def test_a_guess_begins_again_after_a_reading_that_failed() -> None:
-    core = CoreAlone(DoorLimits(t=Limits(open_delay_s=4.0), estimated=True))
+    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=4.0), estimated=True))
     core.hears(OPENS)
     core.sees(DoorSample(), until=5.0)
     core.sees(IoFailed("no reply"), until=5.5)
@@ -394,7 +394,7 @@ def test_a_guess_without_a_delay_is_never_open() -> None:
 
 
 def test_with_one_contact_only_the_other_end_is_a_guess() -> None:
-    core = CoreAlone(DoorLimits(t=Limits(open_delay_s=2.0), debounce=DEBOUNCED, estimated=True))
+    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=2.0), debounce=DEBOUNCED, estimated=True))
     closed = core.sees(DoorSample(closed=True), until=1.0)
     core.hears(OPENS)
     core.sees(DoorSample(closed=True), until=5.0)

@@ -33,6 +33,12 @@ def test_no_other_mode_can_be_asked(mode: int) -> None:
     )
 
 
+def test_a_requester_has_a_longest_name() -> None:
+    with pytest.raises(RequestRefused) as caught:
+        messages.accept(DoorRequest(requester_id="x" * 257, door_name="ward_door"), SETTINGS)
+    assert caught.value.kind == "impossible requester_id"
+
+
 def test_a_request_that_nobody_has_filled_in_closes_no_door() -> None:
     with pytest.raises(RequestRefused) as caught:
         messages.accept(DoorRequest(door_name="ward_door"), SETTINGS)

@@ -10,7 +10,7 @@ from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 from bridges.core.durations import RIVAL_QUIET_S
 from bridges.door.core import decide, initial
 from bridges.door.memory import DoorLimits, Memory
-from bridges.door.settings import Limits, Pulse
+from bridges.door.settings import Durations, Pulse
 from bridges.door.signals import CloseRequested, DoorSample, Event, OpenRequested
 from bridges.rmf.definitions import DoorModeValue
 from tests.door.virtual import DEBOUNCED, Decided
@@ -32,7 +32,7 @@ STEPS = st.lists(
 LIMITS = st.builds(
     DoorLimits,
     t=st.builds(
-        Limits,
+        Durations,
         close_grace_s=st.sampled_from([0.0, 3.0]),
         open_delay_s=st.sampled_from([None, 4.0]),
         max_hold_s=st.sampled_from([None, 5.0]),

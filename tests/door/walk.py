@@ -17,7 +17,7 @@ from bridges.core.durations import RIVAL_QUIET_S
 from bridges.door.core import decide, initial
 from bridges.door.memory import DoorLimits
 from bridges.door.memory import Memory as DoorMemory
-from bridges.door.settings import Limits
+from bridges.door.settings import Durations as Limits
 from bridges.door.signals import CloseRequested as CloseDoor
 from bridges.door.signals import DoorSample, Event
 from bridges.door.signals import OpenRequested as OpenDoor

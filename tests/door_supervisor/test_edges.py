@@ -54,6 +54,8 @@ def test_open_and_close_are_taken_with_their_senders_stamp_to_the_nanosecond() -
             request(7),
             "mode that cannot be asked: requested_mode 7; only OPEN (2) and CLOSED (0) can be",
         ),
+        (request(who="x" * 257), f"impossible requester_id: '{'x' * 40}'…, 257 characters"),
+        (request(door="x" * 257), f"impossible door_name: '{'x' * 40}'…, 257 characters"),
         (request(time=d.Time(-1, 0)), "impossible request_time: -1 s 0 ns"),
         (request(time=d.Time(1, 10**9)), "impossible request_time: 1 s 1000000000 ns"),
     ],

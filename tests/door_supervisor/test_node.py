@@ -8,7 +8,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import stamp
-from bridges.serve.device import Clock
+from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 
 HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT

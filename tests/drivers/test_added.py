@@ -1,4 +1,4 @@
-"""A driver, and a bus type, are added by files alone: checked, run and simulated, no table edited."""
+"""Drivers, kinds and bus types are added by files alone: checked, run, simulated, no table edited."""
 
 import json
 import shutil
@@ -38,7 +38,19 @@ rmf: {{transport: dds, network: localhost, domain_id: {domain}}}
 buses: {{b: {bus}}}
 doors: {{ward_door: {{called: left wing}}}}
 """
-ON_MODBUS = {"type": "modbus", "tcp": {"host": "192.0.2.1", "port": 502}}
+HATCH = """
+kind: hatch
+driver: contact
+rmf: {{transport: dds, network: localhost, domain_id: {domain}}}
+buses: {{b: {bus}}}
+hatches:
+  ward_door:
+    inputs:
+      opened: {{point: unit 1 discrete input 0, active: high}}
+      closed: {{point: unit 1 discrete input 1, active: high}}
+    outputs: {{hold_open: {{point: unit 1 coil 0, active: high}}}}
+"""
+ON_MODBUS = {"type": "modbus", "tcp": {"host": "192.0.2.1", "port": 502}, "timeout_s": 2}
 ON_A_LINE = {"type": "line", "host": "192.0.2.1"}
 
 
@@ -105,10 +117,16 @@ CHECKED = {
         "ward_door closed unit 1 discrete input 0 (10001) in high - 0.05 s - not asserted",
         "ward_door hold_open unit 1 coil 0 (00001) out high - - low not asserted",
     ],
+    "a kind": [
+        "ward_door opened unit 1 discrete input 0 (10001) in high - 0.05 s - not asserted",
+        "ward_door closed unit 1 discrete input 1 (10002) in high - 0.05 s - not asserted",
+        "ward_door hold_open unit 1 coil 0 (00001) out high - - low not asserted",
+    ],
     "a bus type too": ["ward_door asks left wing at 192.0.2.1:4000"],
 }
 SITES: dict[str, tuple[str, dict[str, Any]]] = {
     "one file": (LATCH, ON_MODBUS),
+    "a kind": (HATCH, ON_MODBUS),
     "a bus type too": (LINE, ON_A_LINE),
 }
 

@@ -9,7 +9,7 @@ from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen, Sam
 from bridges.lift.core import decide
 from bridges.lift.memory import LiftLimits, Memory
 from bridges.lift.sensing import MOTION_MEMORY_S
-from bridges.lift.settings import Floor, LiftSettings, Limits
+from bridges.lift.settings import Durations, Floor, LiftSettings
 from bridges.lift.signals import (
     Door,
     Ended,
@@ -31,7 +31,7 @@ class Told:
 
     def __init__(self, debounce: dict[str, float] | None = None, **limits: Any) -> None:
         floors = {"L1": Floor(), "L2": Floor(side=Side.REAR), "L3": Floor()}
-        settings = LiftSettings(floors=floors, limits=Limits(**limits), fire_reset="manual")
+        settings = LiftSettings(floors=floors, limits=Durations(**limits), fire_reset="manual")
         self.limits = LiftLimits.of(settings, debounce or {})
         self.memory = Memory()
 

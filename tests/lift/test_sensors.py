@@ -487,3 +487,52 @@ def test_a_fault_is_news_and_its_words_are_not() -> None:
     lost = [replace(first, faults=(Fault("INPUTS_NOT_FRESH", f"timeout {i}"),)) for i in (1, 2)]
     assert lost[0].news() == lost[1].news() != first.news()
     assert replace(first, read_at=9.0).news() == first.news()
+
+
+class FloorsInAgvMode(Controller):
+    """Its floor code means something only in AGV mode (`valid_when`); its motion lines always do."""
+
+    def read(self) -> LiftSample:
+        sample = super().read()
+        return sample if sample.agv else replace(sample, level=None, floor_valid=False)
+
+
+def test_a_floor_code_is_believed_after_people_used_the_lift_while_it_meant_nothing() -> None:
+    lift = FloorsInAgvMode()
+    story = Story(lift)
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.until(lambda: story.state == "AGV, open at L3, A to L3")
+    story.ends("A")
+    story.run(story.now + 10.0)
+    lift.goal = 0
+    story.until(lambda: lift.standing)
+    story.run(story.now + 60.0)
+    assert (story.state, story.faults) == ("HUMAN, closed at ?", [])
+    story.asks("B", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, B to L1")
+    assert story.faults == []
+
+
+def test_between_valid_floor_codes_a_jump_is_no_position() -> None:
+    lift = FloorsInAgvMode()
+    story = Story(lift)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, A to L1")
+    lift.height = 2.0
+    story.run(story.now + 5.0)
+    assert (story.state, story.faults) == ("AGV, closed at ?, A to L1", ["POSITION_LOST"])
+
+
+def test_a_flicker_of_the_agv_line_makes_no_jump_a_position() -> None:
+    lift = FloorsInAgvMode()
+    story = Story(lift)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, A to L1")
+    lift.height = 2.0
+    story.run(story.now + 5.0)
+    lift.asked_at = story.now + 0.06
+    story.run(story.now + 5.0)
+    assert (story.state, story.faults) == ("AGV, closed at ?, A to L1", ["POSITION_LOST"])

@@ -89,7 +89,7 @@ def test_the_grace_ends_at_its_time_even_for_a_request_that_comes_before_the_sca
     story = boarded()
     story.ends("A")
     story.run(6.9)
-    memory, rules = story.node._memory, story.limits
+    memory, rules = story.node.subject.memory, story.limits
     assert decide(memory, Requested("B", True, "L2"), 6.99, rules).refused
     granted = decide(memory, Requested("B", True, "L2"), 7.0, rules)
     assert (granted.report.session, granted.memory.grace) == ("B", None)

@@ -15,7 +15,8 @@ from bridges.core.debounce import Settled
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from bridges.lift.core import decide, initial, published
 from bridges.lift.memory import Channel, LiftLimits, Memory
-from bridges.lift.settings import LiftSettings, Limits
+from bridges.lift.settings import Durations as Limits
+from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Door, Ended, Event, Hazard, LiftSample, Motion
 from bridges.lift.signals import Requested as Asked
 

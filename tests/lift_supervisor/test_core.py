@@ -319,6 +319,17 @@ def test_a_lift_that_was_never_heard_is_not_waited_for() -> None:
     assert core.idle(desk.memory, 60.0)
 
 
+def test_a_lift_whose_states_have_stopped_is_forgotten_unless_somebody_wants_it() -> None:
+    desk = Alone()
+    desk.shows("")
+    assert not core.idle(desk.memory, 59.0)
+    assert core.idle(desk.memory, 60.0)
+    desk.asks("a")
+    desk.shows("a")
+    desk.until(1000.0)
+    assert not core.idle(desk.memory, 1000.0)
+
+
 def test_who_ends_while_it_waits_leaves_the_queue() -> None:
     desk = Alone()
     desk.asks("a")

@@ -13,10 +13,12 @@ from bridges.rmf.definitions import LiftRequest, LiftState, Time
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic
-from bridges.rmf.transport import Transport, TransportError
+from bridges.rmf.transport import Transport
 from bridges.serve import graph as graph_node
-from bridges.serve.device import Clock
-from bridges.serve.graph import SPREAD_MOST_S, GraphNode
+from bridges.serve.clock import Clock
+from bridges.serve.graph import GraphNode
+from bridges.serve.presence import SPREAD_MOST_S
+from bridges.serve.serving import Serving
 from tests.rmf.domains import domain_of_this_run
 from tests.waiting import wait_until
 
@@ -158,7 +160,7 @@ def test_the_status_says_who_holds_each_lift_who_waits_and_what_is_wrong() -> No
     site.node.round()
     site.until(8.0)
     assert site.node.status() == {"passive": False, "other_publishers": 0, "refused": {}}
-    assert {node.name: node.status() for node in site.node.nodes} == {
+    assert site.node.devices() == {
         "Lift1": {
             "session": "fleet/a",
             "holder": "fleet/a (5 s)",
@@ -198,15 +200,12 @@ def test_faults_are_logged_when_they_come_and_when_they_go(
 def test_a_lost_wire_is_logged_and_does_not_end_it(caplog: pytest.LogCaptureFixture) -> None:
     site = Site()
     site.until(3.0)
-
-    class Broken:
-        def publish(self, message: LiftRequest) -> None:
-            raise TransportError("gone")
-
-    site.node._publishers[LIFT_REQUESTS.name] = Broken()  # type: ignore[assignment]
-    site.asks()
-    assert "not_published" in caplog.text
-    assert site.node.scans > 0
+    site.adapter.publish(LiftRequest("Lift1", stamp(WALL + 3.0), "fleet/a", 1, "L3", 2))
+    site.transport.close()
+    site.node.round()
+    assert "not_published topic=lift_requests" in caplog.text
+    site.until(4.0)
+    assert site.node.devices()["Lift1"]["holder"] == "fleet/a (1 s)"
 
 
 # --- with its thread, and on the wire ----------------------------------------------------------
@@ -238,18 +237,20 @@ def test_in_a_thread_it_serves_until_it_is_stopped(join: Callable[[str], Transpo
     adapter = others.publisher(ADAPTER_LIFT_REQUESTS)
     wait_until(lambda: ear.matched() == 1, "the rival is there")
     kind = replace(KIND, quiet_s=lambda settings: 0.5)
-    node = GraphNode(kind, Settings(), ours, Clock(time.monotonic, time.time))
+    clock = Clock(time.monotonic, time.time)
+    node = GraphNode(kind, Settings(), ours, clock)
+    thread, presence = Serving(node, clock), node.presence
     node.subscribe()
-    assert not node.ready
-    node.start()
-    wait_until(lambda: node.ready and node.rivals == 1, "the rival is seen")
+    assert not thread.ready
+    thread.start()
+    wait_until(lambda: thread.ready and presence.rivals == 1, "the rival is seen")
     rival.close()
-    wait_until(lambda: node.may_speak, "it speaks")
-    wait_until(lambda: ear.matched() == 1 and node.rivals == 0, "its own publisher is no rival")
+    wait_until(lambda: presence.may_speak, "it speaks")
+    wait_until(lambda: ear.matched() == 1 and presence.rivals == 0, "its own is no rival")
     request = LiftRequest("Lift1", stamp(time.time()), "fleet/a", 1, "L3", 2)
     adapter.publish(request)
     wait_until(lambda: heard, "the request is passed on")
     assert replace(heard[0], request_time=request.request_time) == request
-    assert node.alive
-    assert node.stop(5.0)
-    assert not node.alive
+    assert thread.alive
+    assert thread.stop(5.0)
+    assert not thread.alive

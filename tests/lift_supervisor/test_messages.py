@@ -43,6 +43,11 @@ def test_an_end_is_taken_as_fleet_adapters_send_it_and_whatever_else_it_says() -
         ({"door_state": 1}, "unknown door_state"),
         ({"destination_floor": ""}, "no destination_floor"),
         ({"lift_name": "Lift2"}, "not ours"),
+        ({"session_id": "x" * 257}, "impossible session_id"),
+        ({"session_id": "x" * 257, "request_type": 0}, "impossible session_id"),
+        ({"destination_floor": "x" * 257}, "impossible destination_floor"),
+        ({"request_time": Time(-1, 0)}, "impossible request_time"),
+        ({"request_time": Time(1, 10**9)}, "impossible request_time"),
     ],
 )
 def test_what_cannot_be_asked_is_refused_by_name(changes: dict[str, object], kind: str) -> None:
@@ -58,6 +63,25 @@ def test_a_state_is_what_it_shows() -> None:
     assert messages.accept_state(state, ANY, 0.0) == shown
     with pytest.raises(RequestRefused):
         messages.accept_state(state, Settings(lifts=["Lift2"]), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({"lift_name": "x" * 257}, "impossible lift_name"),
+        ({"session_id": "x" * 257}, "impossible session_id"),
+        ({"current_floor": "x" * 257}, "impossible current_floor"),
+        ({"destination_floor": "x" * 257}, "impossible destination_floor"),
+        ({"available_floors": ("x" * 257,)}, "impossible available_floors"),
+        ({"available_floors": ("x",) * 1001}, "impossible available_floors"),
+    ],
+)
+def test_a_state_with_endless_texts_is_not_kept(changes: dict[str, object], kind: str) -> None:
+    state = replace(LiftState(lift_name="Lift1"), **changes)  # type: ignore[arg-type]
+    with pytest.raises(RequestRefused) as refusal:
+        messages.accept_state(state, ANY, 0.0)
+    assert refusal.value.kind == kind
+    assert len(str(refusal.value)) < 400
 
 
 def test_a_message_is_about_its_lift_and_is_stamped_when_it_is_sent() -> None:

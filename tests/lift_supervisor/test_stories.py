@@ -255,10 +255,10 @@ def test_a_second_of_ours_stands_by_and_takes_over() -> None:
     robot = Rider(world, A, UP)
     lift = LiftNode(world)
     world.run(12.5)
-    assert (first.node.may_speak, second.node.may_speak) == (True, False)
+    assert (first.node.presence.may_speak, second.node.presence.may_speak) == (True, False)
     first.leave()
     world.run(60.0)
-    assert second.node.may_speak
+    assert second.node.presence.may_speak
     assert lines(lift) == RIDE_UP
     assert robot.done
 

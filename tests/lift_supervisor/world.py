@@ -9,7 +9,6 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-from bridges.core.kind import Kind
 from bridges.lift import KIND as LIFT
 from bridges.lift.settings import LiftSettings
 from bridges.lift_supervisor import KIND as SUPERVISOR
@@ -17,7 +16,8 @@ from bridges.lift_supervisor.settings import Settings
 from bridges.rmf.definitions import LiftRequest, LiftState, Message
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import Publisher, Subscription
-from bridges.serve.device import Clock, Node
+from bridges.serve.clock import Clock
+from bridges.serve.device import Node
 from bridges.serve.graph import GraphNode
 from hal_fakes.rmf import Party as RmfParty
 from hal_fakes.rmf.phases import EndLiftSession, RequestLift
@@ -157,12 +157,11 @@ class LiftNode:
 
     def restart(self) -> None:
         """A new daemon: outputs off, nothing remembered."""
-        kind: Kind = LIFT
         clock = Clock(lambda: self.world.now, lambda: EPOCH + self.world.now)
-        limits = kind.limits(self.settings, {})
+        limits = LIFT.limits(self.settings, {})
         self.lift.advance(self.world.now)
         self.lift.make_safe()
-        self.node = Node(self.name, kind, self.settings, limits, self.lift, self._say, clock)
+        self.node = Node(self.name, LIFT, self.settings, limits, self.lift, self._say, clock)
         self._scan_at = self.world.now
         self.wake()
 

@@ -30,7 +30,7 @@ def test_a_message_tells_of_the_daemon_and_of_each_device_with_its_faults_and_it
     None
 ):
     found = diagnosis("node", "lift", DAEMON, {"Lift1": LIFT}, AT)
-    daemons = values(kind="lift", simulated="False", pid="12", samples_dropped__door_requests="3")
+    daemons = values(kind="lift", simulated="no", pid="12", samples_dropped__door_requests="3")
     lifts = values(
         kind="lift",
         mode="AGV",

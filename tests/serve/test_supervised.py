@@ -51,7 +51,7 @@ def test_a_lift_is_asked_for_through_the_supervisor_and_released_by_an_operator(
     building.supervisor.wait_for('holder="fleet/a')
     released = building.operator("release", "Lift1")
     assert released.returncode == 0, released.stdout + released.stderr
-    building.lift.wait_for('outputs="LiftOutputs(agv_request=False')
+    building.lift.wait_for("outputs device=Lift1 outputs=-")
 
 
 def test_two_supervisors_are_never_two_opinions(building: Building, tmp_path: Path) -> None:

@@ -176,7 +176,7 @@ FIELDS = {
     "gain: x": "'gain' is the text 'x': a number is wanted",
     "loud: yes": "'loud' is written yes, which not every YAML reads alike: write true",
     "loud: N": "'loud' is written N, which not every YAML reads alike: write false",
-    'loud: "true"': "'loud' is the text 'true': true or false is wanted, without quotes",
+    'loud: "true"': "'loud' is the text \"true\": true or false is wanted, without quotes",
     "loud: 1": "'loud' is the number 1: true or false is wanted",
     "baud: 960": "'baud' is '960': 9600 or 19200 is wanted (did you mean '9600'?)",
     "label: A": "'label' is 'A': a small word is wanted",

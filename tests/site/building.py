@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from bridges.charger import KIND as CHARGER
-from bridges.core.kind import Kind
+from bridges.core.kind import AnyDeviceKind
 from bridges.door import KIND as DOOR
 from bridges.lift import KIND as LIFT
 from bridges.settings.load import load
@@ -46,7 +46,7 @@ class Device:
     """One device from its settings to its plant. `driver()`: a new one, as a new daemon has it."""
 
     name: str
-    kind: Kind
+    kind: AnyDeviceKind
     settings: Any
     plant: Machine
     far: Far

@@ -169,7 +169,9 @@ class HttpFar:
         found: dict[str, Any] = json.loads(self._station.body(reading))
         return found
 
-    def send(self, path: str, method: str = "POST", body: str | None = None) -> None:
+    def send(
+        self, path: str, method: str = "POST", body: str | None = None, safe: bool = False
+    ) -> None:
         self._answers(self._plant.failures)
         self._plant.drive("clear_error", True, self._timeline.now)
 

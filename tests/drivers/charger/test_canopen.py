@@ -8,9 +8,9 @@ import pytest
 
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings.load import SettingsError, load
+from drivers.charger import xnergy
 from drivers.charger.canopen import (
     DRIVER,
-    CanOpenCharger,
     Settings,
     create,
     describe,
@@ -37,7 +37,7 @@ class Receiver:
         self.bus = self.far.bus()
         self.driver = self.made()
 
-    def made(self, on_death: str = "stop") -> CanOpenCharger:
+    def made(self, on_death: str = "stop") -> xnergy.Receiver:
         """Another driver of it."""
         return create("c", Settings(node=10, on_death=on_death), self.bus)  # type: ignore[arg-type]
 

@@ -37,7 +37,9 @@ class Station:
         self.calls.append(f"GET {path}")
         return self.answer  # type: ignore[no-any-return]
 
-    def send(self, path: str, method: str = "POST", body: str | None = None) -> None:
+    def send(
+        self, path: str, method: str = "POST", body: str | None = None, safe: bool = False
+    ) -> None:
         self.calls.append(f"{method} {path}" + (f" {body}" if body else ""))
         if self.fails:
             raise HalError("the answer is lost")
@@ -263,9 +265,9 @@ def test_check_prints_addresses_and_meanings() -> None:
 
 
 def test_check_says_how_often_errors_are_cleared_and_which_meaning_has_no_code() -> None:
-    from bridges.charger.settings import Limits
+    from bridges.charger.settings import Durations
 
-    made = Settings(codes=Codes(idle=[0], charging=[5]), limits=Limits(clear_errors_per_h=2))
+    made = Settings(codes=Codes(idle=[0], charging=[5]), limits=Durations(clear_errors_per_h=2))
     rows = dict(describe(made, bus_file.Settings(api_base="tpu")))
     assert rows["clear error"] == (
         "POST http://tpu/clear_error, when an operator resets, and by itself at most 2 times an hour"

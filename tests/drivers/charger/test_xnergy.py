@@ -90,10 +90,6 @@ def test_only_the_answer_yes_is_in_range_and_only_when_it_is_the_last_checks(res
     assert xnergy.sample(words(range=1), settled=False).measured.in_range is False
 
 
-def test_a_temperature_below_zero_is_below_zero() -> None:
-    assert [xnergy.celsius(word) for word in (25, 0, 0xFFFF)] == [25, 0, -1]
-
-
 any_word = st.integers(0, 0xFFFF)
 
 
@@ -101,7 +97,9 @@ any_word = st.integers(0, 0xFFFF)
 @given(
     st.fixed_dictionaries(
         dict.fromkeys(("state", "error_low", "error_high"), any_word),
-        optional=dict.fromkeys(set(xnergy.READS) - {"state", "error_low", "error_high"}, any_word),
+        optional=dict.fromkeys(
+            {*xnergy.ALWAYS, *xnergy.IN_ERROR} - {"state", "error_low", "error_high"}, any_word
+        ),
     )
 )
 def test_whatever_the_words_are_only_state_5_is_charging(found: dict[str, int]) -> None:

@@ -17,7 +17,7 @@ READ_IN0 = rtu("010200000001")
 IS_0, IS_1 = rtu("01020100"), rtu("01020101")
 
 
-def coils(bus: ModbusBus, count: int) -> list[bool]:
+def coils(bus: ModbusBus, count: int) -> list[int]:
     """The first coils of unit 1."""
     return list(bus.read(ranges(parse(f"unit 1 coil {i}") for i in range(count))[0]).values())
 
@@ -141,7 +141,7 @@ def test_the_late_reply_to_one_question_never_answers_another(line: SerialModule
     bus = bus_to(line.port, Time(), timeout_s=0.05, retries=1)
     asked = "unit 1 discrete input 5"
     assert bus.lines({asked: None}, {}).read() == {asked: True}  # by its second try
-    assert bus._connection.owes(1)
+    assert bus._wire.owes(1)
     assert bus.lines({IN0: None}, {}).read() == {IN0: False}
     assert [frame[3] for frame in line.frames] == [5, 5, 0, 0]
     later.join()

@@ -222,11 +222,11 @@ DAEMON = """
 import sys, threading
 from bridges.door.signals import DoorOutputs
 from bridges.settings.load import load
-from drivers import door_dry_contact
+from drivers.door import dry_contact
 from drivers.hal import modbus
 config = load(sys.argv[1])
 bus = modbus.open_bus(config.buses["module"])
-door = door_dry_contact.create("ward_door", config.devices["ward_door"], bus)
+door = dry_contact.create("ward_door", config.devices["ward_door"], bus)
 door.open()
 pause = threading.Event()
 while True:
