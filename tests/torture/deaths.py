@@ -88,7 +88,11 @@ def kills(directory: Path, rng: random.Random, times: int, table: Table) -> None
         for n in range(times):
             by_hand = n % 2 == 0
             running = here.daemon(**({} if by_hand else SERVICE))
-            pause.wait(rng.uniform(0.0, LONGEST_LIFE_S))
+            if rng.random() < 0.5:
+                wait_until(here.is_on, "the relay holds the door", PATIENCE_S)
+                pause.wait(rng.uniform(0.0, 1.0))
+            else:
+                pause.wait(rng.uniform(0.0, LONGEST_LIFE_S))
             was_on = here.is_on()
             running.end(signal.SIGKILL)
             if not by_hand:
