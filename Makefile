@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: help demo demo-charging test deep test-ros lint format bench flood soak mutate clean
+.PHONY: help demo demo-charging test deep test-ros lint format bench flood soak torture mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
@@ -12,6 +12,7 @@ help:
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again"
+	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make format  rewrite the sources as the linter wants them"
 	@echo "make clean   remove the virtual environment and everything generated"
@@ -68,6 +69,9 @@ flood: .venv/ready
 # Without SEED one is drawn, and printed.
 soak: .venv/ready
 	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED))
+
+torture: .venv/ready
+	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))
 
 # Mutants live in a copy; stopped and started again, only what is not known yet is run. Some of it:
 # make mutate ONLY='bridges.door.*' CHILDREN=1; everything afresh: rm -rf the directory first.

@@ -12,10 +12,9 @@ import pytest
 
 from bridges.rmf.definitions import DoorModeValue
 from tests.rmf.conftest import ROS2
-from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment
+from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment, hold_open
 from tests.waiting import PATIENCE_S, wait_until
 
-OPEN, CLOSED = DoorModeValue.MODE_OPEN, DoorModeValue.MODE_CLOSED
 ROOT = Path(__file__).parents[2]
 
 
@@ -33,22 +32,12 @@ def graph(module: Module) -> Iterator[Graph]:
     joined.transport.close()
 
 
-def _hold_open(module: Module, graph: Graph, running: Daemon) -> None:
-    running.wait_for("ready")
-
-    def held() -> bool:
-        graph.ask(OPEN)
-        return module.relay() == [True]
-
-    wait_until(held, "the relay holds the door")
-
-
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_releases_the_relay_and_leaves_the_graph_at_once(
     module: Module, graph: Graph, tmp_path: Path, number: signal.Signals
 ) -> None:
     with daemon(module.file, tmp_path / "run") as running:
-        _hold_open(module, graph, running)
+        hold_open(module, graph, running)
         assert running.end(number) == 0
         assert graph.heard.matched() == 0
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
@@ -58,8 +47,8 @@ def test_a_signal_releases_the_relay_and_leaves_the_graph_at_once(
 def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_the_yaml_says_now(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
-    with daemon(module.file, tmp_path / "run") as running:
-        _hold_open(module, graph, running)
+    with daemon(module.file, tmp_path / "run", RMF_BRIDGE_SERVICE="1") as running:
+        hold_open(module, graph, running)
         off = command("outputs-off", module.file, "--runtime-dir", tmp_path / "run")
         refused = subprocess.run(off, env=environment(), capture_output=True, text=True)
         assert (refused.returncode, module.relay()) == (69, [True])
@@ -87,7 +76,7 @@ def test_a_second_node_for_the_same_door_takes_both_out_of_service(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     with daemon(module.file, tmp_path / "one") as first:
-        _hold_open(module, graph, first)
+        hold_open(module, graph, first)
         with daemon(module.file, tmp_path / "two") as second:
             wait_until(lambda: graph.last() is DoorModeValue.MODE_OFFLINE, "the door is OFFLINE")
             first.wait_for("TWO_NODES_FOR_ONE_DEVICE")

@@ -16,7 +16,7 @@ from bridges.settings.load import SettingsError, load
 from drivers.door.register import PROFILE, Settings, decode, door_map, points
 from drivers.door.register_map import DoorMap
 from drivers.hal.modbus.points import Point
-from drivers.profiles import FOLDER
+from drivers.profiles.texts import FOLDER
 from tests.depth import examples
 from tests.door.virtual import CLOSED, CoreAlone
 from tests.settings.reading import problems_of as settings_problems
