@@ -1,12 +1,13 @@
 """What log lines say: words of the field, and no Python."""
 
+import logging
 from dataclasses import dataclass
 
 import pytest
 
 from bridges.door.signals import DoorOutputs
 from bridges.lift.signals import LiftOutputs, Side
-from bridges.log import pairs, plain
+from bridges.log import _Formatter, pairs, plain
 from bridges.rmf.definitions import LiftMode
 
 
@@ -52,3 +53,14 @@ def test_a_line_says_what_is_driven_as_a_person_would() -> None:
     assert pairs("outputs", device="Lift1", outputs=outputs) == (
         'outputs device=Lift1 outputs="agv_request yes, call L3"'
     )
+
+
+def test_a_log_line_stays_one_line_whatever_is_in_it() -> None:
+    line = pairs("refused", device="Lift 1", detail='a "b"\nc', floor="")
+    assert line == 'refused device="Lift 1" detail="a \'b\'\\nc" floor=""'
+
+
+@pytest.mark.parametrize(("level", "prefix"), [(logging.INFO, "<6>"), (logging.ERROR, "<3>")])
+def test_under_systemd_every_line_carries_its_priority(level: int, prefix: str) -> None:
+    record = logging.LogRecord("x", level, "", 0, "one\ntwo", (), None)
+    assert _Formatter(journal=True).format(record) == f"{prefix}one\n{prefix}two"

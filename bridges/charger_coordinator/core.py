@@ -182,7 +182,7 @@ def _wanted(memory: Memory, event: Wanted, site: Site) -> tuple[Memory, str]:
         return memory, "request is over"
     if event.station and event.station not in site.robots[who]:
         return memory, "station does not suit the robot"
-    wish, before = _operators(event), memory.wish(who)
+    wish, before = Wish.of(event), memory.wish(who)
     if wish == before:
         return memory, ""
     memory = replace(memory, strikes=without(memory.strikes, who))
@@ -192,16 +192,6 @@ def _wanted(memory: Memory, event: Wanted, site: Site) -> tuple[Memory, str]:
     if wish.station not in ("", has):
         memory = memory.takes_back(who)
     return replace(memory, wishes=tuple(wish if w is before else w for w in memory.wishes)), ""
-
-
-def _operators(event: Wanted) -> Wish:
-    return Wish(
-        event.robot,
-        "operator",
-        station=event.station,
-        request_id=event.request_id,
-        start_timeout_s=event.start_timeout_s,
-    )
 
 
 def _unwanted(memory: Memory, request_id: str) -> tuple[Memory, str]:

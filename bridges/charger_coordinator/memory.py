@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from bridges.charger.report import Diagnosis, diagnosis
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator.settings import Settings
-from bridges.charger_coordinator.signals import Sighting
+from bridges.charger_coordinator.signals import Sighting, Wanted
 from bridges.core.durations import AGES_AGO
 from bridges.rmf.definitions import ChargerStateValue, ChargingAssignments
 
@@ -78,6 +78,17 @@ class Wish(msgspec.Struct, frozen=True):
     station: str = ""
     request_id: str = ""
     start_timeout_s: float = 0.0
+
+    @classmethod
+    def of(cls, wanted: Wanted) -> "Wish":
+        """An operator's."""
+        return cls(
+            wanted.robot,
+            "operator",
+            station=wanted.station,
+            request_id=wanted.request_id,
+            start_timeout_s=wanted.start_timeout_s,
+        )
 
 
 class Grant(msgspec.Struct, frozen=True):

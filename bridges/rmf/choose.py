@@ -1,8 +1,7 @@
-"""Which transport a daemon speaks, in which DDS domain, on which network.
+"""Which transport a daemon speaks, in which ROS domain, on which network.
 
 The YAML says it; ROS's own environment variables fill in what the YAML leaves open, as they do for
-any ROS node. A file beside this one for each transport: `ros2.py`, `dds.py`; `zenoh.py` is not in
-this version.
+any ROS node. A file beside this one for each transport: `ros2.py`, `dds.py`, `zenoh.py`.
 """
 
 import importlib
@@ -20,13 +19,12 @@ from bridges.rmf.transport import Transport, TransportError
 log = logging.getLogger(__name__)
 
 NO_CYCLONEDDS = (
-    "transport dds needs the Python package cyclonedds 11.0.1, which is not installed here ({}). On"
-    " x86-64 `pip install cyclonedds==11.0.1` fetches it. For arm64 there is none to fetch: build"
-    " the C library Cyclone DDS 11.0.1 (cmake -DBUILD_IDLC=OFF; make an empty bin/ in its prefix),"
-    " then `CYCLONEDDS_HOME=<prefix> pip install --no-binary cyclonedds cyclonedds==11.0.1`"
+    "transport dds needs the Python package cyclonedds 11.0.1, and {}. On x86-64 `pip install"
+    " cyclonedds==11.0.1` fetches it. For arm64 there is none to fetch: put zenoh-bridge-ros2dds beside"
+    " RMF and write `transport: zenoh` with `keys: ros2dds`, or build the C library Cyclone DDS 11.0.1"
+    " (cmake -DBUILD_IDLC=OFF; make an empty bin/ in its prefix), then `CYCLONEDDS_HOME=<prefix> pip"
+    " install --no-binary cyclonedds cyclonedds==11.0.1`"
 )
-
-
 NO_ROS = (
     "transport ros2 needs ROS 2 with RMF's messages, and {}. On Ubuntu 24.04 `sudo apt install"
     " ros-jazzy-rclpy {}`; the virtual environment needs --system-site-packages and ROS's own"
@@ -56,11 +54,15 @@ def open_transport(
             f"{' '.join(ros_args)}: only rclpy understands this. Write `transport: ros2`, or give"
             " names by `topics:` in the YAML"
         )
-    return _open_dds(node_name, domain, loopback=loopback)
+    if speaks == "dds":
+        return _open_dds(node_name, domain, loopback=loopback)
+    from bridges.rmf.zenoh import ZenohTransport
+
+    return ZenohTransport(node_name, domain, loopback=loopback, settings=rmf.zenoh)
 
 
 def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
-    """The DDS domain: the YAML's, else ROS_DOMAIN_ID, else 0."""
+    """The ROS domain: the YAML's, else ROS_DOMAIN_ID, else 0."""
     if rmf.domain_id is not None:
         return rmf.domain_id
     text = environ.get("ROS_DOMAIN_ID", "") or "0"
@@ -87,15 +89,30 @@ def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str]) -> bool:
 
 def _choice(rmf: Rmf) -> tuple[str, str]:
     """The transport, and why it is this one."""
-    if rmf.transport == "dds":
-        return "dds", "configured"
+    if rmf.transport in ("dds", "zenoh"):
+        return rmf.transport, "configured"
     missing = missing_of_ros()
     if rmf.transport == "auto":
-        return ("dds", missing) if missing else ("ros2", "rclpy and RMF's messages are here")
+        return _best_without(missing) if missing else ("ros2", "rclpy and RMF's messages are here")
     if missing:
         packages = " ".join(_apt_name(package) for package in sorted(set(PACKAGES.values())))
         raise TransportError(NO_ROS.format(missing, packages))
     return "ros2", "configured"
+
+
+def _best_without(ros: str) -> tuple[str, str]:
+    """What `auto` takes where this is missing of ROS."""
+    missing = missing_of_dds()
+    return ("zenoh", f"{ros}; {missing}") if missing else ("dds", ros)
+
+
+def missing_of_dds() -> str:
+    """What keeps a node from speaking DDS by itself here; "" for nothing."""
+    try:
+        importlib.import_module("cyclonedds.core")
+    except ImportError as error:
+        return f"cyclonedds does not import: {error}"
+    return ""
 
 
 def missing_of_ros() -> str:
@@ -123,8 +140,8 @@ def _open_ros2(
 
 
 def _open_dds(node_name: str, domain: int, *, loopback: bool) -> Transport:
-    if importlib.util.find_spec("cyclonedds") is None:
-        raise TransportError(NO_CYCLONEDDS.format(os.uname().machine))
+    if missing := missing_of_dds():
+        raise TransportError(NO_CYCLONEDDS.format(missing))
     from bridges.rmf.dds import DdsTransport
 
     return DdsTransport(node_name, domain, loopback=loopback)

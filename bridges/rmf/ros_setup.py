@@ -25,7 +25,11 @@ def sourcing(rmf: Rmf, environ: Mapping[str, str], argv: Sequence[str]) -> list[
 
     Raises TransportError where `transport: ros2` cannot be for lack of the file.
     """
-    if rmf.ros_setup is None or rmf.transport == "dds" or environ.get(SOURCED) == rmf.ros_setup:
+    if (
+        rmf.ros_setup is None
+        or rmf.transport in ("dds", "zenoh")
+        or environ.get(SOURCED) == rmf.ros_setup
+    ):
         return []
     if Path(rmf.ros_setup).is_file():
         return ["bash", "-c", SHELL, "rmf-bridge", rmf.ros_setup, *argv]

@@ -1,4 +1,4 @@
-"""What a transport does, whichever wire it speaks: `ros2`, `dds`, `memory`, later `zenoh`.
+"""What a transport does, whichever wire it speaks: `ros2`, `dds`, `zenoh`, `memory`.
 
 One file each beside this one; `bridges/rmf/choose.py` opens the one that the YAML names.
 """

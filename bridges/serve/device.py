@@ -23,7 +23,7 @@ from bridges.core.decision import (
 )
 from bridges.core.durations import AGES_AGO
 from bridges.core.kind import DeviceEvent, E, Kind, L, S
-from bridges.log import pairs
+from bridges.log import pairs, plain
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.serve.clock import Clock, Pace
@@ -129,7 +129,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         decision = self.subject.decision
         if decision is None:
             return {}
-        outputs = str(decision.outputs)
+        outputs = plain(decision.outputs)
         return {**self.subject.status(), "outputs": outputs, "refused": self.refused}
 
     def _read(self) -> Sampled[X] | IoFailed:

@@ -14,8 +14,9 @@ T = TypeVar("T")
 class Inbox(Generic[T]):
     """Every thread may put; the thread that serves takes.
 
-    A request is a level, not a pulse: of several with the same `key` only the last one is kept, in
-    the place of the first, so that a flood of repeats costs a scan no more than one of them.
+    A request is a level, not a pulse: of several with the same `key` only the last one is kept, so that
+    a flood of repeats costs a scan no more than one of them. What is kept stays in the order in which
+    it came.
     """
 
     def __init__(self) -> None:
@@ -31,7 +32,7 @@ class Inbox(Generic[T]):
         with self._lock:
             waiting = self._items.setdefault(name, {})
             key = object() if key is None else key
-            if key not in waiting and len(waiting) == INBOX_SIZE:
+            if waiting.pop(key, None) is None and len(waiting) == INBOX_SIZE:
                 del waiting[next(iter(waiting))]
                 self.dropped += 1
             waiting[key] = item

@@ -8,7 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import GraphKind
@@ -148,14 +148,11 @@ class Devices:
     def _loop(self, bus_name: str, open_bus: OpenBus) -> Loop:
         settings = self._config.buses[bus_name]
         bus = open_bus(bus_name)
-        nodes = [
-            self._node(name, device, bus)
-            for name, device in self._config.devices.items()
-            if self._config.bus_of(name) == bus_name
-        ]
+        nodes = [self._node(name, bus) for name in self._config.devices_on(bus_name)]
         return Loop(bus_name, bus, nodes, settings.scan_s, self._clock)
 
-    def _node(self, name: str, device: Any, bus: Bus) -> AnyNode:
+    def _node(self, name: str, bus: Bus) -> AnyNode:
+        device = self._config.devices[name]
         limits = self._kind.limits(device, self._driver.debounce(device))
         driver = self._driver.create(name, device, bus)
         if name in self._unsafe:

@@ -8,17 +8,16 @@ and once, whatever becomes of it.
 
 import http.client
 import json
-import os
 import re
 import socket
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import msgspec
 
+from bridges import secret_file
 from bridges.core.fields import Name, Period
 from drivers.hal import Bus, BusType, HalError
 from drivers.hal.backoff import Backoff
@@ -30,8 +29,6 @@ if TYPE_CHECKING:
 BODY_MAX = 64 * 1024
 HEADERS = {"Accept": "application/json", "Accept-Encoding": "identity", "User-Agent": "rmf-bridges"}
 JSON = {"Content-Type": "application/json"}
-OTHERS = 0o077
-TOKEN_MAX = 4096
 
 Method = Literal["POST", "PUT"]
 Timeout = Annotated[float, msgspec.Meta(ge=0.1, le=30, extra={"unit": "s"})]
@@ -225,16 +222,10 @@ class HttpBus(Bus):
         if file is None:
             return {}
         try:
-            with Path(file).open("rb") as opened:
-                mode = os.fstat(opened.fileno()).st_mode
-                token = opened.read(TOKEN_MAX + 1).strip()
-        except OSError as error:
-            raise HalError(f"token_file {file} cannot be read: {error.strerror}") from None
-        if mode & OTHERS:
-            raise HalError(f"token_file {file} is open to other users: chmod 600 {file}")
-        if not re.fullmatch(rb"[!-~]{1,%d}" % TOKEN_MAX, token):
-            raise HalError(f"token_file {file} does not hold one token on one line")
-        return {"Authorization": f"Bearer {token.decode()}"}
+            token = secret_file.one_line("token_file", file, "token")
+        except secret_file.SecretError as error:
+            raise HalError(str(error)) from None
+        return {"Authorization": f"Bearer {token}"}
 
     def _explained(self, url: str, error: BaseException) -> HalError:
         failure = self._dialler.failure

@@ -411,7 +411,7 @@ def test_a_person_reads_the_state_in_a_few_words() -> None:
         "motion": "stopped",
         "session": "A",
         "destination": "L2",
-        "outputs": str(LiftOutputs(agv_request=True)),
+        "outputs": "agv_request yes",
         "faults": [],
         "input_age_s": 0.0,
         "refused": {},

@@ -6,32 +6,42 @@ from typing import Any
 import pytest
 from cyclonedds.domain import DomainParticipant
 
+from bridges.core.fields import Zenoh
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.transport import Transport
+from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf.domains import domain_of_this_run
 
 Join = Callable[[str], Transport]
 """Open a node of this name on the graph of this test."""
 
 
+ZENOH = {"zenoh": Zenoh(), "zenoh_ros2dds": Zenoh(keys="ros2dds")}
 ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
 
 
-@pytest.fixture(params=["memory", "dds", ROS2])
+@pytest.fixture(params=["memory", "dds", "zenoh", ROS2])
 def join(request: pytest.FixtureRequest) -> Iterator[Join]:
     """One graph for the test, on each transport in turn; its nodes leave at the end."""
     network = MemoryNetwork()
     on: dict[str, Join] = {
         "memory": lambda name: MemoryTransport(network, name),
         "dds": joining("dds", domain_of_this_run()),
+        "zenoh": joining("zenoh", domain_of_this_run()),
         "ros2": joining("ros2", domain_of_this_run()),
     }
     yield from _graph(on[request.param])
 
 
+@pytest.fixture(params=["dds", "zenoh", ROS2])
+def join_any_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
+    """One graph for the test, on each transport that has a wire."""
+    yield from _graph(joining(request.param, domain_of_this_run()))
+
+
 @pytest.fixture(params=["dds", ROS2])
 def join_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """One graph for the test, on each transport that has a wire."""
+    """One graph for the test, on each transport whose wire is DDS."""
     yield from _graph(joining(request.param, domain_of_this_run()))
 
 
@@ -39,6 +49,12 @@ def join_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
 def join_dds() -> Iterator[Join]:
     """One graph for the test, on DDS."""
     yield from _graph(joining("dds", domain_of_this_run()))
+
+
+@pytest.fixture
+def join_zenoh() -> Iterator[Join]:
+    """One graph for the test, on zenoh."""
+    yield from _graph(joining("zenoh", domain_of_this_run()))
 
 
 @pytest.fixture
@@ -61,9 +77,13 @@ def joining(transport: str, domain: int) -> Join:
     """What opens nodes of this transport in this domain, on loopback."""
 
     def join(name: str) -> Transport:
+        if transport.startswith("zenoh"):
+            return ZenohTransport(name, domain, loopback=True, settings=ZENOH[transport])
         # Imported here: there may be no ROS.
         module = importlib.import_module(f"bridges.rmf.{transport}")
-        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
+        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[
+            transport
+        ]
         node: Transport = getattr(module, kind)(name, domain, loopback=True)
         return node
 

@@ -1,0 +1,274 @@
+"""The `zenoh` transport: a session that looks like a ROS node on rmw_zenoh, or like a
+zenoh-bridge-ros2dds with one node behind it.
+
+zenoh brings itself back: it goes on looking for its routers, and declares everything again when one
+answers. We open a new session only when this machine's addresses have changed, which the old one
+would notice when its links run out of patience.
+
+Source: eclipse-zenoh 1.10 (Python API), and what zenoh_keys.py and zenoh_ends.py name.
+zenoh is imported here and there alone, and only by choose.py.
+"""
+
+import atexit
+import json
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from itertools import count
+from queue import Empty, SimpleQueue
+from typing import Any, Final, TypeVar
+
+import zenoh
+from zenoh.handlers import Callback
+
+from bridges.core.fields import Zenoh
+from bridges.log import pairs
+from bridges.rmf import network, zenoh_config
+from bridges.rmf.definitions import Message
+from bridges.rmf.topics import Topic
+from bridges.rmf.transport import TransportError
+from bridges.rmf.zenoh_ends import ZenohPublisher, ZenohSubscription
+from bridges.rmf.zenoh_keys import WAYS, Keys
+
+M = TypeVar("M", bound=Message)
+log = logging.getLogger(__name__)
+
+LOOK_EVERY_S: Final = 1.0
+NOBODY: Final = "no router answers, or it refuses us: what we say reaches nobody until one does"
+ROUTER: Final = (
+    "a router has come to this machine's own nodes, and what is simulated must reach none"
+)
+Ends = tuple[ZenohPublisher[Any] | ZenohSubscription[Any], ...]
+
+
+class ZenohTransport:
+    """One node: a session, its publishers and subscriptions, and the thread that hands on messages.
+
+    `loopback`: stay on this machine, without a router, whatever `settings` say. Raises TransportError
+    when no session can be opened; that nobody answers yet is no error.
+    """
+
+    def __init__(
+        self, node_name: str, domain_id: int, *, loopback: bool, settings: Zenoh | None = None
+    ) -> None:
+        self.name = node_name
+        self.dropped: dict[str, int] = {}
+        self._settings = settings or Zenoh()
+        self._domain_id = domain_id
+        self._loopback = loopback
+        self._lock = threading.Lock()
+        self._closed = False
+        self._ends: Ends = ()
+        self._deaf: set[str] = set()
+        self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._session: zenoh.Session | None = None
+        self._linked: bool | None = None
+        self._met_router = False
+        self._look_at = time.monotonic() + LOOK_EVERY_S
+        self._wants_router = not loopback and zenoh_config.mode(self._settings) == "client"
+        self._trouble = ""
+        self._neighbours: dict[str, zenoh.WhatAmI] = {}
+        self._join()
+        if self._session is None and not self._wants_router:
+            raise TransportError(f"cannot open a zenoh session: {self._trouble}")
+        # At the end of the interpreter an open session aborts it.
+        atexit.register(self.close)
+        self._thread = threading.Thread(target=self._listen, name=f"{node_name}-zenoh", daemon=True)
+        self._thread.start()
+
+    def publisher(self, topic: Topic[M]) -> ZenohPublisher[M]:
+        """Declare a publisher with `topic.publish` QoS."""
+        publisher = ZenohPublisher(topic, self._orders.put, self._withdraw, self._lives, self._deaf)
+        with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
+            self._attach(publisher)
+            self._ends += (publisher,)
+        return publisher
+
+    def subscribe(
+        self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
+    ) -> ZenohSubscription[M]:
+        """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
+        subscription = ZenohSubscription(
+            topic,
+            received,
+            self._orders.put,
+            self.dropped,
+            others_only=others_only,
+            attached=self._settings.keys == "rmw_zenoh",
+        )
+        with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
+            self._attach(subscription)
+            self._ends += (subscription,)
+        return subscription
+
+    def wall(self) -> float:
+        """The wall clock (s since the epoch)."""
+        return time.time()
+
+    def close(self) -> None:
+        """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+        atexit.unregister(self.close)
+        self._orders.put(_nothing)
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+        with self._lock:
+            self._leave()
+
+    # --- the session ---------------------------------------------------------------------------
+
+    def _join(self) -> None:
+        """Open a session, if one can be opened: a client has none before its router answers."""
+        self._addresses = network.addresses()
+        if self._loopback:
+            ways = zenoh_config.on_loopback(self._domain_id)
+        else:
+            ways = [zenoh_config.on_the_site(self._settings)]
+        try:
+            session = _opened(ways)
+        except zenoh.ZError as error:
+            self._trouble = str(error)
+            return
+        way, name = WAYS[self._settings.keys], str(session.zid())
+        self._keys: Keys = way(self._domain_id, name, self.name)
+        self._numbers = count(1)
+        self._presence = session.liveliness().declare_token(self._keys.presence())
+        self._neighbours = {}
+        self._events = session.info.declare_transport_events_listener(
+            Callback(partial(self._neighbour, self._neighbours), indirect=False), history=True
+        )
+        self._session = session
+
+    def _attach(self, end: ZenohPublisher[Any] | ZenohSubscription[Any]) -> None:
+        """Give an end its place in the session, when there is one."""
+        if self._session is None:
+            return
+        number = next(self._numbers)
+        if isinstance(end, ZenohSubscription) and end.others_only:
+            self._deaf.add(self._keys.token("MS", end.topic, number))
+        end.create(self._session, self._keys, number)
+
+    def _neighbour(
+        self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent
+    ) -> None:
+        """A router or peer is there, or has gone. On zenoh's thread, which holds what asking the
+        session about its neighbours would wait for: so we keep count of them."""
+        if event.kind == zenoh.SampleKind.PUT:
+            neighbours[str(event.transport.zid)] = event.transport.whatami
+        else:
+            neighbours.pop(str(event.transport.zid), None)
+        self._orders.put(self._look)
+
+    def _withdraw(self, publisher: ZenohPublisher[Any]) -> None:
+        with self._lock:
+            if publisher in self._ends:
+                self._ends = tuple(end for end in self._ends if end is not publisher)
+                publisher.leave()
+
+    def _leave(self) -> None:
+        """Close the session; the ends keep nothing of it."""
+        session, self._session = self._session, None
+        if session:
+            session.close()  # type: ignore[no-untyped-call]
+        for end in self._ends:  # not before: a declaration that is only forgotten may block us
+            end.place = None
+        self._deaf.clear()
+        self._neighbours = {}
+
+    def _join_anew(self) -> None:
+        with self._lock:
+            if self._closed:
+                return
+            self._leave()
+            try:
+                self._join()
+                for end in self._ends:
+                    self._attach(end)
+            except (TransportError, zenoh.ZError) as error:  # a secret that has gone, say
+                self._trouble = str(error)
+                self._leave()
+
+    # --- our thread ----------------------------------------------------------------------------
+
+    def _lives(self) -> bool:
+        return not self._closed and self._thread.is_alive()
+
+    def _listen(self) -> None:
+        while not self._closed:
+            try:
+                order = self._orders.get(timeout=None if self._loopback else LOOK_EVERY_S)
+            except Empty:
+                order = _nothing
+            order()
+            self._follow_network()
+
+    def _follow_network(self) -> None:
+        """Join anew when the addresses are others than those with which we joined."""
+        now = time.monotonic()
+        if self._loopback or now < self._look_at:
+            return
+        self._look_at = now + LOOK_EVERY_S
+        self._look()
+        found = network.addresses()
+        if found != self._addresses and self._reaches_out():
+            log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
+            self._join_anew()
+        elif self._session is None:
+            self._join_anew()
+
+    def _reaches_out(self) -> bool:
+        endpoints = (*self._settings.connect, *self._settings.listen)
+        return not all(map(zenoh_config.is_local, endpoints))
+
+    def _look(self) -> None:
+        """Say once that nobody answers, and once that somebody does."""
+        neighbours = list(self._neighbours.values())
+        routers = zenoh.WhatAmI.ROUTER in neighbours
+        if self._loopback:
+            if routers:
+                log.error(pairs("left_graph", node=self.name, reason=ROUTER))
+                self._leave()
+            return
+        self._met_router |= routers
+        linked = routers or (not self._met_router and bool(neighbours))
+        if linked == self._linked:
+            return
+        self._linked = linked
+        where = " ".join(self._settings.connect)
+        if linked:
+            log.info(pairs("linked", node=self.name, connect=where))
+        else:
+            log.warning(pairs("not_linked", node=self.name, connect=where, reason=NOBODY, last=self._trouble))
+
+    @contextmanager
+    def _reporting(self, text: str) -> Iterator[None]:
+        if self._closed:
+            raise TransportError(f"{text}: {self.name} has left the graph")
+        try:
+            yield
+        except zenoh.ZError as error:
+            raise TransportError(f"{text}: {error}") from error
+
+
+def _opened(ways: list[dict[str, Any]]) -> zenoh.Session:
+    """A session by the first of these configurations that serves. Raises ZError when none does."""
+    wanted, *further = ways
+    config = zenoh.Config()
+    for key, value in wanted.items():
+        config.insert_json5(key, json.dumps(value))
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError:
+        if further:
+            return _opened(further)
+        raise
+
+
+def _nothing() -> None:
+    """An order that only wakes our thread."""

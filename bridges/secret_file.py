@@ -1,0 +1,37 @@
+"""A secret comes from a file that its daemon's user alone can read, never from a YAML."""
+
+import os
+import re
+from pathlib import Path
+from typing import Final
+
+OTHERS: Final = 0o077
+LONGEST: Final = 4096
+
+
+class SecretError(Exception):
+    """The file cannot be read, others can read it, or it does not hold one secret."""
+
+
+def one_line(name: str, file: str, what: str) -> str:
+    """The `what` (token, password) that stands in a file, on one line, in printable ASCII.
+
+    `name`: the setting that names the file, for the SecretError that says what is wrong with it.
+    """
+    secret = content(name, file).strip()
+    if not re.fullmatch(rb"[!-~]{1,%d}" % LONGEST, secret):
+        raise SecretError(f"{name} {file} does not hold one {what} on one line")
+    return secret.decode()
+
+
+def content(name: str, file: str) -> bytes:
+    """What a private file holds, up to a little more than the longest secret."""
+    try:
+        with Path(file).open("rb") as opened:
+            mode = os.fstat(opened.fileno()).st_mode
+            found = opened.read(LONGEST + 1)
+    except OSError as error:
+        raise SecretError(f"{name} {file} cannot be read: {error.strerror}") from None
+    if mode & OTHERS:
+        raise SecretError(f"{name} {file} is open to other users: chmod 600 {file}")
+    return found
