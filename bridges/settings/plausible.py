@@ -1,4 +1,4 @@
-"""What a type allows and nobody means: durations that are milliseconds, readings that come too late."""
+"""Valid but implausible settings: durations in milliseconds, readings that are stale on arrival."""
 
 from collections.abc import Iterable, Iterator
 from typing import Final
@@ -9,11 +9,11 @@ from bridges.core.fields import DeviceSettings
 from drivers.hal import Remark
 
 LONG_S: Final = 1000.0
-"""What is this long is often meant in milliseconds."""
+"""A duration this long was often meant in milliseconds."""
 
 
 def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Iterator[Remark]:
-    """Durations so long that they are looked at again, as (path, text), but for the defaults."""
+    """A remark (path, text) on each suspiciously long duration that is not a default."""
     for path, struct in structs:
         info = inspect.type_info(type(struct))
         assert isinstance(info, inspect.StructType)
@@ -35,8 +35,8 @@ def _clock(seconds: float) -> str:
 
 
 def stale_readings(device: DeviceSettings, bus: object) -> Iterator[Remark]:
-    """That a reading is stale before the next one comes."""
+    """A problem if a reading becomes stale before the next one."""
     scan_s, stale_s = getattr(bus, "scan_s", 0.0), device.stale_after()
     if stale_s is not None and scan_s >= stale_s:
-        text = f"stale_after_s is {stale_s:g}, and its bus is read every {scan_s:g} s (scan_s)"
-        yield ("limits", "stale_after_s"), f"{text}: it would never be in service; read more often"
+        text = f"stale_after_s is {stale_s:g}, but its bus is read every {scan_s:g} s (scan_s)"
+        yield ("limits", "stale_after_s"), f"{text}: readings would always be stale; lower scan_s"

@@ -142,7 +142,7 @@ def test_a_configuration_that_cannot_be_right_never_starts(tmp_path: Path) -> No
     ("options", "env", "why"),
     [
         (["--simulate"], {"RMF_BRIDGE_SERVICE": "1"}, "never simulates"),
-        (["--expose"], {}, "goes with"),
+        (["--expose"], {}, "needs --simulate"),
     ],
 )
 def test_a_service_never_simulates_and_a_real_device_needs_no_expose(
