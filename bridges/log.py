@@ -77,8 +77,29 @@ class _Formatter(logging.Formatter):
         return "\n".join(prefix + line for line in text.splitlines())
 
 
+class _OthersOnce(logging.Filter):
+    """Of each place in a library's code that logs, one line: what it says of a bad frame or datagram,
+    anybody can make it say again and again. Our own lines are written to come once."""
+
+    OURS = ("root", "bridges", "drivers", "hal_fakes")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._said: set[tuple[str, int]] = set()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        place = record.pathname, record.lineno
+        if record.name.partition(".")[0] in self.OURS:
+            return True
+        record.exc_info = record.exc_text = None  # where in the library is nobody's first question
+        first = place not in self._said
+        self._said.add(place)
+        return first
+
+
 def start(level: str = "INFO") -> None:
     """Send every log line to stderr."""
     to_stderr = logging.StreamHandler(sys.stderr)
     to_stderr.setFormatter(_Formatter(journal="JOURNAL_STREAM" in os.environ))
+    to_stderr.addFilter(_OthersOnce())
     logging.basicConfig(level=level, handlers=[to_stderr], force=True)

@@ -63,7 +63,7 @@ class HttpServer:
     def __init__(self, stations: Sequence[Station], path: str, timeout_s: float) -> None:
         self._server = _Listener(stations, path, timeout_s)
         host, port = self._server.server_address[:2]
-        self.replace = {"api_base": f"{host!s}:{port}{path}"}
+        self.replace = {"api_base": f"{host!s}:{port}{path}", "token_file": None}
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(LOOK_S,), name="http", daemon=True
         )

@@ -98,8 +98,12 @@ class Config:
 
 def load(path: Path | str) -> Config:
     """Read a device YAML. Raises SettingsError with every problem of it that can be seen."""
+    return understood(path, read(str(path)))
+
+
+def understood(path: Path | str, text: bytes) -> Config:
+    """The text of a device YAML, as it is or was at this path. Raises SettingsError."""
     page = Page(str(path))
-    text = read(page.file)
     root = compose(page, text)
     reading = _Reading(page, root)
     reading.all()

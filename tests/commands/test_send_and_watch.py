@@ -22,8 +22,7 @@ from bridges.rmf import topics
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
-from hal_fakes.domain import free_domain
-from tests.waiting import wait_until
+from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 
 M = TypeVar("M", bound=d.Message)
 ME = "fleet/robot"
@@ -226,8 +225,7 @@ def command(line: str, domain: int) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
-def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic() -> None:
-    domain = free_domain()
+def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(domain: int) -> None:
     with on_dds(domain) as node:
         states = node.publisher(topics.LIFT_STATES)
         requests: list[d.LiftRequest] = []
@@ -237,7 +235,7 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic() -> None:
             states.publish(LIFT)
             wait_until(lambda: requests, "the request arrives")
             states.publish(obeyed(LIFT, requests[0]))
-            out, error = process.communicate(timeout=20)
+            out, error = process.communicate(timeout=PATIENCE_S)
         assert (process.returncode, error) == (0, "")
         assert "done" in out
         assert replace(requests[0], request_time=d.Time()) == d.LiftRequest(
@@ -247,9 +245,9 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_watch_prints_changes_and_leaves_the_graph_at_once_when_told_to(
+    domain: int,
     number: signal.Signals,
 ) -> None:
-    domain = free_domain()
     with on_dds(domain) as node, command("watch", domain) as process:
         states = node.publisher(topics.DOOR_STATES)
         wait_until(lambda: states.matched() > 0, "watch listens to door_states")
@@ -257,15 +255,16 @@ def test_watch_prints_changes_and_leaves_the_graph_at_once_when_told_to(
         assert process.stdout is not None
         assert process.stdout.readline().split()[1:4] == ["door", "ward", "closed"]
         process.send_signal(number)
-        assert process.wait(timeout=20) == 0
-        wait_until(lambda: states.matched() == 0, "watch has left the graph", patience_s=5)
+        assert process.wait(timeout=PATIENCE_S) == 0
+        wait_until(lambda: states.matched() == 0, "watch has left the graph", patience_s=LEASE_S)
 
 
-def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_door() -> None:
-    domain = free_domain()
+def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_door(
+    domain: int,
+) -> None:
     with on_dds(domain) as node, command("send door ward open --direct", domain) as process:
         heard = node.subscribe(topics.DOOR_REQUESTS, lambda _: None)
         wait_until(lambda: heard.matched() > 0, "send is there")
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=20) == 130
-        wait_until(lambda: heard.matched() == 0, "send has left the graph", patience_s=5)
+        assert process.wait(timeout=PATIENCE_S) == 130
+        wait_until(lambda: heard.matched() == 0, "send has left the graph", patience_s=LEASE_S)

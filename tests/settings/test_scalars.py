@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.settings.scalars import reads_as
+from tests.depth import examples
 from tests.settings.reading import RIGHT, changed, config_of, problems_of
 
 NAMES_THAT_ARE_NONE = {
@@ -67,7 +68,7 @@ PLAIN = st.one_of(
 )
 
 
-@settings(derandomize=True, max_examples=1500, deadline=None, database=None)
+@settings(derandomize=True, max_examples=examples(1500), deadline=None, database=None)
 @given(PLAIN)
 def test_every_text_that_pyyaml_takes_for_something_else_is_known(text: str) -> None:
     loader = yaml.SafeLoader("")
