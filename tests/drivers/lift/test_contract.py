@@ -25,9 +25,13 @@ TIMEOUT_S = 0.2
 class TestDryContactsOnModbus(WiredLiftContract):
     serial: ClassVar[modbus.Serial | None] = None
 
+    def wired(self) -> dict[str, Any]:
+        """The wiring as a YAML has it."""
+        return whole(inputs=inputs(moving=line(4)))
+
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = msgspec.convert(whole(inputs=inputs(moving=line(4))), Settings)
+        settings = msgspec.convert(self.wired(), Settings)
         world = RealTime({"lift": LiftPlant("lift", settings, QUICK)})
         plant = world.plants["lift"]
         far_side = [Wiring(plant, wires(settings), modbus.canonical)]
@@ -49,6 +53,24 @@ class TestDryContactsOnModbus(WiredLiftContract):
 
 class TestDryContactsOnRs485(TestDryContactsOnModbus):
     serial: ClassVar = modbus.Serial(port="/dev/null", baudrate=57600, parity="none", stopbits=1)
+
+
+def in_registers(part: Any) -> Any:
+    """The same wiring, with each contact as a bit of a register of a gateway."""
+    if not isinstance(part, dict):
+        return part
+    if "point" in part and "discrete input" in part["point"]:
+        place, number = part["point"].split("discrete input ")
+        register, bit = divmod(int(number), 4)
+        return {**part, "point": f"{place}holding {40 + register} bit {bit}"}
+    return {key: in_registers(value) for key, value in part.items()}
+
+
+class TestContactsAsBitsOfRegisters(TestDryContactsOnModbus):
+    def wired(self) -> dict[str, Any]:
+        found = in_registers(super().wired())
+        assert isinstance(found, dict)
+        return found
 
 
 def on_header(part: Any, pins: Iterator[int]) -> Any:
