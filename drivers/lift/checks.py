@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from bridges.lift.signals import Hazard, Side
 from drivers.hal.points import Wire
 from drivers.lift import codes
+from drivers.lift.broken_lines import floor_warnings, unsafe_codes
 from drivers.lift.table import MOTION, input_rows, wires
 from drivers.lift.wiring import FloorCode, LiftWiring
 from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, slow_alarms, unaccepted
@@ -47,7 +48,7 @@ def warnings(wiring: LiftWiring) -> Iterator[Problem]:
         reads_standing = signal == "stopped"
         for _, path, text in _cut(table, signal, not reads_standing, "the car reads standing"):
             yield path, text
-    confused = "; ".join(_confusions(wiring.floor_code, table))
+    confused = floor_warnings(wiring.floor_code, table)
     if confused:
         yield ("floor_code",), f"{confused}: ask for a parity line, or for codes two lines apart"
     needed = {signal for signal, _, _ in unsafe(wiring)}
@@ -68,6 +69,7 @@ def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
         yield from _cut(table, f"{prefix}_opened", False, f"the {prefix} reads open")
     if not any(_floor_code(wiring.floor_code, wiring.levels())):
         yield from _dead_code(wiring.floor_code, table)
+    yield from unsafe_codes(wiring, table)
     yield from energised_at_boot(table.values())
 
 
@@ -223,15 +225,3 @@ def _dead_code(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
             ("floor_code",),
             f"with the floor code's cable cut, the car reads at {level}",
         )
-
-
-def _confusions(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[str]:
-    """One cut line must not turn a floor's code into another floor's."""
-    for level in dict.fromkeys((*code.codes.values(), *code.lines)):
-        shown = code.show(level)
-        for signal in shown:
-            reads = table[signal].broken_reads()
-            for cut in (False, True) if reads is None else (reads,):
-                other, _ = code.read({**shown, signal: cut})
-                if other not in (None, level):
-                    yield f"with {signal} cut, {level} reads as {other}"

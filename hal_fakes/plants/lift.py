@@ -257,7 +257,7 @@ class LiftPlant(Machine):
             return {}
         states = [h.value for h in Hazard if self._hazard(h)]
         states += ["agv_mode"] if self.agv else []
-        states += ["normal", *(s for s in code.codes.values() if s != "agv_mode")]
+        states += ["normal", *(s for s in code.codes.values() if s not in ("agv_mode", "fault"))]
         numbers = {str(state): number for number, state in reversed(code.codes.items())}
         return _bits("service", len(code.bits), next(numbers[s] for s in states if s in numbers))
 
