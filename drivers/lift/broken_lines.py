@@ -34,7 +34,7 @@ def misread(
     read: Callable[[Lines], str | None],
     table: Mapping[str, Wire],
 ) -> Iterator[Misread]:
-    """Everything that one broken line makes of a code: its meanings with their lines, and its reader."""
+    """What one broken line makes of a code. `shown`: the lines of each meaning; `read`: its reader."""
     for meaning, codes in shown.items():
         for lines in codes:
             for line, asserted in lines.items():

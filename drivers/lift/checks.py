@@ -33,10 +33,13 @@ def warnings(wiring: LiftWiring) -> Iterator[Problem]:
     table = {w.signal: w for w in wires(wiring)}
     if wiring.inputs.agv_mode is None and not _in_service(wiring, "agv_mode"):
         yield ("inputs",), "no agv_mode: the lift cannot confirm that it obeys"
-    elif wiring.outputs.agv_mode_request is None:
+    elif wiring.outputs.agv_mode_request is None and wiring.agv_mode == "requested":
         text = (
             "no agv_mode_request asks for AGV mode, and it is awaited: the lift must grant it alone"
         )
+        yield ("outputs",), text
+    if wiring.agv_mode == "by_call" and wiring.outputs.door_open is None:
+        text = "no door_open: with by_call nothing keeps AGV mode on while a robot goes through"
         yield ("outputs",), text
     yield from slow_alarms(table[hazard] for hazard in Hazard if hazard in table)
     if Hazard.FIRE not in table and not _in_service(wiring, Hazard.FIRE):
@@ -188,6 +191,13 @@ def _motion(wiring: LiftWiring) -> Iterator[Problem]:
 
 def _agv(wiring: LiftWiring) -> Iterator[Problem]:
     by_line, by_code = wiring.inputs.agv_mode, _in_service(wiring, "agv_mode")
+    if wiring.agv_mode == "by_call":
+        if not by_line and not by_code:
+            text = "by_call needs an agv_mode input: nothing else tells that a call was taken"
+            yield ("agv_mode",), text
+        if wiring.outputs.agv_mode_request:
+            text = "agv_mode is by_call, so calls ask for AGV mode: delete one of the two"
+            yield ("outputs", "agv_mode_request"), text
     if by_line and by_code:
         yield ("inputs", "agv_mode"), "service shows agv_mode too: keep one"
     for signal, path, line in input_rows(wiring):
