@@ -8,8 +8,8 @@ Rules:
 - AGV mode comes first, then the call to the destination, then, once the car stands there, the door.
   Where AGV mode is the result of a call (`by_call`), the call comes first, also where the car stands.
 - A call is given only in AGV mode (but for `by_call`), away from the destination, and without
-  overload. A door command is given only in AGV mode, while the car stands at the destination's landing. The two are never on together, and
-  neither comes on within `dead_time_s` of the last one.
+  overload. A door command is given only in AGV mode, while the car stands at the destination's
+  landing. The two are never on together, and neither comes on within `dead_time_s` of the last one.
 - A call is held until the car stands at its destination, or pulsed. It is given again after every
   interruption, and when the car had arrived and is seen at another floor. While the floor code is
   just changing no new call is given: the car may be there.

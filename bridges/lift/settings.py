@@ -90,3 +90,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
         if isinstance(self.floors, list):
             return {name: Stop(name) for name in self.floors}
         return {name: Stop(f.level or name, f.side) for name, f in self.floors.items()}
+
+    def levels(self) -> list[str]:
+        """The landings, from the lowest up."""
+        return list(dict.fromkeys(stop.level for stop in self.stops().values()))

@@ -232,7 +232,3 @@ class LiftWiring(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=
     outputs: Outputs
     calls: dict[Name, Output] = msgspec.field(default_factory=dict)
     call_code: CallCode | None = None
-
-    def levels(self) -> list[str]:
-        """The landings, from the lowest up."""
-        return list(dict.fromkeys(stop.level for stop in self.stops().values()))
