@@ -11,7 +11,10 @@ import socket
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import ssl
 
 Resolve = Callable[..., list[Any]]
 
@@ -52,6 +55,29 @@ class DeadlineSocket(socket.socket):
         """As socket.sendall, whose timeout is already one for all of it."""
         self.settimeout(self.deadline.left())
         super().sendall(*args, **kwargs)
+
+
+def tls_context(deadline: Deadline) -> "ssl.SSLContext":
+    """TLS that ends by the deadline too, and trusts nobody yet: whom, the caller adds.
+
+    A TLS socket takes a plain one over and keeps only its timeout, so it looks at the deadline itself.
+    """
+    import ssl
+
+    from urllib3.util.ssl_ import create_urllib3_context
+
+    class DeadlineTls(ssl.SSLSocket):
+        def recv_into(self, *args: Any, **kwargs: Any) -> int:
+            self.settimeout(deadline.left())
+            return super().recv_into(*args, **kwargs)
+
+        def send(self, *args: Any, **kwargs: Any) -> int:
+            self.settimeout(deadline.left())
+            return super().send(*args, **kwargs)
+
+    context = create_urllib3_context()
+    context.sslsocket_class = DeadlineTls
+    return context
 
 
 class Dialler:
@@ -95,6 +121,7 @@ class Dialler:
             sock.settimeout(timeout_s)
             sock.connect(where)
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            sock.settimeout(self.deadline.left())  # for a handshake of TLS
         except OSError:
             sock.close()
             raise
