@@ -146,6 +146,10 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     driver: Name | None = None
     accept_unsafe: dict[Name, Name] = msgspec.field(default_factory=dict)
 
+    def off_after(self) -> tuple[float, tuple[str, ...]] | None:
+        """After how long (s) without a command what it drives is off by itself, and the setting."""
+        return None
+
     def stale_after(self) -> float | None:
         """After how long (s) without a reading it is out of service; None where that is not a time."""
         return None

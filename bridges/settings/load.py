@@ -35,7 +35,7 @@ from bridges.settings.nodes import (
     read,
     unknown,
 )
-from bridges.settings.plausible import milliseconds, stale_readings
+from bridges.settings.plausible import milliseconds, out_of_step
 from bridges.settings.values import BROKEN, Entry, Spot, Values, below, is_none, locate
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
 from drivers.driver_type import AnyDriver
@@ -356,12 +356,12 @@ class _Reading:
         wires = list(driver.wires(settings))
         wiring.wires(wires, spot)
         wiring.claims(driver.claims(settings), spot)
-        signals = [wire.signal for wire in wires]
+        signals = [*(wire.signal for wire in wires), *driver.unwired(settings)]
         note_unknown_signals(self._page, settings.accept_unsafe, signals, spot)
 
     def _check_pace(self, settings: DeviceSettings, spot: Spot, bus: str | None) -> None:
         read = self._buses[bus].settings if bus else BROKEN
-        for path, text in () if read is BROKEN else stale_readings(settings, read):
+        for path, text in () if read is BROKEN else out_of_step(settings, read):
             self._page.note(locate(spot, path).where(), text)
 
     def _collect_warnings(self, settings: Any, spot: Spot, driver: AnyDriver) -> None:

@@ -57,14 +57,12 @@ class DeadlineSocket(socket.socket):
         super().sendall(*args, **kwargs)
 
 
-def tls_context(deadline: Deadline) -> "ssl.SSLContext":
-    """TLS that ends by the deadline too, and trusts nobody yet: whom, the caller adds.
+def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
+    """Sockets of TLS whose every wait ends by the deadline.
 
-    A TLS socket takes a plain one over and keeps only its timeout, so it looks at the deadline itself.
+    Such a socket takes a plain one over and keeps of it only the timeout, so it looks for itself.
     """
     import ssl
-
-    from urllib3.util.ssl_ import create_urllib3_context
 
     class DeadlineTls(ssl.SSLSocket):
         def recv_into(self, *args: Any, **kwargs: Any) -> int:
@@ -75,9 +73,7 @@ def tls_context(deadline: Deadline) -> "ssl.SSLContext":
             self.settimeout(deadline.left())
             return super().send(*args, **kwargs)
 
-    context = create_urllib3_context()
-    context.sslsocket_class = DeadlineTls
-    return context
+    return DeadlineTls
 
 
 class Dialler:

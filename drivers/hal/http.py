@@ -20,7 +20,7 @@ from bridges import secret_file
 from bridges.core.fields import AbsolutePath, Name, Period
 from drivers.hal import Bus, BusType, HalError
 from drivers.hal.backoff import Backoff
-from drivers.hal.deadline import Dialler, Resolve, tls_context
+from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
 from drivers.hal.http_json import json_object, shown
 
@@ -253,6 +253,7 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     from requests.adapters import HTTPAdapter
     from urllib3 import HTTPConnectionPool, HTTPSConnectionPool
     from urllib3.connection import HTTPConnection, HTTPSConnection
+    from urllib3.util.ssl_ import create_urllib3_context
 
     class Dialled:
         def _new_conn(self) -> socket.socket:
@@ -273,7 +274,9 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     adapter = HTTPAdapter(pool_connections=1, pool_maxsize=1, max_retries=0)
     adapter.poolmanager.pool_classes_by_scheme = {"http": Pool, "https": TlsPool}
     if scheme == "https":
-        adapter.poolmanager.connection_pool_kw["ssl_context"] = tls_context(dialler.deadline)
+        context = create_urllib3_context()  # it trusts nobody yet: `verify` of a call adds whom
+        context.sslsocket_class = tls_socket(dialler.deadline)
+        adapter.poolmanager.connection_pool_kw["ssl_context"] = context
     return adapter
 
 

@@ -5,7 +5,7 @@ import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 import trustme
@@ -41,7 +41,7 @@ class Site:
         authority.cert_pem.write_to_path(str(self.ca_file))
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         authority.issue_cert("127.0.0.1").configure_cert(context)
-        self.server: Any = ThreadingHTTPServer(("127.0.0.1", 0), Answers)
+        self.server = cast(Any, ThreadingHTTPServer(("127.0.0.1", 0), Answers))
         self.server.daemon_threads = True
         self.server.asked = []
         self.server.lacks = 0
