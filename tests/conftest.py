@@ -20,6 +20,13 @@ def domain() -> Iterator[int]:
         yield free
 
 
+@pytest.fixture(scope="module")
+def module_domain() -> Iterator[int]:
+    """One that the tests of a file share."""
+    with domain_for_a_while() as free:
+        yield free
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What takes long is begun first; what hangs on a wire ends."""
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
