@@ -1,3 +1,4 @@
+import signal
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -9,6 +10,10 @@ ON_WIRES = ("commands", "drivers", "hal_fakes", "rmf", "serve", "site")
 """The folders whose tests have threads, processes and sockets. In the others time is virtual."""
 WIRES_HANG_AFTER_S = 900
 """No test that passes takes so long, however busy the machine is."""
+
+signal.signal(
+    signal.SIGHUP, signal.SIG_DFL
+)  # nohup, or a CI's shell, has daemons inherit another one
 
 _deselected: list[str] = []
 

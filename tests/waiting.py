@@ -16,7 +16,7 @@ PATIENCE_S = 120.0
 TOO_LATE = re.compile(
     r" within [\d.]+ s\b|what came first is no echo|is half a frame|is no frame: a collision"
 )
-"""What a bus says when an answer has not come in time, or when a late one meets the next on a serial line."""
+"""What a bus says of an answer that is late, or that meets the next one on a serial line."""
 
 LEASE_S = 9.5
 """Less than DDS takes to miss who has gone without a farewell (10 s)."""
@@ -32,7 +32,7 @@ def wait_until(condition: Callable[[], object], what: str, patience_s: float = P
 
 
 def at_last(step: Callable[[], T], what: str, between: Callable[[], object] = lambda: None) -> T:
-    """What a step on a wire gives. On a busy machine an answer may come too late: then it is tried again.
+    """What a step on a wire gives; tried again when an answer comes late, as on a busy machine.
 
     `between`: done before it is tried again. Every other DriverError is raised.
     """
