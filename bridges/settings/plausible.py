@@ -8,6 +8,8 @@ from msgspec import inspect
 from bridges.core.fields import DeviceSettings
 from drivers.hal import Remark
 
+RENEWED: Final = 3
+"""An output that switches off by itself must be renewed once in this many scans."""
 LONG_S: Final = 1000.0
 """A duration this long was often meant in milliseconds."""
 
@@ -34,9 +36,21 @@ def _clock(seconds: float) -> str:
     return f"{hours:.1f} hours" if hours >= 1 else f"{seconds / 60:.0f} minutes"
 
 
-def stale_readings(device: DeviceSettings, bus: object) -> Iterator[Remark]:
+def out_of_step(device: DeviceSettings, bus: object) -> Iterator[Remark]:
+    """Problems with the pace of the device's bus: readings and commands that come too late."""
+    scan_s = getattr(bus, "scan_s", 0.0)
+    yield from _stale_readings(device, scan_s)
+    if renewed := device.off_after():
+        off_s, path = renewed
+        lost_s = RENEWED * scan_s + getattr(bus, "timeout_s", 0.0)
+        if off_s < lost_s:
+            text = f"{path[-1]} is {off_s:g}, but it is renewed every {scan_s:g} s (scan_s)"
+            yield path, f"{text}: write at least {lost_s:g}, so that one lost reply does not drop the output"
+
+
+def _stale_readings(device: DeviceSettings, scan_s: float) -> Iterator[Remark]:
     """A problem if a reading becomes stale before the next one."""
-    scan_s, stale_s = getattr(bus, "scan_s", 0.0), device.stale_after()
+    stale_s = device.stale_after()
     if stale_s is not None and scan_s >= stale_s:
         text = f"stale_after_s is {stale_s:g}, but its bus is read every {scan_s:g} s (scan_s)"
         yield ("limits", "stale_after_s"), f"{text}: readings would always be stale; lower scan_s"

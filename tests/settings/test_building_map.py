@@ -200,8 +200,8 @@ def test_floors_that_are_a_mapping_are_found_by_their_keys(
 
 def test_a_charger_is_a_vertex_where_robots_charge(capsys: pytest.CaptureFixture[str]) -> None:
     assert complaints(capsys, CHARGER.replace("pad_a", "pharmacy")) == [
-        "device.yaml:5:3: building.yaml:12: the waypoint 'pharmacy' is no charger: is_charger is"
-        " not true"
+        "device.yaml:5:3: building.yaml:12: the waypoint 'pharmacy' is not a charger: set"
+        " is_charger: true"
     ]
     assert complaints(capsys, CHARGER.replace("pad_a", "charger_9")) == [
         "device.yaml:5:3: building.yaml has no charger 'charger_9': it has pad_a"
@@ -212,8 +212,8 @@ def test_a_coordinators_waypoints_and_stations_stand_on_the_map(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert complaints(capsys, COORDINATOR) == [
-        "device.yaml:6:7: building.yaml:12: the waypoint 'pharmacy' is no charger: is_charger is"
-        " not true",
+        "device.yaml:6:7: building.yaml:12: the waypoint 'pharmacy' is not a charger: set"
+        " is_charger: true",
         "device.yaml:9:51: building.yaml has no waypoint 'wait': it has pad_a, pharmacy",
     ]
 

@@ -230,7 +230,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
             "at: input register 30001",
             [
                 "9:20: 30001 looks like a number of the data model, which begins at 1: write input"
-                " register 0; or 0x7531 if 30001 really is the address"
+                " register 0; or 0x7531 if 30001 really is the address on the wire"
             ],
         ),
         ("hold: 1, release: 0", "hold: 1, release: 1", ["10:47: is the value of hold"]),
