@@ -1,9 +1,11 @@
-"""A DDS domain that nobody on this machine uses, for the demo and the tests."""
+"""A ROS domain that nobody on this machine uses, on DDS or zenoh, for the demo and the tests."""
 
 import atexit
 import random
 import socket
 from typing import Final
+
+from bridges.rmf.zenoh_config import LOOPBACK_PORT
 
 DOMAINS: Final = range(10, 100)
 """Above 101 a domain's ports reach into those that Linux hands out to clients."""
@@ -18,13 +20,14 @@ def free_domain() -> int:
     """
     for domain in random.sample(DOMAINS, len(DOMAINS)):
         base = 7400 + 250 * domain
-        if all(_is_free(base + offset) for offset in (0, 10, 11)) and _claimed(domain):
+        dds = all(_is_free(base + offset) for offset in (0, 10, 11))
+        if dds and _is_free(LOOPBACK_PORT + domain, socket.SOCK_STREAM) and _claimed(domain):
             return domain
     raise OSError(f"every DDS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use on this machine")
 
 
-def _is_free(port: int) -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+def _is_free(port: int, kind: socket.SocketKind = socket.SOCK_DGRAM) -> bool:
+    with socket.socket(socket.AF_INET, kind) as probe:
         try:
             probe.bind(("", port))
         except OSError:

@@ -2,6 +2,8 @@ from collections.abc import Sequence
 
 import pytest
 
+from bridges.rmf.choose import missing_of_dds
+
 _deselected: list[str] = []
 
 
@@ -10,10 +12,18 @@ def pytest_deselected(items: Sequence[pytest.Item]) -> None:
     _deselected.extend(item.nodeid for item in items if item.get_closest_marker("ros"))
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Without cyclonedds, as on arm64, the tests of the dds transport cannot be run."""
+    if missing_of_dds():
+        items[:] = [item for item in items if not item.get_closest_marker("dds")]
+
+
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
     """Say so: a green run without ROS has not seen the ros2 transport."""
+    if missing := missing_of_dds():
+        terminalreporter.write_line(f"not run: the tests of the dds transport, as {missing}")
     if _deselected and config.getoption("markexpr") == "not ros":
         files = sorted({nodeid.partition("::")[0] for nodeid in _deselected})
         terminalreporter.write_line(

@@ -13,13 +13,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-from bridges.core.fields import Rmf
 from bridges.rmf import words
-from bridges.rmf.choose import open_transport
 from bridges.rmf.transport import Transport, TransportError
 from hal_fakes.demo.daemons import Daemon, Wrong, stop_all
 from hal_fakes.demo.journal import Journal
 from hal_fakes.domain import free_domain
+from hal_fakes.wire import join, wire
 
 
 class Interrupted(Exception):
@@ -52,9 +51,8 @@ class Stage:
         """Every daemon started, on a domain and a loopback of their own, and a place beside them."""
         domain = free_domain()
         count = {2: "two", 3: "three", 4: "four"}[len(self.files)]
-        self.note(f"{count} daemons on fake hardware, DDS domain {domain}, loopback only")
-        rmf = Rmf(transport="dds", domain_id=domain, network="localhost")
-        transport = open_transport(rmf, "rmf_demo", localhost=True)
+        self.note(f"{count} daemons on fake hardware, {wire()}, domain {domain}, loopback only")
+        transport = join("rmf_demo", domain)
         try:
             for device, file in self.files.items():
                 self.check()

@@ -17,6 +17,7 @@ from bridges.rmf.transport import Transport, TransportError
 from bridges.serve import graph as graph_node
 from bridges.serve.device import Clock
 from bridges.serve.graph import SPREAD_MOST_S, GraphNode
+from hal_fakes import wire
 from tests.rmf.domains import domain_of_this_run
 from tests.waiting import wait_until
 
@@ -212,7 +213,7 @@ def test_a_lost_wire_is_logged_and_does_not_end_it(caplog: pytest.LogCaptureFixt
 # --- with its thread, and on the wire ----------------------------------------------------------
 
 
-@pytest.fixture(params=["memory", "dds"])
+@pytest.fixture(params=["memory", "wire"])
 def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]:
     network, nodes = MemoryNetwork(), list[Transport]()
 
@@ -220,8 +221,7 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
         if request.param == "memory":
             nodes.append(MemoryTransport(network, name))
         else:
-            dds = pytest.importorskip("bridges.rmf.dds")
-            nodes.append(dds.DdsTransport(name, domain_of_this_run(), loopback=True))
+            nodes.append(wire.join(name, domain_of_this_run()))
         return nodes[-1]
 
     yield join

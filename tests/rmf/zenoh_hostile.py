@@ -1,5 +1,7 @@
-"""A program that lies: `python -m tests.rmf.zenoh_hostile ENDPOINT KEY GOOD TOKEN` sends what is no sample
-of a ROS node under KEY, then GOOD (hex) as one until its stdin ends, with ten thousand a second between.
+"""A program that lies: `python -m tests.rmf.zenoh_hostile ENDPOINT KEY GOOD TOKEN`.
+
+It sends what is no sample of a ROS node under KEY, then ten thousand more as fast as it can, then GOOD (in
+hexadecimal) as a ROS node does, until its stdin ends.
 """
 
 import json
@@ -23,9 +25,7 @@ def main(endpoint: str, key: str, text: str, token: str) -> None:
     with zenoh.open(config) as session:
         alive = session.liveliness().declare_token(token)
         attached = (1).to_bytes(8, "little") + bytes(8) + b"\x10" + gid(token)
-        publisher = session.declare_publisher(
-            key, congestion_control=zenoh.CongestionControl.BLOCK
-        )
+        publisher = session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
         while not publisher.matching_status:
             time.sleep(0.01)
         publisher.put(good)  # without attachment

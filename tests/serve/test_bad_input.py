@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import LiftMode, LiftRequest, LiftState
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 from hal_fakes.domain import free_domain
+from hal_fakes.wire import join, wire
 from tests.rmf import peer
 from tests.rmf.conftest import ROS2
 from tests.serve.site import Daemon, daemon, shipped
@@ -36,7 +36,7 @@ class Lift:
         self.domain = domain
         self.states: list[LiftState] = []
         self._status = status
-        self.transport = DdsTransport("rmf", domain, loopback=True)
+        self.transport = join("rmf", domain)
         self._requests = self.transport.publisher(LIFT_REQUESTS)
         self.transport.subscribe(LIFT_STATES, self.states.append)
         wait_until(self._requests.matched, "the node listens")
@@ -55,7 +55,7 @@ class Lift:
         return refused
 
 
-@pytest.fixture(params=["dds", ROS2])
+@pytest.fixture(params=[wire(), ROS2])
 def lift(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Lift]:
     file = shipped("lift_dry_contact.yaml", tmp_path, request.param)
     domain = free_domain()

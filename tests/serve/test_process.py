@@ -12,6 +12,7 @@ import pytest
 
 from bridges.rmf.definitions import DoorModeValue
 from hal_fakes.domain import free_domain
+from hal_fakes.wire import wire
 from tests.rmf.conftest import ROS2
 from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment
 from tests.waiting import wait_until
@@ -20,7 +21,7 @@ OPEN, CLOSED = DoorModeValue.MODE_OPEN, DoorModeValue.MODE_CLOSED
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(params=["dds", ROS2])
+@pytest.fixture(params=[wire(), ROS2])
 def module(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Module]:
     standing = Module(tmp_path, free_domain(), request.param)
     yield standing
@@ -73,7 +74,7 @@ def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_th
 
 
 def test_outputs_that_cannot_be_verified_off_are_said_so(module: Module, tmp_path: Path) -> None:
-    module.file.write_text(YAML.format(domain=module.domain, transport="dds", port=1))
+    module.file.write_text(YAML.format(domain=module.domain, transport=wire(), port=1))
     done = subprocess.run(
         command("outputs-off", module.file, "--runtime-dir", tmp_path / "run"),
         env=environment(),
