@@ -5,6 +5,7 @@ BIN := .venv/bin
 .PHONY: help demo demo-charging test test-ros lint format bench flood soak mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
+	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
 	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
 	@echo "make test-ros  the tests that need ROS 2, in a shell that has sourced its setup file"

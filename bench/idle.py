@@ -6,16 +6,22 @@ from pathlib import Path
 from typing import Any
 
 from bench.daemons import ROOT, cpu_s, daemon, memory_mb, running, threads, wait_for_log
+from hal_fakes.wire import Wire
 
 DOMAIN = 72
 WATCHED_S = 10.0
+WIRES: tuple[Wire, ...] = ("dds", "zenoh")
 
 
 def measure(scratch: Path) -> dict[str, Any]:
-    """One row for the bare node and for each shipped device."""
-    rows = {
-        "bare node": watch([sys.executable, "-m", "bench.bare", str(DOMAIN)], scratch / "b.log")
-    }
+    """A row for the bare node on each wire, for a lift on zenoh, and for each shipped device on dds."""
+    rows = {}
+    for wire in WIRES:
+        command = [sys.executable, "-m", "bench.bare", str(DOMAIN), wire]
+        rows[f"bare node on {wire}"] = watch(command, scratch / f"{wire}.log")
+    lift = ROOT / "config/lift_dry_contact.yaml"
+    on_zenoh = daemon(lift, scratch / "on_zenoh", DOMAIN, "zenoh")
+    rows["lift_dry_contact on zenoh"] = watch(on_zenoh, scratch / "on_zenoh.log")
     for name in ("lift_dry_contact", "door_modbus", "charger_http"):
         command = daemon(ROOT / f"config/{name}.yaml", scratch / name, DOMAIN)
         rows[name] = watch(command, scratch / f"{name}.log")

@@ -14,23 +14,28 @@ from bridges.rmf.choose import open_transport
 from bridges.rmf.definitions import LiftMode, LiftRequest, LiftRequestType, LiftState
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.transport import Transport
+from hal_fakes.wire import Wire
 
 DOMAIN = 71
 ROUNDS = 300
 WARM_UP = 20
+WIRES: tuple[Wire, ...] = ("dds", "zenoh")
 PAUSE_S = 0.12
 """Between rounds, everywhere alike: a daemon sends ten states a second at most, and idle CPUs sleep."""
 
 
 def measure(scratch: Path) -> dict[str, Any]:
     """Milliseconds, p50 and p99, of each path."""
-    bare = _bare_round_trips(scratch)
-    relay, state, _ = daemon_paths(scratch)
-    return {
-        "bare round trip": figures(bare, bare),
-        "LiftRequest to relay edge": figures(relay, bare),
-        "input edge to LiftState": figures(state, bare),
-    }
+    rows = {}
+    for wire in WIRES:
+        bare = _bare_round_trips(scratch, wire)
+        relay, state, _ = daemon_paths(scratch, wire, wire)
+        rows |= {
+            f"{wire}: bare round trip": figures(bare, bare),
+            f"{wire}: LiftRequest to relay": figures(relay, bare),
+            f"{wire}: input to LiftState": figures(state, bare),
+        }
+    return rows
 
 
 def show(figures: dict[str, Any]) -> None:
@@ -61,8 +66,8 @@ def _percentiles(seconds: list[float]) -> tuple[float, float]:
 class Graph:
     """This process's end: sends LiftRequests, and times the LiftStates that come."""
 
-    def __init__(self) -> None:
-        rmf = Rmf(transport="dds", domain_id=DOMAIN)
+    def __init__(self, speaks: Wire = "dds") -> None:
+        rmf = Rmf(transport=speaks, domain_id=DOMAIN)
         self.transport: Transport = open_transport(rmf, "bench", localhost=True)
         self._requests = self.transport.publisher(LIFT_REQUESTS)
         self._states: queue.SimpleQueue[tuple[float, LiftState]] = queue.SimpleQueue()
@@ -93,11 +98,11 @@ class Graph:
                 return at
 
 
-def _bare_round_trips(scratch: Path) -> list[float]:
-    log = scratch / "bare.log"
-    with running([sys.executable, "-m", "bench.bare", str(DOMAIN)], log):
+def _bare_round_trips(scratch: Path, wire: Wire) -> list[float]:
+    log = scratch / f"bare_{wire}.log"
+    with running([sys.executable, "-m", "bench.bare", str(DOMAIN), wire], log):
         wait_for_log(log, "ready")
-        graph = Graph()
+        graph = Graph(wire)
         times = []
         for i in range(WARM_UP + ROUNDS):
             sent_at = graph.send(str(i), LiftRequestType.REQUEST_AGV_MODE, "L1")
@@ -118,12 +123,17 @@ def quick_lift(scratch: Path) -> Path:
     return file
 
 
-def daemon_paths(scratch: Path, transport: str = "dds") -> tuple[list[float], list[float], float]:
-    """Seconds of each request to the relay and each edge to RMF, and the daemon's memory (MB)."""
+def daemon_paths(
+    scratch: Path, transport: str = "dds", ours: Wire = "dds"
+) -> tuple[list[float], list[float], float]:
+    """Seconds of each request to the relay and each edge to RMF, and the daemon's memory (MB).
+
+    `ours`: the wire of this end.
+    """
     log, directory = scratch / f"quick_{transport}.log", scratch / f"quick_{transport}"
     with running(daemon(quick_lift(scratch), directory, DOMAIN, transport), log) as child:
         wait_for_log(log, "ready")
-        graph = Graph()
+        graph = Graph(ours)
         plant = PlantSocket(directory / "plant.sock")
         plant.say("follow")
         driver = PlantSocket(directory / "plant.sock")

@@ -6,8 +6,8 @@ stdin; it shares no code with `bridges/`. Each line of its output is JSON.
 `tokens PATTERN`: each token under a key, as it comes and goes.
 `samples KEY`: each sample under a key, with its attachment taken apart by zenoh's own deserializer.
 `history KEY DEPTH`: the same for who wants what is retained, as rmw_zenoh subscribes.
-`say KEY TOKEN HEX [DEPTH]`: a node that publishes once somebody listens, as rmw_zenoh does; with a depth
-it retains.
+`say KEY TOKEN HEX [DEPTH]`: a node that publishes once somebody listens, as rmw_zenoh does; with a
+depth it retains.
 """
 
 import json

@@ -1,7 +1,7 @@
 """A program that lies: `python -m tests.rmf.zenoh_hostile ENDPOINT KEY GOOD TOKEN`.
 
-It sends what is no sample of a ROS node under KEY, then ten thousand more as fast as it can, then GOOD (in
-hexadecimal) as a ROS node does, until its stdin ends.
+It sends what is no sample of a ROS node under KEY, then ten thousand more as fast as it can, then GOOD
+(in hexadecimal) as a ROS node does, until its stdin ends.
 """
 
 import json
