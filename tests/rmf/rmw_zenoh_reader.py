@@ -15,6 +15,7 @@ import struct
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import xxhash
@@ -116,7 +117,12 @@ def say(session: zenoh.Session, key: str, token: str, payload: str, depth: str =
     return publisher, alive
 
 
-ORDERS = {"tokens": tokens, "samples": samples, "history": history, "say": say}
+ORDERS: dict[str, Callable[..., Any]] = {
+    "tokens": tokens,
+    "samples": samples,
+    "history": history,
+    "say": say,
+}
 
 if __name__ == "__main__":
     main(*sys.argv[1:])

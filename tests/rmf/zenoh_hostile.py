@@ -40,13 +40,18 @@ def main(endpoint: str, key: str, text: str, token: str) -> None:
         session.put(wrong_hash, good, attachment=attached)
         session.put(key.rsplit("/", 1)[0] + "/*", good, attachment=attached)
         ended = threading.Event()
-        threading.Thread(target=lambda: (sys.stdin.read(), ended.set())).start()
+        threading.Thread(target=end, args=(ended,)).start()
         for _ in range(FLOOD):
             publisher.put(b"\0\1\0\0garbage", attachment=attached)
         print("flooded", flush=True)  # noqa: T201
         while not ended.wait(0.05):
             publisher.put(good, attachment=attached)
         del alive
+
+
+def end(ended: threading.Event) -> None:
+    sys.stdin.read()
+    ended.set()
 
 
 if __name__ == "__main__":
