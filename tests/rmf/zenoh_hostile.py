@@ -11,9 +11,22 @@ import time
 
 import zenoh
 
+from bridges.rmf import definitions as d
+from bridges.rmf.cdr import encode
+from bridges.rmf.rihs01 import type_hash
 from tests.rmf.rmw_zenoh_reader import gid
+from tests.rmf.zenoh_programs import meeting
 
 FLOOD = 10_000
+GOOD = d.LiftRequest("Lift1", d.Time(5, 6), "fleet/robot", 1, "L3", 2)
+
+
+def arguments(domain: int) -> tuple[str, str, str, str]:
+    """To lie to the lifts of a domain on this machine."""
+    kind = f"rmf_lift_msgs::msg::dds_::LiftRequest_/{type_hash(d.LiftRequest)}"
+    token = f"@ros2_lv/{domain}/5e/0/7/MP/%/%/liar/%lift_requests/{kind}/::,10:,:,:,,"
+    good = encode(d.LiftRequest, GOOD).hex()
+    return meeting(domain), f"{domain}/lift_requests/{kind}", good, token
 
 
 def main(endpoint: str, key: str, text: str, token: str) -> None:

@@ -101,7 +101,7 @@ def test_a_flood_ends_with_the_last_valid_request_and_states_go_on(lift: Lift) -
 def test_samples_that_are_no_requests_are_dropped_and_the_next_good_one_is_obeyed(
     lift: Lift,
 ) -> None:
-    with peer.running("hostile", lift.domain):
+    with peer.running("hostile", lift.domain, wire()):
         wait_until(lambda: lift.status()["samples_dropped"], "hostile samples are counted")
     lift.send(replace(RIGHT, request_type=0))
     lift.send(RIGHT)
