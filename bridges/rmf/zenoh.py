@@ -10,12 +10,13 @@ zenoh is imported here and there alone, and only by choose.py.
 """
 
 import atexit
+import ctypes
 import json
 import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import count
 from queue import Empty, SimpleQueue
@@ -26,7 +27,7 @@ from zenoh.handlers import Callback
 
 from bridges.core.fields import Zenoh
 from bridges.log import pairs
-from bridges.rmf import network, zenoh_config
+from bridges.rmf import addresses, zenoh_config
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
@@ -125,7 +126,7 @@ class ZenohTransport:
 
     def _join(self) -> None:
         """Open a session, if one can be opened: a client has none before its router answers."""
-        self._addresses = network.addresses()
+        self._addresses = addresses.addresses()
         if self._loopback:
             ways = zenoh_config.on_loopback(self._domain_id)
         else:
@@ -144,6 +145,7 @@ class ZenohTransport:
             Callback(partial(self._neighbour, self._neighbours), indirect=False), history=True
         )
         self._session = session
+        _give_back()
 
     def _attach(self, end: ZenohPublisher[Any] | ZenohSubscription[Any]) -> None:
         """Give an end its place in the session, when there is one."""
@@ -213,7 +215,7 @@ class ZenohTransport:
             return
         self._look_at = now + LOOK_EVERY_S
         self._look()
-        found = network.addresses()
+        found = addresses.addresses()
         if found != self._addresses and self._reaches_out():
             log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
             self._join_anew()
@@ -268,6 +270,12 @@ def _opened(ways: list[dict[str, Any]]) -> zenoh.Session:
         if further:
             return _opened(further)
         raise
+
+
+def _give_back() -> None:
+    """Opening a session leaves 2.5 MB of freed memory to this process: give it back to the machine."""
+    with suppress(AttributeError):  # a C library other than glibc has no such call
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _nothing() -> None:

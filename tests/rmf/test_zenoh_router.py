@@ -11,8 +11,8 @@ import pytest
 import trustme
 
 from bridges.core.fields import Zenoh, ZenohTls
+from bridges.rmf import addresses, zenoh_config
 from bridges.rmf import definitions as d
-from bridges.rmf import network, zenoh_config
 from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_STATES
 from bridges.rmf.transport import TransportError
 from bridges.rmf.zenoh import ZenohTransport
@@ -154,7 +154,7 @@ class Machine:
     """Its addresses, as the test wants them."""
 
     def __init__(self) -> None:
-        self.addresses: network.Addresses = frozenset({(2, "10.0.0.7")})
+        self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
 
 
 def test_another_address_is_joined_with_all_ends_and_what_was_retained_goes_out_again(
@@ -162,7 +162,7 @@ def test_another_address_is_joined_with_all_ends_and_what_was_retained_goes_out_
 ) -> None:
     caplog.set_level(logging.INFO)
     machine = Machine()
-    monkeypatch.setattr(network, "addresses", lambda: machine.addresses)
+    monkeypatch.setattr(addresses, "addresses", lambda: machine.addresses)
     router = site.router()
     # The kernel takes 0.0.0.0 for this machine; that it is loopback our code does not know.
     anywhere = router.endpoint.replace("127.0.0.1", "0.0.0.0")
