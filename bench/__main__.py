@@ -1,7 +1,7 @@
 """`make bench`: latency and memory of the daemons beside a bare transport node, in one run.
 
 Everything runs on loopback, on fake hardware, in processes of its own. The tables go to stdout, the
-figures to bench/results/bench.json. Some of it: `python -m bench idle doors`.
+figures to bench/results/bench.json. Some of it: `python -m bench idle buses`.
 """
 
 import json
@@ -12,32 +12,22 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench import can, chargers, doors, idle, latency, lifts, many_doors, ros
+from bench import buses, day, idle, latency
+from bench.figures import lines
 
 RESULTS = Path(__file__).parent / "results"
-
-
-SECTIONS = {
-    "latency": latency,
-    "idle": idle,
-    "lifts": lifts,
-    "doors": doors,
-    "many_doors": many_doors,
-    "chargers": chargers,
-    "can": can,
-    "ros": ros,
-}
+SECTIONS = {"latency": latency, "idle": idle, "buses": buses, "day": day}
 
 
 def main(chosen: list[str]) -> int:
     """Measure, print, write."""
     figures: dict[str, Any] = {"machine": _machine()}
-    print(figures["machine"], end="\n\n", flush=True)
+    print(figures["machine"], flush=True)
     for name in chosen or SECTIONS:
         with tempfile.TemporaryDirectory(prefix="rmf-bench-") as scratch:
             figures[name] = SECTIONS[name].measure(Path(scratch))
-        SECTIONS[name].show(figures[name])
-        sys.stdout.flush()
+        for title, rows in figures[name].items():
+            print("", *lines(title, rows), sep="\n", flush=True)
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "bench.json").write_text(json.dumps(figures, indent=2) + "\n")
     print(f"\nwritten to {RESULTS / 'bench.json'}")
@@ -45,17 +35,11 @@ def main(chosen: list[str]) -> int:
 
 
 def _machine() -> str:
-    model = next(
-        (
-            line.split(":", 1)[1].strip()
-            for line in Path("/proc/cpuinfo").read_text().splitlines()
-            if line.startswith("model name")
-        ),
-        platform.machine(),
-    )
-    return (
-        f"{model}, {os.cpu_count()} cores, Python {platform.python_version()}, {platform.system()}"
-    )
+    cpu = Path("/proc/cpuinfo").read_text().splitlines()
+    models = [line.split(":", 1)[1].strip() for line in cpu if line.startswith("model name")]
+    model = models[0] if models else platform.machine()
+    python = platform.python_version()
+    return f"{model}, {os.cpu_count()} cores, Python {python}, {platform.system()}"
 
 
 if __name__ == "__main__":

@@ -1,19 +1,59 @@
-"""The far side of the charger bench, a process of its own: sound, dead and trickling HTTP chargers.
+"""HTTP chargers for the bench, in a process of its own: sound, dead and trickling ones.
 
-Prints the ports, one JSON line, and serves until its standard input ends.
+Run as a process it prints the ports, one JSON line, and serves until its standard input ends.
 """
 
 import asyncio
 import contextlib
 import json
 import os
+import subprocess
 import sys
-from typing import Final
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Final
 
 BODY: Final = b'{"state": 0, "error_msg": ""}'
 HEAD: Final = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
 TRICKLE_S: Final = 0.25
 """Between two bytes: shorter than any timeout for one read."""
+
+
+PERIOD_S: Final = 1.0
+TIMEOUT_S: Final = 1.0
+CODES: Final = {"idle": [0], "charging": [5], "error": [8]}
+
+
+@contextmanager
+def http_chargers(sound: int, dead: int = 0, trickling: int = 0) -> Iterator[list[int]]:
+    """The ports of so many chargers."""
+    counts = [str(count) for count in (sound, dead, trickling)]
+    command = [sys.executable, "-m", "bench.charger_servers", *counts]
+    far = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert far.stdin
+    assert far.stdout
+    try:
+        yield json.loads(far.stdout.readline())
+    finally:
+        far.stdin.close()
+        far.wait(10.0)
+        far.stdout.close()
+
+
+def chargers_at(ports: Sequence[int]) -> dict[str, Any]:
+    """A daemon's YAML: a bus and a charger at each port."""
+    settings = {"type": "http", "timeout_s": TIMEOUT_S, "scan_s": PERIOD_S}
+    return {
+        "kind": "charger",
+        "driver": "http",
+        "buses": {
+            f"tpu_{n}": {**settings, "api_base": f"127.0.0.1:{port}"}
+            for n, port in enumerate(ports)
+        },
+        "chargers": {
+            f"charger_{n}": {"bus": f"tpu_{n}", "codes": CODES} for n in range(len(ports))
+        },
+    }
 
 
 async def _sound(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -1,8 +1,7 @@
-"""Starting and stopping what is measured: simulated daemons, and a bare transport node."""
+"""Starting and stopping what is measured, hearing and asking it, and what it costs."""
 
 import json
 import os
-import re
 import signal
 import socket
 import subprocess
@@ -11,9 +10,34 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import yaml
+
+from bench.figures import Row
+from bridges.core.fields import Rmf
+from bridges.rmf.choose import open_transport
+from bridges.rmf.transport import Transport
+from hal_fakes.wire import Wire
+
+Content = dict[str, Any]
 ROOT = Path(__file__).parent.parent
+DOMAIN = 71
+BARE = [sys.executable, "-m", "bench.bare", str(DOMAIN)]
+WIRES: tuple[Wire, ...] = ("dds", "zenoh")
 STOP_S = 5.0
+SETTLE_S = 3.0
+
+
+@contextmanager
+def graph(speaks: Wire = "dds") -> Iterator[Transport]:
+    """This process's own place on the daemons' graph."""
+    rmf = Rmf(transport=speaks, domain_id=DOMAIN)
+    transport = open_transport(rmf, "bench", localhost=True)
+    try:
+        yield transport
+    finally:
+        transport.close()
 
 
 @contextmanager
@@ -36,13 +60,30 @@ def running(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
             end.close()
 
 
-def daemon(file: Path, directory: Path, domain: int, transport: str = "dds") -> list[str]:
-    """The command of one simulated daemon, on this transport whatever its YAML says."""
-    text = re.sub(r"transport: \w+", f"transport: {transport}", file.read_text())
+def shipped(name: str) -> Content:
+    """An example of `config/`."""
+    content: Content = yaml.safe_load((ROOT / f"config/{name}.yaml").read_text())
+    return content
+
+
+def daemon(
+    content: Content, directory: Path, transport: str = "dds", *, simulate: bool = True
+) -> list[str]:
+    """The command of one daemon, on this transport and on loopback whatever its YAML says."""
     file = directory.with_suffix(".yaml")
-    file.write_text(re.sub(r" *ros_setup: .*\n", "", text))
-    run = [sys.executable, "-m", "bridges.cli", "run", str(file), "--simulate"]
-    return [*run, "--domain-id", str(domain), "--runtime-dir", str(directory)]
+    rmf = {"transport": transport, "network": "localhost"}
+    file.write_text(yaml.safe_dump({**content, "rmf": rmf}, sort_keys=False))
+    run = [sys.executable, "-m", "bridges.cli", "run", str(file)]
+    run += ["--simulate"] if simulate else []
+    return [*run, "--domain-id", str(DOMAIN), "--runtime-dir", str(directory)]
+
+
+@contextmanager
+def ready(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """A process that has said in its log that it is ready."""
+    with running(command, log) as child:
+        wait_for_log(log, "ready")
+        yield child
 
 
 def wait_for_log(log: Path, word: str, deadline_s: float = 20.0) -> None:
@@ -84,6 +125,24 @@ class PlantSocket:
         self._socket.close()
 
 
+def cost(command: list[str], log: Path, watched_s: float = 10.0) -> Row:
+    """What a process costs that is left alone: memory, threads, CPU, time to be ready."""
+    started_at = time.monotonic()
+    with ready(command, log) as child:
+        ready_s = time.monotonic() - started_at
+        time.sleep(SETTLE_S)
+        return {**cost_of(child.pid, watched_s), "ready s": ready_s}
+
+
+def cost_of(pid: int, watched_s: float) -> Row:
+    """What it costs from now on."""
+    before_s = cpu_s(pid)
+    time.sleep(watched_s)
+    used_s = cpu_s(pid) - before_s
+    threads = len(list(Path(f"/proc/{pid}/task").iterdir()))
+    return {"RSS MB": memory_mb(pid), "threads": threads, "CPU %": 100 * used_s / watched_s}
+
+
 def memory_mb(pid: int) -> float:
     """Resident memory of a process in MB (10^6 bytes)."""
     pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
@@ -94,8 +153,3 @@ def cpu_s(pid: int) -> float:
     """User and system time that a process has used (s)."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(") ", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def threads(pid: int) -> int:
-    """How many threads a process has."""
-    return len(list(Path(f"/proc/{pid}/task").iterdir()))

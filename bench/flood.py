@@ -12,13 +12,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from bench.daemons import ROOT, cpu_s, daemon, memory_mb, running, wait_for_log
+from bench.daemons import DOMAIN, cpu_s, daemon, memory_mb, ready, shipped
 from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import LiftRequest, LiftState
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.transport import Publisher
 
-DOMAIN = 78
 SECONDS = 60.0
 A_SECOND = 10_000
 BURST = 100
@@ -31,10 +30,8 @@ WRONG = replace(RIGHT, destination_floor="L9")
 
 def measure(scratch: Path, seconds: float) -> dict[str, Any]:
     """The daemon before, during and after the flood."""
-    log = scratch / "flood.log"
-    command = daemon(ROOT / "config/lift_dry_contact.yaml", scratch / "flood", DOMAIN)
-    with running(command, log) as child:
-        wait_for_log(log, "ready")
+    command = daemon(shipped("lift_dry_contact"), scratch / "flood")
+    with ready(command, scratch / "flood.log") as child:
         rmf = DdsTransport("flood", DOMAIN, loopback=True)
         heard: list[tuple[float, LiftState]] = []
         rmf.subscribe(LIFT_STATES, lambda state: heard.append((time.monotonic(), state)))

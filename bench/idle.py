@@ -1,53 +1,101 @@
-"""What an idle daemon costs, beside a bare transport node: memory, threads, CPU, time to be ready."""
+"""What idle daemons cost beside a bare transport node, and what another device in one of them costs."""
 
-import sys
-import time
+from itertools import count
 from pathlib import Path
 from typing import Any
 
-from bench.daemons import ROOT, cpu_s, daemon, memory_mb, running, threads, wait_for_log
-from hal_fakes.wire import Wire
+from bench.charger_servers import chargers_at, http_chargers
+from bench.daemons import BARE, WIRES, Content, cost, daemon, shipped
+from bench.figures import Rows, Tables, each_more
 
-DOMAIN = 72
-WATCHED_S = 10.0
-WIRES: tuple[Wire, ...] = ("dds", "zenoh")
+LIFTS, CAN_CHARGERS, DOORS, HTTP_CHARGERS = (1, 8), (1, 8), (25, 50, 100, 200), (1, 10, 25, 50)
+TCP = {"type": "modbus", "tcp": {"host": "127.0.0.1", "port": 502}}
+SLCAN = {"port": "/dev/serial/by-id/simulated", "bitrate": 250000}
 
 
-def measure(scratch: Path) -> dict[str, Any]:
-    """A row for the bare node on each wire, for a lift on zenoh, and for each shipped device on dds."""
-    rows = {}
-    for wire in WIRES:
-        command = [sys.executable, "-m", "bench.bare", str(DOMAIN), wire]
-        rows[f"bare node on {wire}"] = watch(command, scratch / f"{wire}.log")
-    lift = ROOT / "config/lift_dry_contact.yaml"
-    on_zenoh = daemon(lift, scratch / "on_zenoh", DOMAIN, "zenoh")
-    rows["lift_dry_contact on zenoh"] = watch(on_zenoh, scratch / "on_zenoh.log")
+def measure(scratch: Path) -> Tables:
+    """The bare node on each wire, a lift on zenoh and the shipped devices; then one table for each
+    that can be many, all on dds."""
+    one = {f"bare node on {wire}": cost([*BARE, wire], scratch / f"{wire}.log") for wire in WIRES}
+    lift = daemon(shipped("lift_dry_contact"), scratch / "on_zenoh", "zenoh")
+    one["lift_dry_contact on zenoh"] = cost(lift, scratch / "on_zenoh.log")
     for name in ("lift_dry_contact", "door_modbus", "charger_http"):
-        command = daemon(ROOT / f"config/{name}.yaml", scratch / name, DOMAIN)
-        rows[name] = watch(command, scratch / f"{name}.log")
-    return rows
+        one[name] = _cost(scratch, name, shipped(name))
+    return {
+        "idle": one,
+        "lifts in one daemon": _many(scratch, "lifts", {n: lifts(n) for n in LIFTS}),
+        "doors on one gateway": _many(scratch, "doors", {n: doors(n) for n in DOORS}),
+        "CANopen chargers on one bus": _many(scratch, "can", {n: canopen(n) for n in CAN_CHARGERS}),
+        "chargers on HTTP": _http(scratch),
+    }
 
 
-def show(figures: dict[str, Any]) -> None:
-    """The table."""
-    print(f"\n{'idle':28}{'RSS MB':>9}{'threads':>9}{'CPU %':>8}{'ready s':>9}")
-    for name, row in figures.items():
-        size = f"{row['rss_mb']:>9.1f}{row['threads']:>9}"
-        print(f"{name:28}{size}{row['cpu_percent']:>8.2f}{row['ready_s']:>9.2f}")
+def _cost(scratch: Path, name: str, content: Content, *, simulate: bool = True) -> dict[str, float]:
+    command = daemon(content, scratch / name, simulate=simulate)
+    return cost(command, scratch / f"{name}.log")
 
 
-def watch(command: list[str], log: Path) -> dict[str, float]:
-    started_at = time.monotonic()
-    with running(command, log) as child:
-        wait_for_log(log, "ready")
-        ready_s = time.monotonic() - started_at
-        time.sleep(2.0)
-        before_s = cpu_s(child.pid)
-        time.sleep(WATCHED_S)
-        used_s = cpu_s(child.pid) - before_s
-        return {
-            "rss_mb": memory_mb(child.pid),
-            "threads": threads(child.pid),
-            "cpu_percent": 100 * used_s / WATCHED_S,
-            "ready_s": ready_s,
-        }
+def _many(scratch: Path, name: str, contents: dict[int, Content]) -> Rows:
+    rows = {str(n): _cost(scratch, f"{name}_{n}", content) for n, content in contents.items()}
+    return {**rows, "each more": each_more(rows, list(contents))}
+
+
+def _http(scratch: Path) -> Rows:
+    """Their servers are a process of its own: simulated ones would cost the daemon something."""
+    rows: Rows = {}
+    for n in HTTP_CHARGERS:
+        with http_chargers(n) as ports:
+            rows[str(n)] = _cost(scratch, f"http_{n}", chargers_at(ports), simulate=False)
+    return {**rows, "each more": each_more(rows, HTTP_CHARGERS)}
+
+
+def lifts(many: int) -> Content:
+    """The shipped lift so many times over, each on a Modbus module of its own."""
+    content = shipped("lift_dry_contact")
+    one = content["lifts"]["Lift1"]
+    lifts = {f"Lift{unit}": _on_module(one, unit) for unit in range(1, many + 1)}
+    return {**content, "buses": {"line": TCP}, "lifts": lifts}
+
+
+def _on_module(lift: Any, unit: int) -> Any:
+    coils, inputs = count(), count()
+
+    def moved(part: Any) -> Any:
+        if isinstance(part, list):
+            return [moved(item) for item in part]
+        if not isinstance(part, dict):
+            return part
+        if "point" not in part:
+            return {key: moved(value) for key, value in part.items()}
+        place = f"discrete input {next(inputs)}" if "pull" in part else f"coil {next(coils)}"
+        return {**{k: v for k, v in part.items() if k != "pull"}, "point": f"unit {unit} {place}"}
+
+    return moved(lift)
+
+
+def doors(many: int, bus: Content = TCP) -> Content:
+    """Doors with two limit switches and a relay, each a unit of its own on one line."""
+    return {
+        "kind": "door",
+        "driver": "dry_contact",
+        "buses": {"line": bus},
+        "doors": {f"door_{unit}": _door(unit) for unit in range(1, many + 1)},
+    }
+
+
+def _door(unit: int) -> Content:
+    def contact(place: str) -> Content:
+        return {"point": f"unit {unit} {place}", "active": "high"}
+
+    ends = {"opened": contact("discrete input 0"), "closed": contact("discrete input 1")}
+    return {"inputs": ends, "outputs": {"hold_open": contact("coil 0")}}
+
+
+def canopen(many: int) -> Content:
+    """Receivers on one simulated adapter."""
+    return {
+        "kind": "charger",
+        "driver": "canopen",
+        "buses": {"can": {"type": "can", "slcan": SLCAN}},
+        "chargers": {f"charger_{node}": {"node": node} for node in range(1, many + 1)},
+    }

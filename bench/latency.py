@@ -1,77 +1,97 @@
-"""How long a request takes to the relay, and an input to RMF, against a bare round trip."""
+"""How long a request takes to the relay, an input to RMF and a hazard to all outputs off, against a
+bare round trip and a bare edge callback; and where there is ROS 2, the same against a bare rclpy node.
+
+The far end, which sends and times, is the same for each: on `dds`, as cheap as it can be.
+"""
 
 import queue
-import statistics
+import subprocess
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bench.daemons import ROOT, PlantSocket, daemon, memory_mb, running, wait_for_log
-from bridges.core.fields import Rmf
-from bridges.rmf.choose import open_transport
+from bench.daemons import (
+    BARE,
+    DOMAIN,
+    WIRES,
+    Content,
+    PlantSocket,
+    daemon,
+    graph,
+    memory_mb,
+    ready,
+    shipped,
+)
+from bench.figures import Rows, Tables, compared
+from bridges.rmf.choose import missing_of_ros
 from bridges.rmf.definitions import LiftMode, LiftRequest, LiftRequestType, LiftState
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.transport import Transport
+from bridges.settings.load import load
+from drivers.hal.gpio import canonical
+from drivers.lift.dry_contact import Settings, wires
+from hal_fakes.gpio import WiredFactory
+from hal_fakes.plants.lift import build
 from hal_fakes.wire import Wire
+from hal_fakes.wiring import Wiring
 
-DOMAIN = 71
 ROUNDS = 300
+HAZARDS = 100
 WARM_UP = 20
-WIRES: tuple[Wire, ...] = ("dds", "zenoh")
 PAUSE_S = 0.12
 """Between rounds, everywhere alike: a daemon sends ten states a second at most, and idle CPUs sleep."""
+MINIMAL = [sys.executable, "-m", "bench.minimal_ros", str(DOMAIN)]
+Times = list[float]
 
 
-def measure(scratch: Path) -> dict[str, Any]:
+def measure(scratch: Path) -> Tables:
     """Milliseconds, p50 and p99, of each path."""
-    rows: dict[str, Any] = {}
-    for wire in WIRES:
-        bare = _bare_round_trips(scratch, wire)
-        relay, state, _ = daemon_paths(scratch, wire, wire)
-        rows |= {
-            f"{wire}: bare round trip": figures(bare, bare),
-            f"{wire}: LiftRequest to relay": figures(relay, bare),
-            f"{wire}: input to LiftState": figures(state, bare),
+    latencies: Rows = {}
+    for wire in reversed(WIRES):  # the hazard's figures are those of the last, dds
+        round_trips = _bare_round_trips(scratch, wire)
+        relay, state, off, _ = _daemon_paths(scratch, wire, wire)
+        latencies |= {
+            f"bare round trip on {wire}": compared(round_trips, round_trips),
+            f"LiftRequest to relay edge on {wire}": compared(relay, round_trips),
+            f"input edge to LiftState on {wire}": compared(state, round_trips),
         }
-    return rows
-
-
-def show(figures: dict[str, Any]) -> None:
-    """The table."""
-    print(f"{'latency':28}{'p50 ms':>9}{'p99 ms':>9}{'p50 ratio':>11}{'p99 ratio':>11}")
-    for name, row in figures.items():
-        ratios = f"{row['p50_ratio']:>10.2f}x{row['p99_ratio']:>10.2f}x"
-        print(f"{name:28}{row['p50_ms']:>9.3f}{row['p99_ms']:>9.3f}{ratios}")
-
-
-def figures(seconds: list[float], bare: list[float]) -> dict[str, float]:
-    p50, p99 = _percentiles(seconds)
-    bare50, bare99 = _percentiles(bare)
+    callbacks = _bare_callbacks(scratch)
+    scan_s = load(scratch / "quick_dds.yaml").buses["header"].scan_s
+    worst = {"worst in scan periods": max(off) / scan_s}
     return {
-        "p50_ms": p50 * 1e3,
-        "p99_ms": p99 * 1e3,
-        "p50_ratio": p50 / bare50,
-        "p99_ratio": p99 / bare99,
-        "rounds": len(seconds),
+        "latency": latencies,
+        "hazard input edge": {
+            "to a bare edge callback": compared(callbacks, callbacks),
+            "to all outputs off": {**compared(off, callbacks), **worst},
+        },
+        **_with_ros(scratch),
     }
 
 
-def _percentiles(seconds: list[float]) -> tuple[float, float]:
-    cuts = statistics.quantiles(seconds, n=100, method="inclusive")
-    return cuts[49], cuts[98]
+def _with_ros(scratch: Path) -> Tables:
+    """A lift daemon on `ros2` and on `dds`, against an rclpy node that only sets a pin."""
+    if missing := missing_of_ros():
+        return {f"with ROS 2: nothing, as there is no ROS here ({missing})": {}}
+    bare_relay, bare_state, bare_mb = _minimal(scratch)
+    relays: Rows = {"minimal rclpy node": {**compared(bare_relay, bare_relay), "RSS MB": bare_mb}}
+    states: Rows = {"minimal rclpy node": compared(bare_state, bare_state)}
+    for transport in ("ros2", "dds"):
+        relay, state, _, rss_mb = _daemon_paths(scratch, transport)
+        name = f"lift daemon on {transport}"
+        relays[name] = {**compared(relay, bare_relay), "RSS MB": rss_mb}
+        states[name] = compared(state, bare_state)
+    return {"with ROS 2, request to relay": relays, "with ROS 2, edge to LiftState": states}
 
 
 class Graph:
     """This process's end: sends LiftRequests, and times the LiftStates that come."""
 
-    def __init__(self, speaks: Wire = "dds") -> None:
-        rmf = Rmf(transport=speaks, domain_id=DOMAIN)
-        self.transport: Transport = open_transport(rmf, "bench", localhost=True)
-        self._requests = self.transport.publisher(LIFT_REQUESTS)
+    def __init__(self, transport: Transport) -> None:
+        self._requests = transport.publisher(LIFT_REQUESTS)
         self._states: queue.SimpleQueue[tuple[float, LiftState]] = queue.SimpleQueue()
-        self.transport.subscribe(LIFT_STATES, lambda s: self._states.put((time.monotonic(), s)))
+        transport.subscribe(LIFT_STATES, lambda s: self._states.put((time.monotonic(), s)))
         while not self._requests.matched():
             time.sleep(0.01)
         time.sleep(0.5)  # the other side may not have matched yet
@@ -98,68 +118,161 @@ class Graph:
                 return at
 
 
-def _bare_round_trips(scratch: Path, wire: Wire) -> list[float]:
-    log = scratch / f"bare_{wire}.log"
-    with running([sys.executable, "-m", "bench.bare", str(DOMAIN), wire], log):
-        wait_for_log(log, "ready")
-        graph = Graph(wire)
-        times = []
-        for i in range(WARM_UP + ROUNDS):
-            sent_at = graph.send(str(i), LiftRequestType.REQUEST_AGV_MODE, "L1")
-            times.append(graph.state(sent_at, lambda s: bool(s.session_id)) - sent_at)
-            time.sleep(PAUSE_S)
-        graph.transport.close()
-    return times[WARM_UP:]
+def _bare_round_trips(scratch: Path, wire: Wire) -> Times:
+    with ready([*BARE, wire], scratch / f"bare_{wire}.log"), graph(wire) as transport:
+        far = Graph(transport)
+        return _measured(lambda: _round_trip(far))
 
 
-def quick_lift(scratch: Path) -> Path:
+def _measured(once: Callable[[], float], rounds: int = ROUNDS) -> Times:
+    return [once() for _ in range(WARM_UP + rounds)][WARM_UP:]
+
+
+def _round_trip(far: Graph) -> float:
+    sent_at = far.send("bench", LiftRequestType.REQUEST_AGV_MODE, "L1")
+    took = far.state(sent_at, lambda s: bool(s.session_id)) - sent_at
+    time.sleep(PAUSE_S)
+    return took
+
+
+def _quick_lift() -> Content:
     """The shipped lift with every deliberate delay taken out, so that only the path is measured."""
-    text = (ROOT / "config/lift_dry_contact.yaml").read_text()
-    text = text.replace("pull: down", "pull: down, debounce_s: 0")
-    times = "release_grace_s: 0, min_off_s: 0, hazard_clear_s: 0, max_cycles_per_min: 600"
-    text = text.replace("    floors:", f"    limits: {{{times}}}\n    floors:")
-    file = scratch / "quick_lift.yaml"
-    file.write_text(text)
-    return file
+    content = shipped("lift_dry_contact")
+    lift = content["lifts"]["Lift1"]
+    for contact in _contacts(lift["inputs"]):
+        contact["debounce_s"] = 0
+    times = {"release_grace_s": 0, "min_off_s": 0, "hazard_clear_s": 0, "max_cycles_per_min": 600}
+    lift["limits"] = {**lift.get("limits", {}), **times}
+    return content
 
 
-def daemon_paths(
-    scratch: Path, transport: str = "dds", ours: Wire = "dds"
-) -> tuple[list[float], list[float], float]:
-    """Seconds of each request to the relay and each edge to RMF, and the daemon's memory (MB).
+def _contacts(part: Any) -> list[dict[str, Any]]:
+    if isinstance(part, dict) and "point" in part:
+        return [part]
+    parts = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+    return [contact for each in parts for contact in _contacts(each)]
+
+
+def _daemon_paths(
+    scratch: Path, transport: str, ours: Wire = "dds"
+) -> tuple[Times, Times, Times, float]:
+    """Seconds of each request to the relay, edge to RMF and hazard to all off, and memory (MB).
 
     `ours`: the wire of this end.
     """
-    log, directory = scratch / f"quick_{transport}.log", scratch / f"quick_{transport}"
-    with running(daemon(quick_lift(scratch), directory, DOMAIN, transport), log) as child:
-        wait_for_log(log, "ready")
-        graph = Graph(ours)
-        plant = PlantSocket(directory / "plant.sock")
+    directory = scratch / f"quick_{transport}"
+    command = daemon(_quick_lift(), directory, transport)
+    with ready(command, directory.with_suffix(".log")) as child, graph(ours) as node:
+        far = Graph(node)
+        plant, hand = PlantSocket(directory / "plant.sock"), PlantSocket(directory / "plant.sock")
         plant.say("follow")
-        driver = PlantSocket(directory / "plant.sock")
-        relay = [_to_relay(graph, plant) for _ in range(WARM_UP + ROUNDS)]
-        state = [_to_state(graph, plant, driver) for _ in range(WARM_UP + ROUNDS)]
-        for end in (plant, driver, graph.transport):
+        relay = _measured(lambda: _to_relay(far, plant))
+        state = _measured(lambda: _to_state(far, plant, hand))
+        off = _measured(lambda: _to_outputs_off(far, plant, hand), HAZARDS)
+        for end in (plant, hand):
             end.close()
-        return relay[WARM_UP:], state[WARM_UP:], memory_mb(child.pid)
+        return relay, state, off, memory_mb(child.pid)
 
 
-def _to_relay(graph: Graph, plant: PlantSocket) -> float:
-    sent_at = graph.send("bench", LiftRequestType.REQUEST_AGV_MODE, "L1")
+def _to_relay(far: Graph, plant: PlantSocket) -> float:
+    sent_at = far.send("bench", LiftRequestType.REQUEST_AGV_MODE, "L1")
     took = plant.edge("agv_mode_request", True) - sent_at
-    graph.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
+    far.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
     plant.edge("agv_mode_request", False)
     time.sleep(PAUSE_S)
     return took
 
 
-def _to_state(graph: Graph, plant: PlantSocket, driver: PlantSocket) -> float:
+def _to_state(far: Graph, plant: PlantSocket, hand: PlantSocket) -> float:
     emergency = LiftMode.MODE_EMERGENCY
-    driver.say("press Lift1 code_blue on")
+    hand.say("press Lift1 code_blue on")
     edge_at = plant.edge("code_blue", True)
-    took = graph.state(edge_at, lambda s: s.current_mode == emergency) - edge_at
-    driver.say("press Lift1 code_blue off")
+    took = far.state(edge_at, lambda s: s.current_mode == emergency) - edge_at
+    hand.say("press Lift1 code_blue off")
     over_at = plant.edge("code_blue", False)
-    graph.state(over_at, lambda s: s.current_mode != emergency)
+    far.state(over_at, lambda s: s.current_mode != emergency)
     time.sleep(PAUSE_S)
     return took
+
+
+def _to_outputs_off(far: Graph, plant: PlantSocket, hand: PlantSocket) -> float:
+    far.send("bench", LiftRequestType.REQUEST_AGV_MODE, "L1")
+    plant.edge("agv_mode_request", True)
+    hand.say("press Lift1 fire_alarm on")
+    at = plant.edge("fire_alarm", True)
+    took = plant.edge("agv_mode_request", False) - at
+    # While it burns: a session that outlived the fire would have its relay back at once.
+    ended_at = far.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
+    far.state(ended_at, lambda state: not state.session_id)
+    hand.say("press Lift1 fire_alarm off")
+    plant.edge("fire_alarm", False)
+    time.sleep(PAUSE_S)
+    return took
+
+
+def _bare_callbacks(scratch: Path) -> Times:
+    """From the contact to gpiozero's callback, in a process that does nothing else."""
+    daemon(_quick_lift(), scratch / "callbacks")  # writes the file
+    settings = load(scratch / "callbacks.yaml").devices["Lift1"]
+    assert isinstance(settings, Settings)
+    plant = build("Lift1", settings)
+    factory = WiredFactory([Wiring(plant, wires(settings), canonical)])
+    pin = factory.pin(canonical(settings.inputs.fire_alarm.point))  # type: ignore[union-attr]
+    pin.input_with_pull("down")
+    pin.edges = "both"
+    seen: list[float] = []
+
+    def changed(ticks: Any, state: Any) -> None:
+        seen.append(time.monotonic())
+
+    pin.when_changed = changed
+    took = []
+    for number in range(2 * HAZARDS):
+        at = time.monotonic()
+        plant.press("fire_alarm", number % 2 == 0, at)
+        factory.show(at)
+        if len(seen) > number:
+            took.append(seen[-1] - at)
+        time.sleep(0.01)
+    return took
+
+
+def _minimal(scratch: Path) -> tuple[Times, Times, float]:
+    with ready(MINIMAL, scratch / "minimal.log") as child, graph() as node:
+        far = Graph(node)
+        relay = _measured(lambda: _minimal_relay(far, child))
+        state = _measured(lambda: _minimal_state(far, child))
+        return relay, state, memory_mb(child.pid)
+
+
+def _minimal_relay(far: Graph, child: "subprocess.Popen[bytes]") -> float:
+    sent_at = far.send("bench", LiftRequestType.REQUEST_AGV_MODE, "L1")
+    took = _edge(child, "relay 1") - sent_at
+    far.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
+    _edge(child, "relay 0")
+    time.sleep(PAUSE_S)
+    return took
+
+
+def _minimal_state(far: Graph, child: "subprocess.Popen[bytes]") -> float:
+    edge_at = _press(child, "on", "input 1")
+    arrived = far.state(edge_at, lambda s: s.current_mode == LiftMode.MODE_EMERGENCY)
+    over_at = _press(child, "off", "input 0")
+    far.state(over_at, lambda s: s.current_mode != LiftMode.MODE_EMERGENCY)
+    time.sleep(PAUSE_S)
+    return arrived - edge_at
+
+
+def _press(child: "subprocess.Popen[bytes]", word: str, edge: str) -> float:
+    assert child.stdin is not None
+    child.stdin.write(f"{word}\n".encode())
+    child.stdin.flush()
+    return _edge(child, edge)
+
+
+def _edge(child: "subprocess.Popen[bytes]", edge: str) -> float:
+    assert child.stdout is not None
+    while True:
+        signal, level, at = child.stdout.readline().decode().split()
+        if f"{signal} {level}" == edge:
+            return float(at)

@@ -8,15 +8,28 @@ import sys
 from bridges import __version__
 
 COMMANDS = {
-    "run": "serve a device, from its YAML, until SIGTERM or SIGINT",
-    "check": "validate device YAMLs and print their wiring as a table",
-    "schema": "print what may stand in a device YAML, as JSON Schema",
-    "watch": "show lifts, doors and chargers live, as RMF sees them",
-    "send": "send a request as RMF does, and wait for its effect",
-    "release": "end the session of whoever holds a lift",
-    "reset": "tell a running daemon that its latched faults may clear",
-    "outputs-off": "switch off every output of a device whose daemon is dead",
+    "run": (
+        "serve a device, from its YAML, until SIGTERM or SIGINT",
+        "run my_lift.yaml --simulate",
+    ),
+    "check": (
+        "validate device YAMLs and print their wiring as a table",
+        "check my_lift.yaml --building-map hospital.building.yaml",
+    ),
+    "schema": ("print what may stand in a device YAML, as JSON Schema", "schema > rmf-bridge.json"),
+    "watch": ("show lifts, doors and chargers live, as RMF sees them", "watch --localhost"),
+    "send": (
+        "send a request as RMF does, and wait for its effect",
+        "send lift Lift1 L3 --session me --direct --localhost",
+    ),
+    "release": ("end the session of whoever holds a lift", "release Lift1"),
+    "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
+    "outputs-off": (
+        "switch off every output of a device whose daemon is dead",
+        "outputs-off my_lift.yaml",
+    ),
 }
+"""What each does, and an example."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -27,11 +40,16 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--version", action="version", version=f"rmf-bridge {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     arguments, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
-    for name, text in COMMANDS.items():
-        subparser = subparsers.add_parser(name, help=text, description=text)
+    for name, (text, example) in COMMANDS.items():
+        subparser = subparsers.add_parser(
+            name,
+            help=text,
+            description=text[0].upper() + text[1:] + ".",
+            epilog=f"example: rmf-bridge {example}",
+        )
         if name in arguments:  # only the command that runs is imported
             _module(name).add_arguments(subparser)
-    parsed = parser.parse_args(arguments, argparse.Namespace(ros_args=ros_args))
+    parsed = parser.parse_args(arguments, argparse.Namespace(ros_args=ros_args, typed=arguments))
     try:
         return int(_module(parsed.command).run(parsed))
     except BrokenPipeError:  # the reader of a pipe has gone, as `head` does

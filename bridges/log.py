@@ -1,15 +1,56 @@
 """Logs: one event, one line, `event key=value …`, with the priority that journald understands."""
 
+import dataclasses
 import logging
 import os
 import sys
+from collections.abc import Iterator, Mapping, Set
+from enum import Enum
+
+import msgspec
 
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
 def pairs(event: str, **values: object) -> str:
     """One log line: values with spaces or quotes are quoted, so that a line stays one line."""
-    return " ".join([event, *(f"{key}={_quoted(str(value))}" for key, value in values.items())])
+    return " ".join([event, *(f"{key}={_quoted(plain(value))}" for key, value in values.items())])
+
+
+def plain(value: object) -> str:
+    """A value for a person, without Python's spelling: `agv_request yes, call L3`.
+
+    Of a record only what is set is said; nothing set, or nothing at all, is `-`.
+    """
+    match value:
+        case None:
+            return "-"
+        case bool():
+            return "yes" if value else "no"
+        case Enum():
+            return value.value if isinstance(value.value, str) else value.name
+        case Mapping():
+            return _listed(f"{key} {plain(part)}" for key, part in value.items())
+        case tuple() | list() | Set():
+            return _listed(map(plain, value))
+    if isinstance(value, msgspec.Struct) or dataclasses.is_dataclass(value):
+        return _listed(f"{key} {plain(part)}" for key, part in _set(value))
+    return str(value)
+
+
+def _listed(parts: Iterator[str]) -> str:
+    return ", ".join(parts) or "-"
+
+
+def _set(record: object) -> Iterator[tuple[str, object]]:
+    names = getattr(record, "__struct_fields__", None) or [
+        field.name
+        for field in dataclasses.fields(record)  # type: ignore[arg-type]
+    ]
+    for name in names:
+        part = getattr(record, name)
+        if part is not None and part is not False and part not in ("", ()):
+            yield name, part
 
 
 def _quoted(text: str) -> str:
@@ -36,8 +77,29 @@ class _Formatter(logging.Formatter):
         return "\n".join(prefix + line for line in text.splitlines())
 
 
+class _OthersOnce(logging.Filter):
+    """Of each place in a library's code that logs, one line: what it says of a bad frame or datagram,
+    anybody can make it say again and again. Our own lines are written to come once."""
+
+    OURS = ("root", "bridges", "drivers", "hal_fakes")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._said: set[tuple[str, int]] = set()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        place = record.pathname, record.lineno
+        if record.name.partition(".")[0] in self.OURS:
+            return True
+        record.exc_info = record.exc_text = None  # where in the library is nobody's first question
+        first = place not in self._said
+        self._said.add(place)
+        return first
+
+
 def start(level: str = "INFO") -> None:
     """Send every log line to stderr."""
     to_stderr = logging.StreamHandler(sys.stderr)
     to_stderr.setFormatter(_Formatter(journal="JOURNAL_STREAM" in os.environ))
+    to_stderr.addFilter(_OthersOnce())
     logging.basicConfig(level=level, handlers=[to_stderr], force=True)

@@ -1,14 +1,7 @@
 """Drivers: what a controller's signals mean. One file for each way of wiring a device.
 
-A driver file is `drivers/<kind>/<driver>.py`, after the YAML's `kind:` and `driver:`, and holds
-
-- `Settings`, a msgspec struct that derives from the kind's (`bridges.lift.settings.LiftSettings`…)
-  and adds the wiring;
-- `BUSES`, the bus types that it can stand on, as the names of files in `drivers/hal/`;
-- `create(name, settings, bus) -> Driver`;
-- `wires(settings) -> list[Wire]`, the table that an electrician checks (`drivers/hal/points.py`).
-
-There is no table of drivers to edit: the loader imports by name.
+A driver file is `drivers/<kind>/<driver>.py`, after the YAML's `kind:` and `driver:`, and ends with a
+`DRIVER` (`drivers/driver_type.py`), by which everything else knows it.
 """
 
 from typing import Protocol, TypeVar

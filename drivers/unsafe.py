@@ -4,9 +4,13 @@ An unsafe choice is a problem unless `accept_unsafe: {signal: reason}` accepts i
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
 
 from drivers.hal import gpio
 from drivers.hal.points import Wire
+
+ALARM_WITHIN_S: Final = 1.0
+"""An alarm that is believed later than this deserves a look."""
 
 Unsafe = tuple[str, tuple[str, ...], str]
 """A signal, where the YAML has it, and what is unsafe about it."""
@@ -38,6 +42,14 @@ def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
                 f"{gpio.describe(wire.point)} is pulled {pulled} from power-on until the daemon"
                 f" starts, and its relay is on at {pulled}: use {use}, or the other active level",
             )
+
+
+def slow_alarms(wires: Iterable[Wire]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Alarms that must last long before they are believed, as (path, text)."""
+    for wire in wires:
+        if wire.debounce_s is not None and wire.debounce_s > ALARM_WITHIN_S:
+            text = f"{wire.signal} is believed only after {wire.debounce_s:g} s"
+            yield (*wire.path, "debounce_s"), f"{text}: contacts bounce for 0.05 s"
 
 
 def unaccepted(

@@ -14,12 +14,12 @@ from typing import Any
 from gpiozero import PinInvalidFunction
 from gpiozero.pins.mock import MockFactory, MockPin
 
-from bridges.settings.load import Config
-from drivers.hal.gpio import GpioBus, canonical
+from drivers.hal.gpio import GpioBus
 from drivers.hal.gpio import Settings as GpioSettings
 from drivers.hal.gpio import open_bus as open_real_bus
+from hal_fakes.fake import Inside
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring, wirings
+from hal_fakes.wiring import Wiring
 
 
 class WiredPin(MockPin):  # type: ignore[misc]
@@ -102,8 +102,11 @@ class WiredFactory(MockFactory):  # type: ignore[misc]
                         claimed[point].shown(level)
 
 
-def open_bus(settings: GpioSettings, config: Config, bus_name: str, world: RealTime) -> GpioBus:
+def open_bus(settings: GpioSettings, wirings: Sequence[Wiring], world: RealTime) -> GpioBus:
     """A real GPIO bus on pins that are wired to the plants of this bus."""
-    factory = WiredFactory(wirings(config, bus_name, world.plants, canonical), lock=world.lock)
+    factory = WiredFactory(wirings, lock=world.lock)
     world.on_step.append(factory.show)
     return open_real_bus(settings, factory)
+
+
+FAKE = Inside(open_bus)

@@ -1,8 +1,7 @@
-"""The far side of an `http` bus: a real HTTP server on 127.0.0.1 in front of charging stations.
+"""The far side of an `http` bus: a real HTTP server on 127.0.0.1 in front of stations.
 
-`GET state_path` answers what the station does in the maker's numbers or words and fields; clearing,
-start, stop and range check do what they are called. How the wire fails, by part and mode
-(`hal_fakes.plants.plant.FAILURE_MODES`):
+What a station says is its own file's (`hal_fakes/http_charger.py`). How the wire fails, by part and
+mode (`hal_fakes.plants.plant.FAILURE_MODES`):
 
 |         | off              | stuck           | slow               | garbage        | wrong         |
 | server  | hangs up at once | the last answer | answers too late   | an HTML page   | state as text |
@@ -11,129 +10,48 @@ start, stop and range check do what they are called. How the wire fails, by part
 """
 
 import contextlib
-import json
 import socket
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from select import select
 from types import MappingProxyType
-from typing import Any, Final, cast
+from typing import Any, Final, Protocol
 
-from bridges.charger.signals import Activity
-from drivers.hal.http import base
-from hal_fakes.plants.charger import ROBOTS_FAULTS, Reading
+from drivers.hal import http
+from hal_fakes.fake import Outside
 from hal_fakes.plants.plant import FailureMode, Plant
-from hal_fakes.wiring import devices_on
 
 LOOK_S: Final = 0.05
 NEVER: Final = float("inf")
 PAGE: Final = b"<!doctype html><title>Welcome</title>"
-NEAREST: Final = {
-    Activity.HANDSHAKE: Activity.IDLE,
-    Activity.STOPPING: Activity.CHARGING,
-    Activity.RELEASED: Activity.IDLE,
-}
-"""What a maker shows who has no number of its own for an activity."""
-
 
 Failures = Mapping[str, FailureMode]
 NONE: Final[Failures] = MappingProxyType({})
 
 
-def serve(settings: Any, plants: Mapping[str, Plant], config: Any, bus_name: str) -> "HttpServer":
+def serve(settings: http.Settings, stations: Sequence["Station"]) -> "HttpServer":
     """Serve the stations of this bus on a free port of 127.0.0.1."""
-    stations = [
-        Station(plants[name], device) for name, device in devices_on(config, bus_name).items()
-    ]
-    return HttpServer(stations, base(settings.api_base).path, settings.timeout_s)
+    return HttpServer(stations, http.base(settings.api_base).path, settings.timeout_s)
 
 
-class Station:
-    """One plant with the numbers and paths of its maker."""
+class Station(Protocol):
+    """What answers on one path, and on those that command it; its plant is behind it.
 
-    def __init__(self, plant: Plant, settings: Any) -> None:
-        self.plant = plant
-        self.settings = settings
-        self._lists: Mapping[Activity, list[int]] = settings.codes.lists()
-        self._words = {code: word for word, code in settings.state_words.items()}
-        self._last: bytes | None = None
+    `reads`: the path that is read. `commands`: method and path -> what it does to the plant.
+    """
 
-    def reading(self) -> Reading:
-        """What the station does now."""
-        self.plant.advance(time.monotonic())
-        return cast(Reading, self.plant.sense("reading"))
+    plant: Plant
+    reads: str
+    commands: Mapping[tuple[str, str], tuple[str, bool]]
 
-    def commands(self) -> dict[tuple[str, str], tuple[str, bool]]:
-        """Method and path of each command -> what it does to the plant."""
-        found = {("POST", self.settings.clear_error_path): ("clear_error", True)}
-        does = {
-            "start": ("power", True),
-            "stop": ("power", False),
-            "range_check": ("range_check", True),
-        }
-        for name, action in does.items():
-            if call := getattr(self.settings, name):
-                found[call.method, call.path] = action
-        return found
+    def answer(self) -> bytes:
+        """The body that a reading is answered with, now."""
 
     def obey(self, signal: str, asserted: bool) -> None:
         """Somebody has asked for it."""
-        self.plant.drive(signal, asserted, time.monotonic())
-
-    def body(self, reading: Reading) -> bytes:
-        """The answer to `GET state_path`; wrong where the server is told to be."""
-        server, body = reading.failures.get("server"), reading.failures.get("body")
-        if server == "stuck" and self._last is not None:
-            return self._last
-        code: int | str = self._unknown() if body == "wrong" else self._code(reading)
-        if server == "wrong":
-            code = str(code)
-        self._last = json.dumps(self._answer(code, reading)).encode()
-        return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
-
-    def _answer(self, code: int | str, reading: Reading) -> dict[str, Any]:
-        """Everything where the YAML says that it is."""
-        fields, answer = self.settings.fields, dict[str, Any]()
-        _put(answer, fields.state, self._words.get(code, code))
-        _put(answer, fields.error_text, reading.error_text)
-        if fields.receiver_id:
-            _put(answer, fields.receiver_id, reading.receiver or None)
-        if where := fields.in_range:
-            yes = where.when[0] if where.when else True
-            no = next(n for n in range(256) if n not in where.when) if where.when else False
-            _put(answer, where.field, yes if reading.in_range else no)
-        percent = None if reading.battery is None else 100 * reading.battery
-        for name, value in (("battery_percent", percent), *_numbers(reading)):
-            if number := getattr(fields, name):
-                _put(answer, number.field, None if value is None else value / number.scale)
-        return answer
-
-    def _code(self, reading: Reading) -> int:
-        if reading.error_text in ROBOTS_FAULTS and self.settings.codes.robot_error:
-            return cast(int, self.settings.codes.robot_error[0])
-        nearest = NEAREST.get(reading.activity, Activity.ERROR)
-        codes = self._lists[reading.activity] or self._lists[nearest] or [self._unknown()]
-        return codes[min(int(reading.progress * len(codes)), len(codes) - 1)]
-
-    def _unknown(self) -> int:
-        known = {code for codes in self._lists.values() for code in codes}
-        return next(code for code in range(100, 65536) if code not in known)
-
-
-def _numbers(reading: Reading) -> list[tuple[str, float | None]]:
-    names = ("volts", "amps", "time_to_full_s")
-    return [(name, getattr(reading, name)) for name in names]
-
-
-def _put(answer: dict[str, Any], field: str, value: Any) -> None:
-    """A value at its place; list items have no place here."""
-    *above, last = field.split(".")
-    for name in above:
-        answer = answer.setdefault(name, {})
-    answer[last] = value
 
 
 class HttpServer:
@@ -142,10 +60,10 @@ class HttpServer:
     `path`: of the API. `timeout_s`: the client's deadline, which the slow failures overrun.
     """
 
-    def __init__(self, stations: list[Station], path: str, timeout_s: float) -> None:
+    def __init__(self, stations: Sequence[Station], path: str, timeout_s: float) -> None:
         self._server = _Listener(stations, path, timeout_s)
         host, port = self._server.server_address[:2]
-        self.replace = {"api_base": f"{host!s}:{port}{path}"}
+        self.replace = {"api_base": f"{host!s}:{port}{path}", "token_file": None}
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(LOOK_S,), name="http", daemon=True
         )
@@ -162,12 +80,12 @@ class HttpServer:
 class _Listener(ThreadingHTTPServer):
     daemon_threads = True
 
-    def __init__(self, stations: list[Station], path: str, timeout_s: float) -> None:
-        self.get = {path + s.settings.state_path: s for s in stations}
+    def __init__(self, stations: Sequence[Station], path: str, timeout_s: float) -> None:
+        self.get = {path + s.reads: s for s in stations}
         self.commands = {
             (method, path + below): (s, *does)
             for s in stations
-            for (method, below), does in s.commands().items()
+            for (method, below), does in s.commands.items()
         }
         self.timeout_s = timeout_s
         self._callers: set[socket.socket] = set()
@@ -209,14 +127,13 @@ class _Call(BaseHTTPRequestHandler):
         if station is None:
             self._answer(404, b"{}")
             return
-        reading = station.reading()
-        server = reading.failures.get("server")
-        if server == "slow":
+        failures, body = station.plant.failures, station.answer()
+        if failures.get("server") == "slow":
             self._wait(2 * self.server.timeout_s)
-        if server == "garbage":
-            self._answer(200, PAGE, reading.failures, "text/html")
+        if failures.get("server") == "garbage":
+            self._answer(200, PAGE, failures, "text/html")
             return
-        self._answer(200, station.body(reading), reading.failures)
+        self._answer(200, body, failures)
 
     def do_POST(self) -> None:
         self.rfile.read(int(self.headers.get("Content-Length", "0")))
@@ -224,10 +141,10 @@ class _Call(BaseHTTPRequestHandler):
             self._answer(404, b"{}")
             return
         station, signal, asserted = self.server.commands[self.command, self.path]
-        reading = station.reading()
-        if reading.failures.get("server") is None:
+        failures = station.plant.failures
+        if failures.get("server") is None:
             station.obey(signal, asserted)
-        self._answer(200, b"{}", reading.failures)
+        self._answer(200, b"{}", failures)
 
     do_PUT = do_POST
 
@@ -278,3 +195,6 @@ class _Call(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Who calls is the daemon's log's business."""
+
+
+FAKE = Outside(serve)

@@ -34,6 +34,11 @@ class RealTime:
             self._stirred = True
             self._due.notify()
 
+    def show(self) -> None:
+        """Contacts that have just moved are seen at once, in the caller's thread."""
+        with self.lock:
+            self._step()
+
     def close(self) -> None:
         """Stop time. May be called twice."""
         with self.lock:
@@ -120,4 +125,5 @@ class _Serialised:
     def press(self, signal: str, asserted: bool, now: float) -> None:
         with self._world.lock:
             self._plant.press(signal, asserted, now)
+            self._world.show()
             self._world.stir()

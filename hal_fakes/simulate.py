@@ -1,8 +1,8 @@
 """What stands in for the hardware in `rmf-bridge run FILE --simulate`: for each bus of the file, a
 plant for each of its devices and the far side of the bus in front of them.
 
-GPIO pins cannot leave a process, so their fake lives in the daemon's. Every other bus is served
-by a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus is pointed there.
+Where it can, a far side stands in a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real
+bus is pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's.
 
 Each bus has a control socket in the runtime directory: `plant.sock`, or `plant-<bus>.sock` where
 the file has several buses.
@@ -13,7 +13,6 @@ import json
 import selectors
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
@@ -22,15 +21,15 @@ import msgspec
 from bridges.settings.load import Config
 from drivers.hal import Bus, HalError
 from hal_fakes.control import Control
+from hal_fakes.fake import Inside, far_side, plants_on, stations_on
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import plants_on
 
 READY_S = 15.0
 """How long a child may take to serve (a busy Raspberry Pi imports slowly)."""
 
 
 class Simulation:
-    """The far sides of a file's buses.
+    """The far sides of a file's buses. Those in a process of their own start while the daemon does.
 
     Made before the daemon leaves the directory that a relative path of the file is relative to.
     """
@@ -40,17 +39,18 @@ class Simulation:
         self._file = str(Path(config.path).resolve())
         self._runtime_dir = runtime_dir.resolve()
         self._open = contextlib.ExitStack()
+        self._children = {
+            name: self._start(name) for name in config.buses if self._has_process(name)
+        }
 
-    def open_bus(self, name: str, settings: Any) -> Bus:
-        """Start the fake for this bus; returns a real bus in front of it. Raises HalError.
+    def open_bus(self, name: str) -> Bus:
+        """A real bus in front of the fake for it. Raises HalError.
 
         Two buses may be opened one after the other, not at once.
         """
-        bus_type = self._config.bus_types[name]
-        if bus_type == "gpio":
-            return self._inside(name, settings)
-        bus = import_module(f"drivers.hal.{bus_type}")
-        return cast(Bus, bus.open_bus(self._pointed_at_child(name, settings)))
+        if self._has_process(name):
+            return self._config.bus_type(name).open_bus(self._pointed_at_child(name))
+        return self._inside(name)
 
     def close(self) -> None:
         """End every fake. Close the buses first. May be called twice."""
@@ -61,15 +61,21 @@ class Simulation:
         several = len(self._config.buses) > 1
         return self._runtime_dir / (f"plant-{name}.sock" if several else "plant.sock")
 
-    def _inside(self, name: str, settings: Any) -> Bus:
-        from hal_fakes import gpio
+    def _has_process(self, name: str) -> bool:
+        """Asked without an import of the fake, which would bring its libraries into the daemon."""
+        bus_type = self._config.bus_type(name)
+        return bool(bus_type.fake) and not bus_type.fake_inside
 
+    def _inside(self, name: str) -> Bus:
+        far = far_side(self._config, name)
+        assert isinstance(far, Inside)
         world = RealTime(plants_on(self._config, name))
         self._open.callback(world.close)
         self._open.callback(Control(self.socket_path(name), world.plants).close)
-        return gpio.open_bus(settings, self._config, name, world)
+        stations = stations_on(self._config, name, world.plants)
+        return far.open_bus(self._config.buses[name], stations, world)
 
-    def _pointed_at_child(self, name: str, settings: Any) -> Any:
+    def _start(self, name: str) -> "subprocess.Popen[bytes]":
         socket = self.socket_path(name)
         child = subprocess.Popen(
             [sys.executable, "-m", "hal_fakes", self._file, name, "--socket", str(socket)],
@@ -78,6 +84,11 @@ class Simulation:
             start_new_session=True,  # Ctrl-C in a terminal is for the daemon alone
         )
         self._open.callback(_end, child)
+        return child
+
+    def _pointed_at_child(self, name: str) -> Any:
+        settings = self._config.buses[name]
+        child = self._children.pop(name) if name in self._children else self._start(name)
         replace = _first_line(child, name)
         return msgspec.convert({**msgspec.to_builtins(settings), **replace}, type(settings))
 

@@ -3,11 +3,8 @@
 For buses with points (GPIO, Modbus). How wires fail is in `plants/contact.py`, below the plant.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from importlib import import_module
-from typing import Any
+from collections.abc import Callable, Iterable
 
-from bridges.settings.load import Config
 from drivers.hal.points import Wire
 from hal_fakes.plants.plant import Plant
 
@@ -33,25 +30,3 @@ class Wiring:
         """An output's level, as the bus has it at `now`. KeyError for a point not wired here."""
         wire = self.outputs[point]
         self.plant.drive(wire.signal, wire.asserted(level), now)
-
-
-def devices_on(config: Config, bus_name: str) -> dict[str, Any]:
-    """The devices (name -> settings) that stand on this bus of a `bridges.settings.load.Config`."""
-    return {n: device for n, device in config.devices.items() if config.bus_of(n) == bus_name}
-
-
-def plants_on(config: Config, bus_name: str) -> dict[str, Plant]:
-    """A new plant for each device on this bus: `hal_fakes.plants.<kind>.build(name, settings)`."""
-    build = import_module(f"hal_fakes.plants.{config.kind}").build
-    return {name: build(name, device) for name, device in devices_on(config, bus_name).items()}
-
-
-def wirings(
-    config: Config, bus_name: str, plants: Mapping[str, Plant], canonical: Callable[[str], str]
-) -> list[Wiring]:
-    """A Wiring for each device on this bus, from the driver's own wiring table."""
-    driver = import_module(f"drivers.{config.kind}.{config.driver}")
-    return [
-        Wiring(plants[name], driver.wires(device), canonical)
-        for name, device in devices_on(config, bus_name).items()
-    ]

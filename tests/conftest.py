@@ -1,21 +1,40 @@
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import pytest
 
 from bridges.rmf.choose import missing_of_dds
+from hal_fakes.domain import domain_for_a_while
+
+ON_WIRES = ("commands", "drivers", "hal_fakes", "rmf", "serve", "site")
+"""The folders whose tests have threads, processes and sockets. In the others time is virtual."""
+WIRES_HANG_AFTER_S = 900
+"""No test that passes takes so long, however busy the machine is."""
 
 _deselected: list[str] = []
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """A DDS domain for this test, in which nobody else on this machine is."""
+    with domain_for_a_while() as free:
+        yield free
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What takes long is begun first; what hangs on a wire ends. Without cyclonedds, as on arm64, the
+    tests of the dds transport cannot be run."""
+    if missing_of_dds():
+        items[:] = [item for item in items if not item.get_closest_marker("dds")]
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+    for item in items:
+        if item.path.relative_to(Path(__file__).parent).parts[0] in ON_WIRES:
+            item.add_marker(pytest.mark.timeout(WIRES_HANG_AFTER_S))
 
 
 def pytest_deselected(items: Sequence[pytest.Item]) -> None:
     """Remember what was not run for want of ROS."""
     _deselected.extend(item.nodeid for item in items if item.get_closest_marker("ros"))
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Without cyclonedds, as on arm64, the tests of the dds transport cannot be run."""
-    if missing_of_dds():
-        items[:] = [item for item in items if not item.get_closest_marker("dds")]
 
 
 def pytest_terminal_summary(

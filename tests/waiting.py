@@ -3,9 +3,17 @@
 import threading
 import time
 from collections.abc import Callable
+from typing import TypeVar
 
-PATIENCE_S = 20.0
-"""Long enough for a busy machine; a test that passes never waits for it."""
+from drivers import DriverError
+
+T = TypeVar("T")
+
+PATIENCE_S = 120.0
+"""Long enough for a very busy machine; a test that passes never waits for it."""
+
+LEASE_S = 9.5
+"""Less than DDS takes to miss who has gone without a farewell (10 s)."""
 
 
 def wait_until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
@@ -15,3 +23,21 @@ def wait_until(condition: Callable[[], object], what: str, patience_s: float = P
     while not condition():
         assert time.monotonic() < deadline, f"never happened: {what}"
         pause.wait(0.005)
+
+
+def at_last(step: Callable[[], T], what: str, between: Callable[[], object] = lambda: None) -> T:
+    """What a step on a wire gives that may fail now and then on a busy machine, as scans may.
+
+    `between`: done after each DriverError, before it is tried again.
+    """
+    done: list[T] = []
+
+    def tried() -> bool:
+        try:
+            done.append(step())
+        except DriverError:
+            between()
+        return bool(done)
+
+    wait_until(tried, what)
+    return done[0]

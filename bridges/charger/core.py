@@ -1,55 +1,46 @@
 """The charger's decision core: whose the station is, what it does, and what RMF is told.
 
-1. IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from anywhere. A request only assigns; what
-   the station does is what it says, reading by reading. Current that still flows, ramping down too,
-   is CHARGING; RELEASED is a station disconnected from its robot, until the pad is clear.
-2. A request is granted while the state is IDLE. Its repeats change nothing, and once it is over they
-   do not start it again. Any other request is refused until the station is IDLE; but the robot that
-   stands on the pad may ask where it is known to stand (`pad.py`).
+1. IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from anywhere. A request only assigns; every
+   other state is what the station's readings say. CHARGING lasts as long as current flows, also while
+   it ramps down. RELEASED is a station disconnected from its robot, until the pad is clear.
+2. A request is granted while the state is IDLE. Its repeats change nothing, and do not start it again
+   once it is over. Other requests are refused until the station is IDLE. The robot that stands on the
+   pad is an exception where the station knows it (`pad.py`).
 3. `start_timeout` counts from acceptance. A request that has not charged by then ends in RELEASED and
-   IDLE; the reason is a fault, as the error message is blank unless the state is ERROR.
+   IDLE. The reason is a fault; RMF's error message is blank unless the state is ERROR.
 4. A cancel ends the request that it names and no other. While current flows it takes the power away,
-   and the state stays CHARGING until the station has stopped. A full battery ends it likewise.
+   and the state stays CHARGING until the station has stopped. A full battery ends a request likewise.
 5. Power is given to the robot that the station is assigned to, when it is seen on the pad and in range.
-   Another robot is refused: no power, ERROR and its name; the request that waits goes on waiting.
-6. A fault takes the power first and is reported second; power comes back only with a new request. A
+   Another robot gets no power; the state is ERROR with its name, and the request goes on waiting.
+6. A fault takes the power away before it is reported. Power comes back only with a new request. A
    station at fault, or one that goes on charging when it is told to stop, is out of service
    (protection): ERROR until its errors have been cleared and a good reading says so. A fault of the
    robot's side takes no station out of service.
-7. Failed polls prove nothing: after `misses` of them the state is ERROR, with the robot and request as
-   they were. A request ends, and a station becomes free, on a good reading only; or by an operator,
-   when the station has switched off by itself for certain.
-8. A charge under way when this daemon came, or came back, is shown as it is. It is neither stopped nor
-   credited to whoever asks next, unless that robot is seen there.
+7. Failed polls prove nothing. After `misses` of them the state is ERROR, and robot and request stay as
+   they were. Only a good reading ends a request or frees a station, or an operator, once the station
+   has certainly switched off by itself.
+8. A charge under way when this daemon starts, or reaches the station again, is shown as it is. It is
+   not stopped, and the next request does not get it unless its robot is seen there.
 9. Errors are cleared when an operator says so, or at most `clear_errors_per_h` times an hour.
 """
 
 from msgspec.structs import replace
 
-from bridges.charger import pad, session, told
-from bridges.charger.memory import (
-    AGES_AGO,
-    RIVAL_GONE_S,
-    Cancelled,
-    Event,
-    Holder,
-    Memory,
-    Requested,
-    rivalled,
-    unreachable,
-)
+from bridges.charger import pad, report, session
+from bridges.charger.memory import ChargerLimits, Memory, Session, rivalled, unreachable
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import ChargerLimits
 from bridges.charger.signals import (
     AT_FAULT,
     CURRENT_FLOWS,
     Activity,
+    Cancelled,
     ChargerOutputs,
     ChargerSample,
+    Event,
+    Requested,
 )
 from bridges.core.decision import Decision, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
-
-__all__ = ["Cancelled", "Event", "Holder", "Memory", "Requested", "decide", "initial"]
+from bridges.core.durations import AGES_AGO, NEVER, RIVAL_QUIET_S
 
 REMEMBERED = 8
 """Requests that are over and whose late repeats are still known."""
@@ -69,8 +60,8 @@ def decide(
     memory, refused = _take(memory, event, now, limits)
     memory = replace(memory, power=_power(memory, now, limits))
     outputs = ChargerOutputs(memory.power, memory.clear_errors, memory.range_checks)
-    wake_at = memory.rival_at + RIVAL_GONE_S if rivalled(memory, now) else float("inf")
-    return Decision(memory, outputs, told.report(memory, now, limits), wake_at, refused)
+    wake_at = memory.rival_at + RIVAL_QUIET_S if rivalled(memory, now) else NEVER
+    return Decision(memory, outputs, report.report(memory, now, limits), wake_at, refused)
 
 
 def _take(memory: Memory, event: Event, now: float, limits: ChargerLimits) -> tuple[Memory, str]:
@@ -117,8 +108,8 @@ def _sampled(memory: Memory, sample: ChargerSample, now: float, limits: ChargerL
     return memory
 
 
-def _held(memory: Memory, holder: Holder | None) -> Memory:
-    """The request goes on, or it is over and its late repeats are remembered."""
+def _held(memory: Memory, holder: Session | None) -> Memory:
+    """The memory with this session; without one, the last request's late repeats are remembered."""
     if holder or not memory.holder:
         return replace(memory, holder=holder)
     ended = memory.holder.request.request_id
@@ -127,7 +118,7 @@ def _held(memory: Memory, holder: Holder | None) -> Memory:
 
 
 def _watched(memory: Memory, now: float) -> Memory:
-    """Since when the station charges against the last decision."""
+    """Note since when the station charges although it was told not to."""
     charges = memory.sample and memory.sample.activity is Activity.CHARGING
     if memory.power is not False or not charges:
         return replace(memory, disobeyed_since=None)
@@ -136,7 +127,7 @@ def _watched(memory: Memory, now: float) -> Memory:
 
 
 def _protected(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
-    """Out of service from the station's own fault on, until a clearing is seen to have helped."""
+    """Out of service from a fault of the station until a good reading follows a clearing."""
     sample, since = memory.sample, memory.disobeyed_since
     assert sample
     if not limits.can_stop:
@@ -145,23 +136,23 @@ def _protected(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
         what = "station: it goes on charging though it was told to stop; cut its supply"
         return replace(memory, protection=what)
     if sample.activity is Activity.ERROR and sample.side != "robot":
-        return replace(memory, protection=told.error_text(sample))
+        return replace(memory, protection=report.error_text(sample))
     if now <= memory.clear_by and sample.activity not in AT_FAULT | CURRENT_FLOWS:
         return replace(memory, protection="", clear_by=AGES_AGO)
     return memory
 
 
 def _served(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
-    """Where the policy says so, a known robot on a free pad is served as if it had asked."""
+    """Where the policy says so, a known robot on a free pad is served as if it had request."""
     who = pad.seen(memory.sample, limits).robot
     if limits.unrequested != "serve_known" or who is None or memory.holder:
         return memory
-    wrong = [f for f in told.errors(memory, now, limits) if f.code != pad.WRONG_DOCKING]
+    wrong = [f for f in report.errors(memory, now, limits) if f.code != pad.WRONG_DOCKING]
     if wrong:
         return memory
-    asked = Requested("", who.fleet, who.name)
+    request = Requested("", who.fleet, who.name)
     flows = memory.sample is not None and memory.sample.activity in CURRENT_FLOWS
-    holder = replace(session.granted(asked, now, limits), started=flows)
+    holder = replace(session.granted(request, now, limits), started=flows)
     return replace(memory, holder=holder, adopted=False)
 
 
@@ -169,42 +160,42 @@ def _served(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
 
 
 def _request(
-    memory: Memory, asked: Requested, now: float, limits: ChargerLimits
+    memory: Memory, request: Requested, now: float, limits: ChargerLimits
 ) -> tuple[Memory, str]:
     holder = memory.holder
-    if holder and holder.request.request_id == asked.request_id:
-        return memory, "" if holder.request.who == asked.who else "request_id of another robot"
-    if asked.request_id in memory.over:
+    if holder and holder.request.request_id == request.request_id:
+        return memory, "" if holder.request.who == request.who else "request_id of another robot"
+    if request.request_id in memory.over:
         return memory, "request is over"
-    if limits.receivers and asked.who not in limits.receivers.values():
+    if limits.receivers and request.who not in limits.receivers.values():
         return memory, "robot has no receiver here"
-    on_pad = pad.seen(memory.sample, limits).robot == asked.who
+    on_pad = pad.seen(memory.sample, limits).robot == request.who
     if _in_the_way(memory, on_pad, now, limits):
         return memory, "charger in error"
     if holder is None:
-        return _granted(memory, asked, on_pad, now, limits)
+        return _granted(memory, request, on_pad, now, limits)
     if on_pad and not holder.request.request_id and not holder.over:
-        return replace(memory, holder=session.taken_over(holder, asked, now, limits)), ""
+        return replace(memory, holder=session.taken_over(holder, request, now, limits)), ""
     if on_pad and session.shown_released(holder, now, limits):
-        again = session.granted(asked, now, limits)
+        again = session.granted(request, now, limits)
         return replace(_held(memory, None), holder=again), ""
     return memory, "charger occupied"
 
 
 def _granted(
-    memory: Memory, asked: Requested, on_pad: bool, now: float, limits: ChargerLimits
+    memory: Memory, request: Requested, on_pad: bool, now: float, limits: ChargerLimits
 ) -> tuple[Memory, str]:
-    holder = session.granted(asked, now, limits)
+    holder = session.granted(request, now, limits)
     if memory.adopted and on_pad:
         return replace(memory, holder=replace(holder, started=True), adopted=False), ""
-    if told.state(memory) is not told.IDLE:
+    if report.state(memory) is not report.IDLE:
         return memory, "charger occupied"
     return replace(memory, holder=holder), ""
 
 
 def _in_the_way(memory: Memory, on_pad: bool, now: float, limits: ChargerLimits) -> bool:
     """Is there an error that a request of the robot on the pad would not put right?"""
-    found = told.errors(memory, now, limits)
+    found = report.errors(memory, now, limits)
     return any(not (on_pad and fault.code == pad.WRONG_DOCKING) for fault in found)
 
 
@@ -233,7 +224,7 @@ def _reset(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, s
 def _freed(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, str]:
     """An operator frees a station that does not answer, once it must have switched off by itself."""
     after_s = limits.t.peer_internal_timeout_s
-    silent_s = float("inf") if memory.read_at is None else now - memory.read_at
+    silent_s = NEVER if memory.read_at is None else now - memory.read_at
     if memory.holder is None or after_s is None or silent_s < after_s:
         return memory, "the charger does not answer"
     return _held(memory, None), ""

@@ -1,43 +1,37 @@
-"""What the charger's core remembers, and what can happen to it."""
+"""What the charger's core remembers from scan to scan, and the limits that it is given."""
 
+from collections.abc import Mapping
 from typing import Literal
 
 import msgspec
 
-from bridges.charger.settings import ChargerLimits, Robot
-from bridges.charger.signals import ChargerSample
-from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
-
-RIVAL_GONE_S = 5.0
-"""A second node for this charger is gone when unheard for so long; states come at 1 Hz."""
-AGES_AGO = float("-inf")
+from bridges.charger.settings import ChargerSettings, Durations, Robot, Unrequested, robot
+from bridges.charger.signals import ChargerSample, Requested
+from bridges.core.durations import AGES_AGO, RIVAL_QUIET_S
 
 
-class Requested(msgspec.Struct, frozen=True):
-    """A ChargerRequest that is ours and well formed; `start_timeout_s` 0 is the configured default.
+class ChargerLimits(msgspec.Struct, frozen=True):
+    """A charger's fixed facts as its core needs them. `t`: durations and counts.
 
-    A robot that is served though nobody asked has one without a `request_id`.
+    `receivers`: empty where nobody is verified. `can_stop`: `power` is obeyed.
     """
 
-    request_id: str
-    fleet: str
-    robot: str
-    start_timeout_s: float = 0.0
+    t: Durations = Durations()
+    receivers: Mapping[str, Robot] = {}
+    unrequested: Unrequested = "refuse"
+    can_stop: bool = True
 
-    @property
-    def who(self) -> Robot:
-        """For whom."""
-        return Robot(self.fleet, self.robot)
-
-
-class Cancelled(msgspec.Struct, frozen=True):
-    """A ChargerCancel; without a `request_id`, of what nobody asked for."""
-
-    request_id: str
+    @classmethod
+    def of(
+        cls, settings: ChargerSettings, debounce: Mapping[str, float] | None = None
+    ) -> "ChargerLimits":
+        """From the YAML; a charger has no contacts to debounce."""
+        known = {receiver: robot(text) for receiver, text in settings.receivers.items()}
+        return cls(settings.limits, known, settings.unrequested, settings.can_stop())
 
 
-class Holder(msgspec.Struct, frozen=True):
-    """The request that occupies the station.
+class Session(msgspec.Struct, frozen=True):
+    """A request that occupies the station, and how far its charging is.
 
     `start_by`: charging must have started (monotonic s). `paused_at`: since when another robot on the
     pad keeps it from starting. `checked_at`: when its position was asked for. `started`: current has
@@ -77,7 +71,7 @@ class Memory(msgspec.Struct, frozen=True):
     write_misses: int = 0
     write_failed: bool = False
     write_fault: str = ""
-    holder: Holder | None = None
+    holder: Session | None = None
     over: tuple[str, ...] = ()
     adopted: bool = False
     power: bool | None = None
@@ -90,14 +84,11 @@ class Memory(msgspec.Struct, frozen=True):
     rival_at: float = AGES_AGO
 
 
-Event = Sampled[ChargerSample] | IoFailed | RivalSeen | OperatorReset | Requested | Cancelled
-
-
 def rivalled(memory: Memory, now: float) -> bool:
     """Does another node publish this charger's states?"""
-    return now - memory.rival_at < RIVAL_GONE_S
+    return now - memory.rival_at < RIVAL_QUIET_S
 
 
 def unreachable(memory: Memory, limits: ChargerLimits) -> bool:
-    """Does the last good reading say nothing any more, or was there none?"""
+    """Have `misses` polls failed since the last good reading, or was there none?"""
     return memory.sample is None or memory.misses >= limits.t.misses

@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 
-from bridges.charger.memory import Cancelled, Requested
-from bridges.charger.report import ChargerReport
+from bridges.charger.report import UNREQUESTED, ChargerReport
 from bridges.charger.settings import ChargerSettings
+from bridges.charger.signals import Cancelled, Requested
 from bridges.core.decision import RequestRefused
+from bridges.core.names import check_length
 from bridges.rmf.definitions import (
     ChargerCancel,
     ChargerRequest,
@@ -16,12 +17,8 @@ from bridges.rmf.definitions import (
 )
 from bridges.rmf.stamps import duration, in_seconds
 
-LONGEST_NAME = 256
 LONGEST_TIMEOUT_S = 86400.0
 """A day: whoever asks for more has mistaken the unit."""
-UNREQUESTED = "unrequested/"
-"""ChargerState wants a request id in every state but IDLE; what nobody asked for (an error of a free
-station, a robot that charges by itself) gets this, followed by the charger's name."""
 
 
 def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Requested:
@@ -56,7 +53,8 @@ def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled
 def _check(field: str, text: str) -> None:
     if not text:
         raise RequestRefused(f"empty {field}", "ChargerState must show it")
-    if len(text) > LONGEST_NAME or not text.isprintable():
+    check_length(**{field: text})
+    if not text.isprintable():
         raise RequestRefused(f"impossible {field}", f"{text[:40]!r}, {len(text)} characters")
 
 
@@ -75,35 +73,35 @@ def device_name(message: ChargerRequest | ChargerCancel | ChargerState) -> str:
 
 
 def state_message(
-    name: str, settings: ChargerSettings, shown: ChargerReport, stamp: Time
+    name: str, settings: ChargerSettings, report: ChargerReport, stamp: Time
 ) -> ChargerState:
     """The report as RMF reads it; `stamp` is when the station was read."""
-    request_id = shown.request_id
-    if not request_id and shown.state is not ChargerStateValue.CHARGER_IDLE:
+    request_id = report.request_id
+    if not request_id and report.state is not ChargerStateValue.CHARGER_IDLE:
         request_id = UNREQUESTED + name
     return ChargerState(
         charger_time=stamp,
-        state=int(shown.state),
+        state=int(report.state),
         charger_name=name,
-        error_message=shown.error_message,
+        error_message=report.error_message,
         request_id=request_id,
-        robot_fleet=shown.fleet,
-        robot_name=shown.robot,
-        time_to_fully_charged=duration(shown.measured.time_to_full_s or 0.0),
+        robot_fleet=report.fleet,
+        robot_name=report.robot,
+        time_to_fully_charged=duration(report.measured.time_to_full_s or 0.0),
     )
 
 
-def summary(shown: ChargerReport) -> Mapping[str, str]:
+def summary(report: ChargerReport) -> Mapping[str, str]:
     """What a person wants to read of it, in a line. A robot is only the one that asked, unless the
     station has seen its receiver.
     """
-    measured = shown.measured
-    seen = "" if shown.verified else " (unverified)"
-    told = {
-        "state": shown.state.name.removeprefix("CHARGER_"),
-        "request": shown.request_id or "-",
-        "robot": f"{shown.fleet}/{shown.robot}{seen}" if shown.robot else "-",
-        "error": shown.error_message or "-",
+    measured = report.measured
+    seen = "" if report.verified else " (unverified)"
+    texts = {
+        "state": report.state.name.removeprefix("CHARGER_"),
+        "request": report.request_id or "-",
+        "robot": f"{report.fleet}/{report.robot}{seen}" if report.robot else "-",
+        "error": report.error_message or "-",
     }
     optional = {
         "receiver": measured.receiver_id,
@@ -112,7 +110,7 @@ def summary(shown: ChargerReport) -> Mapping[str, str]:
         "battery_percent": measured.battery_percent,
         "time_to_full_s": measured.time_to_full_s,
     }
-    return told | {key: _short(value) for key, value in optional.items() if value is not None}
+    return texts | {key: _short(value) for key, value in optional.items() if value is not None}
 
 
 def _short(value: str | float) -> str:

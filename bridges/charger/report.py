@@ -1,13 +1,77 @@
-"""What RMF is told about a charger: ChargerState's content, and what the status file says beside it."""
+"""What RMF, the log and the status file are told of a charger, and how its error is read again.
 
+RMF's ChargerState has one text for what is wrong. The coordinator (`bridges/charger_coordinator/`)
+must know from it whose fault that is: `diagnosis` reads what `error_message` has written.
+"""
+
+from enum import StrEnum
 from typing import Any
 
 import msgspec
 from msgspec.structs import replace
 
-from bridges.charger.signals import Measured
+from bridges.charger import pad
+from bridges.charger.memory import ChargerLimits, Memory, rivalled, unreachable
+from bridges.charger.settings import Robot
+from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerSample, Measured
 from bridges.core.decision import Fault
 from bridges.rmf.definitions import ChargerStateValue
+
+IDLE = ChargerStateValue.CHARGER_IDLE
+ASSIGNED = ChargerStateValue.CHARGER_ASSIGNED
+CHARGING = ChargerStateValue.CHARGER_CHARGING
+RELEASED = ChargerStateValue.CHARGER_RELEASED
+ERROR = ChargerStateValue.CHARGER_ERROR
+
+UNREQUESTED = "unrequested/"
+"""ChargerState wants a request id in every state but IDLE. What nobody asked for (an error of a free
+station, a robot that charges by itself) gets this, followed by the charger's name."""
+
+LOST = {
+    "TWO_NODES_FOR_ONE_DEVICE": "two nodes for one device",
+    "CHARGER_UNREACHABLE": "Charger unreachable",
+    "CHARGER_NOT_COMMANDED": "Charger takes no commands",
+}
+"""RMF's error message of a station that is not reached: a fixed text, the reason is in the fault."""
+OUT_OF_SERVICE = "out of service after: "
+
+
+class Diagnosis(StrEnum):
+    """Whose fault an error is.
+
+    PAD: what stands on the pad should not be there. LOST: the station is not reached or not
+    commanded, which says nothing of station or robot. UNCLEAR: nothing tells; then a second station
+    does, as a robot that fails there too is the one at fault.
+    """
+
+    NONE = ""
+    ROBOT = "robot"
+    STATION = "station"
+    PAD = "pad"
+    LOST = "lost"
+    UNCLEAR = "unclear"
+
+
+_BEGINNINGS = {
+    "robot:": Diagnosis.ROBOT,
+    "station:": Diagnosis.STATION,
+    OUT_OF_SERVICE: Diagnosis.STATION,
+    pad.RECEIVER_NOT_TOLD_TEXT: Diagnosis.STATION,
+    pad.WRONG_DOCKING_TEXT: Diagnosis.PAD,
+    pad.UNKNOWN_RECEIVER_TEXT: Diagnosis.PAD,
+    **dict.fromkeys(LOST.values(), Diagnosis.LOST),
+}
+
+
+def error_message(fault: Fault) -> str:
+    """ChargerState's error_message for this fault."""
+    return LOST.get(fault.code, fault.detail)
+
+
+def diagnosis(message: str) -> Diagnosis:
+    """Whose fault it is, by a ChargerState's error_message; another node's text is UNCLEAR."""
+    found = (whose for start, whose in _BEGINNINGS.items() if message.startswith(start))
+    return next(found, Diagnosis.UNCLEAR)
 
 
 class ChargerReport(msgspec.Struct, frozen=True):
@@ -33,3 +97,91 @@ class ChargerReport(msgspec.Struct, frozen=True):
         """All but the age and the measurements, which differ at each reading."""
         measured = Measured(receiver_id=self.measured.receiver_id)
         return replace(self, read_at=None, measured=measured)
+
+
+def report(memory: Memory, now: float, limits: ChargerLimits) -> ChargerReport:
+    """Everything, afresh."""
+    found = errors(memory, now, limits)
+    shown = ERROR if found else state(memory)
+    lost = unreachable(memory, limits)
+    who = _who(memory, shown, limits)
+    on_pad = pad.seen(None if lost else memory.sample, limits)
+    return ChargerReport(
+        read_at=memory.read_at,
+        state=shown,
+        error_message=error_message(found[0]) if found else "",
+        request_id=memory.holder.request.request_id if memory.holder else "",
+        fleet=who.fleet if who else "",
+        robot=who.name if who else "",
+        verified=who is not None and on_pad.robot == who,
+        faults=(*found, *_irregular(memory, shown, limits)),
+        measured=Measured() if lost or memory.sample is None else memory.sample.measured,
+    )
+
+
+def state(memory: Memory) -> ChargerStateValue:
+    """RMF's state of a station that is in no error."""
+    sample, holder = memory.sample, memory.holder
+    if sample is not None and sample.activity in CURRENT_FLOWS:
+        return CHARGING
+    if holder is None:
+        released = sample is not None and sample.activity is Activity.RELEASED
+        return RELEASED if released else IDLE
+    return ASSIGNED if holder.released_at is None else RELEASED
+
+
+def errors(memory: Memory, now: float, limits: ChargerLimits) -> list[Fault]:
+    """Why the state is ERROR, most serious first."""
+    found = []
+    if rivalled(memory, now):
+        what = "another node publishes this charger's states"
+        found.append(Fault("TWO_NODES_FOR_ONE_DEVICE", what))
+    sample = memory.sample
+    if sample is None or unreachable(memory, limits):
+        found.append(Fault("CHARGER_UNREACHABLE", memory.io_fault or "not read yet"))
+    elif sample.activity is Activity.ERROR:
+        found.append(Fault("CHARGER_ERROR", error_text(sample)))
+    elif sample.activity is Activity.UNKNOWN:
+        text = f": {sample.error_text}" if sample.error_text else ""
+        found.append(Fault("UNKNOWN_VENDOR_STATE", f"unknown vendor state {sample.code}{text}"))
+    if memory.protection:
+        found.append(Fault("PROTECTION", OUT_OF_SERVICE + memory.protection))
+    if memory.write_misses >= limits.t.misses:
+        found.append(Fault("CHARGER_NOT_COMMANDED", memory.write_fault))
+    if not unreachable(memory, limits) and (misplaced := pad.misplaced(memory, limits)):
+        found.append(misplaced)
+    return found
+
+
+def error_text(sample: ChargerSample) -> str:
+    """A station's error in its own words, with the side that is at fault before them."""
+    text = sample.error_text or f"the charger reports an error (vendor state {sample.code})"
+    if diagnosis(text) in (Diagnosis.PAD, Diagnosis.LOST):
+        text = f"the charger says: {text}"
+    side = f"{sample.side}: " if sample.side else ""
+    return text if text.startswith(side) else side + text
+
+
+def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> list[Fault]:
+    """What is wrong though the state is no ERROR."""
+    holder = memory.holder
+    if holder is None:
+        who = pad.seen(memory.sample, limits).robot or "the robot is not known"
+        fault = Fault("UNREQUESTED_CHARGING", f"nobody asked for it: {who}")
+        return [fault] if shown is CHARGING else []
+    stopping = memory.sample and memory.sample.activity is Activity.STOPPING
+    if shown is CHARGING and not stopping and holder.over and holder.ended != "full":
+        what = holder.ended or "the charger was at fault"
+        return [Fault("STILL_CHARGING", f"{holder.request.request_id}: {what}")]
+    if shown is RELEASED and holder.ended == "start timeout":
+        return [Fault("START_TIMEOUT", f"{holder.request.who} did not start to charge in time")]
+    return []
+
+
+def _who(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> Robot | None:
+    """Whom it is for; where it is for nobody, who stands there, or was charged when last seen."""
+    if memory.holder:
+        return memory.holder.request.who
+    if shown is IDLE or (unreachable(memory, limits) and not memory.adopted):
+        return None
+    return pad.seen(memory.sample, limits).robot

@@ -3,31 +3,30 @@
 from msgspec.structs import replace
 
 from bridges.charger import pad
-from bridges.charger.memory import Holder, Memory, Requested
-from bridges.charger.settings import ChargerLimits
-from bridges.charger.signals import AT_FAULT, CURRENT_FLOWS, Activity, ChargerSample
+from bridges.charger.memory import ChargerLimits, Memory, Session
+from bridges.charger.signals import AT_FAULT, CURRENT_FLOWS, Activity, ChargerSample, Requested
 
 RANGE_EVERY_S = 5.0
 """A receiver is not asked for its position more often (Xnergy RCU: wait 5 s between two checks)."""
 
 
-def granted(asked: Requested, now: float, limits: ChargerLimits) -> Holder:
+def granted(request: Requested, now: float, limits: ChargerLimits) -> Session:
     """It has the station; `start_timeout` counts from now."""
-    return Holder(asked, now + _patience_s(asked, limits))
+    return Session(request, now + _patience_s(request, limits))
 
 
-def taken_over(holder: Holder, asked: Requested, now: float, limits: ChargerLimits) -> Holder:
+def taken_over(holder: Session, request: Requested, now: float, limits: ChargerLimits) -> Session:
     """The same robot, served without a request until now, has one."""
-    return replace(holder, request=asked, start_by=now + _patience_s(asked, limits))
+    return replace(holder, request=request, start_by=now + _patience_s(request, limits))
 
 
-def _patience_s(asked: Requested, limits: ChargerLimits) -> float:
-    return asked.start_timeout_s or limits.t.start_timeout_s
+def _patience_s(request: Requested, limits: ChargerLimits) -> float:
+    return request.start_timeout_s or limits.t.start_timeout_s
 
 
 def follow(
-    holder: Holder, sample: ChargerSample, now: float, limits: ChargerLimits
-) -> Holder | None:
+    holder: Session, sample: ChargerSample, now: float, limits: ChargerLimits
+) -> Session | None:
     """The request after one reading; None when it is over and the station free."""
     on_pad = pad.seen(sample, limits)
     another = on_pad.is_another(holder.request.who)
@@ -47,13 +46,13 @@ def follow(
     return _pending(holder, sample.activity, on_pad, now)
 
 
-def shown_released(holder: Holder, now: float, limits: ChargerLimits) -> bool:
+def shown_released(holder: Session, now: float, limits: ChargerLimits) -> bool:
     """Has RELEASED been shown for its time?"""
     return holder.released_at is not None and now - holder.released_at >= limits.t.released_s
 
 
-def _beside_another(holder: Holder, now: float, limits: ChargerLimits) -> Holder | None:
-    """Another robot stands on the pad: who waits goes on waiting, who was charged has left."""
+def _beside_another(holder: Session, now: float, limits: ChargerLimits) -> Session | None:
+    """Another robot stands on the pad: who waits goes on waiting; who was charged has left."""
     if shown_released(holder, now, limits):
         return None
     if holder.released_at is not None:
@@ -63,25 +62,25 @@ def _beside_another(holder: Holder, now: float, limits: ChargerLimits) -> Holder
     return holder if holder.paused_at is not None else replace(holder, paused_at=now)
 
 
-def _resumed(holder: Holder, now: float) -> Holder:
+def _resumed(holder: Session, now: float) -> Session:
     if holder.paused_at is None:
         return holder
     return replace(holder, start_by=holder.start_by + now - holder.paused_at, paused_at=None)
 
 
-def _flowing(holder: Holder, sample: ChargerSample, limits: ChargerLimits) -> Holder:
+def _flowing(holder: Session, sample: ChargerSample, limits: ChargerLimits) -> Session:
     percent = sample.measured.battery_percent
     full = percent is not None and percent >= limits.t.full_percent and not holder.ended
     return replace(holder, started=True, released_at=None, ended="full" if full else holder.ended)
 
 
-def _sought_again(holder: Holder, now: float, limits: ChargerLimits) -> Holder:
+def _sought_again(holder: Session, now: float, limits: ChargerLimits) -> Session:
     """The coupling was lost and is sought again: the same request waits for its start."""
     by = now + _patience_s(holder.request, limits)
     return replace(holder, started=False, start_by=by, checked_at=None)
 
 
-def _pending(holder: Holder, activity: Activity, on_pad: pad.Pad, now: float) -> Holder:
+def _pending(holder: Session, activity: Activity, on_pad: pad.Pad, now: float) -> Session:
     if not holder.request.request_id and on_pad.sort == "empty":
         return replace(holder, ended=holder.ended or "left", released_at=now)
     if holder.started or (holder.failed and activity is not Activity.HANDSHAKE):
@@ -108,7 +107,7 @@ def cleared_to_start(memory: Memory, limits: ChargerLimits) -> bool:
 
 
 def range_checked(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
-    """Ask for the robot's position where only that is missing; an old answer does not count."""
+    """Ask for the robot's position where only that is missing. An answer from before does not count."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or holder.started or holder.over:
         return memory

@@ -1,6 +1,6 @@
 """The part of a charger's YAML that does not depend on how it is reached."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Annotated, Literal, NamedTuple
 
 import msgspec
@@ -41,7 +41,7 @@ def robot(text: str) -> Robot:
     return Robot(fleet, name)
 
 
-class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations and counts of a charger.
 
     `misses`: failed polls in a row after which the charger is shown as unreachable; failed commands
@@ -76,7 +76,7 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
     `on_death`: what the daemon's end means for a charge under way: `stop` it, or `keep` it.
     """
 
-    limits: Limits = Limits()
+    limits: Durations = Durations()
     receivers: dict[ReceiverId, Name] = msgspec.field(default_factory=dict)
     unrequested: Unrequested = "refuse"
     on_death: Literal["stop", "keep"] = "stop"
@@ -86,7 +86,7 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
         return True
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """Robots that are none, and robots with two receivers are fine: one may be a spare."""
+        """Names that are no FLEET/ROBOT. A robot may have two receivers: one may be a spare."""
         for receiver, text in self.receivers.items():
             try:
                 robot(text)
@@ -94,21 +94,3 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
                 yield ("receivers", receiver), str(error)
         if self.unrequested == "serve_known" and not self.receivers:
             yield ("unrequested",), "serve_known needs receivers: whom does the station know?"
-
-
-class ChargerLimits(msgspec.Struct, frozen=True):
-    """A charger's fixed facts as its core needs them. `t`: durations and counts.
-
-    `receivers`: empty where nobody is verified. `can_stop`: `power` is obeyed.
-    """
-
-    t: Limits = Limits()
-    receivers: Mapping[str, Robot] = {}
-    unrequested: Unrequested = "refuse"
-    can_stop: bool = True
-
-    @classmethod
-    def of(cls, settings: ChargerSettings) -> "ChargerLimits":
-        """From the YAML."""
-        known = {receiver: robot(text) for receiver, text in settings.receivers.items()}
-        return cls(settings.limits, known, settings.unrequested, settings.can_stop())

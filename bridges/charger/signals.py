@@ -1,4 +1,4 @@
-"""What a charger's driver tells its core, and what the core tells its driver: one scan's image.
+"""What a charger's driver and its core say to each other in one scan, and the core's events.
 
 A station that answers HTTP as the first contract does fills in the activity and the error's text only.
 Richer controllers (CANopen, Modbus, another make's JSON) fill in `measured` and obey `power`.
@@ -8,6 +8,9 @@ from enum import StrEnum
 from typing import Literal
 
 import msgspec
+
+from bridges.charger.settings import Robot
+from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 
 class Activity(StrEnum):
@@ -29,7 +32,7 @@ class Activity(StrEnum):
 CURRENT_FLOWS = frozenset({Activity.CHARGING, Activity.STOPPING})
 AT_FAULT = frozenset({Activity.ERROR, Activity.UNKNOWN})
 
-Side = Literal["", "station", "robot"]
+FaultSide = Literal["", "station", "robot"]
 """Whose fault an error is, by the controller's own diagnosis; "" where it does not say."""
 
 
@@ -60,7 +63,7 @@ class ChargerSample(msgspec.Struct, frozen=True):
     code: int | str
     error_text: str = ""
     measured: Measured = Measured()
-    side: Side = ""
+    side: FaultSide = ""
 
 
 class ChargerOutputs(msgspec.Struct, frozen=True):
@@ -77,3 +80,29 @@ class ChargerOutputs(msgspec.Struct, frozen=True):
     power: bool | None = None
     clear_errors: int = 0
     range_checks: int = 0
+
+
+class Requested(msgspec.Struct, frozen=True):
+    """A ChargerRequest that is ours and well formed; `start_timeout_s` 0 is the configured default.
+
+    A robot that is served though nobody asked has one without a `request_id`.
+    """
+
+    request_id: str
+    fleet: str
+    robot: str
+    start_timeout_s: float = 0.0
+
+    @property
+    def who(self) -> Robot:
+        """The robot that it is for."""
+        return Robot(self.fleet, self.robot)
+
+
+class Cancelled(msgspec.Struct, frozen=True):
+    """A ChargerCancel; without a `request_id`, of what nobody asked for."""
+
+    request_id: str
+
+
+Event = Sampled[ChargerSample] | IoFailed | RivalSeen | OperatorReset | Requested | Cancelled

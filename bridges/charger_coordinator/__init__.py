@@ -1,8 +1,17 @@
 """The charger coordinator: which robot charges where, and who waits, for all chargers of a site."""
 
 from bridges.charger_coordinator import core, keep, messages
-from bridges.charger_coordinator.described import described, warnings
-from bridges.charger_coordinator.settings import Settings, site
+from bridges.charger_coordinator.memory import Memory, Site
+from bridges.charger_coordinator.report import SiteReport
+from bridges.charger_coordinator.settings import Settings, described, warnings
+from bridges.charger_coordinator.signals import (
+    Dedicated,
+    FleetSeen,
+    StateHeard,
+    Unwanted,
+    Wanted,
+)
+from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind
 from bridges.rmf.topics import (
     ADAPTER_CHARGER_CANCELS,
@@ -15,13 +24,13 @@ from bridges.rmf.topics import (
     FLEET_STATES,
 )
 
-
-def quiet_s(settings: Settings) -> float:
-    """How long to listen before the first word."""
-    return settings.quiet_start_s
-
-
-KIND = GraphKind(
+KIND: GraphKind[
+    Settings,
+    Site,
+    Memory,
+    FleetSeen | StateHeard | Wanted | Unwanted | Dedicated,
+    SiteReport,
+] = GraphKind(
     name="charger_coordinator",
     devices_key="coordinator",
     settings=Settings,
@@ -36,7 +45,7 @@ KIND = GraphKind(
     sole=(CHARGING_ASSIGNMENTS,),
     device_name=messages.subject,
     quiet_s=quiet_s,
-    limits=site,
+    limits=Site.of,
     initial=core.initial,
     decide=core.decide,
     stamped=messages.stamped,

@@ -6,32 +6,32 @@ ChargerRequest and ChargerCancel, which no part of RMF does. Rules:
    SETTLES_S, and as long as it does, or is on its way in the same task. The mode alone would not do:
    RMF's fleet adapter leaves it CHARGING through the tasks that follow (rmf_ros2 9dedd0f,
    RobotContext::current_mode, set by WaitForCharge and DockRobot only). An operator's wish lasts until
-   it is over, or its robot full.
+   its request is over or its robot full.
 2. Wishes are served first come, first served, among the stations that suit (`queue.py`). One station,
    one robot: a station is nobody else's until it shows that it has let go.
 3. A request is repeated until the station shows it. A station that does not take it for TAKEN_S is
    passed over for SHUNNED_S, and the wish goes to the end.
-4. What becomes of a request is what the station shows. Charged and released: the wish is fulfilled.
-   Released without having charged: the robot did not come; the wish of a robot that stands at a place
-   of ours goes to the end, any other is over. A robot that stands at that very station failed there.
-5. An error of the station's side takes the station from the robot, which is given another and keeps
-   its place. One of the robot's side, or of neither for certain, counts against the robot as well:
-   after the second (at a second station where it has one) it is not tried again, and a technician is
-   told. Another robot on the pad takes nothing from the one assigned, for its start_timeout.
-6. A station that is not reached proves nothing: a robot that was charging there goes on doing so; one
-   that was on its way gets another after LOST_S.
-7. A request that we did not make, for a robot of ours, is that robot's all the same.
+4. The station shows how a request ends. Charged and released: the wish is fulfilled. Released without
+   having charged: the robot did not come. Then the wish of a robot that stands at a place of ours goes
+   to the end of the queue; any other wish is over. A robot that stands at that very station has failed
+   there.
+5. After an error of the station's side the robot gets another station and keeps its place in the queue.
+   An error of the robot's side, or one that nothing tells, counts as a failure of the robot too. After
+   its second failure (at a second station where it has one) it is not tried again, and a technician is
+   told. Another robot on the pad changes nothing for the robot assigned, for its start_timeout.
+6. A station that is not reached proves nothing. A robot that was charging there keeps it; one that was
+   on its way gets another station after LOST_S.
+7. A request for a robot of ours counts as that robot's, even if somebody else has made it.
 8. Until it may speak, and beside a charging schedule, it only listens.
 """
 
-import math
 from typing import Final
 
 from msgspec.structs import replace
 
+from bridges.charger.report import UNREQUESTED, Diagnosis
 from bridges.charger.settings import Robot
-from bridges.charger_coordinator import voice
-from bridges.charger_coordinator.diagnosis import Side
+from bridges.charger_coordinator import report
 from bridges.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
@@ -39,28 +39,31 @@ from bridges.charger_coordinator.memory import (
     IDLE,
     NODE,
     RELEASED,
-    Dedicated,
-    Event,
-    FleetSeen,
     Grant,
     Memory,
     Seen,
-    Shown,
-    Sighting,
+    Site,
     Standing,
-    Unwanted,
-    Wanted,
     Wish,
     without,
 )
-from bridges.charger_coordinator.queue import UNASKED, allot
-from bridges.charger_coordinator.report import SiteReport, report
-from bridges.charger_coordinator.settings import Site
+from bridges.charger_coordinator.queue import allot
+from bridges.charger_coordinator.report import SiteReport
+from bridges.charger_coordinator.signals import (
+    Dedicated,
+    Event,
+    FleetSeen,
+    Sighting,
+    StateHeard,
+    Unwanted,
+    Wanted,
+)
 from bridges.core.decision import Decision, OperatorReset
+from bridges.core.durations import AGES_AGO, NEVER
 from bridges.core.graph_kind import MaySpeak
 
 SETTLES_S: Final = 2.0
-"""A robot that passes by on another task still shows the mode of its last charging."""
+"""A robot that passes by on another task may still show the mode CHARGING."""
 TAKEN_S: Final = 10.0
 SHUNNED_S: Final = 30.0
 LOST_S: Final = 30.0
@@ -84,9 +87,9 @@ def decide(memory: Memory, event: Event, now: float, site: Site) -> Decided:
     memory = _in_time(_adopted(memory, now, site), now)
     if memory.may_speak:
         memory = allot(memory, now, site)
-    told = report(memory, now, site)
-    memory, publish = voice.say(memory, told, now, site)
-    return Decision(memory, None, told, _wake_at(memory, now, site), refused, publish)
+    shown = report.report(memory, now, site)
+    memory, publish = report.messages(memory, shown.faults, now, site)
+    return Decision(memory, None, shown, _wake_at(memory, now, site), refused, publish)
 
 
 def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory, str]:
@@ -95,8 +98,8 @@ def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory,
             for sighting in robots:
                 memory = _sighted(memory, sighting, now, site)
             return memory, ""
-        case Shown():
-            return _shown(memory, event, now, site), ""
+        case StateHeard():
+            return _heard(memory, event, now, site), ""
         case Wanted():
             return _wanted(memory, event, site)
         case Unwanted(request_id):
@@ -112,12 +115,12 @@ def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory,
 
 
 def _may_speak(memory: Memory, yes: bool, now: float) -> Memory:
-    """What could not be said until now begins anew."""
+    """Requests that no station has shown count from now; assignments are published anew."""
     grants = {
         name: grant if grant.shown else replace(grant, made_at=now)
         for name, grant in memory.grants.items()
     }
-    return replace(memory, may_speak=yes, grants=grants, told=())
+    return replace(memory, may_speak=yes, grants=grants, assigned=())
 
 
 # ---- wishes
@@ -145,7 +148,7 @@ def _sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memo
 
 
 def _is_full(memory: Memory, who: Robot, site: Site) -> bool:
-    """It was being charged, and its fleet says that this is enough."""
+    """It has been charged, and its fleet shows `full_percent`."""
     grant = memory.grants.get(memory.station_of(who) or "")
     percent = memory.robots[who].sighting.battery_percent
     return grant is not None and grant.started and percent >= site.full_percent
@@ -160,7 +163,7 @@ def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standi
 
 
 def _wants(memory: Memory, standing: Standing, wish: Wish | None, now: float, site: Site) -> bool:
-    """Does its fleet show that it is to be charged?"""
+    """Does its fleet show that this robot is to be charged?"""
     sighting = standing.sighting
     if not sighting.charges or sighting.battery_percent >= site.full_percent:
         return False
@@ -179,7 +182,7 @@ def _wanted(memory: Memory, event: Wanted, site: Site) -> tuple[Memory, str]:
         return memory, "request is over"
     if event.station and event.station not in site.robots[who]:
         return memory, "station does not suit the robot"
-    wish, before = _operators(event), memory.wish(who)
+    wish, before = Wish.of(event), memory.wish(who)
     if wish == before:
         return memory, ""
     memory = replace(memory, strikes=without(memory.strikes, who))
@@ -189,16 +192,6 @@ def _wanted(memory: Memory, event: Wanted, site: Site) -> tuple[Memory, str]:
     if wish.station not in ("", has):
         memory = memory.takes_back(who)
     return replace(memory, wishes=tuple(wish if w is before else w for w in memory.wishes)), ""
-
-
-def _operators(event: Wanted) -> Wish:
-    return Wish(
-        event.robot,
-        "operator",
-        station=event.station,
-        request_id=event.request_id,
-        start_timeout_s=event.start_timeout_s,
-    )
 
 
 def _unwanted(memory: Memory, request_id: str) -> tuple[Memory, str]:
@@ -214,26 +207,26 @@ def _unwanted(memory: Memory, request_id: str) -> tuple[Memory, str]:
 # ---- stations
 
 
-def _shown(memory: Memory, shown: Shown, now: float, site: Site) -> Memory:
-    name, before = shown.station, memory.stations.get(shown.station)
-    same = before is not None and (before.state, before.error) == (shown.state, shown.error)
+def _heard(memory: Memory, heard: StateHeard, now: float, site: Site) -> Memory:
+    name, before = heard.station, memory.stations.get(heard.station)
+    same = before is not None and (before.state, before.error) == (heard.state, heard.error)
     since = before.since if before is not None and same else now
-    seen = Seen(shown.state, shown.request_id, shown.robot, shown.error, now, since)
+    seen = Seen(heard.state, heard.request_id, heard.robot, heard.error, now, since)
     memory = replace(memory, stations={**memory.stations, name: seen})
     grant = memory.grants.get(name)
     if grant is not None:
-        if shown.state is not IDLE and shown.request_id == grant.request_id:
+        if heard.state is not IDLE and heard.request_id == grant.request_id:
             return _followed(memory, name, grant, seen, site)
-        if not grant.shown and not grant.over and _may_still_come(shown, grant):
+        if not grant.shown and not grant.over and _may_still_come(heard, grant):
             return memory
         memory = _gone(memory, name, grant, site)
     return memory
 
 
-def _may_still_come(shown: Shown, grant: Grant) -> bool:
+def _may_still_come(heard: StateHeard, grant: Grant) -> bool:
     """The station may be about to take the request."""
-    refused_here = shown.state is ERROR and shown.robot == grant.robot
-    return shown.state is IDLE or (refused_here and shown.request_id.startswith(UNASKED))
+    refused_here = heard.state is ERROR and heard.robot == grant.robot
+    return heard.state is IDLE or (refused_here and heard.request_id.startswith(UNREQUESTED))
 
 
 def _followed(memory: Memory, name: str, grant: Grant, seen: Seen, site: Site) -> Memory:
@@ -245,9 +238,9 @@ def _followed(memory: Memory, name: str, grant: Grant, seen: Seen, site: Site) -
     if seen.state is RELEASED:
         memory = _ended(memory, name, grant, site)
         return memory.with_grant(name, replace(grant, over=True))
-    if seen.side in (Side.ROBOT, Side.STATION, Side.UNCLEAR):
-        memory = memory.with_grant(name, replace(grant, over=True, sent_at=-math.inf))
-        return memory if seen.side is Side.STATION else _struck(memory, name, grant.robot)
+    if seen.diagnosis in (Diagnosis.ROBOT, Diagnosis.STATION, Diagnosis.UNCLEAR):
+        memory = memory.with_grant(name, replace(grant, over=True, sent_at=AGES_AGO))
+        return memory if seen.diagnosis is Diagnosis.STATION else _struck(memory, name, grant.robot)
     return memory
 
 
@@ -285,7 +278,7 @@ def _struck(memory: Memory, name: str, who: Robot) -> Memory:
 
 
 def _adopted(memory: Memory, now: float, site: Site) -> Memory:
-    """Requests that we know nothing of, for robots of ours: they have those stations."""
+    """Take over requests that somebody else has made for robots of ours."""
     for name, seen in memory.stations.items():
         if name not in memory.grants and seen.state in (ASSIGNED, CHARGING):
             memory = _adopt(memory, name, seen, now, site)
@@ -308,7 +301,7 @@ def _adopt(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Mem
 
 
 def _stands_at(memory: Memory, place: str) -> Robot | None:
-    """Who is charged without having asked: who wants to be, and stands there."""
+    """Which robot is charged there without a request: one that wants to be and stands there."""
     here = (w.robot for w in memory.wishes if memory.place_of(w.robot) == place)
     return next((who for who in here if memory.station_of(who) is None), None)
 
@@ -317,7 +310,7 @@ def _stands_at(memory: Memory, place: str) -> Robot | None:
 
 
 def _in_time(memory: Memory, now: float) -> Memory:
-    """What time alone brings about."""
+    """What changes though nothing is heard."""
     for name, grant in list(memory.grants.items()):
         if grant.over or grant.started:
             continue
@@ -334,9 +327,9 @@ def _hopeless_at(memory: Memory, name: str, grant: Grant) -> float:
     """When a robot on its way is better off elsewhere: its station is not reached, by its own daemon
     or that one by us, or another robot does not leave the pad."""
     seen, at = memory.stations.get(name), memory.silent_since(name) + LOST_S
-    if seen is not None and seen.side is Side.LOST:
+    if seen is not None and seen.diagnosis is Diagnosis.LOST:
         at = min(at, seen.since + LOST_S)
-    if seen is not None and seen.side is Side.PAD:
+    if seen is not None and seen.diagnosis is Diagnosis.PAD:
         at = min(at, seen.since + max(grant.start_timeout_s, LOST_S))
     return at
 
@@ -345,5 +338,5 @@ def _wake_at(memory: Memory, now: float, site: Site) -> float:
     due = [*memory.shunned.values(), *(memory.silent_since(name) for name in site.places)]
     for name, grant in memory.grants.items():
         due.append(_hopeless_at(memory, name, grant) if grant.shown else grant.made_at + TAKEN_S)
-    due += voice.due(memory, now)
-    return min((at for at in due if at > now), default=math.inf)
+    due += report.due(memory)
+    return min((at for at in due if at > now), default=NEVER)

@@ -13,13 +13,14 @@ from msgspec import Meta
 from bridges.charger.settings import Robot, robot
 from bridges.charger_coordinator.memory import Grant, Memory, Wish
 from bridges.charger_coordinator.settings import Settings
+from bridges.core import keep
+from bridges.core.keep import Text
 
 VERSION: Final = 1
 SITE: Final = "site"
-Text = Annotated[str, Meta(min_length=1)]
 
 
-class KeptWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class WishRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A Wish; `robot` is FLEET/ROBOT, as everywhere here."""
 
     robot: Text
@@ -30,7 +31,7 @@ class KeptWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     start_timeout_s: Annotated[float, Meta(ge=0, le=86400)]
 
 
-class KeptGrant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class GrantRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A Grant, but for what the station will say again."""
 
     robot: Text
@@ -40,13 +41,12 @@ class KeptGrant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     over: bool
 
 
-class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The file."""
+class Record(keep.Record, frozen=True, forbid_unknown_fields=True):
+    """The parts of Memory that are kept."""
 
-    version: int
     count: Annotated[int, Meta(ge=0)]
-    wishes: list[KeptWish]
-    grants: dict[Text, KeptGrant]
+    wishes: list[WishRecord]
+    grants: dict[Text, GrantRecord]
     strikes: dict[Text, list[Text]]
     served: dict[Text, str]
     over: list[str]
@@ -56,7 +56,7 @@ class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def persist(memories: Mapping[str, Memory]) -> bytes:
     """What the next start needs; the same bytes as long as nothing of it changes."""
     memory = memories.get(SITE, Memory())
-    kept = Kept(
+    record = Record(
         VERSION,
         memory.count,
         [_wish(wish) for wish in memory.wishes],
@@ -66,15 +66,15 @@ def persist(memories: Mapping[str, Memory]) -> bytes:
         list(memory.over),
         {str(who): station for who, station in sorted(memory.preferred.items())},
     )
-    return msgspec.json.encode(kept)
+    return msgspec.json.encode(record)
 
 
-def _wish(w: Wish) -> KeptWish:
-    return KeptWish(str(w.robot), w.by, w.task_id, w.station, w.request_id, w.start_timeout_s)
+def _wish(w: Wish) -> WishRecord:
+    return WishRecord(str(w.robot), w.by, w.task_id, w.station, w.request_id, w.start_timeout_s)
 
 
-def _grant(g: Grant) -> KeptGrant:
-    return KeptGrant(str(g.robot), g.request_id, g.start_timeout_s, g.started, g.over)
+def _grant(g: Grant) -> GrantRecord:
+    return GrantRecord(str(g.robot), g.request_id, g.start_timeout_s, g.started, g.over)
 
 
 def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
@@ -82,16 +82,11 @@ def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
 
     ValueError if the bytes are not what `persist` gave. Durations are counted anew.
     """
-    try:
-        found = msgspec.json.decode(kept, type=Kept)
-    except msgspec.MsgspecError as error:
-        raise ValueError(f"not a coordinator's memory: {error}") from error
-    if found.version != VERSION:
-        raise ValueError(f"version {found.version} of the memory; this is for {VERSION}")
+    found = keep.read(kept, Record, VERSION, "a coordinator's memory")
     return {SITE: _memory(found, settings, now)}
 
 
-def _memory(found: Kept, settings: Settings, now: float) -> Memory:
+def _memory(found: Record, settings: Settings, now: float) -> Memory:
     known, stations = settings.robots(), settings.stations
 
     def ours(text: str) -> Robot | None:

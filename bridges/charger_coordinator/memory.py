@@ -1,24 +1,24 @@
-"""What the coordinator remembers, and the events that it hears."""
+"""What the coordinator remembers, and the site that it is given."""
 
-import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final, Literal, TypeVar
 
 import msgspec
 from msgspec.structs import replace
 
+from bridges.charger.report import Diagnosis, diagnosis
 from bridges.charger.settings import Robot
-from bridges.charger_coordinator.diagnosis import Side, side
-from bridges.core.decision import OperatorReset
-from bridges.core.graph_kind import MaySpeak, Woken
+from bridges.charger_coordinator.settings import Settings
+from bridges.charger_coordinator.signals import Sighting, Wanted
+from bridges.core.durations import AGES_AGO
 from bridges.rmf.definitions import ChargerStateValue, ChargingAssignments
 
 K = TypeVar("K")
 V = TypeVar("V")
 
 NODE: Final = "charger_coordinator"
-NEVER: Final = math.inf
-SILENT_S: Final = 5.0
+STATION_SILENT_S: Final = 5.0
 """A station's states come at 1 Hz; after so long it is silent."""
 STRIKES: Final = 2
 """A robot that failed so often, at a second station where it has one, is not tried again."""
@@ -30,55 +30,39 @@ RELEASED: Final = ChargerStateValue.CHARGER_RELEASED
 ERROR: Final = ChargerStateValue.CHARGER_ERROR
 
 
-class Sighting(msgspec.Struct, frozen=True):
-    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING. `place`: the waypoint
-    of ours at which it stands; None for none."""
+@dataclass(frozen=True, slots=True)
+class Site:
+    """The fixed facts of a site as its core needs them.
 
-    who: Robot
-    charges: bool
-    place: str | None
-    battery_percent: float
-    task_id: str
+    `robots`: stations that suit each, best first. `waits_at`: each robot's own waypoint. `places`:
+    station -> waypoint. `receivers`: id -> robot.
+    """
 
-
-class FleetSeen(msgspec.Struct, frozen=True):
-    """A FleetState, of the robots that we know."""
-
-    robots: tuple[Sighting, ...]
-
-
-class Shown(msgspec.Struct, frozen=True):
-    """A ChargerState. `robot`: None where it names none."""
-
-    station: str
-    state: ChargerStateValue
-    request_id: str = ""
-    robot: Robot | None = None
-    error: str = ""
-
-
-class Wanted(msgspec.Struct, frozen=True):
-    """An operator wants this robot charged; `station`: there rather than elsewhere, "" anywhere."""
-
-    robot: Robot
-    station: str
-    request_id: str
+    robots: Mapping[Robot, tuple[str, ...]]
+    waits_at: Mapping[Robot, str]
+    places: Mapping[str, str]
+    receivers: Mapping[str, Robot]
     start_timeout_s: float
+    full_percent: float
+    again_percent: float
 
+    def station_at(self, place: str | None) -> str | None:
+        """Which station is at this waypoint; None for none."""
+        return next((name for name, at in self.places.items() if at == place), None)
 
-class Unwanted(msgspec.Struct, frozen=True):
-    """An operator's wish is withdrawn."""
-
-    request_id: str
-
-
-class Dedicated(msgspec.Struct, frozen=True):
-    """Somebody else's charging assignments: robot -> the station that it is to use."""
-
-    stations: tuple[tuple[Robot, str], ...]
-
-
-Event = FleetSeen | Shown | Wanted | Unwanted | Dedicated | MaySpeak | OperatorReset | Woken
+    @classmethod
+    def of(cls, settings: Settings) -> "Site":
+        """From the YAML."""
+        robots = settings.robots()
+        return cls(
+            robots={who: tuple(robot.stations) for who, robot in robots.items()},
+            waits_at={who: robot.waits_at for who, robot in robots.items()},
+            places=settings.places(),
+            receivers={r: who for who, robot in robots.items() for r in robot.receivers},
+            start_timeout_s=settings.start_timeout_s,
+            full_percent=settings.full_percent,
+            again_percent=settings.again_percent,
+        )
 
 
 class Wish(msgspec.Struct, frozen=True):
@@ -95,6 +79,17 @@ class Wish(msgspec.Struct, frozen=True):
     request_id: str = ""
     start_timeout_s: float = 0.0
 
+    @classmethod
+    def of(cls, wanted: Wanted) -> "Wish":
+        """An operator's."""
+        return cls(
+            wanted.robot,
+            "operator",
+            station=wanted.station,
+            request_id=wanted.request_id,
+            start_timeout_s=wanted.start_timeout_s,
+        )
+
 
 class Grant(msgspec.Struct, frozen=True):
     """A station given to a robot, since `made_at`, by the request `request_id`.
@@ -110,7 +105,7 @@ class Grant(msgspec.Struct, frozen=True):
     shown: bool = False
     started: bool = False
     over: bool = False
-    sent_at: float = -NEVER
+    sent_at: float = AGES_AGO
 
 
 class Standing(msgspec.Struct, frozen=True):
@@ -118,7 +113,7 @@ class Standing(msgspec.Struct, frozen=True):
 
     sighting: Sighting
     at: float
-    since: float = -NEVER
+    since: float = AGES_AGO
 
 
 class Seen(msgspec.Struct, frozen=True):
@@ -132,9 +127,9 @@ class Seen(msgspec.Struct, frozen=True):
     since: float
 
     @property
-    def side(self) -> Side:
-        """Whose fault the error is; "" where there is none."""
-        return side(self.error) if self.state is ERROR else Side.NONE
+    def diagnosis(self) -> Diagnosis:
+        """Whose fault the error is; NONE where there is none."""
+        return diagnosis(self.error) if self.state is ERROR else Diagnosis.NONE
 
 
 class Memory(msgspec.Struct, frozen=True):
@@ -144,8 +139,8 @@ class Memory(msgspec.Struct, frozen=True):
     each robot has failed. `served`: robot -> the task in which it was charged. `over`: operators'
     wishes that are, whose late repeats are still known. `count`: requests made so far.
     `robots`, `stations`: as last heard, and when. `shunned`: station -> until when it is given to
-    nobody, as it took no request. `preferred`: robot -> the station somebody else dedicated to it.
-    `told`: the assignments last published; `alerts`: which faults a person has been told of.
+    nobody, because it took no request. `preferred`: robot -> the station somebody else dedicated to it.
+    `assigned`: the assignments last published; `alerts`: which faults a person has been told of.
     """
 
     began_at: float = 0.0
@@ -160,11 +155,11 @@ class Memory(msgspec.Struct, frozen=True):
     stations: Mapping[str, Seen] = msgspec.field(default_factory=dict)
     shunned: Mapping[str, float] = msgspec.field(default_factory=dict)
     preferred: Mapping[Robot, str] = msgspec.field(default_factory=dict)
-    told: tuple[ChargingAssignments, ...] = ()
+    assigned: tuple[ChargingAssignments, ...] = ()
     alerts: frozenset[str] = frozenset()
 
     def wish(self, robot: Robot) -> Wish | None:
-        """This robot's wish."""
+        """This robot's wish; None where it has none."""
         return next((wish for wish in self.wishes if wish.robot == robot), None)
 
     def station_of(self, robot: Robot) -> str | None:
@@ -181,23 +176,23 @@ class Memory(msgspec.Struct, frozen=True):
         return len(self.strikes.get(robot, ())) >= STRIKES
 
     def speaks(self, station: str, now: float) -> bool:
-        """Its states come."""
-        return station in self.stations and now < self.stations[station].at + SILENT_S
+        """Has this station's state come lately?"""
+        return station in self.stations and now < self.stations[station].at + STATION_SILENT_S
 
     def silent_since(self, station: str) -> float:
         """When it fell silent, or will if it says nothing more."""
         seen = self.stations.get(station)
-        return SILENT_S + (self.began_at if seen is None else seen.at)
+        return STATION_SILENT_S + (self.began_at if seen is None else seen.at)
 
     # ---- changed copies
 
     def with_grant(self, station: str, grant: Grant | None) -> "Memory":
-        """The station given so; None: to nobody."""
+        """The memory with this station granted so; None: to nobody."""
         rest = without(self.grants, station)
         return replace(self, grants=rest | ({} if grant is None else {station: grant}))
 
     def without_wish(self, robot: Robot) -> "Memory":
-        """This robot wants nothing any more."""
+        """The memory without this robot's wish."""
         wish = self.wish(robot)
         if wish is None:
             return self
@@ -205,20 +200,20 @@ class Memory(msgspec.Struct, frozen=True):
         return replace(self, wishes=tuple(w for w in self.wishes if w is not wish), over=over)
 
     def last_in_queue(self, robot: Robot) -> "Memory":
-        """This robot's wish goes to the end."""
+        """The memory with this robot's wish at the end of the queue."""
         wish = self.wish(robot)
         if wish is None:
             return self
         return replace(self, wishes=(*(w for w in self.wishes if w is not wish), wish))
 
     def takes_back(self, robot: Robot) -> "Memory":
-        """The robot's station is to let go of it."""
+        """The memory in which this robot's station is to release it."""
         station = self.station_of(robot)
         if station is None:
             return self
-        return self.with_grant(station, replace(self.grants[station], over=True, sent_at=-NEVER))
+        return self.with_grant(station, replace(self.grants[station], over=True, sent_at=AGES_AGO))
 
 
 def without(table: Mapping[K, V], key: K) -> dict[K, V]:
-    """The table but for this key."""
+    """A copy of the table without this key."""
     return {k: v for k, v in table.items() if k != key}

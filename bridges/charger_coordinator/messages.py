@@ -8,17 +8,18 @@ from typing import Any
 from bridges.charger.messages import accept_request as accept_charger_request
 from bridges.charger.settings import ChargerSettings, Robot
 from bridges.charger_coordinator.keep import SITE
-from bridges.charger_coordinator.memory import (
+from bridges.charger_coordinator.report import SiteReport
+from bridges.charger_coordinator.settings import Fleet, Settings
+from bridges.charger_coordinator.signals import (
     Dedicated,
     FleetSeen,
-    Shown,
     Sighting,
+    StateHeard,
     Unwanted,
     Wanted,
 )
-from bridges.charger_coordinator.report import SiteReport
-from bridges.charger_coordinator.settings import Fleet, Settings
 from bridges.core.decision import RequestRefused
+from bridges.core.names import LONGEST_TEXT, check_length
 from bridges.rmf import definitions as d
 from bridges.rmf.definitions import Time
 
@@ -43,6 +44,7 @@ def accept_fleet(state: d.FleetState, settings: Settings, wall: float) -> FleetS
 def _sighting(
     fleet_name: str, robot: d.RobotState, fleet: Fleet, places: set[str], near_m: float
 ) -> Sighting:
+    check_length(task_id=robot.task_id)
     return Sighting(
         Robot(fleet_name, robot.name),
         charges=robot.mode.mode in CHARGES,
@@ -63,14 +65,18 @@ def _nearest(at: d.Location, fleet: Fleet, places: set[str], near_m: float) -> s
     return min(near, key=lambda name: near[name], default=None)
 
 
-def accept_state(state: d.ChargerState, settings: Settings, wall: float) -> Shown:
+def accept_state(state: d.ChargerState, settings: Settings, wall: float) -> StateHeard:
     """The event that a ChargerState is."""
     if state.charger_name not in settings.stations:
         raise RequestRefused("station not ours", f"{state.charger_name!r}")
     if state.state not in set(d.ChargerStateValue):
         raise RequestRefused("unknown state", f"{state.charger_name}: {state.state}")
+    check_length(
+        request_id=state.request_id, robot_fleet=state.robot_fleet, robot_name=state.robot_name
+    )
+    check_length(LONGEST_TEXT, error_message=state.error_message)
     named = Robot(state.robot_fleet, state.robot_name)
-    return Shown(
+    return StateHeard(
         state.charger_name,
         d.ChargerStateValue(state.state),
         state.request_id,

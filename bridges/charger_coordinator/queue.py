@@ -1,7 +1,7 @@
 """Who gets which station: first come, first served, among the stations that suit.
 
-A station is free when its last state, no older than SILENT_S, is IDLE, nobody has it, it has not just
-failed to take a request, and no other robot stands there. A robot that turned up at a station
+A station is free when its last state, no older than STATION_SILENT_S, is IDLE, nobody has it, it has
+not just failed to take a request, and no other robot stands there. A robot that turned up at a station
 without a request, and is refused there as such, may have that very station.
 
 Where a robot has failed already it is tried again only if nothing else suits it: a second station
@@ -13,15 +13,13 @@ from typing import Final
 
 from msgspec.structs import replace
 
+from bridges.charger.pad import misplaced_in
+from bridges.charger.report import UNREQUESTED
 from bridges.charger.settings import Robot
-from bridges.charger_coordinator.diagnosis import WRONG_DOCKING
-from bridges.charger_coordinator.memory import ERROR, IDLE, NODE, Grant, Memory, Wish
-from bridges.charger_coordinator.settings import Site
+from bridges.charger_coordinator.memory import ERROR, IDLE, NODE, Grant, Memory, Site, Wish
 
 REMEMBERED_S: Final = 30.0
 """Where a robot was seen by its fleet counts for so long."""
-UNASKED: Final = "unrequested/"
-"""How a charger daemon begins the request id of what nobody asked for."""
 
 
 def allot(memory: Memory, now: float, site: Site) -> Memory:
@@ -61,9 +59,11 @@ def _free(memory: Memory, station: str, robot: Robot, now: float, site: Site) ->
     if station in memory.grants or in_the_way(memory, station, robot, now, site):
         return False
     seen = memory.stations[station]
-    if seen.state is ERROR and seen.robot == robot and seen.error.startswith(WRONG_DOCKING):
-        return seen.request_id.startswith(UNASKED)
-    return seen.state is IDLE
+    if seen.state is not ERROR:
+        return seen.state is IDLE
+    stands_there = misplaced_in(seen.error)
+    is_refused = stands_there is not None and seen.robot == stands_there.robot == robot
+    return is_refused and seen.request_id.startswith(UNREQUESTED)
 
 
 def in_the_way(

@@ -1,14 +1,17 @@
-"""The coordinator's section of its YAML: stations, and each fleet's waypoints and robots."""
+"""The coordinator's section of its YAML: stations, and each fleet's waypoints and robots.
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+`described` and `warnings` are what `check` says of it.
+"""
+
+import math
+from collections.abc import Iterator
 from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
 from bridges.charger.settings import ReceiverId, Robot, StartTimeout
-from bridges.core.fields import Name, QuietStart
+from bridges.core.fields import GraphSettings, Name
 from bridges.core.kind import Place
 from bridges.settings.building_map import CHARGER, WAYPOINT
 
@@ -65,7 +68,7 @@ class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     robots: dict[Name, RobotSettings]
 
 
-class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Which robots charge where.
 
     `stations`: the chargers, by the names under which their daemons publish.
@@ -74,7 +77,6 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     `near_m`: a robot stands at the nearest waypoint that is not farther away.
     `full_percent`: a robot with so much charge gives its station up.
     `again_percent`: a robot that was charged comes back within the same task only below this.
-    `quiet_start_s`: how long it only listens at first.
     """
 
     stations: dict[Name, Station]
@@ -83,7 +85,6 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     near_m: Near = 1.0
     full_percent: Full = 100.0
     again_percent: Low = 90.0
-    quiet_start_s: QuietStart = 3.0
 
     def on_map(self) -> Iterator[Place]:
         """RMF's map has the stations' places, as chargers, and each fleet's waypoints."""
@@ -159,36 +160,51 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return {name: station.waypoint or name for name, station in self.stations.items()}
 
 
-@dataclass(frozen=True, slots=True)
-class Site:
-    """The same as the core needs it.
-
-    `robots`: stations that suit each, best first. `waits_at`: each robot's own waypoint. `places`:
-    station -> waypoint. `receivers`: id -> robot.
-    """
-
-    robots: Mapping[Robot, tuple[str, ...]]
-    waits_at: Mapping[Robot, str]
-    places: Mapping[str, str]
-    receivers: Mapping[str, Robot]
-    start_timeout_s: float
-    full_percent: float
-    again_percent: float
-
-    def station_at(self, place: str | None) -> str | None:
-        """Which station is at this waypoint; None for none."""
-        return next((name for name, at in self.places.items() if at == place), None)
+HEADINGS = ("robot", "charges at", "waits at", "receivers")
 
 
-def site(settings: Settings) -> Site:
-    """From the YAML."""
-    robots = settings.robots()
-    return Site(
-        robots={who: tuple(robot.stations) for who, robot in robots.items()},
-        waits_at={who: robot.waits_at for who, robot in robots.items()},
-        places=settings.places(),
-        receivers={r: who for who, robot in robots.items() for r in robot.receivers},
-        start_timeout_s=settings.start_timeout_s,
-        full_percent=settings.full_percent,
-        again_percent=settings.again_percent,
-    )
+def described(settings: Settings) -> list[tuple[str, ...]]:
+    """Each robot and its places, then each station and its waypoint, then the numbers."""
+    places = settings.places()
+    rows: list[tuple[str, ...]] = [HEADINGS]
+    for who, robot in settings.robots().items():
+        stations, receivers = ", ".join(robot.stations), ", ".join(robot.receivers)
+        rows.append((str(who), stations, robot.waits_at, receivers or "-"))
+    rows += [("", "", "", ""), ("charger", "at waypoint", "", "")]
+    rows += [(name, place, "", "") for name, place in places.items()]
+    numbers = {
+        "start_timeout_s": f"{settings.start_timeout_s:g} s",
+        "near_m": f"{settings.near_m:g} m",
+        "full_percent": f"{settings.full_percent:g} %",
+        "again_percent": f"{settings.again_percent:g} %",
+        "quiet_start_s": f"{settings.quiet_start_s:g} s",
+    }
+    return [*rows, ("", "", "", ""), *((key, text, "", "") for key, text in numbers.items())]
+
+
+def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What works, but not as well as it could."""
+    used = {name for robot in settings.robots().values() for name in robot.stations}
+    for name in settings.stations:
+        if name not in used:
+            yield ("stations", name), f"no robot charges at '{name}'"
+    for who, robot in settings.robots().items():
+        path = ("fleets", who.fleet, "robots", who.name)
+        if len(set(robot.stations)) == 1:
+            only = f"{who} charges at '{robot.stations[0]}' alone"
+            yield path, f"{only}: when it fails there, nothing tells whose fault it is"
+    yield from _near(settings)
+
+
+def _near(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Places that a robot's position hardly tells apart."""
+    for fleet_name, fleet in settings.fleets.items():
+        names = list(fleet.waypoints)
+        for i, name in enumerate(names):
+            a = fleet.waypoints[name]
+            for other in names[:i]:
+                b = fleet.waypoints[other]
+                apart = math.dist((a.x, a.y), (b.x, b.y))
+                if a.level == b.level and apart < settings.near_m:
+                    text = f"'{name}' is less than near_m ({settings.near_m:g} m) from '{other}'"
+                    yield ("fleets", fleet_name, "waypoints", name), text

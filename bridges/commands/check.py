@@ -103,7 +103,7 @@ def described(config: Config) -> list[str]:
         return [f"{config.path}: {config.kind}", "", *aligned(rows), ""]
     lines = [f"{config.path}: {config.kind}, driver {config.driver}"]
     for bus in config.buses:
-        devices = [name for name in config.devices if config.bus_of(name) == bus]
+        devices = config.devices_on(bus)
         lines += ["", f"bus {bus} ({config.bus_types[bus]})", *_bus(config, bus, devices)]
     return [*lines, ""]
 
@@ -118,13 +118,9 @@ def _numbers(section: Any) -> list[tuple[str, ...]]:
 def _bus(config: Config, bus: str, devices: Sequence[str]) -> list[str]:
     wires = [(name, wire) for name in devices for wire in config.wires(name)]
     if wires:
-        hal = named.bus_called(config.bus_types[bus])
-        describe = getattr(hal, "describe", None) or hal.canonical
-        return aligned(
-            [HEADINGS, *(_row(name, wire, describe(wire.point)) for name, wire in wires)]
-        )
-    driver = named.driver_called(config.kind, config.driver)
-    describe = getattr(driver, "describe", lambda settings, bus: [])
+        point = config.bus_type(bus).describe
+        return aligned([HEADINGS, *(_row(name, wire, point(wire.point)) for name, wire in wires)])
+    describe = config.driver_type.describe
     rows = [
         (name, what, text)
         for name in devices

@@ -1,6 +1,7 @@
-"""What `watch` and `send` share: the options of the graph, listening to it, and leaving it cleanly."""
+"""What `watch` and `send` share: the options that name a graph, joining, hearing and leaving it."""
 
 import argparse
+import shlex
 import signal
 import sys
 import time
@@ -14,6 +15,7 @@ from typing import Any
 import msgspec
 
 from bridges.core.fields import Rmf
+from bridges.rmf import words
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport, TransportError
 
@@ -47,7 +49,7 @@ def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _domain(text: str) -> int:
     if not text.isascii() or not text.isdigit() or int(text) > 232:
-        raise argparse.ArgumentTypeError(f"{text!r} is no DDS domain: 0 to 232")
+        raise argparse.ArgumentTypeError(f"'{text}' is no DDS domain: 0 to 232")
     return int(text)
 
 
@@ -95,8 +97,40 @@ def interruptible() -> Iterator[None]:
 
 
 def complain(command: str, text: object) -> None:
-    """One line to standard error, in the command's name."""
-    sys.stderr.write(f"rmf-bridge {command}: {text}\n")
+    """One line to standard error, in the command's name; no text can move the cursor."""
+    sys.stderr.write(words.printable(f"rmf-bridge {command}: {text}") + "\n")
+
+
+@dataclass(frozen=True, slots=True)
+class CommandLine:
+    """The command as it was typed, so that what it proposes can be copied: with the same options.
+
+    `typed`: every word after `rmf-bridge`. `options`: those that another command needs to act on the
+    same graph.
+    """
+
+    typed: tuple[str, ...] = ()
+    options: tuple[str, ...] = ()
+
+    def again_with(self, option: str) -> str:
+        """The same command with one option more."""
+        return shlex.join(("rmf-bridge", *self.typed, option))
+
+    def other(self, *command: str) -> str:
+        """Another command, on the same graph."""
+        return shlex.join(("rmf-bridge", *command, *self.options))
+
+
+def command_line(args: argparse.Namespace) -> CommandLine:
+    """From parsed arguments; `args.typed` is what `cli` was given."""
+    options = ["--direct"] if getattr(args, "direct", False) else []
+    if args.domain_id is not None:
+        options += ["--domain-id", str(args.domain_id)]
+    if args.transport != "auto":
+        options += ["--transport", args.transport]
+    if args.localhost:
+        options += ["--localhost"]
+    return CommandLine(tuple(args.typed), tuple(options))
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +141,8 @@ class Heard:
     at: float
 
 
-class Ears:
-    """Subscriptions whose messages wait in one inbox."""
+class Inbox:
+    """Messages of several topics, in the order in which they came."""
 
     def __init__(
         self,
@@ -116,20 +150,20 @@ class Ears:
         *topics: Topic[Any],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._inbox: SimpleQueue[Heard] = SimpleQueue()
+        self._waiting: SimpleQueue[Heard] = SimpleQueue()
         self._clock = clock
         for topic in topics:
             transport.subscribe(topic, self._received)
 
     def _received(self, message: Any) -> None:
-        self._inbox.put(Heard(message, self._clock()))
+        self._waiting.put(Heard(message, self._clock()))
 
     def listen(self, timeout_s: float) -> list[Heard]:
         """Everything that has arrived, in order; waits for the first, `timeout_s` at the most."""
         heard = []
         try:
-            heard.append(self._inbox.get(timeout=max(0.0, timeout_s)))
+            heard.append(self._waiting.get(timeout=max(0.0, timeout_s)))
             while True:
-                heard.append(self._inbox.get_nowait())
+                heard.append(self._waiting.get_nowait())
         except Empty:
             return heard

@@ -12,7 +12,12 @@ from bridges.commands import send
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The lift, and the options that every sender has."""
-    send.release_arguments(parser)
+    parser.add_argument("name", metavar="LIFT", help="the lift, as RMF names it")
+    parser.add_argument(
+        "--session", default="", metavar="ID", help="only this session (default: whoever has it)"
+    )
+    parser.set_defaults(kind="lift", end=True, floor=None, granted_only=False)
+    send.add_shared_arguments(parser, direct=True)
 
 
 def run(args: argparse.Namespace) -> int:

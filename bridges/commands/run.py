@@ -12,7 +12,7 @@ from bridges.commands.graph import TRANSPORTS, overridden
 from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
-from bridges.serve.daemon import Daemon
+from bridges.serve import places, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
 
@@ -53,13 +53,15 @@ def run(args: argparse.Namespace) -> int:
         for problem in error.problems:
             logging.error(str(problem))
         return EX_CONFIG
+    end = signals.End()  # before the lock says who is to be told what
+    signals.ignore_reset()
     try:
-        held = runtime.RuntimeDirectory(runtime.directory(args.file, args.runtime_dir))
-    except (runtime.AlreadyRunning, OSError) as error:
+        held = _held(args)
+    except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
         logging.error(str(error))
         return EX_UNAVAILABLE
     try:
-        return _serve(config, held, args)
+        return _serve(config, held, end, args)
     except (TransportError, HalError) as error:
         logging.error(str(error))
         return EX_UNAVAILABLE
@@ -67,20 +69,46 @@ def run(args: argparse.Namespace) -> int:
         held.close()
 
 
-def _serve(config: Config, held: runtime.RuntimeDirectory, args: argparse.Namespace) -> int:
+def _held(args: argparse.Namespace) -> runtime.RuntimeDirectory:
+    """A simulation is always one by hand. Raises AlreadyRunning, Unknown or PermissionError."""
+    file = args.file.absolute()
+    if args.simulate:
+        found = places.as_told(args.runtime_dir) or places.by_hand(file)
+    else:
+        found = runtime.find(file, args.runtime_dir)
+    places.own(found)
+    return runtime.RuntimeDirectory(found, file, serves=True)
+
+
+def _outputs_off(args: argparse.Namespace) -> list[str]:
+    """The command that switches off what this one may leave on."""
+    given = ["--runtime-dir", os.path.abspath(args.runtime_dir)] if args.runtime_dir else []
+    file = str(args.file.absolute())
+    return [sys.executable, "-m", "bridges.cli", "outputs-off", file, *given]
+
+
+def _serve(
+    config: Config, held: runtime.RuntimeDirectory, end: signals.End, args: argparse.Namespace
+) -> int:
     if command := ros_setup.sourcing(config.rmf, os.environ, sys.orig_argv):
         os.execvpe(command[0], command, ros_setup.sourced(config.rmf, os.environ))
     if not args.simulate:
-        os.chdir(held.path)  # lgpio leaves a FIFO where it is imported
-        return Daemon(config, held, ros_args=args.ros_args).serve()
+        from bridges.serve.daemon import Daemon
+
+        outputs_off = _outputs_off(args)
+        places.work_somewhere(held.places)  # lgpio leaves a FIFO where it is imported
+        return Daemon(config, held, end, ros_args=args.ros_args, outputs_off=outputs_off).serve()
     from hal_fakes.simulate import Simulation
 
     logging.warning("SIMULATED: no hardware moves, and nothing that RMF is told is true")
     simulation = Simulation(config, held.path)
+    from bridges.serve.daemon import Daemon  # the far sides start meanwhile
+
     try:
         return Daemon(
             config,
             held,
+            end,
             open_bus=simulation.open_bus,
             localhost=not args.expose,
             simulated=True,

@@ -7,22 +7,25 @@ after Ctrl-C.
 import argparse
 import sys
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from typing import Any, TextIO
 from uuid import uuid4
 
-from bridges.commands.effects import Done, Failed, SoFar, Wish, described, step
+from bridges.commands.exchange import step
 from bridges.commands.graph import (
-    Ears,
     Heard,
+    Inbox,
     add_graph_arguments,
+    command_line,
     complain,
     interruptible,
     open_graph,
 )
-from bridges.commands.queueing import Queue, Withdrawal
-from bridges.commands.wishes import Charge, ChargeCancel, DoorMove, LiftEnd, LiftRide
+from bridges.commands.requests import Done, Failed, Request, Seen
+from bridges.commands.requests.charger import Charge, ChargeCancel, QueuedCancel, QueuedCharge
+from bridges.commands.requests.door import DoorMove
+from bridges.commands.requests.lift import LiftEnd, LiftRide
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.stamps import stamp
@@ -35,66 +38,75 @@ LOOK_EVERY_S = 0.1
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """`lift`, `door` and `charger`, each with the options of the graph."""
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="lift|door|charger")
-    _lift_arguments(kinds.add_parser("lift", help="ask for a lift, or end its session"))
-    _door_arguments(kinds.add_parser("door", help="hold a door open, or let it close"))
-    _charger_arguments(kinds.add_parser("charger", help="assign a charger, or cancel that"))
+    for kind, (text, example, add) in {
+        "lift": (
+            "ask for a lift, or end its session",
+            "Lift1 L3 --session fleet/robot",
+            _lift_arguments,
+        ),
+        "door": ("hold a door open, or let it close", "ward_door open", _door_arguments),
+        "charger": (
+            "assign a charger, or cancel that",
+            "any --queue --robot fleet/robot",
+            _charger_arguments,
+        ),
+    }.items():
+        example = f"example: rmf-bridge send {kind} {example}"
+        add(kinds.add_parser(kind, help=text, epilog=example))
 
 
-def _common(parser: argparse.ArgumentParser, *, direct: bool) -> None:
+def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> None:
+    """Which graph, how long, and (of lifts and doors) whom to ask."""
     add_graph_arguments(parser)
     parser.add_argument(
-        "--timeout", type=_seconds, default=60.0, metavar="S", help="give up after S seconds (60)"
+        "--timeout",
+        type=_seconds,
+        default=60.0,
+        metavar="S",
+        help="give up after S seconds (default: 60)",
     )
     if direct:
         parser.add_argument(
             "--direct",
             action="store_true",
-            help="speak to the node itself, not to RMF's supervisor",
+            help="ask the device's own daemon, not RMF's supervisor",
         )
     parser.set_defaults(usage=parser.error)
 
 
 def _seconds(text: str) -> float:
-    seconds = float(text)
-    if not 0 <= seconds <= 86400:
-        raise argparse.ArgumentTypeError(f"{text} s: 0 to 86400")
-    return seconds
+    with suppress(ValueError):
+        if 0 <= float(text) <= 86400:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"'{text}' is no number of seconds from 0 to 86400")
 
 
 def _lift_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", metavar="NAME")
-    parser.add_argument("floor", metavar="FLOOR", nargs="?", help="as the LiftState names it")
+    parser.add_argument("name", metavar="NAME", help="the lift, as RMF names it")
+    parser.add_argument("floor", metavar="FLOOR", nargs="?", help="its name in LiftState")
     parser.add_argument("--session", default="", metavar="ID", help="fleet/robot, or any name")
     parser.add_argument(
         "--end",
         action="store_true",
-        help="end the session (of whoever holds it, without --session)",
+        help="end the session that --session names, else that of whoever holds the lift",
     )
     parser.add_argument(
         "--granted-only", action="store_true", help="wait for the session, not for the car"
     )
-    _common(parser, direct=True)
-
-
-def release_arguments(parser: argparse.ArgumentParser) -> None:
-    """A lift's END and nothing else, for `rmf-bridge release`."""
-    parser.add_argument("name", metavar="LIFT")
-    parser.add_argument(
-        "--session", default="", metavar="ID", help="only if this one holds it (whoever does)"
-    )
-    parser.set_defaults(kind="lift", end=True, floor=None, granted_only=False)
-    _common(parser, direct=True)
+    add_shared_arguments(parser, direct=True)
 
 
 def _door_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", metavar="NAME")
+    parser.add_argument("name", metavar="NAME", help="the door, as RMF names it")
     parser.add_argument("action", choices=("open", "close"))
-    parser.add_argument("--requester", default=NODE_NAME, metavar="ID", help=f"({NODE_NAME})")
-    _common(parser, direct=True)
+    parser.add_argument(
+        "--requester", default=NODE_NAME, metavar="ID", help=f"default: {NODE_NAME}"
+    )
+    add_shared_arguments(parser, direct=True)
 
 
 def _charger_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", metavar="NAME")
+    parser.add_argument("name", metavar="NAME", help="the charger, as RMF names it")
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--robot", metavar="FLEET/ROBOT", help="assign the charger to this robot")
     what.add_argument("--cancel", metavar="REQUEST_ID", help="cancel the request of this id")
@@ -103,59 +115,65 @@ def _charger_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="ask the charger coordinator, which may choose another charger; NAME may be `any`",
     )
-    parser.add_argument("--request-id", metavar="ID", help="(a new one)")
+    parser.add_argument("--request-id", metavar="ID", help="default: a new one")
     parser.add_argument(
         "--start-timeout",
         type=_seconds,
         default=0.0,
         metavar="S",
-        help="cancelled when charging has not started after S seconds (the charger's own default)",
+        help="cancel if charging has not begun after S seconds (default: the charger's own limit)",
     )
-    _common(parser, direct=False)
+    add_shared_arguments(parser, direct=False)
 
 
-def wish_of(args: argparse.Namespace) -> Wish:
+def request_of(args: argparse.Namespace) -> Request:
     """What the command line asks for. A contradiction in it ends in exit code 2."""
     match args.kind:
         case "lift":
-            return _lift_wish(args)
+            return _lift_request(args)
         case "door":
-            return DoorMove(args.name, args.action == "open", args.requester, direct=args.direct)
+            opened = args.action == "open"
+            return DoorMove(
+                args.name, opened, args.requester, direct=args.direct, line=command_line(args)
+            )
         case _:
-            return _charger_wish(args)
+            return _charger_request(args)
 
 
-def _lift_wish(args: argparse.Namespace) -> Wish:
+def _lift_request(args: argparse.Namespace) -> Request:
     if args.end == (args.floor is not None):
         args.usage("either a FLOOR, or --end")
+    line = command_line(args)
     if args.end:
         if args.granted_only:
             args.usage("--granted-only goes with a FLOOR")
-        return LiftEnd(args.name, args.session, direct=args.direct)
+        return LiftEnd(args.name, args.session, direct=args.direct, line=line)
     if not args.session:
-        args.usage("a lift is asked for in somebody's name: --session fleet/robot")
+        args.usage("whose session is it? --session FLEET/ROBOT, or any name")
     return LiftRide(
-        args.name, args.floor, args.session, direct=args.direct, granted_only=args.granted_only
+        args.name, args.floor, args.session, args.granted_only, direct=args.direct, line=line
     )
 
 
-def _charger_wish(args: argparse.Namespace) -> Wish:
+def _charger_request(args: argparse.Namespace) -> Request:
+    line = command_line(args)
     if args.cancel is not None:
-        return Withdrawal(args.cancel) if args.queue else ChargeCancel(args.name, args.cancel)
+        cancel = QueuedCancel if args.queue else ChargeCancel
+        return cancel(args.name, args.cancel, line=line)
     fleet, slash, robot = args.robot.partition("/")
     if not (fleet and slash and robot):
-        args.usage(f"--robot {args.robot!r}: say FLEET/ROBOT")
+        args.usage(f"--robot '{args.robot}' is not FLEET/ROBOT")
     request_id = args.request_id or f"{NODE_NAME}-{uuid4().hex[:8]}"
-    wish = Queue if args.queue else Charge
-    return wish(args.name, fleet, robot, request_id, args.start_timeout)
+    charge = QueuedCharge if args.queue else Charge
+    return charge(args.name, fleet, robot, request_id, args.start_timeout, line=line)
 
 
 def run(args: argparse.Namespace) -> int:
     """Send and wait."""
-    wish = wish_of(args)
+    request = request_of(args)
     try:
         with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
-            return send(transport, wish, args.timeout, sys.stdout)
+            return send(transport, request, args.timeout, sys.stdout)
     except TransportError as error:
         complain("send", error)
         return 1
@@ -164,33 +182,35 @@ def run(args: argparse.Namespace) -> int:
         return 130
 
 
-def send(transport: Transport, wish: Wish, timeout_s: float, out: TextIO) -> int:
+def send(transport: Transport, request: Request, timeout_s: float, out: TextIO) -> int:
     """0 when the effect was seen within `timeout_s`, else 1."""
-    errand = _Errand(transport, wish, timeout_s, out)
+    exchange = _Exchange(transport, request, timeout_s, out)
     while True:
-        code = errand.look()
+        code = exchange.look()
         if code is not None:
             return code
 
 
-class _Errand:
-    """The clock, the wire and the screen around `effects.step`."""
+class _Exchange:
+    """The clock, the wire and the screen around `exchange.step`."""
 
-    def __init__(self, transport: Transport, wish: Wish, timeout_s: float, out: TextIO) -> None:
-        self.wish, self.out = wish, out
-        self.publisher: Publisher[Any] = transport.publisher(wish.topic)
-        self.ears = Ears(transport, wish.states, topics.DOOR_SUPERVISOR_HEARTBEAT)
-        self.so_far = SoFar(began_at=time.monotonic(), timeout_s=timeout_s)
+    def __init__(
+        self, transport: Transport, request: Request, timeout_s: float, out: TextIO
+    ) -> None:
+        self.request, self.out = request, out
+        self.publisher: Publisher[Any] = transport.publisher(request.topic)
+        self.inbox = Inbox(transport, request.states, topics.DOOR_SUPERVISOR_HEARTBEAT)
+        self.seen = Seen(began_at=time.monotonic(), timeout_s=timeout_s)
         self.said: set[str] = set()
         self.described = ""
 
     def look(self) -> int | None:
         """Take what was heard, and do what follows from it; an exit code when it is over."""
-        for heard in self.ears.listen(LOOK_EVERY_S):
+        for heard in self.inbox.listen(LOOK_EVERY_S):
             self._take(heard)
         now = time.monotonic()
-        self.so_far = replace(self.so_far, listeners=self.publisher.matched())
-        todo = step(self.wish, self.so_far, now)
+        self.seen = replace(self.seen, listeners=self.publisher.matched())
+        todo = step(self.request, self.seen, now)
         if todo.outcome is not None:
             return self._finish(todo.outcome)
         if todo.hint and todo.hint not in self.said:
@@ -202,26 +222,26 @@ class _Errand:
 
     def _take(self, heard: Heard) -> None:
         if isinstance(heard.message, d.SupervisorHeartbeat):
-            self.so_far = replace(self.so_far, heartbeat=heard)
+            self.seen = replace(self.seen, heartbeat=heard)
             return
         name = words.device(heard.message)
-        self.so_far = replace(self.so_far, names=self.so_far.names | {name})
-        if not self.wish.about(heard.message):
+        self.seen = replace(self.seen, names=self.seen.names | {name})
+        if not self.request.about(heard.message):
             return
-        self.so_far = replace(self.so_far, states=(*self.so_far.states, heard))
-        text = described(heard.message)
+        self.seen = replace(self.seen, states=(*self.seen.states, heard))
+        text = words.described(heard.message)
         if text != self.described:
             self.described = text
             self._line(heard.at, "state", text)
 
-    def _send(self, request: words.Requested, now: float) -> None:
-        if not isinstance(request, d.ChargerRequest | d.ChargerCancel):
-            request = replace(request, request_time=stamp(time.time()))
-        if self.so_far.first_sent_at is None:
-            self._line(now, "request", f"{words.request(request)} on {self.wish.topic.name}")
-        first = now if self.so_far.first_sent_at is None else self.so_far.first_sent_at
-        self.so_far = replace(self.so_far, first_sent_at=first, last_sent_at=now)
-        self.publisher.publish(request)
+    def _send(self, message: words.Requested, now: float) -> None:
+        if isinstance(message, d.LiftRequest | d.DoorRequest):
+            message = replace(message, request_time=stamp(time.time()))
+        if self.seen.first_sent_at is None:
+            self._line(now, "request", f"{words.request(message)} on {self.request.topic.name}")
+        first = now if self.seen.first_sent_at is None else self.seen.first_sent_at
+        self.seen = replace(self.seen, first_sent_at=first, last_sent_at=now)
+        self.publisher.publish(message)
 
     def _finish(self, outcome: Done | Failed) -> int:
         if isinstance(outcome, Done):
@@ -231,7 +251,7 @@ class _Errand:
         return 1
 
     def _line(self, at: float, what: str, text: str) -> None:
-        elapsed_s = max(0.0, at - self.so_far.began_at)
-        name = words.printable(self.wish.name)
-        self.out.write(f"{elapsed_s:8.3f} s  {what:<7}  {name}  {text}\n")
+        elapsed_s = max(0.0, at - self.seen.began_at)
+        line = f"{elapsed_s:8.3f} s  {what:<7}  {self.request.name}  {text}"
+        self.out.write(words.printable(line) + "\n")
         self.out.flush()

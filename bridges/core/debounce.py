@@ -9,6 +9,8 @@ from typing import Generic, TypeVar, cast
 import msgspec
 from msgspec.structs import replace
 
+from bridges.core.durations import NEVER
+
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 
@@ -28,7 +30,7 @@ class Settled(msgspec.Struct, Generic[T_co], frozen=True):
 
     def due_at(self, hold_s: float) -> float:
         """When what is seen will count, if it stays; inf when it does."""
-        return float("inf") if self.torn_since is None else self.since + hold_s
+        return NEVER if self.torn_since is None else self.since + hold_s
 
 
 def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "Settled[T]":

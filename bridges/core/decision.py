@@ -6,17 +6,25 @@ whole report afresh, so a repeated, lost or reordered event cannot leave a relay
 not be.
 """
 
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import msgspec
 
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 
-S = TypeVar("S")
+X = TypeVar("X")
+"""A sample, as a driver decodes it."""
 M = TypeVar("M")
+"""A core's memory."""
 O = TypeVar("O")  # noqa: E741
+"""A core's outputs; None for one that moves no hardware."""
 R = TypeVar("R", bound="Report")
+"""A core's report."""
+
+
+Said = tuple[Topic[Message], Message]
+"""A message and where it goes."""
 
 
 class Fault(msgspec.Struct, frozen=True):
@@ -29,10 +37,10 @@ class Fault(msgspec.Struct, frozen=True):
         return f"{self.code}: {self.detail}" if self.detail else self.code
 
 
-class Sampled(msgspec.Struct, Generic[S], frozen=True):
+class Sampled(msgspec.Struct, Generic[X], frozen=True):
     """The driver has read every input once; the reading is as old as `now` when it is decided."""
 
-    sample: S
+    sample: X
 
 
 class IoFailed(msgspec.Struct, frozen=True):
@@ -64,7 +72,7 @@ class Report(Protocol):
     def faults(self) -> tuple[Fault, ...]:
         """Everything that is wrong now, most serious first."""
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """The part whose change is worth publishing at once: the report without its age."""
 
 
@@ -81,13 +89,20 @@ class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     report: R
     wake_at: float
     refused: str = ""
-    publish: tuple[tuple[Topic[Any], Message], ...] = ()
+    publish: tuple[Said, ...] = ()
+
+
+LONGEST_DETAIL = 300
 
 
 class RequestRefused(Exception):
-    """A message that is not obeyed. `kind` is a short fixed name to count and to log once by."""
+    """A message that is not obeyed. `kind` is a short fixed name to count and to log once by.
+
+    `detail` may quote the message, which anybody can send: it is cut to LONGEST_DETAIL characters.
+    """
 
     def __init__(self, kind: str, detail: str) -> None:
+        detail = detail[:LONGEST_DETAIL]
         super().__init__(f"{kind}: {detail}")
         self.kind = kind
         self.detail = detail

@@ -14,6 +14,8 @@ from msgspec import Meta
 
 Seconds = Annotated[float, Meta(ge=0, le=86400, extra={"unit": "s"})]
 """A duration that may be zero."""
+Timeout = Annotated[float, Meta(ge=1, le=86400, extra={"unit": "s"})]
+"""After how long something is given up: with zero it would never be tried."""
 Period = Annotated[float, Meta(ge=0.01, le=60, extra={"unit": "s"})]
 """A repetition period."""
 QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
@@ -141,3 +143,21 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
     bus: Name | None = None
     accept_unsafe: dict[Name, Name] = msgspec.field(default_factory=dict)
+
+    def stale_after(self) -> float | None:
+        """After how long (s) without a reading it is out of service; None where that is not a time."""
+        return None
+
+
+class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every kind without hardware has.
+
+    `quiet_start_s`: how long it only listens at first.
+    """
+
+    quiet_start_s: QuietStart = 3.0
+
+
+def quiet_s(settings: GraphSettings) -> float:
+    """How long it only listens before it sends its first message (s)."""
+    return settings.quiet_start_s

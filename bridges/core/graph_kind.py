@@ -7,10 +7,10 @@ that it learns of from messages, with one core memory for each. `bridges/<kind>/
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, Union
 
-from bridges.core.decision import Decision
-from bridges.core.kind import Place
+from bridges.core.decision import Decision, M, OperatorReset, R
+from bridges.core.kind import AnyDeviceKind, E, L, Place, S
 from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
 
@@ -27,9 +27,13 @@ class Woken:
     """Nothing but time has passed: it is the core's `wake_at`."""
 
 
+GraphEvent = Union[MaySpeak, Woken, OperatorReset, E]  # noqa: UP007
+"""Everything that such a core may be told."""
+
+
 @dataclass(frozen=True, slots=True)
-class GraphKind:
-    """One kind that lives on RMF's graph alone.
+class GraphKind(Generic[S, L, M, E, R]):
+    """One kind that lives on RMF's graph alone: its settings, limits, memory, events and report.
 
     `devices_key`: the YAML's section of its settings. `settings`: the struct that reads it.
     `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
@@ -56,21 +60,26 @@ class GraphKind:
 
     name: str
     devices_key: str
-    settings: type
-    requests: Mapping[Topic[Any], Callable[[Any, Any, float], Any]]
-    publishes: tuple[Topic[Any], ...]
-    sole: tuple[Topic[Any], ...]
+    settings: type[S]
+    requests: Mapping[Topic[Message], Callable[[Any, S, float], E]]
+    publishes: tuple[Topic[Message], ...]
+    sole: tuple[Topic[Message], ...]
     device_name: Callable[[Any], str]
-    quiet_s: Callable[[Any], float]
-    limits: Callable[[Any], Any]
-    initial: Callable[[str, float], Any]
-    decide: Callable[[Any, Any, float, Any], Decision[Any, Any, Any]]
+    quiet_s: Callable[[S], float]
+    limits: Callable[[S], L]
+    initial: Callable[[str, float], M]
+    decide: Callable[[M, GraphEvent[E], float, L], Decision[M, None, R]]
     stamped: Callable[[Any, Time], Message]
-    summary: Callable[[Any, float], Mapping[str, str]]
-    idle: Callable[[Any, float], bool]
-    together: Callable[[Mapping[str, Any]], tuple[Topic[Any], Message]] | None = None
-    persist: Callable[[Mapping[str, Any]], bytes] | None = None
-    restore: Callable[[bytes, Any, float], Mapping[str, Any]] | None = None
-    described: Callable[[Any], list[tuple[str, ...]]] | None = None
-    warnings: Callable[[Any], Iterable[tuple[tuple[str, ...], str]]] | None = None
-    on_map: Callable[[Any], Iterable[Place]] = lambda settings: ()
+    summary: Callable[[R, float], Mapping[str, str]]
+    idle: Callable[[M, float], bool]
+    together: Callable[[Mapping[str, M]], tuple[Topic[Message], Message]] | None = None
+    persist: Callable[[Mapping[str, M]], bytes] | None = None
+    restore: Callable[[bytes, S, float], Mapping[str, M]] | None = None
+    described: Callable[[S], list[tuple[str, ...]]] | None = None
+    warnings: Callable[[S], Iterable[tuple[tuple[str, ...], str]]] | None = None
+    on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
+
+
+AnyGraphKind = GraphKind[Any, Any, Any, Any, Any]
+AnyKind = AnyDeviceKind | AnyGraphKind
+"""One that is found by its name."""

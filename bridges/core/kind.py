@@ -1,23 +1,45 @@
 """What a kind of device is to the daemon: its topics, and the pure functions of its folder.
 
-`bridges/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or doors.
+`bridges/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or doors. A
+`KIND` is written down with its types, so that mypy proves that what the runtime hands from one
+function to the next is what that one takes.
 """
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar, Union
 
-from bridges.core.decision import Decision
+from bridges.core.decision import (
+    Decision,
+    IoFailed,
+    M,
+    O,
+    OperatorReset,
+    R,
+    RivalSeen,
+    Sampled,
+    X,
+)
 from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
+
+S = TypeVar("S")
+"""A device's settings; a kind's own, for one without hardware."""
+L = TypeVar("L")
+"""What the core is to know of them."""
+E = TypeVar("E")
+"""What requests are to the core, as `accept` gives them."""
+
+DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: UP007
+"""Everything that the core of a device may be told."""
 
 Place = tuple[tuple[str, ...], str, str]
 """A setting that names something on RMF's map: its path, what it is (`building_map`), the name."""
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
-    """One kind of device.
+class Kind(Generic[S, L, M, X, E, O, R]):
+    """One kind of device: its settings, limits, memory, sample, requests, outputs and report.
 
     `devices_key`: the YAML's section of them. `states`: the topic of its state messages.
     `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
@@ -36,15 +58,19 @@ class Kind:
 
     name: str
     devices_key: str
-    states: Topic[Any]
-    requests: Mapping[Topic[Any], Callable[[Any, Any], Any]]
+    states: Topic[Message]
+    requests: Mapping[Topic[Message], Callable[[Any, S], E]]
     device_name: Callable[[Any], str]
     sender: Callable[[Any], str]
-    limits: Callable[[Any, Mapping[str, float]], Any]
-    initial: Callable[[Any, float], Any]
-    decide: Callable[[Any, Any, float, Any], Decision[Any, Any, Any]]
-    state_message: Callable[[str, Any, Any, Time], Message]
-    summary: Callable[[Any], Mapping[str, str]]
-    published: Callable[[Any, Any], Any] = lambda memory, report: memory
-    alarm_topics: Callable[[Any], tuple[Topic[Any], ...]] = lambda settings: ()
-    on_map: Callable[[Any], Iterable[Place]] = lambda settings: ()
+    limits: Callable[[S, Mapping[str, float]], L]
+    initial: Callable[[L, float], M]
+    decide: Callable[[M, DeviceEvent[X, E], float, L], Decision[M, O, R]]
+    state_message: Callable[[str, S, R, Time], Message]
+    summary: Callable[[R], Mapping[str, str]]
+    published: Callable[[M, R], M] = lambda memory, report: memory
+    alarm_topics: Callable[[S], tuple[Topic[Message], ...]] = lambda settings: ()
+    on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
+
+
+AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]
+"""One that is found by its name."""

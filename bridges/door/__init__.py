@@ -1,11 +1,22 @@
-"""Doors."""
+"""Doors: RMF's DoorRequest to a relay or register, and the truth about the door as DoorState."""
 
 from bridges.core.kind import Kind
 from bridges.door import core, messages
-from bridges.door.settings import DoorLimits
+from bridges.door.memory import DoorLimits, Memory
+from bridges.door.report import DoorReport
+from bridges.door.settings import DoorSettings
+from bridges.door.signals import CloseRequested, DoorOutputs, DoorSample, OpenRequested
 from bridges.rmf import topics
 
-KIND = Kind(
+KIND: Kind[
+    DoorSettings,
+    DoorLimits,
+    Memory,
+    DoorSample,
+    OpenRequested | CloseRequested,
+    DoorOutputs,
+    DoorReport,
+] = Kind(
     name="door",
     devices_key="doors",
     states=topics.DOOR_STATES,

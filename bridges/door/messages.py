@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from bridges.core.decision import RequestRefused
-from bridges.door.core import CloseDoor, DoorReport, OpenDoor
+from bridges.core.names import check_length
+from bridges.door.report import DoorReport
 from bridges.door.settings import DoorSettings
+from bridges.door.signals import CloseRequested, OpenRequested
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Time
 
 
-def accept(message: DoorRequest, settings: DoorSettings) -> OpenDoor | CloseDoor:
+def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | CloseRequested:
     """The event that this request is.
 
     Who asks does not matter to a door, but somebody always does: a request without a requester_id is
@@ -17,11 +19,12 @@ def accept(message: DoorRequest, settings: DoorSettings) -> OpenDoor | CloseDoor
     """
     if not message.requester_id:
         raise RequestRefused("no requester", "requester_id is empty")
+    check_length(requester_id=message.requester_id)
     mode = message.requested_mode.value
     if mode == DoorModeValue.MODE_OPEN:
-        return OpenDoor(message.requester_id)
+        return OpenRequested(message.requester_id)
     if mode == DoorModeValue.MODE_CLOSED:
-        return CloseDoor(message.requester_id)
+        return CloseRequested(message.requester_id)
     raise RequestRefused(
         "mode that cannot be asked", f"requested_mode {mode}; only OPEN (2) and CLOSED (0) can be"
     )

@@ -1,12 +1,12 @@
 """What to believe of a door's inputs: debounce, age, and estimates where no contact is wired.
 
 Rules:
-- A change counts when it has lasted for its signal's debounce. A fire alarm or an obstruction that
-  ends must be away for `hazard_clear_s`. While one has never settled, a first sight of it counts.
-- A reading older than `stale_after_s` is no reading; what was believed before such a gap is
-  forgotten, because the door may have moved unseen.
-- A missing limit contact is estimated only when the YAML says so: from the time for which the relay
-  is known to have been on or off. A failed reading or write starts that time again.
+- A change counts when it has lasted for its signal's debounce. The end of a fire alarm or an
+  obstruction counts when it has lasted for `hazard_clear_s`. Until such an input has settled for the
+  first time, a single reading of the hazard counts.
+- After `stale_after_s` without a reading, what was believed is forgotten: the door may have moved.
+- A missing limit contact is estimated only when the YAML says so, from the time for which the relay
+  has been on or off. A failed reading or write starts that time again.
 - A controller that does not say where the door is (`lost`) is believed at once.
 """
 
@@ -15,32 +15,13 @@ from collections.abc import Iterator
 import msgspec
 from msgspec.structs import replace
 
-from bridges.core.debounce import Settled, forget, settle
-from bridges.door.settings import DoorLimits
+from bridges.core.debounce import forget, settle
+from bridges.core.durations import NEVER
+from bridges.door.memory import Contact, DoorLimits, Senses
 from bridges.door.signals import DoorSample
 
-NEVER = float("inf")
 SIGNALS = ("opened", "closed", "obstruction", "fire")
 HAZARDS = ("obstruction", "fire")
-
-Contact = Settled[bool | None]
-"""One input with its debounce. Where it is not wired, both value and candidate are None."""
-
-
-class Senses(msgspec.Struct, frozen=True):
-    """Each contact (None: not read yet); when all were last read, and since when without a miss.
-
-    `lost`, `errors`: the last reading's (`DoorSample`).
-    """
-
-    opened: Contact | None = None
-    closed: Contact | None = None
-    obstruction: Contact | None = None
-    fire: Contact | None = None
-    read_at: float | None = None
-    linked_since: float | None = None
-    lost: str = ""
-    errors: tuple[str, ...] = ()
 
 
 class View(msgspec.Struct, frozen=True):
@@ -83,7 +64,7 @@ def take(senses: Senses, sample: DoorSample, now: float, limits: DoorLimits) -> 
 
 
 def miss(senses: Senses) -> Senses:
-    """A reading or a write has failed: what was half seen must be seen again."""
+    """A reading has failed: debounce and the time of the relay start again."""
     return replace(
         senses,
         opened=forget(senses.opened),
@@ -95,7 +76,7 @@ def miss(senses: Senses) -> Senses:
 
 
 def is_fresh(senses: Senses, now: float, limits: DoorLimits) -> bool:
-    """Is the last reading young enough to be a fact?"""
+    """Is the last reading younger than `stale_after_s`?"""
     return senses.read_at is not None and now < senses.read_at + limits.t.stale_after_s
 
 
@@ -119,8 +100,13 @@ def look(senses: Senses, held: bool, held_since: float, now: float, limits: Door
     )
 
 
+def released_by_fire(view: View, limits: DoorLimits) -> bool:
+    """Has the fire alarm taken the hold away?"""
+    return view.fresh and view.fire and limits.on_fire == "release"
+
+
 def _hold_s(before: Contact | None, seen: bool | None, signal: str, limits: DoorLimits) -> float:
-    """How long `seen` must last: a hazard goes more slowly than it comes."""
+    """How long `seen` must last: the end of a hazard longer than its beginning."""
     hold_s = limits.debounce.get(signal, 0.0)
     clearing = signal in HAZARDS and seen is False and before is not None and before.value
     return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
@@ -139,7 +125,7 @@ def _believed(contact: Contact | None) -> bool:
 
 
 def _feared(contact: Contact | None) -> bool:
-    """A hazard that is believed; or seen at all, where nothing is believed yet."""
+    """Is the hazard there? Before its input has settled, a single reading counts."""
     if contact is None:
         return False
     return bool(contact.value if _settled(contact) else contact.candidate)
@@ -157,7 +143,7 @@ def _estimates(
 
 
 def _changes(senses: Senses, limits: DoorLimits, now: float, *estimates: float) -> Iterator[float]:
-    """When staleness, an estimate or a half-seen contact will next change the view."""
+    """When the view may change by staleness, an estimate or a contact that settles (s)."""
     stale_at = NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
     due = [stale_at, *estimates]
     for signal in SIGNALS:

@@ -1,18 +1,18 @@
-"""The part of a door's YAML that does not depend on how it is wired, and its core's limits."""
+"""The part of a door's YAML that does not depend on how it is wired."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
-from bridges.core.fields import DeviceSettings, Seconds
+from bridges.core.fields import DeviceSettings, Seconds, Timeout
 
 StaleAfter = Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})]
 PulseSeconds = Annotated[float, Meta(ge=0.05, le=600, extra={"unit": "s"})]
 
 
-class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations of a door.
 
     `stale_after_s`: without a good reading for this long the door is OFFLINE and its hold off.
@@ -26,8 +26,8 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     stale_after_s: StaleAfter = 1.0
     close_grace_s: Seconds = 3.0
-    travel_s: Seconds = 10.0
-    open_timeout_s: Seconds = 15.0
+    travel_s: Timeout = 10.0
+    open_timeout_s: Timeout = 15.0
     hazard_clear_s: Seconds = 1.0
     open_delay_s: Seconds | None = None
     max_hold_s: Seconds | None = None
@@ -54,10 +54,14 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     `pulse`: re-trigger an operator that closes by itself; absent, the relay stays on.
     """
 
-    limits: Limits = Limits()
+    limits: Durations = Durations()
     feedback: Literal["sensors", "estimated"] = "sensors"
     on_fire: Literal["open", "release"] | None = None
     pulse: Pulse | None = None
+
+    def stale_after(self) -> float:
+        """As its limits say."""
+        return self.limits.stale_after_s
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
         """What the fields cannot say one by one."""
@@ -79,24 +83,3 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
             )
         if delay_s is not None and delay_s > self.limits.travel_s:
             yield ("limits", "open_delay_s"), "must not be longer than travel_s"
-
-
-class DoorLimits(msgspec.Struct, frozen=True):
-    """A door's fixed facts as its core needs them. `t`: the durations; `debounce`: s by signal."""
-
-    t: Limits = Limits()
-    debounce: Mapping[str, float] = {}
-    estimated: bool = False
-    on_fire: Literal["open", "release"] = "release"
-    pulse: Pulse | None = None
-
-    @classmethod
-    def of(cls, settings: DoorSettings, debounce: Mapping[str, float]) -> "DoorLimits":
-        """From the YAML and the wiring's debounce by signal."""
-        return cls(
-            settings.limits,
-            debounce,
-            settings.feedback == "estimated",
-            settings.on_fire or "release",
-            settings.pulse,
-        )

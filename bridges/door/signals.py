@@ -1,6 +1,8 @@
-"""What a door's driver tells its core, and what the core tells its driver: one scan's image."""
+"""What a door's driver and its core say to each other in one scan, and the core's events."""
 
 import msgspec
+
+from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 
 class DoorSample(msgspec.Struct, frozen=True):
@@ -29,3 +31,18 @@ class DoorOutputs(msgspec.Struct, frozen=True):
 
     hold_open: bool = False
     between_pulses: bool = False
+
+
+class OpenRequested(msgspec.Struct, frozen=True):
+    """A requester wants the door open. `requester_id` is for the log only."""
+
+    requester_id: str
+
+
+class CloseRequested(msgspec.Struct, frozen=True):
+    """A requester no longer wants the door open."""
+
+    requester_id: str
+
+
+Event = Sampled[DoorSample] | IoFailed | RivalSeen | OperatorReset | OpenRequested | CloseRequested

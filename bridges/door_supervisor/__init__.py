@@ -1,8 +1,12 @@
 """The door supervisor: in the place of RMF's own, between fleet adapters and any number of doors."""
 
+from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind
-from bridges.door_supervisor import core, messages, table
+from bridges.door_supervisor import core, keep, messages, report
+from bridges.door_supervisor.memory import Limits, Memory
+from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.settings import Settings
+from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
 from bridges.rmf.topics import (
     ADAPTER_DOOR_REQUESTS,
     DOOR_REQUESTS,
@@ -10,18 +14,13 @@ from bridges.rmf.topics import (
     DOOR_SUPERVISOR_HEARTBEAT,
 )
 
-
-def limits(settings: Settings) -> core.Limits:
-    """What the core is to know of the YAML."""
-    return core.Limits(open_alarm_s=settings.open_alarm_s)
-
-
-def quiet_s(settings: Settings) -> float:
-    """How long to listen before the first word."""
-    return settings.quiet_start_s
-
-
-KIND = GraphKind(
+KIND: GraphKind[
+    Settings,
+    Limits,
+    Memory,
+    OpenRequested | CloseRequested | StateHeard,
+    DoorHoldReport,
+] = GraphKind(
     name="door_supervisor",
     devices_key="supervisor",
     settings=Settings,
@@ -33,13 +32,13 @@ KIND = GraphKind(
     sole=(DOOR_REQUESTS,),
     device_name=messages.device_name,
     quiet_s=quiet_s,
-    limits=limits,
+    limits=Limits.of,
     initial=core.initial,
     decide=core.decide,
     stamped=messages.stamped,
     summary=messages.summary,
     idle=core.idle,
-    together=table.heartbeat,
-    persist=table.persist,
-    restore=table.restore,
+    together=report.heartbeat,
+    persist=keep.persist,
+    restore=keep.restore,
 )

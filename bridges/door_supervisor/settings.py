@@ -2,12 +2,10 @@
 
 from collections.abc import Iterable
 
-import msgspec
-
-from bridges.core.fields import Name, Patience, QuietStart
+from bridges.core.fields import GraphSettings, Name, Patience
 
 
-class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the door supervisor may decide by itself: nothing but when to complain.
 
     `doors`: the doors that it serves; every door that it hears of when absent, as RMF's own does.
@@ -17,7 +15,6 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """
 
     doors: list[Name] | None = None
-    quiet_start_s: QuietStart = 3.0
     open_alarm_s: Patience = 600.0
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:

@@ -2,10 +2,21 @@
 
 from bridges.core.kind import Kind
 from bridges.lift import core, messages
-from bridges.lift.limits import LiftLimits
+from bridges.lift.memory import LiftLimits, Memory
+from bridges.lift.report import LiftReport
+from bridges.lift.settings import LiftSettings
+from bridges.lift.signals import Ended, LiftOutputs, LiftSample, Requested
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 
-KIND = Kind(
+KIND: Kind[
+    LiftSettings,
+    LiftLimits,
+    Memory,
+    LiftSample,
+    Requested | Ended,
+    LiftOutputs,
+    LiftReport,
+] = Kind(
     name="lift",
     devices_key="lifts",
     states=LIFT_STATES,

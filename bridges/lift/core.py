@@ -1,30 +1,28 @@
 """The lift's decision core: who holds the lift, what its relays do, and what RMF is told.
 
 Rules, in the order in which they are applied:
-1. A session is granted to the first request while the lift is free, unless something forbids every
-   output (an obstacle); its own requests refresh it, those of others are refused. It ends by its own
-   END and by nothing else: never by a hazard, a fault or a timeout. One in HUMAN mode is a session
-   without outputs.
-2. After END the session is gone at once; AGV mode and the door may stay held for `release_grace_s`,
-   in which only the same session is granted, whatever else is wrong (a supervisor that restarts
-   sends END for a robot that is still inside, and it must get out in a fire, too).
-3. A request sets what is wanted; `bridges/lift/drive.py` says what may be energised.
-4. Obstacles switch everything off and never touch the session: fire (and its latch, where an
-   operator must reset it), code blue, earthquake, emergency, out of service, manual mode, a second
-   node for this lift, inputs that cannot be believed, outputs that cannot be written. A gap in
-   reading or writing shorter than `stale_after_s` is none. Overload only delays.
-5. The door is OPEN for RMF when its contact, the floor and the standstill say so freshly. While a
-   session is held and no open door at its destination has been published for it yet (the robot is
-   outside), AGV mode must be on too and nothing may be wrong: RMF's robots look at session, floor
-   and door only, and must not board a lift in a fire. Once it has been published, a robot may be
-   inside, and the true door is shown in any mode, so that it gets out. Neither goes through a door
-   that is about to be held and is not yet: its relay may have to rest while the door closes.
+1. While the lift is free, the first request is granted a session, unless an obstacle forbids every
+   output. The session's own requests refresh it; requests of others are refused. A session ends by
+   its own END only, never by a hazard, a fault or a timeout. A session in HUMAN mode has no outputs.
+2. END ends the session at once. AGV mode and the door's hold may stay on for `release_grace_s`. In
+   that time only the same session is granted, even in a fire: a supervisor that restarts sends END
+   for a robot that is still inside, and that robot must get out.
+3. A request sets what is wanted. `bridges/lift/drive.py` says what may be energised.
+4. Obstacles switch every output off and never change the session. They are: fire (and its latch,
+   where an operator must reset it), code blue, earthquake, emergency, out of service, manual mode, a
+   second node for this lift, inputs that cannot be believed, outputs that cannot be written. A gap
+   in reading or writing that is shorter than `stale_after_s` is no obstacle. Overload only delays.
+5. RMF is told OPEN when fresh inputs show the door open, a floor, and the car standing there.
+   - Before OPEN has been published for a session at its destination, its robot is outside. Then
+     OPEN also needs AGV mode and no fault: a robot looks at session, floor and door only, and must
+     not board a lift in a fire.
+   - After that a robot may be inside. The true door is shown in any mode, so that it gets out.
+   - A door whose hold is wanted but not on yet (the relay must rest) is not shown OPEN: it may
+     close by itself while a robot drives through.
 """
 
-import math
 from typing import Any
 
-import msgspec
 from msgspec.structs import replace
 
 from bridges.core.decision import (
@@ -36,17 +34,14 @@ from bridges.core.decision import (
     Sampled,
     WriteFailed,
 )
+from bridges.core.durations import NEVER, RIVAL_QUIET_S
 from bridges.lift import drive
-from bridges.lift.drive import Grace, Relays, Session
-from bridges.lift.limits import LiftLimits
+from bridges.lift.memory import Grace, LiftLimits, Memory, Session
 from bridges.lift.report import LiftReport, report
-from bridges.lift.sensing import HAZARDS, Senses, View, gap, look, take, trust
-from bridges.lift.signals import Hazard, LiftOutputs, LiftSample
+from bridges.lift.sensing import HAZARDS, View, gap, look, take, trust
+from bridges.lift.signals import Event, Hazard, LiftOutputs, LiftSample, Requested
 from bridges.rmf.definitions import Bool, EmergencySignal, Message
 from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
-
-RIVAL_GONE_S = 5.0
-"""A second node for this lift is gone when nothing was heard of it for so long; states come at 1 Hz."""
 
 NOT_RMFS = frozenset(
     {
@@ -61,42 +56,6 @@ NOT_RMFS = frozenset(
 """Hazards that take the lift away; overload only delays it."""
 
 
-class Asked(msgspec.Struct, frozen=True):
-    """A LiftRequest for AGV or HUMAN mode that is ours, well formed and for a floor we serve."""
-
-    session_id: str
-    agv: bool
-    destination: str
-
-
-class Ended(msgspec.Struct, frozen=True):
-    """A LiftRequest for END_SESSION, whatever its other fields say."""
-
-    session_id: str
-
-
-class Memory(msgspec.Struct, frozen=True):
-    """Everything that outlives a scan.
-
-    `io_fault`: what reading or writing said that has just failed. `unwritten_since`: since when
-    each scan's outputs could not be written; `write_failed`: those of the last scan.
-    """
-
-    senses: Senses = Senses()
-    session: Session | None = None
-    grace: Grace | None = None
-    relays: Relays = Relays()
-    fire_latched: bool = False
-    alarmed: bool = False
-    rival_at: float | None = None
-    io_fault: str = ""
-    unwritten_since: float | None = None
-    write_failed: bool = False
-
-
-Event = Sampled[Any] | IoFailed | RivalSeen | OperatorReset | Asked | Ended
-
-
 def initial(limits: LiftLimits, now: float) -> Memory:
     """Nothing read, nobody in session, everything off."""
     return Memory()
@@ -105,21 +64,17 @@ def initial(limits: LiftLimits, now: float) -> Memory:
 def decide(
     memory: Memory, event: Event, now: float, limits: LiftLimits
 ) -> Decision[Memory, LiftOutputs, LiftReport]:
-    """One scan: take the event in, look, and derive outputs and report afresh."""
+    """One scan: take in the event, look at the inputs, derive outputs and report afresh."""
     alarmed_before = memory.alarmed
     memory, refused = _take(memory, event, now, limits)
     view = look(memory.senses, now, limits)
     memory = _latch(memory, view, now, limits)
     allowed = not obstacles(memory, view, now, limits)
     memory, outputs = _drive(memory, view, allowed, now, limits)
-    driven = memory.relays.outputs()
-    awaited = outputs.hold_door is not None and driven.hold_door is None
-    faults = _faults(memory, view, now, limits)
-    read_at = memory.senses.read_at
     return Decision(
         memory,
-        driven,
-        report(memory.session, view, read_at, faults, driven.agv_request, awaited, limits),
+        memory.relays.outputs(),
+        report(memory, view, outputs, _faults(memory, view, now, limits), limits),
         _wake_at(memory, view, outputs, now, limits),
         refused,
         _alarms(alarmed_before, memory, limits),
@@ -127,7 +82,7 @@ def decide(
 
 
 def published(memory: Memory, shown: LiftReport) -> Memory:
-    """The last report is out: if it offered an open door at the destination, a robot may be inside."""
+    """The memory once this report is out. After OPEN at the destination a robot may be inside."""
     session = memory.session
     if session is None or shown.open_at != session.destination:
         return memory
@@ -152,13 +107,13 @@ def obstacles(memory: Memory, view: View, now: float, limits: LiftLimits) -> tup
 def _unwritten_at(memory: Memory, limits: LiftLimits) -> float:
     """When outputs have not been written for so long that it matters."""
     since = memory.unwritten_since
-    return math.inf if since is None else since + limits.t.stale_after_s
+    return NEVER if since is None else since + limits.t.stale_after_s
 
 
 def _drive(
     memory: Memory, view: View, allowed: bool, now: float, limits: LiftLimits
 ) -> tuple[Memory, LiftOutputs]:
-    """The next outputs, in memory's relays, and what they would be if relays needed no rest."""
+    """The memory with the next state of the relays; and the outputs that are wanted."""
     session, grace, relays = memory.session, memory.grace, memory.relays
     outputs = LiftOutputs()
     if session and drive.serves(session, allowed, now, limits):
@@ -169,7 +124,7 @@ def _drive(
     elif grace and now >= grace.until:
         grace = None
     elif grace and allowed:
-        outputs = drive.kept(grace, relays, view, now, limits)
+        outputs = drive.stays_on(grace, relays, view, now, limits)
     relays = relays.step(outputs, now, limits)
     if session and relays.call.on and session.call_at is None:
         session = replace(session, call_at=now)
@@ -189,13 +144,13 @@ def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple
             return replace(memory, rival_at=now), ""
         case OperatorReset():
             return _reset(memory, now, limits), ""
-        case Asked():
+        case Requested():
             return _ask(memory, event, now, limits)
     return _end(memory, event.session_id, now, limits)
 
 
 def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) -> Memory:
-    """A reading; and what was written since the one before it, all went well."""
+    """Take in a reading. If no write has failed since the last one, the outputs are written."""
     return replace(
         memory,
         senses=take(memory.senses, sample, now, limits),
@@ -205,31 +160,31 @@ def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) ->
     )
 
 
-def _ask(memory: Memory, asked: Asked, now: float, limits: LiftLimits) -> tuple[Memory, str]:
+def _ask(memory: Memory, request: Requested, now: float, limits: LiftLimits) -> tuple[Memory, str]:
     held, grace = memory.session, memory.grace
-    if held and held.id != asked.session_id:
+    if held and held.id != request.session_id:
         return memory, f"held by {held.id}"
     if held:
-        return replace(memory, session=_refresh(held, asked, now)), ""
+        return replace(memory, session=_refresh(held, request, now)), ""
     if grace and now < grace.until:
-        if grace.session.id != asked.session_id:
+        if grace.session.id != request.session_id:
             return memory, f"released by {grace.session.id} a moment ago"
-        return replace(memory, session=_grant(asked, now, grace.session.boarded), grace=None), ""
+        return replace(memory, session=_grant(request, now, grace.session.boarded), grace=None), ""
     why_not = obstacles(memory, look(memory.senses, now, limits), now, limits)
     if why_not:
         return memory, why_not[0].code
-    return replace(memory, session=_grant(asked, now, boarded=False), grace=None), ""
+    return replace(memory, session=_grant(request, now, boarded=False), grace=None), ""
 
 
-def _grant(asked: Asked, now: float, boarded: bool) -> Session:
-    return Session(asked.session_id, asked.agv, asked.destination, now, boarded=boarded)
+def _grant(request: Requested, now: float, boarded: bool) -> Session:
+    return Session(request.session_id, request.agv, request.destination, now, boarded=boarded)
 
 
-def _refresh(session: Session, asked: Asked, now: float) -> Session:
+def _refresh(session: Session, request: Requested, now: float) -> Session:
     """A repeat only says that RMF is still there; another destination or mode is a new request."""
-    if (asked.agv, asked.destination) == (session.agv, session.destination):
+    if (request.agv, request.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
-    return _grant(asked, now, session.boarded)
+    return _grant(request, now, session.boarded)
 
 
 def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tuple[Memory, str]:
@@ -249,7 +204,7 @@ def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
     session = memory.session
     if session and session.fault:
         session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
-    # What is seen to burn latches again in this same decision; what cannot be seen may burn.
+    # A fire that is seen latches again in this decision. Where inputs are stale there may be a fire.
     unseen = not look(memory.senses, now, limits).fresh
     return replace(
         memory,
@@ -261,7 +216,7 @@ def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
 
 
 def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory:
-    """A fire stays until its policy lets it go; a rival until it has been silent long enough."""
+    """A fire stays as `fire_reset` says; a rival until it has been silent for RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
     manual = limits.fire_reset == "manual"
     rival_at = memory.rival_at
@@ -269,14 +224,14 @@ def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory
         memory,
         fire_latched=manual and (burning or memory.fire_latched),
         alarmed=memory.alarmed or burning,
-        rival_at=None if rival_at is None or now >= rival_at + RIVAL_GONE_S else rival_at,
+        rival_at=None if rival_at is None or now >= rival_at + RIVAL_QUIET_S else rival_at,
     )
 
 
 def _alarms(
     before: bool, memory: Memory, limits: LiftLimits
 ) -> tuple[tuple[Topic[Any], Message], ...]:
-    """One `true` on the rising edge; `false` only after an operator's reset; each once."""
+    """`true` once when a fire alarm comes; `false` once when an operator resets."""
     if memory.alarmed == before or limits.alarm == "none":
         return ()
     if limits.alarm == FIRE_ALARM_TRIGGER.name:
@@ -309,5 +264,5 @@ def _wake_at(
     if memory.grace:
         due += [drive.let_go_at(memory.grace, limits), memory.grace.until]
     if memory.rival_at is not None:
-        due.append(memory.rival_at + RIVAL_GONE_S)
-    return min((at for at in due if at > now), default=math.inf)
+        due.append(memory.rival_at + RIVAL_QUIET_S)
+    return min((at for at in due if at > now), default=NEVER)

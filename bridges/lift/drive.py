@@ -1,136 +1,33 @@
 """What the lift's outputs should be: from who holds the lift, what is seen, and what was asked.
 
 Rules:
-- Nothing is newly energised without a session, and nothing at all under an obstacle (`core.py`), for
-  a session in HUMAN mode, while RMF is silent with the robot outside, or while a fault waits for its
-  next try. After END, for the grace, AGV mode and the door's hold stay as far as they are on; the
-  hold ends `dead_time_s` before AGV mode.
-- AGV mode first; then the call to the destination; then, standing there, the door.
-- A call only in AGV mode, away from the destination, not while overloaded. A door command only while
-  standing at the destination's landing. Never both; and neither within `dead_time_s` of the last one.
-- A call is held until the car stands at its destination, or pulsed; it is given again when the car is
-  seen at another floor after it had arrived, and after every interruption; never for a floor code
-  that is just changing, which may say that the car is there.
-- What is waited for (AGV mode, the floor, the open door) has its time; when it is up the outputs go
-  off and a fault is shown; three more tries follow 10, 30 and 60 s later; then the fault latches.
-  So does AGV mode that ends while we ask for it. An overload only stops the clock.
-- Off is immediate. On waits for `min_off_s` and for the relay's cycles of the last minute.
+- Without a session no output is switched on. All are off under an obstacle (`core.py`), for a session
+  in HUMAN mode, while RMF is silent with the robot outside, and while a fault waits for its next try.
+  In the grace after END, AGV mode and the door's hold stay on if they were on; the hold ends
+  `dead_time_s` before AGV mode.
+- AGV mode comes first, then the call to the destination, then, once the car stands there, the door.
+- A call is given only in AGV mode, away from the destination, and without overload. A door command
+  is given only while the car stands at the destination's landing. The two are never on together, and
+  neither comes on within `dead_time_s` of the last one.
+- A call is held until the car stands at its destination, or pulsed. It is given again after every
+  interruption, and when the car had arrived and is seen at another floor. While the floor code is
+  just changing no new call is given: the car may be there.
+- AGV mode, the floor and the open door are each waited for with a timeout. After it the outputs go
+  off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches.
+  AGV mode that ends during the ride is such a fault too. An overload stops the waiting time.
+- Switching off is immediate. Switching on waits for `min_off_s` and for the relay's cycles of the
+  last minute (`Channel` in `memory.py`).
 """
 
-import math
-from typing import Generic, Literal, TypeVar
-
-import msgspec
 from msgspec.structs import replace
 
 from bridges.core.decision import Fault
-from bridges.lift.limits import LiftLimits
+from bridges.core.durations import NEVER
+from bridges.lift.memory import Grace, LiftLimits, Relays, Session, Waiting
 from bridges.lift.sensing import View
-from bridges.lift.signals import Hazard, LiftOutputs, Side
+from bridges.lift.signals import Hazard, LiftOutputs
 
-T = TypeVar("T")
-NEVER = float("inf")
 RETRY_AFTER_S = (10.0, 30.0, 60.0)
-Waiting = Literal["agv", "floor", "door"]
-
-
-class Session(msgspec.Struct, frozen=True):
-    """Who holds the lift, what they asked, and how far we are with it.
-
-    `boarded`: an open door at the destination has been published for this session: a robot may be
-    inside. `agv_seen`: AGV mode is on for our request. `arrived`: the car stood at the destination.
-    `call_at`: when the present call began. `waiting`, `since`: what we wait for. `tries`: how often
-    that has failed; `retry_at`: outputs stay off until then (inf: latched).
-    """
-
-    id: str
-    agv: bool
-    destination: str
-    asked_at: float
-    boarded: bool = False
-    agv_seen: bool = False
-    arrived: bool = False
-    call_at: float | None = None
-    waiting: Waiting | None = None
-    since: float = 0.0
-    tries: int = 0
-    retry_at: float | None = None
-    fault: Fault | None = None
-
-
-class Grace(msgspec.Struct, frozen=True):
-    """After END: whose return is awaited, with what may stay on meanwhile, until when."""
-
-    session: Session
-    until: float
-
-
-class Channel(msgspec.Struct, Generic[T], frozen=True):
-    """One output or one group of exclusive ones: what is on, since when off, recent switchings on."""
-
-    on: T | None = None
-    off_at: float = -NEVER
-    ons: tuple[float, ...] = ()
-
-    def step(
-        self, wanted: T | None, now: float, ready_at: float, limits: LiftLimits
-    ) -> "Channel[T]":
-        """The next state: off at once, on when wear and `ready_at` allow, changed by way of off."""
-        if self.on is not None:
-            return self if wanted == self.on else replace(self, on=None, off_at=now)
-        if wanted is None or now < self.may_switch_on_at(now, ready_at, limits):
-            return self
-        return Channel(wanted, self.off_at, (*self.recent(now), now))
-
-    def recent(self, now: float) -> tuple[float, ...]:
-        """When it was switched on during the last minute."""
-        return tuple(at for at in self.ons if now - at < 60.0)
-
-    def may_switch_on_at(self, now: float, ready_at: float, limits: LiftLimits) -> float:
-        """The earliest time at which it may be energised."""
-        recent = self.recent(now)
-        most = limits.t.max_cycles_per_min
-        rested_at = recent[-most] + 60.0 if len(recent) >= most else -NEVER
-        return max(self.off_at + limits.t.min_off_s, ready_at, rested_at)
-
-
-class Relays(msgspec.Struct, frozen=True):
-    """Every output with its history. A call and a door command exclude each other in time."""
-
-    agv: Channel[bool] = Channel()
-    call: Channel[str] = Channel()
-    hold: Channel[Side] = Channel()
-
-    def outputs(self) -> LiftOutputs:
-        """What the driver is to write."""
-        return LiftOutputs(bool(self.agv.on), self.call.on, self.hold.on)
-
-    def step(self, wanted: LiftOutputs, now: float, limits: LiftLimits) -> "Relays":
-        """Move every output towards what is wanted, as far as is allowed now."""
-        agv = self.agv.step(wanted.agv_request or None, now, -NEVER, limits)
-        rested_at = self._rested_at(limits) if agv.on else NEVER
-        call_ready_at = NEVER if self.hold.on else rested_at
-        call = self.call.step(wanted.call, now, call_ready_at, limits)
-        hold_ready_at = NEVER if self.call.on or call.on else rested_at
-        hold = self.hold.step(wanted.hold_door, now, hold_ready_at, limits)
-        return Relays(agv, call, hold)
-
-    def changes_at(self, wanted: LiftOutputs, now: float, limits: LiftLimits) -> float:
-        """When an output that is wanted and still off may come on; always later than `now`."""
-        agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, -NEVER, limits)
-        ready_at = max(agv_at, self._rested_at(limits))
-        due = []
-        if wanted.agv_request and not self.agv.on:
-            due.append(agv_at)
-        if wanted.call and not self.call.on:
-            due.append(self.call.may_switch_on_at(now, ready_at, limits))
-        if wanted.hold_door and not self.hold.on:
-            due.append(self.hold.may_switch_on_at(now, ready_at, limits))
-        return max(min(due, default=NEVER), math.nextafter(now, NEVER))
-
-    def _rested_at(self, limits: LiftLimits) -> float:
-        """When neither call nor door command has been on for `dead_time_s`."""
-        return max(self.call.off_at, self.hold.off_at) + limits.t.dead_time_s
 
 
 def at_destination(session: Session, view: View, limits: LiftLimits) -> bool:
@@ -155,16 +52,16 @@ def serves(session: Session, allowed: bool, now: float, limits: LiftLimits) -> b
 
 
 def paused(session: Session) -> Session:
-    """Outputs are off for another reason than a failure of the lift's: later it starts afresh."""
+    """The session while its outputs are off, but not by a timeout; later its ride starts anew."""
     return replace(session, agv_seen=False, arrived=False, call_at=None, waiting=None)
 
 
 def advance(
     session: Session, view: View, requested: bool, now: float, limits: LiftLimits
 ) -> Session:
-    """Bring the progress of a session that is served up to what is seen: arrivals, waits, retries.
+    """The session's progress after what is seen: arrivals, waits and retries.
 
-    `requested`: AGV mode has been asked of the lift until now.
+    `requested`: our AGV request was on until now.
     """
     if session.retry_at is not None:
         if now < session.retry_at:
@@ -202,8 +99,10 @@ def wanted(session: Session, view: View, now: float, limits: LiftLimits) -> Lift
     return LiftOutputs(agv_request=True, call=stop.level)
 
 
-def kept(grace: Grace, relays: Relays, view: View, now: float, limits: LiftLimits) -> LiftOutputs:
-    """After END: what stays on."""
+def stays_on(
+    grace: Grace, relays: Relays, view: View, now: float, limits: LiftLimits
+) -> LiftOutputs:
+    """The outputs in the grace after END."""
     standing = agv_ok(view) and at_destination(grace.session, view, limits)
     hold = relays.hold.on if standing and now < let_go_at(grace, limits) else None
     return LiftOutputs(agv_request=bool(relays.agv.on), hold_door=hold)
@@ -226,7 +125,7 @@ def next_at(session: Session, limits: LiftLimits) -> tuple[float, ...]:
 
 
 def _arrive(session: Session, view: View, limits: LiftLimits) -> Session:
-    """Standing at the destination ends the call; seen at another floor, the car is called anew."""
+    """Standing at the destination ends the call. A car that then is seen elsewhere is called again."""
     if at_destination(session, view, limits):
         return replace(session, arrived=True)
     elsewhere = view.level not in (None, limits.stops[session.destination].level)
@@ -258,7 +157,7 @@ def _timeout_fault(session: Session, waiting: Waiting, limits: LiftLimits) -> Fa
 
 
 def _trip(session: Session, fault: Fault, now: float) -> Session:
-    """Outputs off for a while; for good after the third retry."""
+    """Outputs off until the next try; after the third retry the fault latches."""
     latched = session.tries >= len(RETRY_AFTER_S)
     retry_at = NEVER if latched else now + RETRY_AFTER_S[session.tries]
     return replace(paused(session), tries=session.tries + 1, retry_at=retry_at, fault=fault)

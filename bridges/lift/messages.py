@@ -1,18 +1,19 @@
 """LiftRequest in, LiftState out: is it well formed, and can it be asked of this lift?"""
 
 from collections.abc import Mapping
-from typing import Any
 
 from bridges.core.decision import RequestRefused
-from bridges.lift.core import Asked, Ended
+from bridges.core.names import check_length
 from bridges.lift.report import LiftReport
 from bridges.lift.settings import LiftSettings
+from bridges.lift.signals import Ended, Requested
 from bridges.rmf.definitions import (
     LiftMode,
     LiftRequest,
     LiftRequestDoor,
     LiftRequestType,
     LiftState,
+    Message,
     Time,
 )
 from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
@@ -20,7 +21,7 @@ from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
 AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
 
 
-def accept(request: LiftRequest, settings: LiftSettings) -> Asked | Ended:
+def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
     """The event that a request is. Raises RequestRefused for what cannot be asked.
 
     An END_SESSION is taken whatever its floor and door say: fleet adapters send "" and 0
@@ -28,6 +29,7 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Asked | Ended:
     """
     if not request.session_id:
         raise RequestRefused("empty session_id", "a session needs a name")
+    check_length(session_id=request.session_id)
     if request.request_type == LiftRequestType.REQUEST_END_SESSION:
         return Ended(request.session_id)
     agv = request.request_type == LiftRequestType.REQUEST_AGV_MODE
@@ -40,10 +42,10 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Asked | Ended:
         raise RequestRefused(
             "floor not served", f"{request.destination_floor!r} is none of {', '.join(floors)}"
         )
-    return Asked(request.session_id, agv, request.destination_floor)
+    return Requested(request.session_id, agv, request.destination_floor)
 
 
-def alarm_topics(settings: LiftSettings) -> tuple[Topic[Any], ...]:
+def alarm_topics(settings: LiftSettings) -> tuple[Topic[Message], ...]:
     """Where this lift tells the fleets of a fire, if it does."""
     return tuple(t for t in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL) if t.name == settings.alarm)
 
@@ -53,30 +55,30 @@ def device_name(message: LiftRequest | LiftState) -> str:
     return message.lift_name
 
 
-def state_message(name: str, settings: LiftSettings, shown: LiftReport, stamp: Time) -> LiftState:
+def state_message(name: str, settings: LiftSettings, report: LiftReport, stamp: Time) -> LiftState:
     """The report as RMF reads it; `stamp` is when the inputs were read."""
     return LiftState(
         lift_time=stamp,
         lift_name=name,
         available_floors=tuple(settings.stops()),
-        current_floor=shown.floor,
-        destination_floor=shown.destination,
-        door_state=int(shown.door),
-        motion_state=int(shown.motion),
+        current_floor=report.floor,
+        destination_floor=report.destination,
+        door_state=int(report.door),
+        motion_state=int(report.motion),
         available_modes=AVAILABLE_MODES,
-        current_mode=int(shown.mode),
-        session_id=shown.session,
+        current_mode=int(report.mode),
+        session_id=report.session,
     )
 
 
-def summary(shown: LiftReport) -> Mapping[str, str]:
+def summary(report: LiftReport) -> Mapping[str, str]:
     """What a person wants to read of it, in a line."""
-    door = shown.door.name.removeprefix("DOOR_").lower()
+    door = report.door.name.removeprefix("DOOR_").lower()
     return {
-        "mode": shown.mode.name.removeprefix("MODE_"),
-        "floor": shown.floor or "?",
-        "door": f"{door} (estimated)" if shown.estimated else door,
-        "motion": shown.motion.name.removeprefix("MOTION_").lower(),
-        "session": shown.session or "-",
-        "destination": shown.destination or "-",
+        "mode": report.mode.name.removeprefix("MODE_"),
+        "floor": report.floor or "?",
+        "door": f"{door} (estimated)" if report.estimated else door,
+        "motion": report.motion.name.removeprefix("MOTION_").lower(),
+        "session": report.session or "-",
+        "destination": report.destination or "-",
     }

@@ -5,14 +5,13 @@ from typing import Any
 import msgspec
 
 from bridges.core.decision import Fault
-from bridges.lift.drive import Session
-from bridges.lift.limits import LiftLimits
+from bridges.lift.memory import LiftLimits, Memory, Relays, Session
 from bridges.lift.sensing import View
-from bridges.lift.signals import Hazard, Motion
+from bridges.lift.signals import Hazard, LiftOutputs, Motion
 from bridges.rmf.definitions import LiftDoor, LiftMode, LiftMotion
 
 OFFLINE = frozenset({"INPUTS_NOT_FRESH", "OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})
-"""Faults with which we can no longer speak for the lift."""
+"""With one of these faults the lift is shown OFFLINE."""
 
 
 class LiftReport(msgspec.Struct, frozen=True):
@@ -43,26 +42,22 @@ class LiftReport(msgspec.Struct, frozen=True):
 
 
 def report(
-    session: Session | None,
+    memory: Memory,
     view: View,
-    read_at: float | None,
+    wanted: LiftOutputs,
     faults: tuple[Fault, ...],
-    agv_requested: bool,
-    hold_awaited: bool,
     limits: LiftLimits,
 ) -> LiftReport:
-    """The state as it is shown now. `agv_requested` stands in where no AGV status is wired.
-
-    `hold_awaited`: the door is to be held, and the relay for it still rests. It may stand open for
-    its own dwell time, and would then close on the robot that was told that it is open.
-    """
+    """The state as it is shown now. `wanted`: the outputs if no relay needed a rest."""
+    session, relays = memory.session, memory.relays
     destination = session.destination if session else ""
     floor = limits.floor_name(view.level, destination) if view.fresh and view.level else ""
-    mode = _mode(view, faults, agv_requested)
-    sound = mode is LiftMode.MODE_AGV and not faults
-    door, estimated = _door(session, view, floor, sound, hold_awaited, limits)
+    mode = _mode(view, faults, relays)
+    door, estimated = _door(session, view, floor, limits)
+    if door is LiftDoor.DOOR_OPEN and not _may_enter(session, mode, wanted, relays, faults):
+        door, estimated = LiftDoor.DOOR_MOVING, False
     return LiftReport(
-        read_at=read_at,
+        read_at=memory.senses.read_at,
         floor=floor,
         destination=destination,
         door=door,
@@ -74,7 +69,28 @@ def report(
     )
 
 
-def _mode(view: View, faults: tuple[Fault, ...], agv_requested: bool) -> LiftMode:
+def _may_enter(
+    session: Session | None,
+    mode: LiftMode,
+    wanted: LiftOutputs,
+    relays: Relays,
+    faults: tuple[Fault, ...],
+) -> bool:
+    """Is an open door shown as open? A robot that sees it drives through.
+
+    Not while the door is to be held and its relay still rests: it may stand open for its own dwell
+    time, and would then close on the robot. And for a session that has not boarded, only in AGV mode
+    with nothing wrong.
+    """
+    if wanted.hold_door is not None and relays.hold.on is None:
+        return False
+    if session is None or session.boarded:
+        return True
+    return mode is LiftMode.MODE_AGV and not faults
+
+
+def _mode(view: View, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:
+    """Where no AGV mode status is wired, our own request stands in for it."""
     codes = {fault.code for fault in faults}
     if codes & {"FIRE", "FIRE_LATCHED"}:
         return LiftMode.MODE_FIRE
@@ -84,34 +100,30 @@ def _mode(view: View, faults: tuple[Fault, ...], agv_requested: bool) -> LiftMod
         return LiftMode.MODE_EMERGENCY
     if view.hazards & {Hazard.OUT_OF_SERVICE, Hazard.MANUAL}:
         return LiftMode.MODE_OFFLINE
-    agv = agv_requested if view.agv is None else view.agv
+    agv = relays.agv.on if view.agv is None else view.agv
     return LiftMode.MODE_AGV if agv else LiftMode.MODE_HUMAN
 
 
 def _door(
-    session: Session | None,
-    view: View,
-    floor: str,
-    sound: bool,
-    hold_awaited: bool,
-    limits: LiftLimits,
+    session: Session | None, view: View, floor: str, limits: LiftLimits
 ) -> tuple[LiftDoor, bool]:
-    """The door to show, and whether it rests on an estimate."""
+    """The door as it is seen, and whether that rests on an estimate.
+
+    With a session at a known floor only the door that serves that floor counts.
+    """
     if not view.fresh:
         return LiftDoor.DOOR_MOVING, False
     seen = [side for side in (view.front, view.rear) if side]
     if session and floor:
         seen = [view.door(limits.side(floor))]
     opened = [side for side in seen if side.open]
-    if not opened:
-        closed = all(side.closed for side in seen)
-        estimated = closed and any(side.estimated for side in seen)
-        return (LiftDoor.DOOR_CLOSED if closed else LiftDoor.DOOR_MOVING), estimated
-    boarding = session is not None and not session.boarded
-    ready = not hold_awaited and (not boarding or sound)
-    if view.stopped and floor and ready:
-        return LiftDoor.DOOR_OPEN, all(side.estimated for side in opened)
-    return LiftDoor.DOOR_MOVING, False
+    if opened:
+        proven = view.stopped and floor
+        door = LiftDoor.DOOR_OPEN if proven else LiftDoor.DOOR_MOVING
+        return door, bool(proven) and all(side.estimated for side in opened)
+    closed = all(side.closed for side in seen)
+    estimated = closed and any(side.estimated for side in seen)
+    return (LiftDoor.DOOR_CLOSED if closed else LiftDoor.DOOR_MOVING), estimated
 
 
 def _motion(view: View, door: LiftDoor) -> LiftMotion:

@@ -1,17 +1,20 @@
 """What to believe of a lift's inputs: debounce, age, and whether they can be true together.
 
 Rules:
-- A change counts when it has lasted for its signal's debounce. A hazard that ends must be away for
-  `hazard_clear_s`. Nothing is believed before every input has settled once, nor while one has not
-  kept still for `RESTLESS_S`.
-- A reading older than `stale_after_s` is no reading, and what was believed before it is forgotten:
-  the lift may be anywhere. A shorter gap changes nothing, but what was half seen is seen anew.
-- A floor is a position only if the car can have come there: a code that cannot be, or that skips
-  floors faster than a car travels (or, with motion lines, changes while the car is seen standing) is
-  none, until the code shows the last good floor or another that can be true, or an operator resets.
+- A change counts when it has lasted for its signal's debounce. The end of a hazard counts when it has
+  lasted for `hazard_clear_s`. No input is believed before every input has settled once, nor while
+  one of them keeps changing for longer than `RESTLESS_S`.
+- After `stale_after_s` without a reading, what was believed is forgotten: the lift may be anywhere.
+  A shorter gap changes nothing, but the debounce of a change that had begun starts again.
+- A floor code is believed only if the car can have come to that floor. It cannot if the code skips
+  floors faster than a car travels, or (with motion lines) changes while the car stands. Then the
+  position is unknown until the code shows the last good floor or another one that can be true, or
+  until an operator resets.
+- While the floor code means nothing (`valid_when`, for longer than its debounce) the car may go
+  anywhere unseen. The next floor that it shows is believed.
 - A door is open when the contact that proves it says so. With one contact the other end is estimated
   by the door's travel time, and marked.
-- A car is stopped when the motion lines say so; without such lines, nothing contradicts it.
+- A car stands when the motion lines say so; without motion lines it is taken to stand.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,41 +25,17 @@ from msgspec.structs import replace
 
 from bridges.core.debounce import Settled, forget, settle
 from bridges.core.decision import Fault
-from bridges.lift.limits import LiftLimits
+from bridges.core.durations import AGES_AGO, NEVER
+from bridges.lift.memory import LiftLimits, Position, Senses
 from bridges.lift.signals import Door, Hazard, LiftSample, Motion, Side
 
-NEVER = float("inf")
 HAZARDS = tuple(Hazard)
 
 MOTION_MEMORY_S = 2.0
-"""How long after the car was last seen moving a new floor is still its doing."""
+"""For so long after the car was last seen moving, a new floor code can be true."""
 
 RESTLESS_S = 2.0
-"""An input that does not keep still for its debounce within this time is broken or torn about."""
-
-
-class Position(msgspec.Struct, frozen=True):
-    """`trusted`: the last floor that can be true, seen last at `seen_at`; `suspect`: one that can't.
-
-    `moved_at`: when the car was last not seen standing.
-    """
-
-    trusted: str | None = None
-    seen_at: float = 0.0
-    suspect: str | None = None
-    moved_at: float | None = None
-
-
-class Senses(msgspec.Struct, frozen=True):
-    """Every input with its debounce, since when it has been so, and when all were last read."""
-
-    read_at: float | None = None
-    code: Settled[tuple[str | None, str]] | None = None
-    doors: tuple[Settled[Door | None] | None, Settled[Door | None] | None] = (None, None)
-    motion: Settled[Motion | None] | None = None
-    agv: Settled[bool | None] | None = None
-    hazards: dict[Hazard, Settled[bool]] = {}
-    position: Position = Position()
+"""An input that does not settle within this time keeps changing: a loose wire, or interference."""
 
 
 class DoorSeen(msgspec.Struct, frozen=True):
@@ -71,9 +50,9 @@ class DoorSeen(msgspec.Struct, frozen=True):
 class View(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
-    `blind`: why nothing can be believed, "" when all is fresh. `level`: the landing, None when
-    unknown; `level_settles`: another one is being shown. `agv`: None where not wired. `changes_at`:
-    when this may differ if nothing is read (s).
+    `blind`: why no input can be believed, "" when all are fresh. `level`: the landing, None when
+    unknown; `level_settles`: the code is just changing. `agv`: None where not wired. `changes_at`:
+    when the view may change without a new reading (s).
     """
 
     blind: str
@@ -119,12 +98,12 @@ def take(senses: Senses, sample: LiftSample, now: float, limits: LiftLimits) -> 
             h: _settle_hazard(senses.hazards.get(h), h, h in sample.hazards, now, limits)
             for h in HAZARDS
         },
-        position=_locate(senses.position, code, sample.motion, now, limits),
+        position=_locate(senses.position, code, sample, now, limits),
     )
 
 
 def gap(senses: Senses, now: float) -> Senses:
-    """A reading has failed: what was half seen must be seen again, and the car may have moved."""
+    """A reading has failed: debounce starts again, and the car may have moved."""
     return Senses(
         senses.read_at,
         forget(senses.code),
@@ -173,8 +152,8 @@ def look(senses: Senses, now: float, limits: LiftLimits) -> View:
 
 
 def stale_at(senses: Senses, limits: LiftLimits) -> float:
-    """When the last reading is too old to be a fact; it is when there is none."""
-    return -NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
+    """When the last reading becomes stale (s); -inf before the first."""
+    return AGES_AGO if senses.read_at is None else senses.read_at + limits.t.stale_after_s
 
 
 def _settle_hazard(
@@ -186,7 +165,7 @@ def _settle_hazard(
 def _hazard_hold_s(
     before: Settled[bool] | None, hazard: Hazard, seen: bool, limits: LiftLimits
 ) -> float:
-    """How long it must last: a hazard goes more slowly than it comes."""
+    """How long the reading must last: the end of a hazard longer than its beginning."""
     hold_s = limits.debounce_s(hazard)
     clearing = before is not None and bool(before.value) and not seen
     return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
@@ -195,14 +174,16 @@ def _hazard_hold_s(
 def _locate(
     before: Position,
     code: Settled[tuple[str | None, str]],
-    motion: Motion | None,
+    sample: LiftSample,
     now: float,
     limits: LiftLimits,
 ) -> Position:
-    """Follow the car from floor to floor, and stop believing where it cannot have gone."""
-    if motion is not Motion.STOPPED:
+    """Follow the car from floor to floor; a floor where it cannot have gone is only suspected."""
+    if sample.motion is not Motion.STOPPED:
         before = replace(before, moved_at=now)
     level = code.value[0] if code.value else None
+    if level is None and not sample.floor_valid:
+        return Position(moved_at=before.moved_at)
     if level is None or level == before.suspect:
         return before
     if level == before.trusted or _can_have_come(before, level, now, limits):
@@ -216,12 +197,12 @@ def _can_have_come(before: Position, level: str, now: float, limits: LiftLimits)
     memory_s = MOTION_MEMORY_S + limits.debounce_s("floor")
     if before.moved_at is None or now - before.moved_at > memory_s:
         return False
-    skipped = abs(limits.index(level) - limits.index(before.trusted)) - 1
+    skipped = limits.floors_between(level, before.trusted)
     return now - before.seen_at >= skipped * limits.t.floor_travel_min_s
 
 
 def _stands(motion: Settled[Motion | None] | None) -> bool:
-    """Where the lines mean nothing (yet), the first sight of a movement counts."""
+    """Does the car stand? Before the motion lines have settled, a first reading of movement counts."""
     if motion is None:
         return False
     return (motion.candidate if motion.value is None else motion.value) in (None, Motion.STOPPED)
@@ -244,7 +225,10 @@ def _door(seen: Settled[Door | None] | None, now: float, limits: LiftLimits) -> 
 
 
 class Unsettled(msgspec.Struct, frozen=True):
-    """An input that is just changing, or has never settled. Both times are s, -inf for long ago."""
+    """An input that is changing or has never settled.
+
+    `due_at`: when it settles if it does not change again. `torn_at`: when it counts as restless. In s.
+    """
 
     name: str
     due_at: float
@@ -272,7 +256,7 @@ def _unsettled(senses: Senses, limits: LiftLimits) -> Iterator[Unsettled]:
 
 def _wait(name: str, seen: Settled[Any] | None, hold_s: float, most_s: float) -> Unsettled:
     if seen is None or seen.steady_at is None or seen.torn_since is None:
-        return Unsettled(name, seen.due_at(hold_s) if seen else -NEVER, -NEVER)
+        return Unsettled(name, seen.due_at(hold_s) if seen else AGES_AGO, AGES_AGO)
     return Unsettled(name, seen.due_at(hold_s), seen.torn_since + most_s + RESTLESS_S)
 
 

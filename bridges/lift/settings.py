@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from bridges.core.fields import DeviceSettings, Name, Period, Seconds
+from bridges.core.fields import DeviceSettings, Name, Period, Seconds, Timeout
 from bridges.core.kind import Place
 from bridges.lift.signals import Side, Stop
 from bridges.settings.building_map import FLOOR
@@ -23,7 +23,7 @@ class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     side: Side = Side.FRONT
 
 
-class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations and counts of a lift.
 
     `stale_after_s`: without a good reading, or without a good write, for this long the lift is
@@ -43,10 +43,10 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     stale_after_s: Period = 1.0
     release_grace_s: Seconds = 3.0
-    agv_timeout_s: Seconds = 600.0
-    floor_timeout_s: Seconds = 120.0
-    door_timeout_s: Seconds = 10.0
-    request_timeout_s: Seconds = 30.0
+    agv_timeout_s: Timeout = 600.0
+    floor_timeout_s: Timeout = 120.0
+    door_timeout_s: Timeout = 10.0
+    request_timeout_s: Timeout = 30.0
     hazard_clear_s: Seconds = 1.0
     door_travel_s: Seconds = 5.0
     floor_travel_min_s: Seconds = 0.5
@@ -68,9 +68,13 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     """
 
     floors: list[Name] | dict[Name, Floor]
-    limits: Limits = Limits()
+    limits: Durations = Durations()
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
+
+    def stale_after(self) -> float:
+        """As its limits say."""
+        return self.limits.stale_after_s
 
     def on_map(self) -> list[Place]:
         """RMF's map has these floors too."""

@@ -1,8 +1,10 @@
-"""What a lift's driver tells its core, and what the core tells its driver: one scan's image."""
+"""What a lift's driver and its core say to each other in one scan, and the core's events."""
 
 from enum import Enum, StrEnum
 
 import msgspec
+
+from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 
 class Door(Enum):
@@ -46,7 +48,8 @@ class LiftSample(msgspec.Struct, frozen=True):
     """Every input of one lift, decoded but not debounced.
 
     `level`: the landing that the floor code names, None for no code (between floors).
-    `code_fault`: "" or why the code cannot be (illegal, two of one-hot, parity).
+    `code_fault`: "" or why the code cannot be (illegal, two of one-hot, parity). `floor_valid`: the
+    code means something now; while it does not, the car may go anywhere unseen.
     `motion`, `agv`, `rear_door`: None where not wired; `agv` None also while its line means nothing.
     """
 
@@ -57,6 +60,7 @@ class LiftSample(msgspec.Struct, frozen=True):
     motion: Motion | None = None
     agv: bool | None = None
     hazards: frozenset[Hazard] = frozenset()
+    floor_valid: bool = True
 
 
 class Side(Enum):
@@ -82,3 +86,20 @@ class LiftOutputs(msgspec.Struct, frozen=True):
     agv_request: bool = False
     call: str | None = None
     hold_door: Side | None = None
+
+
+class Requested(msgspec.Struct, frozen=True):
+    """A LiftRequest for AGV or HUMAN mode that is ours, well formed and for a floor we serve."""
+
+    session_id: str
+    agv: bool
+    destination: str
+
+
+class Ended(msgspec.Struct, frozen=True):
+    """A LiftRequest for END_SESSION, whatever its other fields say."""
+
+    session_id: str
+
+
+Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Requested | Ended

@@ -2,21 +2,22 @@
 
 It stands in for RMF's own (rmf_ros2, lift_supervisor/Node.cpp): fleet adapters ask on
 `adapter_lift_requests`, one session at a time is passed on to the lift's node on `lift_requests`,
-until the lift's states show that it has been obeyed. Rules:
-1. Who wants the lift is served in the order of first requests. Who ENDs, or is silent for
-   `silent_after_s`, leaves the queue. A silence of the lift itself is nobody's: adapters only repeat
-   themselves at its states.
-2. The lift's states say who has it. A session that they show goes before every queue if its robot
-   asks for it, and is ended if nobody has asked for `orphan_after_s`.
-3. One session at a time has its turn. Its request is sent when it is new or changed; again when the
-   state does not show what was asked, or when the adapter has repeated it (the node takes our silence
-   for RMF's); never while the lift shows another session.
-4. A turn ends by END: the holder's own, wherever the lift is and in whatever mode; or ours, for a
-   holder that the lift never accepted and that has gone silent, and after `holder_ttl_s` where the
-   site wants that. END is repeated until a state that has come after it shows another session, or
-   none. Only then is the next one served.
-5. While the lift is in fire, emergency or offline mode nobody is sent to it and no queue moves; END,
-   and HUMAN mode, which asks for nothing, are passed on.
+until the lift's states show that it has been obeyed. `bridges/core/freshness.py` says which requests
+count. Rules:
+1. Sessions are served in the order of their first requests. A session leaves the queue by END, or when
+   it has been silent for `silent_after_s`. While the lift itself is silent this time stands still:
+   adapters repeat their requests only when its states come.
+2. The lift's states say which session has it. That session goes before the queue if its robot asks
+   for it. If nobody has asked for it for `orphan_after_s`, it is ended.
+3. One session at a time has its turn. Its request is sent when it is new or changed. It is sent again
+   when the state does not show what was asked, and when the adapter has repeated it (the node takes
+   our silence for RMF's). It is never sent while the lift shows another session.
+4. A turn ends by END. Either the holder sends it, wherever the lift is and in whatever mode. Or we do:
+   for a holder that is silent and was never accepted by the lift, and after `holder_ttl_s` where the
+   site wants that. END is repeated until a later state shows another session, or none. Only then is
+   the next session served.
+5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the queue stands
+   still. END is passed on, and so is HUMAN mode, which asks for nothing.
 6. Until it may speak, and beside another supervisor, it only listens. It then starts from what the
    states show and who has asked, so a restart ends no ride.
 7. Nothing is sent twice within GAP_S, and nothing again, unchanged, within REPEAT_S.
@@ -28,29 +29,16 @@ from typing import Final
 from msgspec.structs import replace
 
 from bridges.core.decision import Decision
+from bridges.core.durations import FORGOTTEN_S, NEVER, SILENT_S, due_at
+from bridges.core.freshness import hear
 from bridges.core.graph_kind import MaySpeak
-from bridges.lift_supervisor.freshness import FUTURE_S, Rules, Voice
-from bridges.lift_supervisor.memory import (
-    FLOWING_S,
-    NEVER,
-    Asked,
-    Claim,
-    Ended,
-    Event,
-    Limits,
-    Memory,
-    Shown,
-    Turn,
-)
+from bridges.lift_supervisor.memory import Claim, Limits, Memory, Turn
 from bridges.lift_supervisor.report import SupervisorReport, alarms, report
+from bridges.lift_supervisor.signals import Ended, Event, Requested, StateHeard
 from bridges.rmf.definitions import LiftRequest, LiftRequestType
 from bridges.rmf.topics import LIFT_REQUESTS
 
-GAP_S: Final = 0.1
-REPEAT_S: Final = 1.0
-FORGOTTEN_S: Final = 60.0
 MAX_CLAIMS: Final = 100
-MAX_VOICES: Final = 200
 
 END: Final = LiftRequestType.REQUEST_END_SESSION
 AGV: Final = LiftRequestType.REQUEST_AGV_MODE
@@ -64,8 +52,12 @@ def initial(lift: str, started_at: float) -> Memory:
 
 
 def idle(memory: Memory, now: float) -> bool:
-    """A lift that has never been heard, and that nobody has asked for in a while."""
-    return memory.shown is None and not memory.claims and now >= memory.heard_at + FORGOTTEN_S
+    """Nobody wants this lift, and nothing has been heard of it in a while.
+
+    A session that is still to be ended is found again in the lift's states, if they come back.
+    """
+    heard_at = max(memory.heard_at, memory.shown_at)
+    return not memory.claims and now >= heard_at + FORGOTTEN_S
 
 
 def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
@@ -76,7 +68,7 @@ def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
     message = wanted(memory)
     due = now >= _due_at(memory, message)
     if due:
-        memory = replace(memory, sent=message, sent_at=now, prompted=False)
+        memory = replace(memory, sent=message, last_sent=message, sent_at=now, prompted=False)
     may_come = tuple(alarms(memory, now, limits))
     return Decision(
         memory,
@@ -93,14 +85,14 @@ def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
 
 def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Memory, str]:
     match event:
-        case Asked() | Ended():
-            memory, counts = _listen(memory, event, now, limits)
-            if not counts:
-                return memory, "stale request"
+        case Requested() | Ended():
+            memory, refused = _listen(memory, event, now, limits)
+            if refused:
+                return memory, refused
             if isinstance(event, Ended):
                 return _end(memory, event.session, now), ""
             return _ask(memory, event, now)
-        case Shown():
+        case StateHeard():
             return _see(memory, event, now), ""
         case MaySpeak(yes):
             return _speak(memory, yes), ""
@@ -109,43 +101,39 @@ def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Mem
 
 
 def _listen(
-    memory: Memory, event: Asked | Ended, now: float, limits: Limits
-) -> tuple[Memory, bool]:
-    """Does it count? Voices are kept in the order in which they were last heard."""
-    voices = {k: v for k, v in memory.voices.items() if k != event.session}
-    if len(voices) == MAX_VOICES:
-        del voices[next(iter(voices))]
-    known = memory.voices.get(event.session, Voice())
-    voices[event.session], counts = known.heard(
-        event.stamp, event.age_s, now, _rules(memory, now, limits), ends=isinstance(event, Ended)
+    memory: Memory, event: Requested | Ended, now: float, limits: Limits
+) -> tuple[Memory, str]:
+    """Does it count?"""
+    requesters, refused = hear(
+        memory.requesters,
+        event.session,
+        event.stamp,
+        now,
+        memory.rules(now, limits),
+        age_s=event.age_s,
+        ends=isinstance(event, Ended),
+        holders={claim.session for claim in memory.claims},
     )
-    return replace(memory, heard_at=now, voices=voices), counts
+    return replace(memory, heard_at=now, requesters=requesters), refused
 
 
-def _rules(memory: Memory, now: float, limits: Limits) -> Rules:
-    if limits.clock_synchronised:
-        return Rules(limits.max_request_age_s, known_clocks=False)
-    future_s = NEVER if memory.may_speak else FUTURE_S
-    return Rules(now - memory.started_at, future_s=future_s)
-
-
-def _ask(memory: Memory, asked: Asked, now: float) -> tuple[Memory, str]:
+def _ask(memory: Memory, request: Requested, now: float) -> tuple[Memory, str]:
     """Join the queue, or say the same or something else from one's place in it."""
-    before = memory.claim(asked.session)
+    before = memory.claim(request.session)
     served = memory.shown.floors if memory.shown else ()
-    if served and asked.wish.request_type == AGV and asked.wish.floor not in served:
+    if served and request.target.request_type == AGV and request.target.floor not in served:
         return _still_there(memory, before, now), "floor not served"
     if before is None and len(memory.claims) == MAX_CLAIMS:
         return memory, "queue full"
     since = before.since if before else now
-    claim = Claim(asked.session, asked.wish, since, now)
+    claim = Claim(request.session, request.target, since, now)
     turn = memory.turn
-    holds = turn is not None and turn.session == asked.session and not turn.ends
+    holds = turn is not None and turn.session == request.session and not turn.ends
     return replace(_with(memory, before, claim), prompted=memory.prompted or holds), ""
 
 
 def _still_there(memory: Memory, before: Claim | None, now: float) -> Memory:
-    """A request that cannot be obeyed is a sign of life all the same."""
+    """A request that cannot be obeyed still shows that its requester is there."""
     return memory if before is None else _with(memory, before, replace(before, heard_at=now))
 
 
@@ -169,9 +157,9 @@ def _without(memory: Memory, session: str) -> Memory:
     return replace(memory, claims=tuple(c for c in memory.claims if c.session != session))
 
 
-def _see(memory: Memory, shown: Shown, now: float) -> Memory:
+def _see(memory: Memory, shown: StateHeard, now: float) -> Memory:
     """A state: it may confirm an END, ask for a repeat, or show somebody else's session."""
-    flowed = now <= memory.shown_at + FLOWING_S
+    flowed = now <= memory.shown_at + SILENT_S
     same = flowed and shown.session == memory.session_shown
     turn, prompted = memory.turn, memory.prompted
     if turn and turn.ends:
@@ -181,7 +169,7 @@ def _see(memory: Memory, shown: Shown, now: float) -> Memory:
         claim = memory.claim(turn.session)
         assert claim is not None
         turn = replace(turn, seen=turn.seen or shown.session == turn.session)
-        prompted = prompted or not shown.satisfies(turn.session, claim.wish)
+        prompted = prompted or not shown.satisfies(turn.session, claim.target)
     return replace(
         memory,
         turn=turn,
@@ -194,7 +182,7 @@ def _see(memory: Memory, shown: Shown, now: float) -> Memory:
 
 
 def _speak(memory: Memory, yes: bool) -> Memory:
-    """Whoever has had the turn, the states will show it when we speak again."""
+    """While we may not speak nobody has a turn; later the lift's states show who has the lift."""
     return replace(memory, may_speak=yes, turn=memory.turn if yes else None)
 
 
@@ -202,7 +190,7 @@ def _speak(memory: Memory, yes: bool) -> Memory:
 
 
 def _forget_silent(memory: Memory, now: float, limits: Limits) -> Memory:
-    """Age-out of those who wait; the holder leaves by END alone."""
+    """Drop the claims of sessions that wait and are silent; a holder leaves by END only."""
     holder = memory.turn.session if memory.turn and not memory.turn.ends else ""
     staying = tuple(
         claim
@@ -230,7 +218,7 @@ def _take_turns(memory: Memory, now: float, limits: Limits) -> Memory:
 
 
 def _obey_the_lift(memory: Memory, shown: str, now: float, limits: Limits) -> Memory:
-    """It has taken a session whose turn it is not: after a restart, or a request past us."""
+    """The lift shows a session that has no turn: after our restart, or by a request not from us."""
     if memory.claim(shown):
         return _begin(memory, Turn(shown, now, seen=True))
     if memory.shown_at >= memory.session_since + limits.orphan_after_s:
@@ -239,7 +227,7 @@ def _obey_the_lift(memory: Memory, shown: str, now: float, limits: Limits) -> Me
 
 
 def _let_go(memory: Memory, turn: Turn, now: float, limits: Limits) -> Memory:
-    """A holder that is heard no more: at once if the lift never took it, else as the site wants."""
+    """End the turn of a silent holder: soon if the lift never took it, else after `holder_ttl_s`."""
     claim = memory.claim(turn.session)
     assert claim is not None
     after_s = limits.holder_ttl_s if turn.seen else limits.silent_after_s
@@ -261,33 +249,32 @@ def wanted(memory: Memory) -> LiftRequest | None:
         return LiftRequest(memory.lift, session_id=turn.session, destination_floor=floor)
     claim = memory.claim(turn.session)
     assert claim is not None
-    wish = claim.wish
+    target = claim.target
     somebody_elses = memory.session_shown not in ("", turn.session)
-    if somebody_elses or (wish.request_type == AGV and memory.nobody_is_sent):
+    if somebody_elses or (target.request_type == AGV and memory.nobody_is_sent):
         return None
     return LiftRequest(
         lift_name=memory.lift,
         session_id=turn.session,
-        request_type=wish.request_type,
-        destination_floor=wish.floor,
-        door_state=wish.door,
+        request_type=target.request_type,
+        destination_floor=target.floor,
+        door_state=target.door,
     )
 
 
 def _due_at(memory: Memory, message: LiftRequest | None) -> float:
-    """When to send it: at once if it is new, later if it is only worth repeating."""
-    sent = memory.sent
+    """When to send it. A repeated END may name another floor: that does not make it new."""
     if message is None:
         return NEVER
-    if sent is None or (message != sent and message.request_type != END):
-        return memory.sent_at + GAP_S
-    return memory.sent_at + REPEAT_S if memory.prompted else NEVER
+    new = memory.sent is None or (message != memory.sent and message.request_type != END)
+    said = memory.sent is None and message == memory.last_sent  # in another turn, the same words
+    return due_at(memory.sent_at, new=new and not said, again=memory.prompted or said)
 
 
 def _wake_at(memory: Memory, due: list[float], now: float, limits: Limits) -> float:
-    """When time alone may change something: what is `due`, or the end of somebody's silence."""
+    """When the decision may change though nothing is heard."""
     if memory.shown is not None and memory.flows(now):
-        due.append(math.nextafter(memory.shown_at + FLOWING_S, NEVER))
+        due.append(math.nextafter(memory.shown_at + SILENT_S, NEVER))
     for claim in memory.claims:
         due.append(memory.gone_at(claim, now, limits.silent_after_s))
         due.append(memory.gone_at(claim, now, limits.holder_ttl_s))

@@ -1,18 +1,14 @@
-"""What the lift supervisor's core remembers of one lift, and the events that it takes in."""
+"""What the lift supervisor's core remembers of one lift, and the limits that it is given."""
 
-import math
-from collections.abc import Mapping
 from typing import Final
 
 import msgspec
 
-from bridges.core.graph_kind import MaySpeak, Woken
-from bridges.lift_supervisor.freshness import Voice
+from bridges.core.durations import AGES_AGO, NEVER, SILENT_S
+from bridges.core.freshness import FUTURE_S, Requesters, Rules
+from bridges.lift_supervisor.settings import Settings
+from bridges.lift_supervisor.signals import StateHeard, Target
 from bridges.rmf.definitions import LiftMode, LiftRequest
-
-FLOWING_S: Final = 3.0
-"""States come at 1 Hz; after a gap as long as this the lift was silent."""
-NEVER: Final = math.inf
 
 NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.MODE_OFFLINE)
 """Modes in which a lift is not RMF's to send robots to."""
@@ -28,66 +24,31 @@ class Limits(msgspec.Struct, frozen=True):
     clock_synchronised: bool = False
     max_request_age_s: float = 10.0
 
-
-class Wish(msgspec.Struct, frozen=True):
-    """What a session asks of the lift, as LiftRequest has it."""
-
-    request_type: int
-    floor: str
-    door: int
-
-
-class Asked(msgspec.Struct, frozen=True):
-    """An adapter's request for AGV or HUMAN mode; `stamp` is its own (s), `age_s` by our clock."""
-
-    session: str
-    wish: Wish
-    stamp: float
-    age_s: float
-
-
-class Ended(msgspec.Struct, frozen=True):
-    """An adapter's, or an operator's, END_SESSION, whatever its other fields say."""
-
-    session: str
-    stamp: float
-    age_s: float
-
-
-class Shown(msgspec.Struct, frozen=True):
-    """A LiftState."""
-
-    session: str
-    floor: str
-    destination: str
-    door: int
-    mode: int
-    floors: tuple[str, ...] = ()
-
-    def satisfies(self, session: str, wish: Wish) -> bool:
-        """Does it show what was asked? As rmf_lift_supervisor judges it."""
-        there = wish.floor == self.floor and not self.destination
-        return (
-            (wish.floor == self.destination or there)
-            and wish.door == self.door
-            and session == self.session
+    @classmethod
+    def of(cls, settings: Settings) -> "Limits":
+        """From the YAML."""
+        ttl_s = settings.holder_ttl_s
+        return cls(
+            silent_after_s=settings.silent_after_s,
+            orphan_after_s=settings.quiet_start_s,
+            holder_alarm_s=settings.holder_alarm_s,
+            holder_ttl_s=NEVER if ttl_s is None else ttl_s,
+            clock_synchronised=settings.clock_synchronised,
+            max_request_age_s=settings.max_request_age_s,
         )
-
-
-Event = Asked | Ended | Shown | MaySpeak | Woken
 
 
 class Claim(msgspec.Struct, frozen=True):
     """A session that wants the lift: what it last asked, since when it asks, and when it last did."""
 
     session: str
-    wish: Wish
+    target: Target
     since: float
     heard_at: float
 
 
 class Turn(msgspec.Struct, frozen=True):
-    """Whom we speak for. `ends`: its END is what we send. `seen`: the lift has shown the session."""
+    """The session that we speak for. `ends`: we send its END. `seen`: the lift has shown it."""
 
     session: str
     since: float
@@ -99,9 +60,9 @@ class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
     `claims`: in the order of first requests, the holder's among them. `heard_at`: when an adapter was
-    last heard, `voices`: what of each. `shown_at`: when the latest state came; `session_since`: since
-    when its session is shown; `flowing_since`: since when states come without a gap. `sent`: the last
-    request of this turn; `prompted`: it is worth repeating.
+    last heard; `requesters`: what of each. `shown`: the latest state, which came at `shown_at`;
+    `session_since`: since when its session is shown; `flowing_since`: since when states come without
+    a gap. `sent`: the last request of this turn, `last_sent` of any; `prompted`: it is worth repeating.
     """
 
     lift: str
@@ -109,31 +70,34 @@ class Memory(msgspec.Struct, frozen=True):
     may_speak: bool = False
     claims: tuple[Claim, ...] = ()
     turn: Turn | None = None
-    shown: Shown | None = None
-    shown_at: float = -NEVER
-    session_since: float = -NEVER
-    flowing_since: float = -NEVER
-    heard_at: float = -NEVER
-    voices: Mapping[str, Voice] = {}
+    shown: StateHeard | None = None
+    shown_at: float = AGES_AGO
+    session_since: float = AGES_AGO
+    flowing_since: float = AGES_AGO
+    heard_at: float = AGES_AGO
+    requesters: Requesters = {}
     sent: LiftRequest | None = None
-    sent_at: float = -NEVER
+    last_sent: LiftRequest | None = None
+    sent_at: float = AGES_AGO
     prompted: bool = False
 
     def claim(self, session: str) -> Claim | None:
-        """This session's."""
-        for claim in self.claims:
-            if claim.session == session:
-                return claim
-        return None
+        """The claim of this session; None where it has none."""
+        return next((claim for claim in self.claims if claim.session == session), None)
 
     @property
     def session_shown(self) -> str:
-        """Who has the lift by its own word; "" for nobody."""
+        """The session that the lift shows; "" for none."""
         return self.shown.session if self.shown else ""
+
+    @property
+    def nobody_is_sent(self) -> bool:
+        """Is the lift in a mode in which no robot is sent to it?"""
+        return self.shown is not None and self.shown.mode in NOBODY_IS_SENT
 
     def flows(self, now: float) -> bool:
         """Do the lift's states come? Before the first one, nothing is waited for."""
-        return self.shown is None or now <= self.shown_at + FLOWING_S
+        return self.shown is None or now <= self.shown_at + SILENT_S
 
     def gone_at(self, claim: Claim, now: float, after_s: float) -> float:
         """When a requester will have been silent for so long; never while the lift is silent."""
@@ -141,7 +105,8 @@ class Memory(msgspec.Struct, frozen=True):
             return NEVER
         return max(claim.heard_at, self.flowing_since) + after_s
 
-    @property
-    def nobody_is_sent(self) -> bool:
-        """Is the lift in a mode in which no robot is sent to it?"""
-        return self.shown is not None and self.shown.mode in NOBODY_IS_SENT
+    def rules(self, now: float, limits: Limits) -> Rules:
+        """How the stamps of adapters' requests are judged now."""
+        if limits.clock_synchronised:
+            return Rules(limits.max_request_age_s, known_clocks=False)
+        return Rules(now - self.started_at, future_s=NEVER if self.may_speak else FUTURE_S)

@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Final
 
 from bridges.core.decision import RequestRefused
-from bridges.lift_supervisor.core import AGV, END
-from bridges.lift_supervisor.memory import Asked, Ended, Shown, Wish
+from bridges.core.freshness import SECOND_NS, in_ns
+from bridges.core.names import check_length
 from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings
+from bridges.lift_supervisor.signals import Ended, Requested, StateHeard, Target
 from bridges.rmf.definitions import (
     LiftRequest,
     LiftRequestDoor,
@@ -15,10 +17,11 @@ from bridges.rmf.definitions import (
     LiftState,
     Time,
 )
-from bridges.rmf.stamps import in_seconds
+
+MAX_FLOORS: Final = 1000
 
 
-def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Asked | Ended:
+def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Requested | Ended:
     """The event that an adapter's request is; `wall` is our clock (s since the epoch).
 
     Of an END_SESSION only the session is looked at: fleet adapters send no floor with it
@@ -27,23 +30,33 @@ def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Ask
     _check_lift(request.lift_name, settings)
     if not request.session_id:
         raise RequestRefused("empty session_id", "a session needs a name")
-    stamp = in_seconds(request.request_time)
-    if request.request_type == END:
+    check_length(session_id=request.session_id, destination_floor=request.destination_floor)
+    stamp = in_ns(request.request_time) / SECOND_NS
+    if request.request_type == LiftRequestType.REQUEST_END_SESSION:
         return Ended(request.session_id, stamp, wall - stamp)
     if request.request_type not in set(LiftRequestType):
         raise RequestRefused("unknown request_type", str(request.request_type))
     if request.door_state not in set(LiftRequestDoor):
         raise RequestRefused("unknown door_state", str(request.door_state))
-    if request.request_type == AGV and not request.destination_floor:
+    agv = request.request_type == LiftRequestType.REQUEST_AGV_MODE
+    if agv and not request.destination_floor:
         raise RequestRefused("no destination_floor", f"{request.session_id} wants to go nowhere")
-    wish = Wish(request.request_type, request.destination_floor, request.door_state)
-    return Asked(request.session_id, wish, stamp, wall - stamp)
+    target = Target(request.request_type, request.destination_floor, request.door_state)
+    return Requested(request.session_id, target, stamp, wall - stamp)
 
 
-def accept_state(state: LiftState, settings: Settings, wall: float) -> Shown:
+def accept_state(state: LiftState, settings: Settings, wall: float) -> StateHeard:
     """The event that a lift's state is."""
     _check_lift(state.lift_name, settings)
-    return Shown(
+    check_length(
+        session_id=state.session_id,
+        current_floor=state.current_floor,
+        destination_floor=state.destination_floor,
+        available_floors=max(state.available_floors, key=len, default=""),
+    )
+    if len(state.available_floors) > MAX_FLOORS:
+        raise RequestRefused("impossible available_floors", f"{len(state.available_floors)} floors")
+    return StateHeard(
         session=state.session_id,
         floor=state.current_floor,
         destination=state.destination_floor,
@@ -56,6 +69,7 @@ def accept_state(state: LiftState, settings: Settings, wall: float) -> Shown:
 def _check_lift(name: str, settings: Settings) -> None:
     if not name:
         raise RequestRefused("empty lift_name", "a lift needs a name")
+    check_length(lift_name=name)
     if settings.lifts is not None and name not in settings.lifts:
         raise RequestRefused("not ours", f"{name!r} is none of {', '.join(settings.lifts)}")
 

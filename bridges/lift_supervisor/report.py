@@ -6,10 +6,11 @@ from typing import Any, Final
 import msgspec
 
 from bridges.core.decision import Fault
-from bridges.lift_supervisor.memory import FLOWING_S, Limits, Memory
+from bridges.core.durations import SILENT_S
+from bridges.lift_supervisor.memory import Limits, Memory
 
 OVERDUE_S: Final = 30.0
-"""What the lift has not done by then is worth a fault."""
+"""A lift that has not obeyed after so long is at fault."""
 
 
 class SupervisorReport(msgspec.Struct, frozen=True):
@@ -56,7 +57,7 @@ def alarms(memory: Memory, now: float, limits: Limits) -> Iterator[tuple[float, 
     turn = memory.turn
     if not memory.flows(now):
         if turn or memory.claims:
-            yield memory.shown_at + FLOWING_S, Fault("LIFT_SILENT", "no LiftState comes")
+            yield memory.shown_at + SILENT_S, Fault("LIFT_SILENT", "no LiftState comes")
         return
     if turn is None:
         return

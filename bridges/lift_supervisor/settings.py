@@ -2,12 +2,10 @@
 
 from collections.abc import Iterable
 
-import msgspec
-
-from bridges.core.fields import Name, Patience, QuietStart, Seconds
+from bridges.core.fields import GraphSettings, Name, Patience, Seconds
 
 
-class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the lift supervisor may decide by itself.
 
     `lifts`: the lifts that it serves; every lift that it hears of when absent, as RMF's own does.
@@ -23,7 +21,6 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """
 
     lifts: list[Name] | None = None
-    quiet_start_s: QuietStart = 3.0
     silent_after_s: Patience = 10.0
     holder_alarm_s: Patience = 60.0
     holder_ttl_s: Patience | None = None

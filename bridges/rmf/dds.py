@@ -11,6 +11,7 @@ shows at the next publish.
 cyclonedds is imported here, in dds_ends.py, idl.py and graph.py, and these only by choose.py.
 """
 
+import ctypes
 import logging
 import math
 import os
@@ -24,7 +25,7 @@ from weakref import WeakValueDictionary
 from cyclonedds import core
 from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.internal import dds_infinity
+from cyclonedds.internal import DDS, dds_infinity
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
@@ -50,6 +51,9 @@ LOOK_EVERY_S: Final = 1.0
 LOOK_EVERY_NS: Final = 1_000_000_000
 """How often to look whether the network has changed."""
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
+ERRORS: Final = 1 | 2
+"""Cyclone's fatal errors and errors. Its warnings are a line for each malformed datagram, which anybody
+can send; its binding has no call for the mask, and its configuration does not reach them."""
 
 _domains: WeakValueDictionary[tuple[int, str], Any] = WeakValueDictionary()
 _domains_lock = threading.Lock()
@@ -241,5 +245,6 @@ def _shared_domain(domain_id: int, configuration: str) -> Any:
     with _domains_lock:
         domain = _domains.get(key)
         if domain is None:
+            DDS._dll_handle.dds_set_log_mask(ctypes.c_uint32(ERRORS))
             domain = _domains[key] = Domain(domain_id, configuration)
         return domain

@@ -10,7 +10,7 @@ from typing import Generic, Literal, TypeVar
 
 from bridges.rmf import definitions as d
 
-M = TypeVar("M", bound=d.Message)
+M_co = TypeVar("M_co", bound=d.Message, covariant=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,15 +26,15 @@ RETAINED = Qos("transient_local", 100)
 
 
 @dataclass(frozen=True, slots=True)
-class Topic(Generic[M]):
+class Topic(Generic[M_co]):
     """A topic as ROS names it (no `rt/`), and the QoS of the end that we hold."""
 
     name: str
-    type: type[M]
+    type: type[M_co]
     publish: Qos = VOLATILE
     subscribe: Qos = VOLATILE
 
-    def named(self, name: str) -> "Topic[M]":
+    def named(self, name: str) -> "Topic[M_co]":
         """The same topic under the name that a site has given it."""
         return replace(self, name=name)
 

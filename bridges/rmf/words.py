@@ -1,7 +1,8 @@
 """RMF's messages in one line of words each: what `watch`, `send` and the demo print.
 
-The words are RMF's constants without their prefix (DOOR_OPEN is `OPEN`); a number that RMF does not
-define is shown as the number. Names come from the network: nothing unprintable gets through.
+The words are RMF's constants without their prefix, in small letters but for a lift's mode (DOOR_OPEN
+is `open`, MODE_AGV `AGV`); a number that RMF does not define is shown as the number. Names come from
+the network: nothing unprintable gets through.
 """
 
 from enum import IntEnum
@@ -49,41 +50,47 @@ def stamped_at(state: Stated) -> float:
 
 
 def condition(state: Stated) -> str:
-    """What the device says of itself: `L1 OPEN AGV`, `MOVING`, `ERROR over temperature`."""
+    """What a device says of itself: `car at L1, door open, mode AGV`, `moving`, `error: too hot`."""
     match state:
         case d.LiftState():
             return _lift_condition(state)
         case d.DoorState():
-            return word(d.DoorModeValue, state.current_mode.value)
+            return plain(d.DoorModeValue, state.current_mode.value)
         case d.ChargerState():
             return _charger_condition(state)
 
 
+def plain(enum: type[IntEnum], value: int) -> str:
+    """`DOOR_OPEN` as `open`: for a person, who needs no constant."""
+    return word(enum, value).lower()
+
+
 def _lift_condition(state: d.LiftState) -> str:
-    words = [
-        state.current_floor or "no-floor",
-        word(d.LiftDoor, state.door_state),
-        word(d.LiftMode, state.current_mode),
-    ]
+    car = f"car at {state.current_floor}" if state.current_floor else "car at no known floor"
     if state.motion_state not in (d.LiftMotion.MOTION_STOPPED, d.LiftMotion.MOTION_UNKNOWN):
-        words.append(f"going {word(d.LiftMotion, state.motion_state)}")
+        car += f", going {plain(d.LiftMotion, state.motion_state)}"
+    parts = [
+        car,
+        f"door {plain(d.LiftDoor, state.door_state)}",
+        f"mode {word(d.LiftMode, state.current_mode)}",
+    ]
     if state.destination_floor:
-        words.append(f"to {state.destination_floor}")
-    return printable(" ".join(words))
+        parts.append(f"destination {state.destination_floor}")
+    return printable(", ".join(parts))
 
 
 def _charger_condition(state: d.ChargerState) -> str:
-    words = [word(d.ChargerStateValue, state.state)]
+    said = plain(d.ChargerStateValue, state.state)
     if state.error_message:
-        words.append(state.error_message)
+        said += f": {state.error_message}"
     left_s = in_seconds(state.time_to_fully_charged)
     if left_s > 0:
-        words.append(f"full in {left_s / 60:.0f} min")
-    return printable(" ".join(words))
+        said += f", full in {left_s / 60:.0f} min"
+    return printable(said)
 
 
 def holder(state: Stated) -> str:
-    """Whose the device is: a lift's session, a charger's request and robot; "" for nobody's."""
+    """Who has the device: a lift's session, a charger's robot and request; "" for nobody."""
     match state:
         case d.LiftState():
             return printable(state.session_id)
@@ -91,27 +98,37 @@ def holder(state: Stated) -> str:
             return ""
         case d.ChargerState():
             robot = f"{state.robot_fleet}/{state.robot_name}" if state.robot_name else ""
-            return printable(" ".join(word for word in (state.request_id, robot) if word))
+            request = f"request {state.request_id}" if state.request_id else ""
+            both = f"{robot} ({request})" if robot and request else robot or request
+            return printable(both)
+
+
+def described(state: Stated) -> str:
+    """`car at L1, door open, mode AGV, held by fleet/robot`; `idle`."""
+    who = holder(state)
+    has = "for" if isinstance(state, d.ChargerState) else "held by"
+    return condition(state) + (f", {has} {who}" if who else "")
 
 
 def request(message: Requested) -> str:
-    """What is asked: `AGV_MODE to L3 door OPEN for fleet/robot`."""
+    """What is asked: `mode AGV, car to L3, door open, for fleet/robot`."""
     match message:
         case d.LiftRequest():
             return _lift_request(message)
         case d.DoorRequest():
-            mode = word(d.DoorModeValue, message.requested_mode.value)
-            return printable(f"{mode} for {message.requester_id}")
+            mode = plain(d.DoorModeValue, message.requested_mode.value)
+            return printable(f"door {mode}, for {message.requester_id}")
         case d.ChargerRequest():
             robot = f"{message.fleet_name}/{message.robot_name}"
-            return printable(f"charge {robot} as {message.request_id}")
+            return printable(f"charge {robot} (request {message.request_id})")
         case d.ChargerCancel():
-            return printable(f"cancel {message.request_id}")
+            return printable(f"cancel request {message.request_id}")
 
 
 def _lift_request(message: d.LiftRequest) -> str:
-    kind = word(d.LiftRequestType, message.request_type)
     if message.request_type == d.LiftRequestType.REQUEST_END_SESSION:
-        return printable(f"{kind} of {message.session_id}")
-    door = word(d.LiftRequestDoor, message.door_state)
-    return printable(f"{kind} to {message.destination_floor} door {door} for {message.session_id}")
+        return printable(f"end the session of {message.session_id}")
+    mode = word(d.LiftRequestType, message.request_type).removesuffix("_MODE")
+    door = plain(d.LiftRequestDoor, message.door_state)
+    where = f"car to {message.destination_floor}, door {door}"
+    return printable(f"mode {mode}, {where}, for {message.session_id}")

@@ -13,8 +13,9 @@ LiftState, DoorState and their like have no place for any of this.
 
 from collections.abc import Iterator, Mapping
 from itertools import islice
-from typing import Any, Final
+from typing import Final
 
+from bridges.log import plain
 from bridges.rmf.definitions import (
     DiagnosticArray,
     DiagnosticLevel,
@@ -23,13 +24,12 @@ from bridges.rmf.definitions import (
     KeyValue,
     Time,
 )
+from bridges.serve.subject import Status
 
 MOST: Final = 100
 """A supervisor learns of its lifts from the network: no flood of names makes us say more than this."""
 SIMULATED: Final = "SIMULATED"
 PASSIVE: Final = "PASSIVE"
-
-Status = Mapping[str, Any]
 
 
 def diagnosis(
@@ -78,6 +78,6 @@ def _pairs(status: Status) -> Iterator[tuple[str, str]]:
         if key == "faults":
             yield from ((fault["code"], fault["detail"]) for fault in value)
         elif isinstance(value, Mapping):
-            yield from ((f"{key} {part}", str(count)) for part, count in value.items())
+            yield from ((f"{key} {part}", plain(count)) for part, count in value.items())
         else:
-            yield key, str(value)
+            yield key, plain(value)

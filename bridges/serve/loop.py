@@ -1,149 +1,88 @@
-"""The loop: one thread that owns one bus and the devices on it.
+"""The loop: one bus and the devices on it.
 
-RMF callbacks and GPIO edges only put something into the inbox. The loop waits on the inbox until the
-next device is due, scans it, and makes every output safe before it ends, however it ends.
+RMF callbacks and GPIO edges only put something into the inbox. A round scans each device that is due,
+has something in the inbox, or may have changed; and every output is made safe at the end, however that
+comes.
 """
 
 import logging
-import math
-import queue
-import threading
 from collections.abc import Sequence
-from typing import Any
 
+from bridges.core.durations import AGES_AGO
 from bridges.log import pairs
-from bridges.serve.device import Clock, Node
+from bridges.serve.clock import Clock
+from bridges.serve.device import AnyNode
+from bridges.serve.inbox import Inbox
+from bridges.serve.serving import LEAST_GAP_S
 from drivers.hal import Bus
 
 log = logging.getLogger(__name__)
 
-INBOX_SIZE = 512
-"""More events than this for one device between two scans are a flood: the oldest go, counted."""
-
-LEAST_GAP_S = 0.001
-"""Time alone never asks for scans faster than this."""
-
-Item = tuple[str, Any]
-
-
-class Inbox:
-    """Events for the devices of one loop; any thread may put, the loop's thread takes.
-
-    A request is a level, not a pulse: of several with the same `key` only the last one is kept, in
-    the place of the first, so that a flood of repeats costs a scan no more than one of them.
-    """
-
-    def __init__(self) -> None:
-        self._items: dict[str, dict[Any, Any]] = {}
-        self._lock = threading.Lock()
-        self._bell: queue.SimpleQueue[None] = queue.SimpleQueue()
-        self._rung = False
-        self.dropped = 0
-
-    def put(self, item: Item, key: Any = None) -> None:
-        """Add one event for a device and wake the loop. An event without a key replaces none."""
-        device, event = item
-        with self._lock:
-            waiting = self._items.setdefault(device, {})
-            key = object() if key is None else key
-            if key not in waiting and len(waiting) == INBOX_SIZE:
-                del waiting[next(iter(waiting))]
-                self.dropped += 1
-            waiting[key] = event
-        self.wake()
-
-    def wake(self) -> None:
-        """Wake the loop without an event. A bell that rings already is not rung again."""
-        if not self._rung:
-            self._rung = True
-            self._bell.put(None)
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for the bell; False when the time is up first."""
-        try:
-            self._bell.get(timeout=max(0.0, timeout_s))
-        except queue.Empty:
-            return False
-        self._rung = False
-        return True
-
-    def take(self) -> dict[str, list[Any]]:
-        """All events so far, by device, in order."""
-        with self._lock:
-            taken, self._items = self._items, {}
-        return {device: list(waiting.values()) for device, waiting in taken.items()}
-
 
 class Loop:
-    """Scans the nodes of one bus. `scans` counts finished rounds, for the watchdog."""
+    """Scans the nodes of one bus, each once in `scan_s` (s) and whenever it asks for it."""
 
     def __init__(
-        self, name: str, bus: Bus, nodes: Sequence[Node], scan_s: float, clock: Clock
+        self, bus_name: str, bus: Bus, nodes: Sequence[AnyNode], scan_s: float, clock: Clock
     ) -> None:
-        self.name = name
+        self.name = f"bus-{bus_name}"
         self.nodes = nodes
-        self.inbox = Inbox()
-        self.scans = 0
-        self.safe = False
+        self.inbox: Inbox[object] = Inbox()
+        self._bus_name = bus_name
         self._bus = bus
         self._scan_s = scan_s
         self._clock = clock
-        self._due = dict.fromkeys((node.name for node in nodes), -math.inf)
+        self._due = dict.fromkeys((node.name for node in nodes), AGES_AGO)
         self._edge = False
-        self._stopping = False
-        self._thread = threading.Thread(target=self._run, name=f"bus-{name}", daemon=True)
-
-    def start(self) -> None:
-        """Begin to scan."""
-        self._bus.on_edge(self._on_edge)
-        self._thread.start()
-
-    def stop(self, timeout_s: float) -> bool:
-        """End after the scan under way, outputs off; False if it does not end, or not safely."""
-        self._stopping = True
-        self.inbox.wake()
-        self._thread.join(timeout_s)
-        return not self._thread.is_alive() and self.safe
+        bus.on_edge(self._on_edge)
 
     @property
-    def alive(self) -> bool:
-        """False when it has ended, by stop or by a defect of ours."""
-        return self._thread.is_alive()
+    def wake_at(self) -> float:
+        """When the next device is due."""
+        return min(self._due.values())
 
     @property
     def ready(self) -> bool:
         """Every device has been tried once and its first state is out."""
         return all(node.ready for node in self.nodes)
 
+    def round(self) -> None:
+        """Scan whatever is due."""
+        events = self.inbox.take()
+        everything = self._take_edge()
+        for node in self.nodes:
+            if self.inbox.closed:
+                return
+            if everything or node.name in events or self._is_due(node):
+                self._scan(node, events.get(node.name, ()))
+        self._bus.scanned()
+
+    def end(self) -> bool:
+        """Every output off, and the bus let go."""
+        self._bus.insist()
+        safe = [node.make_safe() for node in self.nodes]
+        for node in self.nodes:
+            node.close()
+        self._bus.close()
+        log.info(pairs("outputs_off", bus=self._bus_name, verified=all(safe)))
+        return all(safe)
+
+    def _scan(self, node: AnyNode, events: Sequence[object]) -> None:
+        started = self._clock.monotonic()
+        node.scan(events)
+        next_at = min(node.wake_at, started + self._scan_s)
+        self._due[node.name] = max(next_at, started + LEAST_GAP_S)
+
+    def _is_due(self, node: AnyNode) -> bool:
+        return self._clock.monotonic() >= self._due[node.name]
+
     def _on_edge(self) -> None:
         self._edge = True
         self.inbox.wake()
 
-    def _run(self) -> None:
-        try:
-            while not self._stopping:
-                self._round()
-        finally:
-            self._bus.insist()
-            safe = [node.make_safe() for node in self.nodes]
-            for node in self.nodes:
-                node.close()
-            self._bus.close()
-            self.safe = all(safe)
-            log.info(pairs("outputs_off", bus=self.name, verified=self.safe))
-
-    def _round(self) -> None:
-        self.inbox.wait(min(self._due.values()) - self._clock.monotonic())
-        events = self.inbox.take()
-        everything, self._edge = self._edge, False
-        for node in self.nodes:
-            if self._stopping:
-                return
-            due = self._clock.monotonic() >= self._due[node.name]
-            if due or everything or node.name in events:
-                started = self._clock.monotonic()
-                node.scan(events.get(node.name, ()))
-                next_at = min(node.wake_at, started + self._scan_s)
-                self._due[node.name] = max(next_at, started + LEAST_GAP_S)
-        self.scans += 1
-        self._bus.scanned()
+    def _take_edge(self) -> bool:
+        """Was there an edge? One that comes meanwhile is of this round, or rings for the next."""
+        if not self._edge:
+            return False
+        self._edge = False
+        return True

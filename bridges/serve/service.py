@@ -1,64 +1,38 @@
 """What one daemon serves: devices on buses, or a kind that lives on RMF's graph alone.
 
-Either has loops with a thread each, subscribes for them, and says how they are.
+Either has threads, subscribes for them, and says how they are.
 """
 
-import importlib
 import logging
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Kind
+from bridges.core.kind import AnyDeviceKind
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
-from bridges.rmf.transport import Publisher, Transport, TransportError
-from bridges.serve.device import Clock, Node
-from bridges.serve.graph import GraphNode, Kept
+from bridges.rmf.topics import M_co, Topic
+from bridges.rmf.transport import Transport
+from bridges.serve.clock import Clock
+from bridges.serve.device import AnyNode, Node
+from bridges.serve.graph import AnyGraphNode, GraphNode
+from bridges.serve.keeper import Kept
 from bridges.serve.loop import Loop
+from bridges.serve.outlet import Named, Outlet
+from bridges.serve.predecessor import SafeFirst
+from bridges.serve.serving import Serving
+from bridges.serve.subject import Status
 from bridges.settings.load import Config
+from bridges.settings.names import kind_called
 from drivers.hal import Bus
 
 log = logging.getLogger(__name__)
 
-OpenBus = Callable[[str, Any], Bus]
-
-
-def _clock(transport: Transport) -> Clock:
-    """Durations by the machine's own clock, stamps by RMF's."""
-    return Clock(time.monotonic, transport.wall)
-
-
-def open_bus(name: str, settings: Any) -> Bus:
-    """The real bus that the YAML names."""
-    hal = importlib.import_module(type(settings).__module__)
-    bus: Bus = hal.open_bus(settings)
-    return bus
-
-
-class Serving(Protocol):
-    """One thread of a service, as the daemon sees it. `scans` counts finished rounds."""
-
-    scans: int
-
-    def start(self) -> None:
-        """Begin."""
-
-    def stop(self, timeout_s: float) -> bool:
-        """End after the round under way, outputs off; False if it does not end, or not safely."""
-
-    @property
-    def alive(self) -> bool:
-        """False when it has ended."""
-
-    @property
-    def ready(self) -> bool:
-        """It has been through its first round."""
+OpenBus = Callable[[str], Bus]
 
 
 class Service(Protocol):
@@ -74,81 +48,75 @@ class Service(Protocol):
     def reset(self) -> None:
         """An operator says that latched faults may clear."""
 
-    def status(self) -> Mapping[str, Any]:
+    def status(self) -> Status:
         """For the status file: how the service as a whole is."""
 
-    def devices(self) -> Mapping[str, Mapping[str, Any]]:
+    def devices(self) -> Mapping[str, Status]:
         """For the status file: each device, lift or door by name."""
 
 
-def named_by(config: Config, topic: Topic[Any]) -> Topic[Any]:
+def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
     """A topic under the name that the site has given it."""
     return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
 
 def service(
-    config: Config, transport: Transport, open_bus: OpenBus, kept: Kept | None = None
+    config: Config,
+    transport: Transport,
+    open_bus: OpenBus,
+    kept: Kept | None = None,
+    unsafe: Collection[str] = (),
 ) -> Service:
     """What serves this YAML. Raises HalError when a bus cannot be opened.
 
-    `kept`: where a kind that has to remembers across restarts; None to forget.
+    `kept`: where a kind that has to remembers across restarts; None to forget. `unsafe`: devices that
+    a dead daemon may have left on.
     """
-    kind: Kind | GraphKind = importlib.import_module(f"bridges.{config.kind}").KIND
+    kind = kind_called(config.kind)
     named = partial(named_by, config)
+    clock = Clock(time.monotonic, transport.wall)  # durations by the machine's, stamps by RMF's
     if isinstance(kind, GraphKind):
-        return GraphService(
-            GraphNode(kind, config.section, transport, _clock(transport), named, kept)
-        )
-    return Devices(config, kind, transport, open_bus, named)
+        return GraphService(GraphNode(kind, config.section, transport, clock, named, kept), clock)
+    return Devices(config, kind, transport, open_bus, named, clock, unsafe)
 
 
 class GraphService:
     """A supervisor or coordinator: one thread, no bus."""
 
-    def __init__(self, node: GraphNode) -> None:
-        self.loops = [node]
-        self._node = node
-
-    def subscribe(self) -> None:
-        """Begin to hear RMF."""
-        self._node.subscribe()
-
-    def reset(self) -> None:
-        """Its subjects hear of it."""
-        self._node.reset()
-
-    def status(self) -> Mapping[str, Any]:
-        """For the status file."""
-        return self._node.status()
-
-    def devices(self) -> Mapping[str, Mapping[str, Any]]:
-        """For the status file."""
-        return {subject.name: subject.status() for subject in self._node.nodes}
+    def __init__(self, node: AnyGraphNode, clock: Clock) -> None:
+        self.loops = [Serving(node, clock)]
+        self.subscribe = node.subscribe
+        self.reset = node.reset
+        self.status = node.status
+        self.devices = node.devices
 
 
 class Devices:
-    """Lifts, doors or chargers: a loop for each bus, and a node for each device."""
+    """Lifts, doors or chargers: a loop with a thread for each bus, and a node for each device."""
 
     def __init__(
         self,
         config: Config,
-        kind: Kind,
+        kind: AnyDeviceKind,
         transport: Transport,
         open_bus: OpenBus,
-        named: Callable[[Topic[Any]], Topic[Any]],
+        named: Named,
+        clock: Clock,
+        unsafe: Collection[str] = (),
     ) -> None:
         self._config = config
+        self._unsafe = unsafe
         self._kind = kind
-        self._driver = importlib.import_module(f"drivers.{config.kind}.{config.driver}")
+        self._driver = config.driver_type
         self._transport = transport
-        self._clock = _clock(transport)
+        self._clock = clock
         self._named = named
         self._strangers: Counter[str] = Counter()
-        self._publishers: dict[str, Publisher[Any]] = {
-            topic.name: transport.publisher(named(topic)) for topic in self._topics()
-        }
-        self.loops = [self._loop(name, open_bus) for name in config.buses]
-        self._placed = {node.name: (node, loop) for loop in self.loops for node in loop.nodes}
+        self._outlet = Outlet(transport, named)
+        self._outlet.open(self._topics())
+        self._loops = [self._loop(name, open_bus) for name in config.buses]
+        self.loops = [Serving(loop, clock) for loop in self._loops]
+        self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
 
     def subscribe(self) -> None:
         """Begin to hear RMF, and whoever else publishes our devices' states."""
@@ -160,51 +128,49 @@ class Devices:
     def reset(self) -> None:
         """Each device hears of it in its own loop."""
         for device, (_, loop) in self._placed.items():
-            loop.inbox.put((device, OperatorReset()))
+            loop.inbox.put(device, OperatorReset())
 
-    def status(self) -> Mapping[str, Any]:
+    def status(self) -> Status:
         """For the status file."""
         return {
             "requests_for_others": self._strangers["requests"],
-            "events_dropped": sum(loop.inbox.dropped for loop in self.loops),
+            "events_dropped": sum(loop.inbox.dropped for loop in self._loops),
         }
 
-    def devices(self) -> Mapping[str, Mapping[str, Any]]:
+    def devices(self) -> Mapping[str, Status]:
         """For the status file."""
         return {name: node.status() for name, (node, _) in self._placed.items()}
 
-    def _topics(self) -> list[Topic[Any]]:
+    def _topics(self) -> list[Topic[Message]]:
         alarms = {t for d in self._config.devices.values() for t in self._kind.alarm_topics(d)}
         return [self._kind.states, *alarms]
 
     def _loop(self, bus_name: str, open_bus: OpenBus) -> Loop:
         settings = self._config.buses[bus_name]
-        bus = open_bus(bus_name, settings)
-        nodes = [
-            self._node(name, device, bus)
-            for name, device in self._config.devices.items()
-            if self._config.bus_of(name) == bus_name
-        ]
+        bus = open_bus(bus_name)
+        nodes = [self._node(name, bus) for name in self._config.devices_on(bus_name)]
         return Loop(bus_name, bus, nodes, settings.scan_s, self._clock)
 
-    def _node(self, name: str, device: Any, bus: Bus) -> Node:
-        debounce: Mapping[str, float] = getattr(self._driver, "debounce", lambda _: {})(device)
-        limits = self._kind.limits(device, debounce)
+    def _node(self, name: str, bus: Bus) -> AnyNode:
+        device = self._config.devices[name]
+        limits = self._kind.limits(device, self._driver.debounce(device))
         driver = self._driver.create(name, device, bus)
-        return Node(name, self._kind, device, limits, driver, self._publish, self._clock)
+        if name in self._unsafe:
+            driver = SafeFirst(name, driver)
+        return Node(name, self._kind, device, limits, driver, self._outlet.publish, self._clock)
 
-    def _to_inbox(self, topic: Topic[Any]) -> Callable[[Any], None]:
+    def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
         """A callback for the transport's thread. Other nodes' states are not ours to count."""
         states = topic == self._kind.states
 
-        def put(message: Any) -> None:
+        def put(message: Message) -> None:
             device = self._kind.device_name(message)
             if device in self._placed:
                 node, loop = self._placed[device]
                 event = node.event(topic, message)
                 if event is not None:
                     sender = "" if states else self._kind.sender(message)
-                    loop.inbox.put((device, event), (topic.name, sender))
+                    loop.inbox.put(device, event, (topic.name, sender))
             elif not states:
                 self._count_stranger(device)
 
@@ -214,9 +180,3 @@ class Devices:
         if not self._strangers:
             log.info(pairs("not_ours", kind=self._kind.name, name=device))
         self._strangers["requests"] += 1
-
-    def _publish(self, topic: Topic[Any], message: Message) -> None:
-        try:
-            self._publishers[topic.name].publish(message)
-        except TransportError as error:
-            log.error(pairs("not_published", topic=topic.name, reason=error))

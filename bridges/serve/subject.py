@@ -1,70 +1,111 @@
-"""One subject of a kind without hardware: its core's memory, and what the log and status say of it."""
+"""One lift, door or charger (or a coordinator's site): its core's memory, and what becomes of a
+decision: messages go out, refusals are counted, states and faults are logged when they change."""
 
 import logging
-import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
-from bridges.core.decision import Fault
-from bridges.core.graph_kind import GraphKind
+from bridges.core.decision import Decision, Fault, M, O, R
+from bridges.core.durations import NEVER
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
-from bridges.serve.device import Clock
+from bridges.serve.clock import Clock
+from bridges.serve.refusals import Refusals
 
 log = logging.getLogger(__name__)
 
+Status = Mapping[str, Any]
+"""What the status file says of something, as JSON has it."""
 
-class Subject:
-    """One lift or door that the kind's core looks after."""
+Publish = Callable[[Topic[Message], Message], None]
+"""Sends to RMF, and does not raise."""
+
+V = TypeVar("V")
+"""Everything that a core may be told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Core(Generic[M, V, O, R]):
+    """A kind's core with its limits, as subjects need it.
+
+    `word`: what a subject is called in the log. `decide(memory, event, now)`. `summary(report, now)`:
+    key -> value for the log and the status file. `identity(fault)`: by what a fault is the one that
+    was logged before.
+    """
+
+    word: str
+    decide: Callable[[M, V, float], Decision[M, O, R]]
+    summary: Callable[[R, float], Mapping[str, str]]
+    identity: Callable[[Fault], object]
+
+
+class Subject(Generic[M, V, O, R]):
+    """What one core looks after."""
 
     def __init__(
-        self, name: str, kind: GraphKind, limits: Any, started_at: float, clock: Clock
+        self,
+        name: str,
+        memory: M,
+        core: Core[M, V, O, R],
+        publish: Publish,
+        refusals: Refusals,
+        clock: Clock,
     ) -> None:
         self.name = name
-        self._kind = kind
-        self._limits = limits
+        self.memory = memory
+        self.wake_at = NEVER
+        self.decision: Decision[M, O, R] | None = None
+        self._core = core
+        self._whose = {core.word: name}
+        self._publish = publish
+        self._refusals = refusals
         self._clock = clock
-        self.memory = kind.initial(name, started_at)
-        self.wake_at = math.inf
-        self._report: Any = None
-        self._news: Any = None
-        self._faults: tuple[Fault, ...] = ()
+        self._logged_news: object = None
+        self._logged: Mapping[str, str] = {}
+        self._faults: Mapping[object, Fault] = {}
 
-    def decide(self, event: Any) -> tuple[Sequence[tuple[Topic[Any], Message]], str]:
-        """One step of the core: what to publish, and why the event was refused."""
-        now = self._clock.monotonic()
-        decision = self._kind.decide(self.memory, event, now, self._limits)
-        self.memory, self.wake_at = decision.memory, decision.wake_at
-        self._report = decision.report
-        self._log_changes(now)
-        return decision.publish, decision.refused
+    def decide(self, event: V) -> Decision[M, O, R]:
+        """One step of the core."""
+        decision = self._core.decide(self.memory, event, self._clock.monotonic())
+        self.memory, self.wake_at, self.decision = decision.memory, decision.wake_at, decision
+        for topic, message in decision.publish:
+            self._publish(topic, message)
+        if decision.refused:
+            self._refusals.add(decision.refused, event, **self._whose)
+        return decision
 
-    def idle(self, now: float) -> bool:
-        """It need not be remembered."""
-        return self._kind.idle(self.memory, now)
+    def log(self, report: R) -> None:
+        """Say once what is new in a report."""
+        news = report.news()
+        if news != self._logged_news:
+            self._logged_news = news
+            self._log_state(self._core.summary(report, self._clock.monotonic()))
+        if report.faults or self._faults:
+            self._log_faults({self._core.identity(fault): fault for fault in report.faults})
 
-    def status(self) -> Mapping[str, Any]:
+    def status(self) -> Status:
         """For the status file; from any thread."""
-        if self._report is None:
+        decision = self.decision
+        if decision is None:
             return {}
-        now, read_at = self._clock.monotonic(), self._report.read_at
+        report, now = decision.report, self._clock.monotonic()
+        read_at = report.read_at
         return {
-            **self._kind.summary(self._report, now),
-            "faults": [{"code": f.code, "detail": f.detail} for f in self._report.faults],
+            **self._core.summary(report, now),
+            "faults": [{"code": f.code, "detail": f.detail} for f in report.faults],
             "input_age_s": None if read_at is None else round(now - read_at, 3),
         }
 
-    def _log_changes(self, now: float) -> None:
-        faults, before = self._report.faults, self._faults
-        if self._report.news() != self._news:
-            log.info(pairs("state", subject=self.name, **self._kind.summary(self._report, now)))
-        for fault in faults:
-            if fault not in before:
-                log.warning(pairs("fault", subject=self.name, code=fault.code, detail=fault.detail))
-        for fault in before:
-            if fault not in faults:
-                log.info(
-                    pairs("fault_over", subject=self.name, code=fault.code, detail=fault.detail)
-                )
-        self._news, self._faults = self._report.news(), faults
+    def _log_state(self, summary: Mapping[str, str]) -> None:
+        if summary != self._logged:
+            log.info(pairs("state", **self._whose, **summary))
+        self._logged = summary
+
+    def _log_faults(self, faults: Mapping[object, Fault]) -> None:
+        before, self._faults = self._faults, faults
+        for fault in (faults[key] for key in faults if key not in before):
+            log.warning(pairs("fault", **self._whose, code=fault.code, detail=fault.detail))
+        for fault in (before[key] for key in before if key not in faults):
+            log.info(pairs("fault_over", **self._whose, code=fault.code, detail=fault.detail))

@@ -1,13 +1,14 @@
-"""One YAML scalar to one text, number, truth or choice, within its bounds; and how to say what not.
+"""One YAML scalar to one text, number, truth or choice: what is written there is read here, whether its
+type allows it is msgspec's to judge, and how to say what not is said here again.
 
 A text is a text only if YAML could not take it for something else, a number only if it is written
-so that nobody can misread it (`yaml_scalars`).
+so that nobody can misread it (`scalars.py`).
 """
 
-import re
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import Annotated, Any, Literal
 
+import msgspec
 from msgspec.inspect import (
     BoolType,
     DictType,
@@ -30,7 +31,6 @@ from bridges.settings.nodes import either, is_plain, nearest, shown
 from bridges.settings.scalars import TRUTHS, number, reads_as, whole_number
 
 Extra = Mapping[str, Any]
-N = TypeVar("N", int, float)
 
 
 class Wrong(Exception):
@@ -63,7 +63,7 @@ def wanted_text(wanted: Type, extra: Extra | None = None) -> str:
         noun = "a whole number" if isinstance(wanted, IntType) else "a number"
         return f"{noun}{_span(wanted, extra or {})}"
     if isinstance(wanted, LiteralType | EnumType):
-        return either(_choices(wanted))
+        return either(choices(wanted))
     return _NOUNS[type(wanted)]
 
 
@@ -77,7 +77,7 @@ _NOUNS: dict[type[Type], str] = {
 }
 
 
-def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> Any:
+def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
     """The scalar as the first of these types that it can be. Raises Wrong."""
     *others, last = sorted(types, key=_rank)
     for wanted in others:
@@ -89,7 +89,11 @@ def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> Any:
         return leaf([last.type], node, last.extra or {})
     if is_plain(node) and not node.value:
         raise Wrong(f"has no value: {wanted_text(last, extra)} is wanted")
-    return _READERS[type(last)](last, node, extra)
+    value = _read(last, node, extra)
+    try:
+        return msgspec.convert(value, _annotation(last))
+    except msgspec.ValidationError as error:
+        raise Wrong(_reason(last, node, extra, "length" in str(error))) from None
 
 
 def _rank(wanted: Type) -> int:
@@ -97,7 +101,56 @@ def _rank(wanted: Type) -> int:
     return isinstance(wanted.type if isinstance(wanted, Metadata) else wanted, StrType)
 
 
-def _text(wanted: StrType, node: ScalarNode, extra: Extra) -> str:
+def _annotation(wanted: Type) -> Any:
+    """The type that msgspec described, with its bounds: what `convert` judges by."""
+    if isinstance(wanted, EnumType):
+        return wanted.cls
+    if isinstance(wanted, LiteralType):
+        return Literal[wanted.values]
+    return Annotated[_PLAIN[type(wanted)], msgspec.Meta(**msgspec.structs.asdict(wanted))]
+
+
+_PLAIN: dict[type[Type], type] = {StrType: str, IntType: int, FloatType: float, BoolType: bool}
+
+
+def _read(wanted: Type, node: ScalarNode, extra: Extra) -> object:
+    """The value that is written there, if nobody can take it for another. Raises Wrong."""
+    if isinstance(wanted, LiteralType | EnumType):  # as written: YAML's readings do not matter
+        return choices(wanted).get(node.value, node.value)
+    if isinstance(wanted, StrType):
+        _check_text(node, extra)
+        return node.value
+    value = _READINGS[type(wanted)](node.value) if is_plain(node) else None
+    if value is None:
+        raise _misread(wanted, node, extra)
+    return value
+
+
+_READINGS: dict[type[Type], Callable[[str], object]] = {
+    IntType: whole_number,
+    FloatType: number,
+    BoolType: TRUTHS.get,
+}
+
+
+def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
+    """Why `convert` did not take a value; `length`: because of its length."""
+    written = shown(node.value)
+    if isinstance(wanted, LiteralType | EnumType):
+        near = nearest(node.value, choices(wanted))
+        meant = f" (did you mean '{near}'?)" if near else ""
+        return f"is '{written}': {wanted_text(wanted)} is wanted{meant}"
+    if not isinstance(wanted, StrType):
+        return f"is {written}: {wanted_text(wanted, extra)} is wanted"
+    if length:
+        least, most = wanted.min_length or 0, wanted.max_length
+        span = f"at least {least}" if most is None else f"{least} to {most}"
+        return f"has {len(node.value)} characters: {span} are allowed"
+    form = extra.get("pattern", f"text like {wanted.pattern}")
+    return f"is '{written}': {form} is wanted"
+
+
+def _check_text(node: ScalarNode, extra: Extra) -> None:
     text: str = node.value
     reading = reads_as(text) if is_plain(node) and "check" not in extra else None
     if reading is not None:
@@ -105,108 +158,51 @@ def _text(wanted: StrType, node: ScalarNode, extra: Extra) -> str:
         if looks(node) == f"the number {text}":
             taken = f"is the number {text}"
         raise Wrong(f'{taken}: if the text is meant, write "{shown(text)}" in quotes')
-    least, most = wanted.min_length or 0, wanted.max_length
-    if len(text) < least or (most is not None and len(text) > most):
-        raise Wrong(f"has {len(text)} characters: {_between(least, most)} are allowed")
     if any("\ud800" <= c <= "\udfff" for c in text):
         raise Wrong("holds half a character (\\ud800 to \\udfff): write the whole character")
-    if wanted.pattern is not None and not re.search(wanted.pattern, text):
-        form = extra.get("pattern", f"text like {wanted.pattern}")
-        raise Wrong(f"is '{shown(text)}': {form} is wanted")
-    return text
 
 
-def _between(least: int, most: int | None) -> str:
-    return f"at least {least}" if most is None else f"{least} to {most}"
-
-
-def _whole(wanted: IntType, node: ScalarNode, extra: Extra) -> int:
-    value = whole_number(node.value) if is_plain(node) else None
-    if value is None:
-        raise _no_number(node, wanted_text(wanted, extra))
-    return _within(wanted, value, node, extra)
-
-
-def _number(wanted: FloatType, node: ScalarNode, extra: Extra) -> float:
-    value = number(node.value) if is_plain(node) else None
-    if value is None:
-        raise _no_number(node, wanted_text(wanted, extra))
-    return _within(wanted, value, node, extra)
-
-
-def _no_number(node: ScalarNode, wanted: str) -> Wrong:
-    text = shown(node.value)
+def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> Wrong:
+    """What is written is not read as a number or truth: the way to write what may be meant."""
+    text, asked = shown(node.value), wanted_text(wanted, extra)
     if not is_plain(node):
-        hint = ", without quotes" if number(node.value) is not None else ""
-        return Wrong(f'is the text "{text}": {wanted} is wanted{hint}')
-    reading = reads_as(node.value)
-    if reading and reading.startswith("the number") and number(node.value) is None:
-        return Wrong(f"is written {text}, which YAML may read as {reading}: write {wanted} plainly")
-    return Wrong(f"is {looks(node)}: {wanted} is wanted")
-
-
-def _within(wanted: IntType | FloatType, value: N, node: ScalarNode, extra: Extra) -> N:
-    """The value if its type's bounds allow it."""
-    fine = (
-        (wanted.gt is None or value > wanted.gt)
-        and (wanted.ge is None or value >= wanted.ge)
-        and (wanted.lt is None or value < wanted.lt)
-        and (wanted.le is None or value <= wanted.le)
-        and (wanted.multiple_of is None or value % wanted.multiple_of == 0)
-    )
-    if not fine:
-        raise Wrong(f"is {shown(node.value)}: {wanted_text(wanted, extra)} is wanted")
-    return value
+        meant = _READINGS[type(wanted)](node.value) is not None
+        return Wrong(
+            f'is the text "{text}": {asked} is wanted{", without quotes" if meant else ""}'
+        )
+    reading = reads_as(node.value) or ""
+    if isinstance(wanted, BoolType) and reading in ("true", "false"):
+        return Wrong(f"is written {text}, which not every YAML reads alike: write {reading}")
+    if reading.startswith("the number") and number(node.value) is None:
+        return Wrong(f"is written {text}, which YAML may read as {reading}: write {asked} plainly")
+    return Wrong(f"is {looks(node)}: {asked} is wanted")
 
 
 def _span(wanted: IntType | FloatType, extra: Extra) -> str:
     """The bounds with their unit: ` from 0 to 10 s`."""
     words = []
     if wanted.ge is not None and wanted.le is not None:
-        words += [f"from {wanted.ge:g} to {wanted.le:g}"]
+        words += [f"from {_digits(wanted.ge)} to {_digits(wanted.le)}"]
     else:
-        words += [f"of at least {wanted.ge:g}"] if wanted.ge is not None else []
-        words += [f"of at most {wanted.le:g}"] if wanted.le is not None else []
-    words += [f"above {wanted.gt:g}"] if wanted.gt is not None else []
-    words += [f"below {wanted.lt:g}"] if wanted.lt is not None else []
-    words += [f"in steps of {wanted.multiple_of:g}"] if wanted.multiple_of is not None else []
+        words += [f"of at least {_digits(wanted.ge)}"] if wanted.ge is not None else []
+        words += [f"of at most {_digits(wanted.le)}"] if wanted.le is not None else []
+    words += [f"above {_digits(wanted.gt)}"] if wanted.gt is not None else []
+    words += [f"below {_digits(wanted.lt)}"] if wanted.lt is not None else []
+    words += (
+        [f"in steps of {_digits(wanted.multiple_of)}"] if wanted.multiple_of is not None else []
+    )
     unit = extra.get("unit", "")
     if not words:
         return f" ({unit})" if unit else ""
     return f" {' and '.join(words)}{f' {unit}' if unit else ''}"
 
 
-def _truth(wanted: BoolType, node: ScalarNode, extra: Extra) -> bool:
-    if is_plain(node) and node.value in TRUTHS:
-        return TRUTHS[node.value]
-    reading = reads_as(node.value) if is_plain(node) else None
-    if reading in ("true", "false"):
-        raise Wrong(f"is written {node.value}, which not every YAML reads alike: write {reading}")
-    hint = ", without quotes" if node.value in TRUTHS else ""
-    raise Wrong(f"is {looks(node)}: true or false is wanted{hint}")
+def _digits(bound: float) -> str:
+    """As a person writes it: 1000000, 0.05."""
+    return str(int(bound)) if bound == int(bound) else f"{bound:g}"
 
 
-def _choices(wanted: LiteralType | EnumType) -> dict[str, Any]:
-    if isinstance(wanted, LiteralType):
-        return {str(v): v for v in wanted.values}
-    return {str(member.value): member for member in wanted.cls}
-
-
-def _choice(wanted: LiteralType | EnumType, node: ScalarNode, extra: Extra) -> Any:
-    """One of a few words. They are compared as written, so that YAML's readings do not matter."""
-    choices = _choices(wanted)
-    if node.value in choices:
-        return choices[node.value]
-    near = nearest(node.value, choices)
-    meant = f" (did you mean '{near}'?)" if near else ""
-    raise Wrong(f"is '{shown(node.value)}': {either(choices)} is wanted{meant}")
-
-
-_READERS: dict[type[Type], Callable[[Any, ScalarNode, Extra], Any]] = {
-    StrType: _text,
-    IntType: _whole,
-    FloatType: _number,
-    BoolType: _truth,
-    LiteralType: _choice,
-    EnumType: _choice,
-}
+def choices(wanted: LiteralType | EnumType) -> dict[str, object]:
+    """What may be written -> what it stands for."""
+    values = wanted.values if isinstance(wanted, LiteralType) else [m.value for m in wanted.cls]
+    return {str(value): value for value in values}

@@ -4,32 +4,26 @@
     driver: dry_contact     a file of drivers/
     rmf: {...}              bridges.core.fields.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
-    lifts: {name: {...}}    the kind's own key; what each holds is the driver's `Settings`
+    lifts: {name: {...}}    the kind's own key; what each holds is the driver's `settings`
 
 A kind that lives on RMF's graph alone has `kind`, `rmf` and one section of its own.
 
 Structs say what may stand in a section (`yaml_values`); what concerns several sections is checked
 here and in `wiring`. The daemon takes nothing else from the file, and checks nothing again.
-
-A driver's file may have, besides what `drivers/__init__.py` says: `warnings(settings)`, as (path,
-text) of what is legal but worth a look; and where there are no wires, `describe(settings, bus's
-settings)`, as (what, text), for `check`; and `claims(settings)`, as (place, path), of what no other
-device of its bus may use.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import msgspec
 from msgspec.inspect import LiteralType
 from yaml import MappingNode, Node, ScalarNode
 
-from bridges.core.fields import Name, Rmf
-from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Kind
+from bridges.core.fields import DeviceSettings, Name, Rmf
+from bridges.core.graph_kind import AnyGraphKind, AnyKind, GraphKind
+from bridges.rmf import topics
 from bridges.settings import names as named
 from bridges.settings.nodes import (
     Page,
@@ -41,12 +35,16 @@ from bridges.settings.nodes import (
     read,
     unknown,
 )
+from bridges.settings.plausible import milliseconds, stale_readings
 from bridges.settings.values import BROKEN, Entry, Spot, Values, below, is_none, locate
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
+from drivers.driver_type import AnyDriver
+from drivers.hal import AnyBus, Bus
 from drivers.hal.points import Wire
 
 __all__ = ["Config", "Problem", "SettingsError", "load"]
 
+TOPICS = [topic.name for topic in vars(topics).values() if isinstance(topic, topics.Topic)]
 MAPPING = "a mapping (key: value)"
 
 
@@ -54,8 +52,8 @@ MAPPING = "a mapping (key: value)"
 class Config:
     """A file that is right.
 
-    `text`: its bytes as they were read. `buses` and `devices`: name -> the `Settings` of the bus's
-    or driver's file. `bus_types`: name -> `type:`. `warnings`: what is legal but worth a look.
+    `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's
+    or driver's record. `bus_types`: name -> `type:`. `warnings`: what is legal but worth a look.
     `section`: the settings of a kind without devices (`bridges/core/graph_kind.py`): it has no driver
     and no buses.
     """
@@ -76,22 +74,36 @@ class Config:
         named_bus: str | None = self.devices[device_name].bus
         return named_bus or next(iter(self.buses))
 
+    def devices_on(self, bus: str) -> list[str]:
+        """The names of the devices that stand on this bus."""
+        return [name for name in self.devices if self.bus_of(name) == bus]
+
+    @property
+    def driver_type(self) -> AnyDriver:
+        """The driver of its devices."""
+        return named.driver_called(self.kind, self.driver)
+
     def wires(self, device_name: str) -> list[Wire]:
         """A device's wiring table; empty where its driver has none."""
-        driver = named.driver_called(self.kind, self.driver)
-        return wires_of(driver, self.devices[device_name])
+        return list(self.driver_type.wires(self.devices[device_name]))
 
+    def bus_type(self, name: str) -> AnyBus:
+        """What the bus of this name is."""
+        return named.bus_called(self.bus_types[name])
 
-def wires_of(driver: ModuleType, settings: Any) -> list[Wire]:
-    """A device's wiring table; empty where its driver has none."""
-    table = getattr(driver, "wires", None)
-    return list(table(settings)) if table else []
+    def open_bus(self, name: str) -> Bus:
+        """The real bus of this name. Raises HalError."""
+        return self.bus_type(name).open_bus(self.buses[name])
 
 
 def load(path: Path | str) -> Config:
     """Read a device YAML. Raises SettingsError with every problem of it that can be seen."""
+    return understood(path, read(str(path)))
+
+
+def understood(path: Path | str, text: bytes) -> Config:
+    """The text of a device YAML, as it is or was at this path. Raises SettingsError."""
     page = Page(str(path))
-    text = read(page.file)
     root = compose(page, text)
     reading = _Reading(page, root)
     reading.all()
@@ -105,7 +117,7 @@ class _Bus:
 
     entry: Entry
     type: str | None
-    hal: ModuleType | None
+    hal: AnyBus | None
     settings: Any
 
 
@@ -116,10 +128,10 @@ class _Reading:
         self._page = page
         self._top = Spot(root, root, "the file")
         self._values = Values(page)
-        self._kind: Kind | GraphKind | None = None
+        self._kind: AnyKind | None = None
         self._section: Any = None
         self._kind_name = ""
-        self._driver: ModuleType | None = None
+        self._driver: AnyDriver | None = None
         self._driver_name = ""
         self._rmf = Rmf()
         self._buses: dict[str, _Bus] = {}
@@ -150,7 +162,7 @@ class _Reading:
             self._read_driver(below(self._top.node, "driver"))
         sections = self._values.known(entries, self._top, self._keys())
         if "rmf" in sections:
-            self._rmf = self._values.make(Rmf, sections["rmf"].spot())
+            self._read_rmf(sections["rmf"].spot())
         if "buses" in sections:
             self._read_buses(sections["buses"].spot())
         if isinstance(self._kind, GraphKind):
@@ -183,7 +195,14 @@ class _Reading:
             self._driver_name = name
             self._driver = named.driver_called(self._kind_name, name)
 
-    def _read_section(self, entry: Entry | None, kind: GraphKind) -> None:
+    def _read_rmf(self, spot: Spot) -> None:
+        self._rmf = self._values.make(Rmf, spot)
+        for name in () if self._rmf is BROKEN else self._rmf.topics:
+            if name not in TOPICS:
+                key = locate(spot, ("topics", name)).key
+                self._page.note(key, unknown("topic", name, TOPICS))
+
+    def _read_section(self, entry: Entry | None, kind: AnyGraphKind) -> None:
         """The settings of a kind without devices; all of them may have defaults."""
         if entry:
             self._section = self._values.make(kind.settings, entry.spot())
@@ -232,9 +251,8 @@ class _Reading:
         if name is None:
             return _Bus(entry, None, None, BROKEN)
         hal = named.bus_called(name)
-        settings = self._values.make(hal.Settings, entry.spot(), ("type",))
-        warnings = getattr(hal, "warnings", None)
-        for path, text in warnings(settings) if warnings and settings is not BROKEN else ():
+        settings = self._values.make(hal.settings, entry.spot(), ("type",))
+        for path, text in () if settings is BROKEN else hal.warnings(settings):
             self._warn(locate(entry.spot(), path).where(), f"bus '{entry.name}': {text}")
         return _Bus(entry, name, hal, settings)
 
@@ -260,7 +278,7 @@ class _Reading:
     def _allowed_types(self) -> list[str]:
         """The bus types that the driver can stand on; all while the driver is not known."""
         types = named.bus_types()
-        return [t for t in types if t in self._driver.BUSES] if self._driver else types
+        return [t for t in types if t in self._driver.buses] if self._driver else types
 
     def _read_devices(self, spot: Spot) -> None:
         entries = self._names(spot, (self._kind.name if self._kind else ""))
@@ -287,39 +305,45 @@ class _Reading:
             self._page.note(entry.value, unknown("bus", name, self._buses))
         return None
 
-    def _device(self, entry: Entry, bus: str | None, driver: ModuleType) -> Any:
+    def _device(self, entry: Entry, bus: str | None, driver: AnyDriver) -> Any:
         """A device's settings, with all that can be said about its wires."""
         spot = Spot(entry.value, entry.key, entry.spot().label)
         hal = self._buses[bus].hal if bus else None
         wiring = Wiring(self._page, entry.name, bus or "", hal)
         values = Values(self._page, wiring.checks)
         before = len(self._page.problems)
-        settings = values.make(driver.Settings, spot)
+        settings = values.make(driver.settings, spot)
         if settings is BROKEN:
             wiring.parts(values.structs, spot)
         else:
             self._check_signals(settings, spot, wiring, driver)
+            self._check_pace(settings, spot, bus)
         if len(self._page.problems) == before:
             self._collect_warnings(settings, spot, driver)
+            for path, text in milliseconds(values.structs):
+                self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
         self._uses += wiring.uses
         return settings
 
-    def _check_signals(self, settings: Any, spot: Spot, wiring: Wiring, driver: ModuleType) -> None:
+    def _check_signals(self, settings: Any, spot: Spot, wiring: Wiring, driver: AnyDriver) -> None:
         """The wires of a device whose settings are all there and of the right sort."""
-        wires = wires_of(driver, settings)
+        wires = list(driver.wires(settings))
         wiring.wires(wires, spot)
-        claims = getattr(driver, "claims", None)
-        wiring.claims(claims(settings) if claims else (), spot)
+        wiring.claims(driver.claims(settings), spot)
         signals = [wire.signal for wire in wires]
         note_unknown_signals(self._page, settings.accept_unsafe, signals, spot)
 
-    def _collect_warnings(self, settings: Any, spot: Spot, driver: ModuleType) -> None:
+    def _check_pace(self, settings: DeviceSettings, spot: Spot, bus: str | None) -> None:
+        read = self._buses[bus].settings if bus else BROKEN
+        for path, text in () if read is BROKEN else stale_readings(settings, read):
+            self._page.note(locate(spot, path).where(), text)
+
+    def _collect_warnings(self, settings: Any, spot: Spot, driver: AnyDriver) -> None:
         """What is to be known of a device that is in order."""
         for signal, reason in settings.accept_unsafe.items():
             key = locate(spot, ("accept_unsafe", signal)).key
             self._warn(key, f"{spot.label}: unsafe wiring of '{signal}' is accepted: {reason}")
-        warnings = getattr(driver, "warnings", None)
-        for path, text in warnings(settings) if warnings else ():
+        for path, text in driver.warnings(settings):
             self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
 
     def _warn(self, node: Node, text: str) -> None:

@@ -1,9 +1,11 @@
 """What the names in a YAML stand for: kinds, drivers and bus types are files, found by name.
 
-Only the name of a file that exists is ever imported. There is no table of them to edit.
+Only the name of a file that exists is ever imported. There is no table of them to edit, and no other
+file imports a kind, a driver or a bus by its name.
 """
 
 import importlib
+import re
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -11,8 +13,9 @@ from types import ModuleType
 import bridges
 import drivers
 import drivers.hal
-from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Kind
+from bridges.core.graph_kind import AnyKind
+from drivers.driver_type import AnyDriver
+from drivers.hal import AnyBus
 
 
 def kind_names() -> list[str]:
@@ -21,37 +24,42 @@ def kind_names() -> list[str]:
 
 
 def driver_names(kind: str) -> list[str]:
-    """What `driver:` may be: the files `drivers/<kind>/<driver>.py` that name their buses."""
-    return _found(drivers, f"{kind}/*.py", "BUSES", lambda path: path.stem)
+    """What `driver:` may be: the files `drivers/<kind>/<driver>.py` that hold a `DRIVER`."""
+    return _found(drivers, f"{kind}/*.py", "DRIVER", lambda path: path.stem)
 
 
 def bus_types() -> list[str]:
-    """What a bus's `type:` may be: the files and folders of `drivers/hal/` that open one."""
-    files = _found(drivers.hal, "*.py", "def open_bus(", lambda path: path.stem)
-    folders = _found(drivers.hal, "*/__init__.py", "def open_bus(", lambda path: path.parent.name)
+    """What a bus's `type:` may be: the files and folders of `drivers/hal/` that hold a `BUS`."""
+    files = _found(drivers.hal, "*.py", "BUS", lambda path: path.stem)
+    folders = _found(drivers.hal, "*/__init__.py", "BUS", lambda path: path.parent.name)
     return sorted({*files, *folders})
 
 
-def _found(package: ModuleType, pattern: str, line: str, name: Callable[[Path], str]) -> list[str]:
-    """Names of the files that have a line which begins so.
+def _found(
+    package: ModuleType, pattern: str, record: str, name: Callable[[Path], str]
+) -> list[str]:
+    """Names of the files that hold such a record.
 
     They are searched, not imported: others beside them need a vendor's library.
     """
     found = (path for root in package.__path__ for path in Path(root).glob(pattern))
-    return sorted({name(path) for path in found if f"\n{line}" in path.read_text("utf-8")})
+    holds = re.compile(rf"^{record}(:| =)", re.MULTILINE).search
+    return sorted({name(path) for path in found if holds(path.read_text("utf-8"))})
 
 
-def kind_called(name: str) -> Kind | GraphKind:
+def kind_called(name: str) -> AnyKind:
     """The kind that `kind:` names; one of `kind_names()`."""
-    kind: Kind | GraphKind = importlib.import_module(f"bridges.{name}").KIND
+    kind: AnyKind = importlib.import_module(f"bridges.{name}").KIND
     return kind
 
 
-def driver_called(kind: str, name: str) -> ModuleType:
+def driver_called(kind: str, name: str) -> AnyDriver:
     """The driver that `kind:` and `driver:` name; one of `driver_names(kind)`."""
-    return importlib.import_module(f"drivers.{kind}.{name}")
+    driver: AnyDriver = importlib.import_module(f"drivers.{kind}.{name}").DRIVER
+    return driver
 
 
-def bus_called(name: str) -> ModuleType:
-    """The file of a bus that `type:` names; one of `bus_types()`."""
-    return importlib.import_module(f"drivers.hal.{name}")
+def bus_called(name: str) -> AnyBus:
+    """The type of bus that `type:` names; one of `bus_types()`."""
+    bus: AnyBus = importlib.import_module(f"drivers.hal.{name}").BUS
+    return bus

@@ -8,15 +8,16 @@ import inspect
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
 import msgspec
 from msgspec import inspect as mi
 
 from bridges.core.fields import Rmf
-from bridges.core.graph_kind import GraphKind
+from bridges.core.graph_kind import AnyGraphKind, GraphKind
 from bridges.settings import names as named
+from bridges.settings.leaves import Extra, choices, wanted_text
+from drivers.driver_type import AnyDriver
 
 KEYS = r"(?:^|(?<=[.;]\s))((?:`\w+`(?:,\s)?)+): "
 MEANING = re.compile(rf"{KEYS}(.*?)(?={KEYS}|\Z)", re.M | re.S)
@@ -29,7 +30,7 @@ class Shape:
     kind: str
     devices_key: str
     driver: str
-    module: ModuleType
+    type: AnyDriver
 
 
 def shapes() -> Iterator[Shape]:
@@ -40,7 +41,7 @@ def shapes() -> Iterator[Shape]:
             yield Shape(kind, key, driver, named.driver_called(kind, driver))
 
 
-def graph_kinds() -> list[GraphKind]:
+def graph_kinds() -> list[AnyGraphKind]:
     """Every sort of file without devices."""
     kinds = (named.kind_called(name) for name in named.kind_names())
     return [kind for kind in kinds if isinstance(kind, GraphKind)]
@@ -48,9 +49,9 @@ def graph_kinds() -> list[GraphKind]:
 
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of a device YAML, for editors."""
-    buses = {name: named.bus_called(name).Settings for name in named.bus_types()}
+    buses = {name: named.bus_called(name).settings for name in named.bus_types()}
     graph = [kind.settings for kind in graph_kinds()]
-    types = [Rmf, *buses.values(), *(shape.module.Settings for shape in shapes()), *graph]
+    types = [Rmf, *buses.values(), *(shape.type.settings for shape in shapes()), *graph]
     refs, components = msgspec.json.schema_components(types, ref_template="#/$defs/{name}")
     by_type = dict(zip(types, refs, strict=True))
     for bus in buses.values():
@@ -75,7 +76,7 @@ def _allow_type(components: dict[str, Any], ref: dict[str, Any]) -> None:
 def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[str, Any]:
     kinds_of_bus = [
         {"allOf": [by_type[buses[name]], {"properties": {"type": {"const": name}}}]}
-        for name in shape.module.BUSES
+        for name in shape.type.buses
         if name in buses
     ]
     return {
@@ -89,13 +90,13 @@ def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[
             "buses": {"type": "object", "additionalProperties": {"oneOf": kinds_of_bus}},
             shape.devices_key: {
                 "type": "object",
-                "additionalProperties": by_type[shape.module.Settings],
+                "additionalProperties": by_type[shape.type.settings],
             },
         },
     }
 
 
-def _graph_file(kind: GraphKind, by_type: dict[Any, Any]) -> dict[str, Any]:
+def _graph_file(kind: AnyGraphKind, by_type: dict[Any, Any]) -> dict[str, Any]:
     return {
         "type": "object",
         "additionalProperties": False,
@@ -119,10 +120,10 @@ def page() -> str:
         *_sections("`rmf`", Rmf),
     ]
     for name in named.bus_types():
-        sections += _sections(f"Bus of `type: {name}`", named.bus_called(name).Settings)
+        sections += _sections(f"Bus of `type: {name}`", named.bus_called(name).settings)
     for shape in shapes():
         title = f"`{shape.devices_key}` with `driver: {shape.driver}`"
-        sections += _sections(title, shape.module.Settings)
+        sections += _sections(title, shape.type.settings)
     for kind in graph_kinds():
         sections += _sections(f"`{kind.devices_key}` of `kind: {kind.name}`", kind.settings)
     return "\n\n".join(sections) + "\n"
@@ -184,37 +185,21 @@ def _inner(info: mi.Type) -> list[type]:
     return []
 
 
-def _type(info: mi.Type, unit: str = "") -> str:
+def _type(info: mi.Type, extra: Extra | None = None) -> str:
     match info:
-        case mi.Metadata(type=part, extra=extra):
-            return _type(part, str((extra or {}).get("unit", "")))
+        case mi.Metadata(type=part, extra=more):
+            return _type(part, more)
         case mi.StructType():
             return "a mapping, below"
         case mi.UnionType(types=types):
-            return " or ".join(_type(part, unit) for part in types if part != mi.NoneType())
+            return " or ".join(_type(part, extra) for part in types if part != mi.NoneType())
         case mi.DictType(value_type=part):
             return f"name: {_type(part)}"
         case mi.ListType(item_type=part) | mi.VarTupleType(item_type=part):
             return f"list of {_type(part)}"
-        case mi.LiteralType(values=values):
-            return ", ".join(f"`{value}`" for value in values)
-        case mi.EnumType(cls=cls):
-            return ", ".join(f"`{member.value}`" for member in cls)
-        case mi.IntType() | mi.FloatType():
-            return _number(info, unit)
-        case mi.BoolType():
-            return "true, false"
-        case mi.StrType():
-            return "text"
-    return type(info).__name__.removesuffix("Type").lower()
-
-
-def _number(info: mi.IntType | mi.FloatType, unit: str) -> str:
-    what = "whole number" if isinstance(info, mi.IntType) else "number"
-    least = info.ge if info.ge is not None else info.gt
-    most = info.le if info.le is not None else info.lt
-    bounds = f" {least:g} to {most:g}" if least is not None and most is not None else ""
-    return f"{what}{bounds}{f' {unit}' if unit else ''}"
+        case mi.LiteralType() | mi.EnumType():
+            return ", ".join(f"`{choice}`" for choice in choices(info))
+    return wanted_text(info, extra).removeprefix("a ")
 
 
 def _default(field: mi.Field) -> str:

@@ -21,7 +21,7 @@ from msgspec.inspect import (
 )
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.settings.leaves import Wrong, leaf, looks, wanted_text
+from bridges.settings.leaves import Extra, Wrong, leaf, looks, wanted_text
 from bridges.settings.nodes import Page, either, is_plain, nearest, shown, unknown
 from bridges.settings.scalars import is_null, is_null_word
 
@@ -115,7 +115,7 @@ class Values:
     def __init__(self, page: Page, checks: Mapping[str, Check] | None = None) -> None:
         self._page = page
         self._checks = checks or {}
-        self.structs: list[tuple[tuple[str, ...], Any]] = []
+        self.structs: list[tuple[tuple[str, ...], object]] = []
 
     def make(self, cls: Any, spot: Spot, besides: tuple[str, ...] = ()) -> Any:
         """A `cls` (a type, or msgspec's description of one) of a node, or BROKEN.
@@ -161,7 +161,7 @@ class Values:
                 self._page.note(spot.at, f"{spot.label} needs '{name}': {wanted}")
         return {name: entry for name, entry in found.items() if name in fields}
 
-    def _value(self, wanted: Type, spot: Spot, extra: Mapping[str, Any] | None = None) -> Any:
+    def _value(self, wanted: Type, spot: Spot, extra: Extra | None = None) -> object:
         if isinstance(wanted, Metadata):
             return self._value(wanted.type, spot, wanted.extra)
         if isinstance(wanted, UnionType):
@@ -174,7 +174,7 @@ class Values:
             return self._list(wanted, spot)
         return self._leaf([wanted], spot, extra or {})
 
-    def _union(self, wanted: UnionType, spot: Spot, extra: Mapping[str, Any] | None) -> Any:
+    def _union(self, wanted: UnionType, spot: Spot, extra: Extra | None) -> object:
         """The one member that a node of this sort can be; of several leaves, the first that fits."""
         members = [t for t in wanted.types if not isinstance(t, NoneType)]
         if len(members) < len(wanted.types) and is_none(spot.node):
@@ -187,7 +187,7 @@ class Values:
             return self._value(fitting[0], spot, extra)
         return self._leaf(fitting, spot, extra or {})
 
-    def _leaf(self, types: list[Type], spot: Spot, extra: Mapping[str, Any]) -> Any:
+    def _leaf(self, types: list[Type], spot: Spot, extra: Extra) -> object:
         if not isinstance(spot.node, ScalarNode):
             self._mismatch(spot, either(wanted_text(t, extra) for t in types))
             return BROKEN
@@ -198,13 +198,13 @@ class Values:
             self._page.note(spot.at if empty else spot.node, f"{spot.label} {wrong}")
             return BROKEN
         check = self._checks.get(extra.get("check", ""))
-        reason = check(value, spot) if check else None
+        reason = check(spot.node.value, spot) if check else None
         if reason is None:
             return value
         self._page.note(spot.node, reason)
         return BROKEN
 
-    def _list(self, wanted: ListType | VarTupleType, spot: Spot) -> Any:
+    def _list(self, wanted: ListType | VarTupleType, spot: Spot) -> object:
         if not isinstance(spot.node, SequenceNode):
             self._mismatch(spot, wanted_text(wanted))
             return BROKEN
@@ -219,8 +219,8 @@ class Values:
             return BROKEN
         return values if isinstance(wanted, ListType) else tuple(values)
 
-    def _dict(self, wanted: DictType, spot: Spot) -> Any:
-        made: dict[Any, tuple[Any, Node]] = {}
+    def _dict(self, wanted: DictType, spot: Spot) -> object:
+        made: dict[object, tuple[object, Node]] = {}
         before = len(self._page.problems)
         entries = self.entries(spot)
         broken = len(self._page.problems) > before
@@ -236,7 +236,7 @@ class Values:
             return BROKEN
         return {key: value for key, (value, _) in made.items()}
 
-    def _struct(self, wanted: StructType, spot: Spot, besides: tuple[str, ...]) -> Any:
+    def _struct(self, wanted: StructType, spot: Spot, besides: tuple[str, ...]) -> object:
         fields = {f.encode_name: f for f in wanted.fields}
         known = {n: wanted_text(f.type) if f.required else None for n, f in fields.items()}
         before = len(self._page.problems)
@@ -254,7 +254,7 @@ class Values:
         self._ask(made, spot)
         return made
 
-    def _ask(self, made: Any, spot: Spot) -> None:
+    def _ask(self, made: object, spot: Spot) -> None:
         problems = getattr(made, "problems", None)
         for path, text in problems() if problems else ():
             self._page.note(locate(spot, path).where(), text)

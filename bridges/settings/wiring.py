@@ -1,18 +1,17 @@
 """Checks across the wires of a file: points that do not exist, points used twice, unlikely wires.
 
 What a point may be called and which wires cannot be are the bus's knowledge (`canonical` and
-`wire_problems` of its file in `drivers/hal/`).
+`wire_problems` of its `BUS` in `drivers/hal/`).
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from types import ModuleType
-from typing import Any
 
 from yaml import Node
 
 from bridges.settings.nodes import Page, unknown
 from bridges.settings.values import Check, Spot, below, locate
+from drivers.hal import AnyBus
 from drivers.hal.points import Input, Output, Wire
 
 
@@ -30,7 +29,7 @@ class Use:
 class Wiring:
     """The points of one device as they are met while its settings are read, and then as wires."""
 
-    def __init__(self, page: Page, device: str, bus: str, hal: ModuleType | None) -> None:
+    def __init__(self, page: Page, device: str, bus: str, hal: AnyBus | None) -> None:
         self._page = page
         self._device = device
         self._bus = bus
@@ -42,11 +41,10 @@ class Wiring:
         return self._use(text, spot.path[:-1], spot.node)
 
     def _use(self, point: str, path: tuple[str, ...], node: Node) -> str | None:
-        canonical = getattr(self._hal, "canonical", None)
-        if canonical is None:
+        if self._hal is None:
             return None
         try:
-            name = canonical(point)
+            name = self._hal.canonical(point)
         except ValueError as error:
             return str(error)
         self.uses.append(Use(self._bus, name, point, f"{self._device} {'.'.join(path)}", node))
@@ -79,7 +77,7 @@ class Wiring:
             user = f"{self._device} {'.'.join(path)}"
             self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
 
-    def parts(self, structs: Iterable[tuple[tuple[str, ...], Any]], spot: Spot) -> None:
+    def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
         """Judge the wires of a device that is otherwise not in order, so that no table exists."""
         for path, struct in structs:
             if isinstance(struct, Input):
@@ -91,8 +89,7 @@ class Wiring:
                 self._judge(wire, spot)
 
     def _judge(self, wire: Wire, spot: Spot) -> None:
-        problems = getattr(self._hal, "wire_problems", None)
-        for text in problems(wire) if problems else ():
+        for text in self._hal.wire_problems(wire) if self._hal else ():
             name = wire.path[-1] if wire.path else wire.signal
             self._page.note(locate(spot, wire.path).key, f"'{name}': {text}")
 

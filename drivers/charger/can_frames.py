@@ -6,32 +6,26 @@ frame is sent by a scan of ours, never by a cyclic sender: a daemon that hangs s
 that is not seen is not fed either; only the frames that take its power away are sent to it.
 """
 
-from collections.abc import Callable, Iterator
+import functools
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Final
 
 import msgspec
 
 from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import (
-    Activity,
-    ChargerOutputs,
-    ChargerSample,
-    Measured,
-    Side,
-)
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
 from bridges.core.fields import Name
 from bridges.settings.nodes import unknown
 from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows
+from drivers.driver_type import DriverType
 from drivers.hal import can
-from drivers.hal.points import Wire
+from drivers.hal.can.broadcasts import Broadcasts, Said
 from drivers.profiles import profile_problems
 
-BUSES: Final = ("can",)
-
 Volume = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
-UNKNOWN: Final[tuple[Activity, Side]] = (Activity.UNKNOWN, "")
+UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -101,11 +95,6 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield f"frame {can.named(frames.id(name))}", ("map",) if settings.map else ("profile",)
 
 
-def wires(settings: Settings) -> list[Wire]:
-    """None: a charger on CAN has no contacts."""
-    return []
-
-
 def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, str]]:
     """What `check` prints in place of a wiring table: (what, meaning)."""
     found = frame_map(settings)
@@ -143,44 +132,30 @@ class FrameDriver:
     """`drivers.Driver` of one charger."""
 
     def __init__(self, settings: Settings, bus: can.CanBus) -> None:
-        self._settings = settings
+        self._setpoints = settings.setpoints
         self._map = frame_map(settings)
         self._dbc = dbc.load(self._map.dbc)
-        self._bus = bus
         self._meanings = self._map.state.codes.meanings()
-        self._pause = bus.backoff()
-        self._needed = _needed(self._map)
-        self._heard: dict[str, tuple[bytes, float]] = {}
-        self._odd: dict[str, str] = {}
+        self._frames = Broadcasts(bus, _said(self._map, self._dbc))
         self._in_error = False
         self._power: bool | None = None
         self._seen = False
-        self._sent_at: dict[str, float] = {}
         self._touched = False
-        for frame in self._map.frames():
-            mask = self._map.masks.get(frame, 0x1FFF_FFFF) | can.EXTENDED
-            bus.listen([can.Wanted(self._dbc.id(frame), mask)], self._hearer(frame))
 
     def open(self) -> None:
         """See that the scan can keep the pace; nothing is sent. Raises DriverError."""
-        scan_s = self._bus.settings.scan_s
         for sent in self._map.send:
-            if sent.every_s < scan_s:
-                raise DriverError(
-                    f"{sent.frame} must be sent every {sent.every_s:g} s, and a scan is"
-                    f" every {scan_s:g} s: set the bus's scan_s to {sent.every_s:g} or less"
-                )
+            self._frames.check_pace(sent.frame, sent.every_s)
 
     def read(self) -> ChargerSample:
         """The charger now. Raises DriverError."""
         self._seen = False
-        self._bus.take()
-        self._see()
-        values = self._values()
+        values = self._values(self._frames.read())
         code = int(values.get(self._map.state.at, -1))
         activity, side = self._meanings.get(code, UNKNOWN)
         if self._undiagnosed(activity, values):
-            values = self._values()
+            state, *_ = self._map.frames()
+            values = self._values(self._frames.read_after(state, self._map.errors.frames()))
         found = self._errors(values)
         self._seen = True
         return ChargerSample(
@@ -195,7 +170,7 @@ class FrameDriver:
         """Feed it, or keep it off: each frame that is due. Raises DriverError."""
         if outputs.power is not None:
             if outputs.power != self._power:
-                self._sent_at.clear()
+                self._frames.feed_at_once()
             self._power = outputs.power
         if self._power is not None and (self._seen or not self._power):
             self._feed(self._power)
@@ -203,7 +178,7 @@ class FrameDriver:
     def make_safe(self) -> None:
         """What takes its power away, now. Silence does the rest. Raises DriverError."""
         self._power = False
-        self._sent_at.clear()
+        self._frames.feed_at_once()
         self._feed(on=False)
         self._touched = False
 
@@ -216,95 +191,32 @@ class FrameDriver:
                 return  # it is not fed any more, and stops by itself
 
     def _feed(self, on: bool) -> None:
-        now = self._bus.now()
         for sent in self._map.send:
-            values = sent.values(on, self._settings.setpoints)
-            slack_s = self._bus.settings.scan_s / 2
-            due_at = self._sent_at.get(sent.frame, float("-inf")) + sent.every_s - slack_s
-            if values is None or now < due_at:
+            values = sent.values(on, self._setpoints)
+            if values is None:
                 continue
+            payload = functools.partial(self._dbc.encode, sent.frame, values)
             self._touched = self._touched or on
-            payload = self._dbc.encode(sent.frame, values)
-            self._bus.send(can.Frame(self._dbc.id(sent.frame), payload))
-            self._sent_at[sent.frame] = now
-
-    def _hearer(self, frame: str) -> Callable[[can.Frame, float], None]:
-        length = self._dbc.length(frame)
-
-        def hear(heard: can.Frame, at: float) -> None:
-            if len(heard.payload) == length:
-                self._heard[frame] = (heard.payload, at)
-            else:
-                size = f"{len(heard.payload)} bytes, where the map has {length}"
-                self._odd[frame] = f"one ({can.named(heard.id)}) of {size}"
-
-        return hear
-
-    def _see(self) -> None:
-        """Have what is needed, and fresh; wait for it where it may come in time. Raises HalError."""
-        if self._fresh():
-            self._pause.mended()
-            self._odd.clear()
-            return
-        self._pause.check()
-        if not self._bus.wait(self._fresh, self._bus.settings.timeout_s):
-            raise self._pause.failed(self._silent())
-        self._pause.mended()
-
-    def _missing(self) -> str:
-        """The first frame that is needed and not fresh; "" when all are."""
-        now = self._bus.now()
-        old = (b"", float("-inf"))
-        return next(
-            (
-                f
-                for f, limit_s in self._needed.items()
-                if now - self._heard.get(f, old)[1] >= limit_s
-            ),
-            "",
-        )
+            self._frames.feed(self._dbc.id(sent.frame), sent.every_s, payload)
 
     def _undiagnosed(self, activity: Activity, values: dict[str, float]) -> bool:
-        """An error's signals may come a moment after its state: wait for them, once for an error.
+        """An error's signals may come a moment after its state: they are awaited, once for an error.
 
-        An error of no side counts as the station's, and takes it out of service. True when waited.
+        An error of no side counts as the station's, and takes it out of service.
         """
         before, self._in_error = self._in_error, activity is Activity.ERROR
-        if before or not self._in_error or self._errors(values):
-            return False
-        since = self._heard[self._map.frames()[0]][1]
-        texts = (*self._map.errors.station, *self._map.errors.robot)
-        frames = {signal.split(".")[0] for signal in texts}
+        return self._in_error and not before and not self._errors(values)
 
-        def told() -> bool:
-            return all(self._heard.get(frame, (b"", since))[1] > since for frame in frames)
+    def _values(self, frames: Mapping[str, bytes]) -> dict[str, float]:
+        """Every signal of these frames, by Frame.Signal. Raises DriverError."""
+        return {
+            f"{frame}.{signal}": value
+            for frame, payload in frames.items()
+            for signal, value in self._dbc.decode(frame, payload).items()
+        }
 
-        self._bus.wait(told, self._bus.settings.timeout_s)
-        return True
-
-    def _fresh(self) -> bool:
-        return not self._missing()
-
-    def _silent(self) -> str:
-        frame = self._missing()
-        place = can.named(self._dbc.id(frame))
-        text = f"no {frame} ({place}) at {self._bus.where} within {self._needed[frame]:g} s"
-        odd = self._odd.pop(frame, "")
-        return (
-            f"{text}, but {odd}: is it another make?" if odd else f"{text}: {self._bus.silence()}"
-        )
-
-    def _values(self) -> dict[str, float]:
-        """Every signal of frames that are fresh, by Frame.Signal. Raises DriverError."""
-        values: dict[str, float] = {}
-        for frame, (payload, at) in self._heard.items():
-            if self._bus.now() - at < self._needed.get(frame, self._map.others_timeout_s):
-                found = self._dbc.decode(frame, payload)
-                values |= {f"{frame}.{signal}": value for signal, value in found.items()}
-        return values
-
-    def _errors(self, values: dict[str, float]) -> list[tuple[Side, str]]:
-        sides: tuple[tuple[Side, dict[str, str]], ...] = (
+    def _errors(self, values: dict[str, float]) -> list[tuple[FaultSide, str]]:
+        sides: tuple[tuple[FaultSide, dict[str, str]], ...] = (
             ("station", self._map.errors.station),
             ("robot", self._map.errors.robot),
         )
@@ -327,12 +239,20 @@ class FrameDriver:
         )
 
 
-def _needed(found: FrameMap) -> dict[str, float]:
-    """Frames without which there is no reading, and how old they may be: state, and who is there."""
-    needed = {found.frames()[0]: found.state_timeout_s}
-    if found.receiver:
-        needed.setdefault(found.receiver.split(".")[0], found.others_timeout_s)
-    return needed
+def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
+    """What is heard. Without its state, and who is there, there is no reading."""
+    state, *_ = found.frames()
+    receiver = (found.receiver or "").split(".")[0]
+    return {
+        name: Said(
+            id=frames.id(name),
+            mask=found.masks.get(name, 0x1FFF_FFFF),
+            length=frames.length(name),
+            fresh_s=found.state_timeout_s if name == state else found.others_timeout_s,
+            needed=name in (state, receiver),
+        )
+        for name in found.frames()
+    }
 
 
 def _receiver(number: float | None) -> str | None:
@@ -343,3 +263,14 @@ def _receiver(number: float | None) -> str | None:
 def _rounded(value: float | None) -> float | None:
     """Without what scaling by 0.1 leaves behind."""
     return None if value is None else round(value, 3)
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("can",),
+    create=create,
+    describe=describe,
+    claims=claims,
+    warnings=warnings,
+    fake="hal_fakes.can.frame_charger",
+)

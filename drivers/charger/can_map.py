@@ -48,6 +48,10 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     station: dict[Signal, Name] = msgspec.field(default_factory=dict)
     robot: dict[Signal, Name] = msgspec.field(default_factory=dict)
 
+    def frames(self) -> set[str]:
+        """The frames that they are in."""
+        return {signal.split(".")[0] for signal in (*self.station, *self.robot)}
+
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A frame that the charger must be sent again and again; at least one of `on` and `off`.

@@ -21,18 +21,16 @@ from bridges.charger.signals import (
     Activity,
     ChargerOutputs,
     ChargerSample,
+    FaultSide,
     Measured,
-    Side,
 )
 from drivers.charger import json_fields
 from drivers.charger.json_fields import Field
 from drivers.charger.state_codes import CODE_MAX, Code, Codes
+from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.hal.points import Wire
 
-BUSES = ("http",)
-
-UNKNOWN: Final[tuple[Activity, Side]] = (Activity.UNKNOWN, "")
+UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 WORD_MAX: Final = 64
 Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
 Path = Annotated[str, msgspec.Meta(pattern=r"^/[A-Za-z0-9._~/-]*$", max_length=256)]
@@ -149,18 +147,15 @@ class Calls(Protocol):
     def get_json(self, path: str) -> dict[str, Any]:
         """One JSON object. Raises HalError."""
 
-    def send(self, path: str, method: http.Method = "POST", body: str | None = None) -> None:
-        """Once. Raises HalError."""
+    def send(
+        self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
+    ) -> None:
+        """Once; `safe` where it takes power away. Raises HalError."""
 
 
 def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
     """The driver of one station."""
     return HttpCharger(settings, bus)
-
-
-def wires(settings: Settings) -> list[Wire]:
-    """None: a station on HTTP has no contacts."""
-    return []
 
 
 def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str, str]]:
@@ -273,7 +268,7 @@ class HttpCharger:
     def make_safe(self) -> None:
         """No power; a station that may go on charging without us is left as it is."""
         if self._settings.on_death == "stop":
-            self._send(self._settings.stop)
+            self._send(self._settings.stop, safe=True)
 
     def close(self) -> None:
         """Nothing to let go."""
@@ -282,7 +277,7 @@ class HttpCharger:
         given, self._power = self._power, None
         on = self._activity in (Activity.HANDSHAKE, Activity.CHARGING)
         if on or (given is not False and self._activity in AT_FAULT):
-            self._send(self._settings.stop)
+            self._send(self._settings.stop, safe=True)
 
     def _start_if_needed(self) -> None:
         given, self._power = self._power, None
@@ -290,9 +285,9 @@ class HttpCharger:
         if waits or (not given and self._activity is Activity.HANDSHAKE):
             self._send(self._settings.start)
 
-    def _send(self, call: Call | None) -> None:
+    def _send(self, call: Call | None, safe: bool = False) -> None:
         if call:
-            self._bus.send(call.path, call.method, call.body)
+            self._bus.send(call.path, call.method, call.body, safe)
 
 
 def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> int | str:
@@ -338,3 +333,13 @@ def _in_range(answer: Mapping[str, Any], place: InRange | None) -> bool | None:
     if not isinstance(value, bool):
         raise json_fields.wrong(place.field, value, "true or false")
     return value
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("http",),
+    create=create,
+    describe=describe,
+    warnings=warnings,
+    fake="hal_fakes.http_charger",
+)

@@ -8,11 +8,11 @@ from typing import Annotated
 
 import msgspec
 
-from bridges.charger.signals import Activity, Side
+from bridges.charger.signals import Activity, FaultSide
 
 CODE_MAX = 65535
 Code = Annotated[int, msgspec.Meta(ge=0, le=CODE_MAX)]
-ROBOT_ERROR: tuple[Activity, Side] = (Activity.ERROR, "robot")
+ROBOT_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "robot")
 
 
 class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -44,9 +44,9 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
                     yield (name, str(n)), f"state {code} is already {seen[code]}: give it once"
                 seen[code] = name
 
-    def meanings(self) -> dict[int | str, tuple[Activity, Side]]:
+    def meanings(self) -> dict[int | str, tuple[Activity, FaultSide]]:
         """By the maker's state: what the station does, and whose fault an error is."""
-        made: dict[int | str, tuple[Activity, Side]] = {
+        made: dict[int | str, tuple[Activity, FaultSide]] = {
             code: (activity, "") for activity, codes in self.lists().items() for code in codes
         }
         return made | dict.fromkeys(self.robot_error, ROBOT_ERROR)

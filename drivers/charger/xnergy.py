@@ -1,4 +1,7 @@
-"""Xnergy's receiver (RCU): its numbers, wherever they are read, CANopen objects or Modbus registers.
+"""Xnergy's receiver (RCU): what its numbers mean and how it is driven, whatever wire it is on.
+
+Where its numbers are is in `canopen.py` and `modbus.py`. No place for clearing an error is published:
+an error ends by itself, or with the receiver's power.
 
 Facts: the maker's published ROS driver (`xnergy-charger-rcu`): state codes, error bits, addresses,
 scales, and the range check before a start. Not tried on the hardware. That driver decodes the high
@@ -9,14 +12,23 @@ Errors have a side: what the transmitter (TPU, on the wall) reports, or lies on 
 station's; everything else is the robot's, its receiver and where it stands.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Protocol
 
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured, Side
+from bridges.charger.settings import ChargerSettings
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
+from drivers import DriverError
+
+ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
+IN_ERROR: Final = ("latched_low", "latched_high")
+"""What a scan reads, and in an error also the maker's shadow error, which stays after it has gone."""
+ENABLE: Final = "enable"
+CHECK_RANGE: Final = "check_range"
+"""What is written: 1 or 0, and 1."""
 
 Words = Mapping[str, int]
-"""Raw unsigned words by the names of `READS`; one that the wire does not have is absent."""
+"""Raw unsigned words by the names of ALWAYS and IN_ERROR."""
 
 TICKS_PER_UNIT: Final = 128
 """Volts and amps come in 1/128."""
@@ -46,7 +58,7 @@ CODES: Final[Mapping[int, tuple[Activity, str]]] = {
 }
 """What is published; every other code is UNKNOWN (`activity`)."""
 
-ERROR_BITS: Final[Mapping[int, tuple[Side, str]]] = {
+ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
     0x0000_0001: ("robot", "the receiver's flash memory is not set"),
     0x0000_0002: ("robot", "pairing timeout"),
     0x0000_0004: ("robot", "communication lost after pairing"),
@@ -66,76 +78,12 @@ ERROR_BITS: Final[Mapping[int, tuple[Side, str]]] = {
 """The error as one number of 32 bits, its high word above its low word."""
 
 IN_RANGE: Final = 1
-RANGES: Final[Mapping[int, str]] = {
-    0: "range check under way",
-    IN_RANGE: "in range",
-    2: "out of range",
-    240: "range check failed",
-}
-"""Results of a range check; only IN_RANGE is a yes."""
-
-
-@dataclass(frozen=True, slots=True)
-class Object:
-    """A CANopen object, by SDO: `octets` is its width, unsigned and little-endian."""
-
-    index: int
-    subindex: int
-    octets: int = 2
-
-    def __str__(self) -> str:
-        return f"0x{self.index:04X}:{self.subindex:02X}"
-
-
-@dataclass(frozen=True, slots=True)
-class Where:
-    """One number of the RCU: its CANopen object, its Modbus place; None where none is published."""
-
-    sdo: Object | None
-    modbus: str | None
-
-
-CAN_BITRATE: Final = 250_000
-CAN_NODE: Final = 10
-HEARTBEAT_S: Final = 0.1
-"""The node's heartbeat says `operational` (5) each 100 ms; old firmware has none."""
-MODBUS_UNIT: Final = 16
-MODBUS_BAUD: Final = 9600
-
-ENABLE: Final = Where(Object(0x2000, 1, 1), "coil 0")
-CHECK_RANGE: Final = Where(Object(0x2000, 2, 1), "coil 2")
-READS: Final[Mapping[str, Where]] = {
-    "state": Where(Object(0x2002, 0x0A), "input register 51"),
-    "error_low": Where(Object(0x2002, 0x03), "input register 52"),
-    "error_high": Where(Object(0x2002, 0x04), "input register 53"),
-    "latched_low": Where(Object(0x2002, 0x01), "input register 0"),
-    "latched_high": Where(Object(0x2002, 0x02), "input register 1"),
-    "volts": Where(Object(0x2002, 0x06), "input register 32"),
-    "amps": Where(Object(0x2002, 0x07), "input register 31"),
-    "range": Where(Object(0x2002, 0x0D), "input register 100"),
-    "device_c": Where(None, "input register 36"),
-    "coil_c": Where(None, "input register 37"),
-}
-"""What a scan reads. `latched`: the maker's shadow error, which stays after the error has gone.
-Modbus gives it all in input registers 0 to 100; at most 50 were ever asked for at once."""
+"""The result of a range check that is a yes. Others: 0 under way, 2 out of range, 240 failed."""
 
 
 def activity(code: int) -> Activity:
     """What a state code means: total, an unpublished one is UNKNOWN."""
     return CODES.get(code, (Activity.UNKNOWN, ""))[0]
-
-
-def state_rows() -> list[tuple[str, str]]:
-    """What `check` says of the state codes: (meaning, its numbers)."""
-    rows = [
-        (
-            f"state {meaning}",
-            ", ".join(str(code) for code in range(256) if activity(code) is meaning),
-        )
-        for meaning in Activity
-        if meaning is not Activity.UNKNOWN
-    ]
-    return [*rows, ("any other state", "error, with its number")]
 
 
 def sample(words: Words, settled: bool = True) -> ChargerSample:
@@ -157,12 +105,7 @@ def sample(words: Words, settled: bool = True) -> ChargerSample:
     )
 
 
-def celsius(word: int) -> int:
-    """A temperature register: whole °C, below zero as a two's complement."""
-    return word - 0x1_0000 if word & 0x8000 else word
-
-
-def errors(number: int) -> list[tuple[Side, str]]:
+def errors(number: int) -> list[tuple[FaultSide, str]]:
     """Side and text of each bit that is set: the station's first, the robot's last.
 
     An unpublished bit is nobody's.
@@ -183,7 +126,7 @@ def error_number(words: Words) -> int:
     return words.get("latched_high", 0) << 16 | words.get("latched_low", 0)
 
 
-def _text(words: Words, found: list[tuple[Side, str]]) -> str:
+def _text(words: Words, found: list[tuple[FaultSide, str]]) -> str:
     """The first error's side says it all for its own; another side's has its name before it."""
     if found:
         main = found[0][0]
@@ -255,3 +198,110 @@ def steer(told: Told, outputs: ChargerOutputs, code: int, now: float) -> tuple[T
 
 def _charges(code: int) -> bool:
     return activity(code) is Activity.CHARGING
+
+
+# ---- on a wire
+
+
+class Wire(Protocol):
+    """Where the receiver's numbers are."""
+
+    def alive(self) -> bool:
+        """Raises DriverError where it does not live; True when it has started anew meanwhile."""
+
+    def read(self, names: Iterable[str]) -> dict[str, int]:
+        """The words of these names, read now. Raises DriverError."""
+
+    def write(self, name: str, value: int, safe: bool = False) -> None:
+        """ENABLE or CHECK_RANGE. `safe`: it takes power away. Raises DriverError."""
+
+    def insist(self) -> None:
+        """Try at once what comes next."""
+
+    def now(self) -> float:
+        """Monotonic seconds."""
+
+
+class Receiver:
+    """`drivers.Driver` of one receiver."""
+
+    def __init__(self, settings: ChargerSettings, wire: Wire) -> None:
+        self._settings = settings
+        self._wire = wire
+        self._told = Told()
+        self._code = -1
+        self._touched = False
+
+    def open(self) -> None:
+        """Nothing is claimed and nothing sent: a charge under way is not ours to stop."""
+
+    def read(self) -> ChargerSample:
+        """The receiver now. Raises DriverError."""
+        if self._wire.alive():
+            self._told = replace(self._told, enabled=None)
+        words = self._wire.read(ALWAYS)
+        if activity(words["state"]) is Activity.ERROR:
+            words |= self._wire.read(IN_ERROR)
+        self._code = words["state"]
+        return sample(words, settled(self._told, self._wire.now()))
+
+    def write(self, outputs: ChargerOutputs) -> None:
+        """Start, stop or check the range, where that is due. Raises DriverError."""
+        told, orders = steer(self._told, outputs, self._code, self._wire.now())
+        if orders.enable is not None:
+            self._enable(orders.enable)
+        if orders.check_range:
+            self._told = replace(self._told, range_checks=told.range_checks, asked_at=told.asked_at)
+            self._wire.write(CHECK_RANGE, 1)
+        self._told = told
+
+    def make_safe(self) -> None:
+        """What the settings say of the daemon's end: stopped, and acknowledged, or left alone."""
+        if self._settings.on_death == "stop":
+            self._enable(False)
+
+    def close(self) -> None:
+        """Stopped, if it may be on and may not stay so; and let go."""
+        if self._touched and self._told.enabled is not False:
+            self._wire.insist()
+            try:
+                self.make_safe()
+            except DriverError:
+                return  # it was tried; make_safe has said so before
+
+    def _enable(self, on: bool) -> None:
+        self._touched = True
+        self._told = replace(self._told, enabled=None)
+        self._wire.write(ENABLE, int(on), safe=not on)
+        self._told = replace(self._told, enabled=on)
+
+
+def rows(settings: ChargerSettings, where: Mapping[str, str]) -> list[tuple[str, str]]:
+    """For `check`: (what, meaning), by where each name is."""
+    return [
+        *((name, f"read {where[name]}") for name in ALWAYS),
+        *((name, f"the same in an error: {where[name]}") for name in IN_ERROR),
+        ("power", f"write {where[ENABLE]}: 1 starts from idle, 0 stops"),
+        ("range check", f"write {where[CHECK_RANGE]} before each start"),
+        ("clear error", "no place for it is published: cycle the receiver's power"),
+        ("end of the daemon", "0 is written" if settings.on_death == "stop" else "nothing"),
+        *_state_rows(),
+    ]
+
+
+def _state_rows() -> Iterator[tuple[str, str]]:
+    for meaning in Activity:
+        if meaning is not Activity.UNKNOWN:
+            codes = (str(code) for code in range(256) if activity(code) is meaning)
+            yield f"state {meaning}", ", ".join(codes)
+    yield "any other state", "error, with its number"
+
+
+def warnings(settings: ChargerSettings, wire: str) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What is legal but worth a look: (path, text). `wire`: what the plug is of."""
+    text = (
+        "the maker's published numbers are not tried on hardware: watch the first charge, and pull"
+    )
+    yield (), f"{text} the {wire} plug during one"
+    if settings.receivers:
+        yield ("receivers",), "this controller tells no receiver's id: it will charge nobody"

@@ -15,10 +15,9 @@ import msgspec
 
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.driver_type import DriverType
 from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire
-from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
-
-BUSES: Final = ("gpio", "modbus")
+from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, slow_alarms, unaccepted
 
 DEBOUNCE_S: Final = 0.05
 
@@ -144,6 +143,7 @@ def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
                 wire.path,
                 "a cut wire may read as a closed door; wire a contact that shuts with it",
             )
+    yield from slow_alarms(w for w in wires(settings) if w.signal in ("fire", "obstruction"))
     for signal in settings.accept_unsafe.keys() - {signal for signal, _, _ in _unsafe(settings)}:
         yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
     if settings.feedback == "estimated":
@@ -198,3 +198,13 @@ def _unsafe(settings: Settings) -> Iterator[Unsafe]:
         if wire.signal in CUT_MUST_READ:
             yield from cut_must_read(wire, *CUT_MUST_READ[wire.signal])
     yield from energised_at_boot(table)
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("gpio", "modbus"),
+    create=create,
+    wires=wires,
+    debounce=debounce,
+    warnings=warnings,
+)

@@ -12,20 +12,12 @@ from bridges.core.fields import Name
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
 from drivers.door.register_map import DoorMap, Errors, Flag, Parts, Problems, Status
+from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
+from drivers.hal.modbus.lines import Lines
 from drivers.hal.modbus.points import Point
-from drivers.hal.modbus.registers import (
-    WRITABLE,
-    RegisterLines,
-    Unit,
-    Word,
-    at,
-    misplaced,
-    place,
-)
+from drivers.hal.modbus.registers import WRITABLE, Unit, Word, at, misplaced, place
 from drivers.profiles import Profile, profile_problems
-
-BUSES: Final = ("modbus",)
 
 BITS: Final = 16
 
@@ -131,16 +123,16 @@ def _command_in(settings: Settings) -> tuple[str, ...]:
 def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterDoor":
     """The door on its bus; nothing is sent before `open`."""
     found = points(settings)
-    command = door_map(settings).command
-    reads = {part: point for part, point in found.items() if part != "command"}
-    lines = RegisterLines(bus, reads, found["command"], command.release, command.read_back)
+    command, outputs = door_map(settings).command, {"command": found.pop("command")}
+    safe = {"command": command.release}
+    lines = Lines(bus, found, outputs, safe, command.read_back)
     return RegisterDoor(door_map(settings), lines)
 
 
 class RegisterDoor:
     """`drivers.Driver` of one door."""
 
-    def __init__(self, found: DoorMap, lines: RegisterLines) -> None:
+    def __init__(self, found: DoorMap, lines: Lines) -> None:
         self._map = found
         self._lines = lines
 
@@ -155,7 +147,8 @@ class RegisterDoor:
     def write(self, outputs: DoorOutputs) -> None:
         """Hold the door, or release it."""
         command = self._map.command
-        self._lines.write(command.hold if outputs.hold_open else command.release)
+        value = command.hold if outputs.hold_open else command.release
+        self._lines.bring({"command": value})
 
     def make_safe(self) -> None:
         """Released, and read back where it can be."""
@@ -219,3 +212,14 @@ def _address(text: str) -> int:
 def _status_text(status: Status) -> str:
     words = [(v, word) for word in ("closed", "moving", "open") for v in getattr(status, word)]
     return ", ".join(f"{v} {word}" for v, word in sorted([*words, *status.faults.items()]))
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("modbus",),
+    create=create,
+    describe=describe,
+    claims=claims,
+    warnings=warnings,
+    fake="hal_fakes.modbus.register_door",
+)

@@ -1,16 +1,25 @@
-"""Buses: the only importers of vendor libraries, each lazily and in its own file.
+"""Buses: the only importers of vendor libraries, each lazily and in its own file or folder.
 
-A file is named after the bus `type:` of the YAML and holds `Settings` (a msgspec struct) and
-`open_bus(settings) -> Bus`. A Bus belongs to one thread. Every failure is a HalError, raised within
-the bus's I/O timeout; after one, attempts follow with a backoff from 0.5 to 30 s during which calls
-fail at once, so that a dead device costs the others on its bus no more than one timeout a period.
+It is named after the bus `type:` of the YAML and holds a `BUS`. A Bus belongs to one thread. Every
+failure is a HalError, raised within the bus's I/O timeout; after one, attempts follow with a backoff
+from 0.5 to 30 s during which calls fail at once, so that a dead device costs the others on its bus no
+more than one timeout a period.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeAlias, TypeVar
 
-from drivers.hal.points import HalError
+import msgspec
 
-__all__ = ["Bus", "HalError"]
+from drivers.hal.points import HalError, Wire
+
+__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Remark"]
+
+Settings = TypeVar("Settings", bound=msgspec.Struct)
+
+Remark = tuple[tuple[str, ...], str]
+"""What is to be said of a setting: its path below the struct, and the text."""
 
 
 class Bus:
@@ -29,8 +38,31 @@ class Bus:
         """Release the bus. Does not raise; may be called twice."""
 
 
-# A bus file whose bus has points also holds, at module level and without its vendor library:
-#   canonical(point: str) -> str            one spelling; ValueError says what to write instead
-#   wire_problems(wire: Wire) -> Iterable[str]   what cannot be right about this wire on this bus
-#
-# A bus file may also have `warnings(settings)`: (path, text) of what is legal but worth a look.
+@dataclass(frozen=True)
+class BusType(Generic[Settings]):
+    """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, made without its vendor library.
+
+    `settings`: what stands below the bus's name in the YAML, `scan_s` (how often it is read) among it.
+    `open_bus(settings)`: raises HalError.
+    `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
+    far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it
+    cannot leave the daemon's process, as pins cannot.
+
+    A bus with points also has
+    `canonical(point)`: one spelling; ValueError says what to write instead;
+    `describe(point)`: every spelling, for the table that an electrician reads;
+    `wire_problems(wire)`: what cannot be right about this wire on this bus.
+    """
+
+    settings: type[Settings]
+    open_bus: Callable[[Settings], Bus]
+    warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
+    fake: str = ""
+    fake_inside: bool = False
+    canonical: Callable[[str], str] = str
+    describe: Callable[[str], str] = str
+    wire_problems: Callable[[Wire], Iterable[str]] = lambda wire: ()
+
+
+AnyBus: TypeAlias = BusType[Any]
+"""One that was found by its name."""

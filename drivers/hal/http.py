@@ -19,15 +19,14 @@ import msgspec
 
 from bridges import secret_file
 from bridges.core.fields import Name, Period
-from drivers.hal import Bus, HalError
+from drivers.hal import Bus, BusType, HalError
+from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve
 
 if TYPE_CHECKING:
     from requests.adapters import HTTPAdapter
 
 BODY_MAX = 64 * 1024
-BACKOFF_FIRST_S = 0.5
-BACKOFF_MAX_S = 30.0
 HEADERS = {"Accept": "application/json", "Accept-Encoding": "identity", "User-Agent": "rmf-bridges"}
 JSON = {"Content-Type": "application/json"}
 
@@ -134,24 +133,24 @@ class HttpBus(Bus):
         self._base = base(settings.api_base)
         self._dialler = Dialler(self._base.host, self._base.port, resolve)
         self._adapter = _adapter(self._dialler)
-        self._clock = clock
-        self._pause_s = 0.0
-        self._retry_at = float("-inf")
-        self._failure = ""
+        self._backoff, self._safe_backoff = (Backoff(clock, lambda: 0.0) for _ in range(2))
 
     def get_json(self, path: str) -> dict[str, Any]:
         """GET `api_base` + `path`, which must answer 200 with one JSON object."""
         url = self._base.url(path)
-        with self._attempt():
+        with self._attempt(self._backoff):
             return _json_object(url, *self._get(url))
 
-    def send(self, path: str, method: Method = "POST", body: str | None = None) -> None:
+    def send(
+        self, path: str, method: Method = "POST", body: str | None = None, safe: bool = False
+    ) -> None:
         """A command, with `body` (JSON) if any; any 2xx is success.
 
-        Sent at most once, also when the answer is lost.
+        Sent at most once, also when the answer is lost. `safe`: it takes power away, and waits for no
+        pause that a reading has begun.
         """
         url = self._base.url(path)
-        with self._attempt():
+        with self._attempt(self._safe_backoff if safe else self._backoff):
             self._adapter.close()  # a kept connection might be dead, and there is no second try
             self._call(method, url, body)
 
@@ -160,27 +159,25 @@ class HttpBus(Bus):
 
     def insist(self) -> None:
         """Try at once what is asked next, whatever the backoff."""
-        self._retry_at = float("-inf")
+        self._backoff.insist()
+        self._safe_backoff.insist()
 
     def close(self) -> None:
         """Hang up."""
         self._adapter.close()
 
     @contextmanager
-    def _attempt(self) -> Iterator[None]:
-        """Backoff: after a failure, calls fail at once, with the same text, until it is time again."""
-        if self._clock() < self._retry_at:
-            raise HalError(self._failure)
+    def _attempt(self, backoff: Backoff) -> Iterator[None]:
+        """After a failure, calls fail at once, with the same text, until it is time again."""
+        backoff.check()
         self._dialler.deadline.start(self._settings.timeout_s)
         try:
             yield
         except HalError as error:
             self._adapter.close()
-            self._failure = str(error)
-            self._pause_s = min(max(2 * self._pause_s, BACKOFF_FIRST_S), BACKOFF_MAX_S)
-            self._retry_at = self._clock() + self._pause_s
+            backoff.failed(str(error))
             raise
-        self._pause_s = 0.0
+        backoff.mended()
 
     def _get(self, url: str) -> tuple[str, bytes]:
         dialled = self._dialler.dialled
@@ -329,3 +326,11 @@ def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) < len(pairs):
         raise ValueError("a name stands twice in one object")
     return found
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    fake="hal_fakes.http",
+    warnings=warnings,
+)

@@ -72,8 +72,8 @@ class Wire:
         """The electrical level (True is high) for this meaning."""
         return asserted == (self.active == "high")
 
-    def asserted(self, level: bool) -> bool:
-        """What this electrical level means."""
+    def asserted(self, level: int) -> bool:
+        """What this electrical level (1 is high) means."""
         return level == (self.active == "high")
 
     def broken_reads(self) -> bool | None:
@@ -89,18 +89,21 @@ class Wire:
 
 
 class Lines(Protocol):
-    """Raw levels of some points of one bus (True is high), claimed for one device."""
+    """Raw levels of some points of one bus (1 and True are high), claimed for one device."""
 
     def claim(self) -> None:
         """Take every output at its safe level in one step, and every input. Raises HalError."""
 
-    def read(self) -> Mapping[str, bool]:
+    def read(self) -> Mapping[str, int]:
         """Every input's level by its canonical point, read now. Raises HalError."""
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Drive these outputs. Raises HalError; then the levels written are unknown."""
+        """Drive these outputs. Raises HalError; then the levels written are unknown.
 
-    def outputs(self) -> Mapping[str, bool] | None:
+        One that goes to its safe level is tried, whatever becomes of the others.
+        """
+
+    def outputs(self) -> Mapping[str, int] | None:
         """The outputs' levels as the bus itself says, for read-back; None where it cannot say."""
 
     def close(self) -> None:

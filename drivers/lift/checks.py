@@ -7,7 +7,7 @@ from drivers.hal.points import Wire
 from drivers.lift import codes
 from drivers.lift.table import MOTION, input_rows, wires
 from drivers.lift.wiring import FloorCode, LiftWiring
-from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
+from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, slow_alarms, unaccepted
 
 Problem = tuple[tuple[str, ...], str]
 """Where (path below the device), and what is wrong with the fix."""
@@ -17,18 +17,14 @@ ALARMS = (Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY)
 
 def problems(wiring: LiftWiring) -> Iterator[Problem]:
     """What keeps the daemon from starting."""
-    found = [
-        *_floors(wiring),
-        *_floor_code(wiring.floor_code, wiring.levels()),
-        *_calls(wiring),
-        *_doors(wiring),
-        *_motion(wiring),
-        *_agv(wiring),
-        *_service(wiring),
-    ]
-    yield from found
-    if not found:
-        yield from unaccepted(unsafe(wiring), wiring.accept_unsafe)
+    yield from _floors(wiring)
+    yield from _floor_code(wiring.floor_code, wiring.levels())
+    yield from _calls(wiring)
+    yield from _doors(wiring)
+    yield from _motion(wiring)
+    yield from _agv(wiring)
+    yield from _service(wiring)
+    yield from unaccepted(unsafe(wiring), wiring.accept_unsafe)
 
 
 def warnings(wiring: LiftWiring) -> Iterator[Problem]:
@@ -36,6 +32,12 @@ def warnings(wiring: LiftWiring) -> Iterator[Problem]:
     table = {w.signal: w for w in wires(wiring)}
     if wiring.inputs.agv_mode is None and not _in_service(wiring, "agv_mode"):
         yield ("inputs",), "no agv_mode: the lift cannot confirm that it obeys"
+    elif wiring.outputs.agv_mode_request is None:
+        text = (
+            "no agv_mode_request asks for AGV mode, and it is awaited: the lift must grant it alone"
+        )
+        yield ("outputs",), text
+    yield from slow_alarms(table[hazard] for hazard in Hazard if hazard in table)
     if Hazard.FIRE not in table and not _in_service(wiring, Hazard.FIRE):
         yield ("inputs",), "no fire_alarm: a fire recall would not be seen"
     for hazard in ALARMS:
@@ -64,7 +66,8 @@ def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
             wanted = single.proves == "closed"
             yield from _cut(table, prefix, wanted, f"the {prefix} reads open")
         yield from _cut(table, f"{prefix}_opened", False, f"the {prefix} reads open")
-    yield from _dead_code(wiring.floor_code, table)
+    if not any(_floor_code(wiring.floor_code, wiring.levels())):
+        yield from _dead_code(wiring.floor_code, table)
     yield from energised_at_boot(table.values())
 
 

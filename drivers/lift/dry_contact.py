@@ -7,13 +7,12 @@ from collections.abc import Iterable, Mapping
 from typing import cast
 
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from drivers.driver_type import DriverType
 from drivers.hal.points import Points, PointsBus, Wire
 from drivers.lift import checks as lift_checks
 from drivers.lift import codes
 from drivers.lift import table as lift_table
 from drivers.lift.wiring import Inputs, LiftWiring
-
-BUSES = ("gpio", "modbus")
 
 DOOR = {
     (True, False): Door.OPEN,
@@ -122,6 +121,7 @@ def decode(
         hazards=frozenset(
             h for h in Hazard if h == service or (h not in unknown and shown.get(h, False))
         ),
+        floor_valid="floor" not in unknown,
     )
 
 
@@ -168,3 +168,13 @@ def _number(prefix: str, width: int, shown: Mapping[str, bool]) -> int:
     number = codes.decode("binary", [shown[f"{prefix}_bit{i}"] for i in range(width)])
     assert number is not None  # binary shows any number
     return number
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("gpio", "modbus"),
+    create=create,
+    wires=wires,
+    debounce=debounce,
+    warnings=warnings,
+)

@@ -16,15 +16,17 @@ import can
 import canopen
 from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 
-from drivers.charger import xnergy
-from hal_fakes.can.side import Send
-from hal_fakes.plants.pad import PadReading
+from drivers.charger.canopen import HEARTBEAT_S, OBJECTS, Settings
+from hal_fakes.can.side import Send, slow_s
+from hal_fakes.fake import Fake
+from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
-from hal_fakes.plants.xnergy_rcu import words
+from hal_fakes.plants.xnergy_rcu import SIGNALS, words
 
 TYPES: Final = {1: datatypes.UNSIGNED8, 2: datatypes.UNSIGNED16}
-BEAT: Final = {None: xnergy.HEARTBEAT_S, "slow": 1.0}
+BEAT: Final = {None: HEARTBEAT_S, "slow": 1.0}
 STARTING, STOPPED, OPERATIONAL = 0, 4, 5
+NAMES: Final = {(found.index, found.subindex): name for name, found in OBJECTS.items()}
 
 
 class CanOpenRcu:
@@ -60,7 +62,7 @@ class CanOpenRcu:
             self._was_off = True
             return
         mode = self.plant.failures.get("heartbeat")
-        if mode in ("off", "stuck") or now < self._beat_at + BEAT.get(mode, xnergy.HEARTBEAT_S):
+        if mode in ("off", "stuck") or now < self._beat_at + BEAT.get(mode, HEARTBEAT_S):
             return
         self._beat_at = now
         state = STARTING if self._was_off else STOPPED if mode == "wrong" else OPERATIONAL
@@ -86,18 +88,16 @@ class CanOpenRcu:
 
     def _read(self, index: int, subindex: int, od: Any) -> int | None:
         at = (index, subindex)
-        for name, where in xnergy.READS.items():
-            if where.sdo and (where.sdo.index, where.sdo.subindex) == at:
-                found = words(self._reading(), self._latched)
-                self._latched = found["latched_high"] << 16 | found["latched_low"]
-                return found[name]
-        return None
+        name = NAMES.get(at)
+        if name is None or name in SIGNALS:
+            return None
+        found = words(self._reading(), self._latched)
+        self._latched = found["latched_high"] << 16 | found["latched_low"]
+        return found[name]
 
     def _write(self, index: int, subindex: int, od: Any, data: bytes) -> None:
-        for signal, where in (("enable", xnergy.ENABLE), ("check_range", xnergy.CHECK_RANGE)):
-            assert where.sdo
-            if (index, subindex) == (where.sdo.index, where.sdo.subindex):
-                self.plant.drive(signal, bool(data[0]), time.monotonic())
+        if (name := NAMES.get((index, subindex))) in SIGNALS:
+            self.plant.drive(name, bool(data[0]), time.monotonic())
 
 
 class _Network(canopen.Network):
@@ -120,13 +120,17 @@ def frame(can_id: int, payload: bytes) -> can.Message:
 def dictionary() -> Any:
     """The RCU's published objects."""
     made = canopen.ObjectDictionary()  # type: ignore[no-untyped-call]
-    for where in (xnergy.ENABLE, xnergy.CHECK_RANGE, *xnergy.READS.values()):
-        if where.sdo is None:
-            continue
-        if where.sdo.index not in made:
-            made.add_object(ODRecord(f"objects {where.sdo.index:04X}", where.sdo.index))
-        variable = ODVariable(str(where.sdo), where.sdo.index, where.sdo.subindex)
-        variable.data_type = TYPES[where.sdo.octets]
-        record: Any = made[where.sdo.index]
+    for found in OBJECTS.values():
+        if found.index not in made:
+            made.add_object(ODRecord(f"objects {found.index:04X}", found.index))
+        variable = ODVariable(str(found), found.index, found.subindex)
+        variable.data_type = TYPES[found.octets]
+        record: Any = made[found.index]
         record.add_member(variable)
     return made
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: PadPlant(name),
+    station=lambda plant, settings, bus: CanOpenRcu(plant, settings.node, slow_s(bus)),
+)

@@ -10,16 +10,17 @@ list.
 
 import time
 from collections.abc import Mapping
-from typing import Any, Final, cast
+from typing import Final, cast
 
 import can
 
 from bridges.charger.signals import Activity
 from drivers.charger import dbc
-from drivers.charger.can_frames import frame_map
+from drivers.charger.can_frames import Settings, frame_map
 from drivers.charger.can_map import FrameMap, Sent
 from hal_fakes.can.side import Send
-from hal_fakes.plants.pad import PadReading
+from hal_fakes.fake import Fake
+from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
 
 STATUS_S: Final = 0.1
@@ -44,7 +45,7 @@ FLAGS: Final = {
 class FrameCharger:
     """A station (`hal_fakes.can.side.Station`)."""
 
-    def __init__(self, plant: Plant, settings: Any) -> None:
+    def __init__(self, plant: Plant, settings: Settings) -> None:
         self.plant = plant
         self._map: FrameMap = frame_map(settings)
         self._dbc = dbc.load(self._map.dbc)
@@ -150,3 +151,9 @@ def _short(message: can.Message) -> can.Message:
         is_extended_id=message.is_extended_id,
         data=bytes(message.data)[:6],
     )
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: PadPlant(name),
+    station=lambda plant, settings, bus: FrameCharger(plant, settings),
+)

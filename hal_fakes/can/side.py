@@ -20,11 +20,19 @@ from typing import Any, Final, Protocol
 
 import can
 
+from drivers.hal.can import Settings
 from hal_fakes.plants.plant import FailureMode, Plant
 
 LOOK_S: Final = 0.02
 """How soon a failure that is told shows, and heartbeats and status frames come on time."""
 BUS_OFF: Final = 0x40
+SLOWNESS: Final = 1.5
+"""How many of the client's time limits a slow answer takes."""
+
+
+def slow_s(settings: Settings) -> float:
+    """How late a slow answer comes on this bus."""
+    return SLOWNESS * settings.timeout_s
 
 
 class Medium(Protocol):

@@ -1,46 +1,20 @@
-"""`python -m hal_fakes.demo`: exit code 0 when the robot's day went right, 1 with the reason, 130
-after Ctrl-C. Nothing is left running, whichever way it ends."""
+"""`python -m hal_fakes.demo [ride|charging]`: exit code 0 when the day went right, 1 with the reason,
+130 after Ctrl-C. Nothing is left running, whichever way it ends."""
 
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
-from hal_fakes.demo import day, verdict
-from hal_fakes.demo.journal import Journal
-from hal_fakes.demo.stage import Stage, play
-from hal_fakes.demo.world import World
-from hal_fakes.rmf.robot import Robot
+from hal_fakes.demo import charging, ride
+from hal_fakes.demo.stage import Stage
 
-CONFIG = Path(__file__).parents[2] / "config"
-FILES = {
-    day.LIFT: CONFIG / "lift_dry_contact.yaml",
-    day.DOOR: CONFIG / "door_modbus.yaml",
-    day.CHARGER: CONFIG / "charger_http.yaml",
-}
-READY_WITHIN_S = 20.0
-
-
-def run(stage: Stage, failures: Sequence[tuple[str, str, str]], directory: Path) -> None:
-    """Start everybody and live the day. Raises Wrong, Interrupted or TransportError."""
-    robot = Robot(f"{day.FLEET}/{day.ROBOT}")
-    with stage.up(directory) as transport:
-        world = World(transport, stage.journal, robot, stage.check)
-        for daemon in stage.daemons.values():
-            daemon.follow(world.edge)
-        standing = f"{day.LIFT} at {day.FROM}, {day.DOOR} closed and {day.CHARGER} idle"
-        world.until(lambda: day.dawns(world), READY_WITHIN_S, f"every daemon up: {standing}")
-        stage.journal.begin_day()
-        stage.note(standing)
-        for device, part, mode in failures:
-            stage.note(f"{device}: {part} fails, {mode}")
-            stage.order(device, f"fail {device} {part} {mode}")
-        day.live(world, stage.press)
+DEMOS = {"ride": ride.DEMO, "charging": charging.DEMO}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the demo."""
+    """Run a demo."""
     parser = argparse.ArgumentParser(prog="python -m hal_fakes.demo", description=__doc__)
+    parser.add_argument("demo", nargs="?", choices=DEMOS, default="ride", help="default: ride")
     parser.add_argument(
         "--fail",
         nargs=3,
@@ -49,23 +23,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         metavar=("DEVICE", "PART", "MODE"),
         help="let a part fail first: off, stuck, slow, garbage or wrong; the demo then exits 1",
     )
-    failures = parser.parse_args(argv).fail
-    for device, _, _ in failures:
-        if device not in FILES:
-            parser.error(f"no device {device!r}; there are {', '.join(FILES)}")
-    stage = Stage(FILES)
-    return play(stage, lambda at: run(stage, failures, at), verdict.problems, summary)
-
-
-def summary(journal: Journal) -> str:
-    """What was done, in a few lines."""
-    counts = ", ".join(f"{n} {what}" for what, n in sorted(journal.counts().items()))
-    legs = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in journal.legs.items())
-    return (
-        "\nRIGHT: the robot went through the door, rode from "
-        f"{day.FROM} to {day.TO} and charged; every relay is off.\n"
-        f"       {counts}\n       {legs}\n"
-    )
+    args = parser.parse_args(argv)
+    demo = DEMOS[args.demo]
+    for device, _, _ in args.fail:
+        if device not in demo.files:
+            parser.error(f"no device '{device}'; there are {', '.join(demo.files)}")
+    return Stage(demo, args.fail).play()
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from bridges.rmf import definitions as d
 from bridges.rmf import words
 from bridges.rmf.words import Requested, Stated
 from hal_fakes.plants.plant import Edge
@@ -34,7 +33,7 @@ class Line:
     text: str
 
     def render(self, began_at: float, *, colour: bool) -> str:
-        """`   1.234 s  state    Lift1        L1 OPEN AGV`."""
+        """`   1.234 s  state    Lift1       car at L1, door open, mode AGV`."""
         start = f"{self.at - began_at:8.3f} s  "
         body = f"{self.what:<7}  {self.device:<10}  {self.text}"
         code = COLOURS.get(self.what)
@@ -69,9 +68,7 @@ class Journal:
     def state(self, message: Stated, at: float) -> None:
         """What a node says."""
         self.states.append(message)
-        holder = words.holder(message)
-        text = words.condition(message) + (f", {_held(message)} {holder}" if holder else "")
-        self._once(Line(at, "state", words.device(message), text))
+        self._once(Line(at, "state", words.device(message), words.described(message)))
 
     def note(self, what: What, text: str, at: float, device: str = "") -> None:
         """What a robot does, where it is sent, what a person is told, or the demo itself."""
@@ -114,7 +111,3 @@ class Journal:
 
     def _add(self, line: Line) -> None:
         self._waiting.append(replace(line, text=words.printable(line.text)))
-
-
-def _held(state: Stated) -> str:
-    return "session" if isinstance(state, d.LiftState) else "request"

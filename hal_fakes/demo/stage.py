@@ -1,6 +1,6 @@
-"""The demos' stage: processes, journal, and one way out, however a demo ends.
+"""What a demo is, and the one way through it: daemons up, the day, the verdict, nothing left running.
 
-Exit code 0 when it went right, 1 with the reason, 130 after Ctrl-C. Nothing is left running.
+Exit code 0 when it went right, 1 with the reason, 130 after Ctrl-C.
 """
 
 import shutil
@@ -10,52 +10,110 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
+from typing import Final
 
 from bridges.rmf import words
 from bridges.rmf.transport import Transport, TransportError
+from bridges.settings.load import load
 from hal_fakes.demo.daemons import Daemon, Wrong, stop_all
 from hal_fakes.demo.journal import Journal
+from hal_fakes.demo.world import World
 from hal_fakes.domain import free_domain
 from hal_fakes.wire import join, wire
+
+READY_WITHIN_S: Final = 20.0
+Failure = tuple[str, str, str]
+"""A device, a part of its plant, and how that fails."""
 
 
 class Interrupted(Exception):
     """Ctrl-C, or another signal to end."""
 
 
-class Stage:
-    """`daemons`: by the device that each serves. `files`: their YAMLs."""
+@dataclass(frozen=True, slots=True)
+class Demo:
+    """`files`: a daemon's YAML, by the device that it serves. `dawn`: how everything stands in the
+    morning, which `dawns` sees. `live`: the day itself, which raises Wrong when something does not come
+    about in time. `problems`: whatever was not as it should be, from the journal alone. `right`: the
+    day in a sentence."""
 
-    def __init__(self, files: dict[str, Path]) -> None:
-        self.files = files
+    files: dict[str, Path]
+    dawn: str
+    dawns: Callable[[World], bool]
+    live: Callable[[World], None]
+    problems: Callable[[Journal], Sequence[str]]
+    right: str
+
+
+class Stage:
+    """One performance of a demo; `failures` happen before its day begins."""
+
+    def __init__(self, demo: Demo, failures: Sequence[Failure] = ()) -> None:
+        self.demo = demo
+        self.failures = failures
         self.daemons: dict[str, Daemon] = {}
         self.journal = Journal(time.monotonic(), sys.stdout.write, colour=sys.stdout.isatty())
         self._interrupted = False
 
-    def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Only marks it: nothing is cut off half-way, so nothing is forgotten."""
-        self._interrupted = True
-
-    def check(self) -> None:
-        """Raises Interrupted, or Wrong when a daemon has died."""
+    def play(self) -> int:
+        """The exit code; the daemons' logs remain only where it went wrong."""
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._interrupt)
+        directory = Path(tempfile.mkdtemp(prefix="rmf-demo-"))
+        code, keep_logs = self._played(directory)
+        if not keep_logs:
+            shutil.rmtree(directory)
         sys.stdout.flush()
-        if self._interrupted:
-            raise Interrupted
-        for daemon in self.daemons.values():
-            daemon.check()
+        return code
+
+    def _played(self, directory: Path) -> tuple[int, bool]:
+        try:
+            with self._up(directory) as transport:
+                self._live(transport)
+        except Interrupted:
+            sys.stdout.write("interrupted; every daemon has been stopped\n")
+            return 130, False
+        except TransportError as error:
+            sys.stdout.write(f"the demo cannot start: {error}\n")
+            return 1, False
+        except Wrong as wrong:
+            self._fail([str(wrong)])
+            return 1, True
+        if problems := self.demo.problems(self.journal):
+            self._fail(problems)
+            return 1, True
+        sys.stdout.write(summary(self.demo, self.journal))
+        return 0, False
+
+    def _live(self, transport: Transport) -> None:
+        world = World(transport, self.daemons, self.journal, self._check)
+        for device, file in self.demo.files.items():
+            if load(file).buses:
+                self.daemons[device].follow(world.edge)
+        world.until(
+            lambda: self.demo.dawns(world), READY_WITHIN_S, f"the morning: {self.demo.dawn}"
+        )
+        self.journal.begin_day()
+        world.note(self.demo.dawn)
+        for device, part, mode in self.failures:
+            world.note(f"{part} of {device} fails: {mode}")
+            self.daemons[device].order(f"fail {device} {part} {mode}")
+        self.demo.live(world)
 
     @contextmanager
-    def up(self, directory: Path) -> Iterator[Transport]:
+    def _up(self, directory: Path) -> Iterator[Transport]:
         """Every daemon started, on a domain and a loopback of their own, and a place beside them."""
         domain = free_domain()
-        count = {2: "two", 3: "three", 4: "four"}[len(self.files)]
-        self.note(f"{count} daemons on fake hardware, {wire()}, domain {domain}, loopback only")
+        count = len(self.demo.files)
+        begun = f"{count} daemons on fake hardware, {wire()}, domain {domain}, loopback only"
+        self.journal.note("demo", begun, time.monotonic())
         transport = join("rmf_demo", domain)
         try:
-            for device, file in self.files.items():
-                self.check()
+            for device, file in self.demo.files.items():
+                self._check()
                 self.daemons[device] = Daemon(file, directory, domain)
             yield transport
             self.journal.flush(time.monotonic())
@@ -63,69 +121,32 @@ class Stage:
             stop_all(self.daemons.values())
             transport.close()
 
-    def order(self, device: str, line: str) -> None:
-        """One order to the plants of a device's daemon."""
-        self.daemons[device].order(line)
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        """Only marks it: nothing is cut off half-way, so nothing is forgotten."""
+        self._interrupted = True
 
-    def press(self, device: str, signal_name: str, on: bool) -> None:
-        """A person or the building acts on a plant."""
-        self.order(device, f"press {device} {signal_name} {'on' if on else 'off'}")
+    def _check(self) -> None:
+        """Raises Interrupted, or Wrong when a daemon has died."""
+        sys.stdout.flush()
+        if self._interrupted:
+            raise Interrupted
+        for daemon in self.daemons.values():
+            daemon.check()
 
-    def note(self, text: str) -> None:
-        """A line of the demo's own."""
-        self.journal.note("demo", text, time.monotonic())
-
-
-def play(
-    stage: Stage,
-    act: Callable[[Path], None],
-    problems: Callable[[Journal], Sequence[str]],
-    summary: Callable[[Journal], str],
-) -> int:
-    """Act, and judge what came of it; the logs remain only where it went wrong."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, stage.interrupt)
-    directory = Path(tempfile.mkdtemp(prefix="rmf-demo-"))
-    code = _judged(stage, act, problems, summary, directory)
-    if code != 1:
-        shutil.rmtree(directory)
-    sys.stdout.flush()
-    return code
+    def _fail(self, problems: Sequence[str]) -> None:
+        self.journal.flush(time.monotonic())
+        for daemon in self.daemons.values():
+            sys.stdout.write(f"\n--- the end of {daemon.log}\n{daemon.tail()}\n")
+        sys.stdout.write("\n")
+        for device in self.daemons:
+            state = self.journal.latest(device)
+            if state is not None:
+                sys.stdout.write(f"last state of {device}: {words.described(state)}\n")
+        sys.stdout.write("\nWRONG: " + "\n       ".join(problems) + "\n")
 
 
-def _judged(
-    stage: Stage,
-    act: Callable[[Path], None],
-    problems: Callable[[Journal], Sequence[str]],
-    summary: Callable[[Journal], str],
-    directory: Path,
-) -> int:
-    try:
-        act(directory)
-    except Interrupted:
-        sys.stdout.write("interrupted; every daemon has been stopped\n")
-        return 130
-    except TransportError as error:
-        sys.stdout.write(f"the demo cannot start: {error}\n")
-        shutil.rmtree(directory)
-        return 1
-    except Wrong as wrong:
-        return _fail(stage, [str(wrong)])
-    wrongs = problems(stage.journal)
-    if wrongs:
-        return _fail(stage, wrongs)
-    sys.stdout.write(summary(stage.journal))
-    return 0
-
-
-def _fail(stage: Stage, wrongs: Sequence[str]) -> int:
-    stage.journal.flush(time.monotonic())
-    for daemon in stage.daemons.values():
-        sys.stdout.write(f"\n--- the end of {daemon.log}\n{daemon.tail()}\n")
-    sys.stdout.write("\n")
-    for device in stage.daemons:
-        state = stage.journal.latest(device)
-        said = words.condition(state) if state else "nothing"
-        sys.stdout.write(f"last said by {device}: {said}\n")
-    sys.stdout.write("\nWRONG: " + "\n       ".join(wrongs) + "\n")
-    return 1
+def summary(demo: Demo, journal: Journal) -> str:
+    """What was done, in a few lines."""
+    counts = ", ".join(f"{n} {what}" for what, n in sorted(journal.counts().items()))
+    legs = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in journal.legs.items())
+    return f"\nRIGHT: {demo.right}\n       {counts}\n       {legs}\n"

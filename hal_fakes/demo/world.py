@@ -1,79 +1,143 @@
-"""RMF's side of the demo on a real graph: both supervisors, a fleet adapter, and what was heard.
+"""RMF's side of a demo on a real graph: its supervisors, fleet adapters and robots, and what is heard.
 
-Requests take RMF's whole way: the fleet adapter publishes on the adapter topics, the supervisor
-hears that from the wire and publishes on the node's topic.
+Requests take RMF's whole way: a fleet adapter publishes on the adapter topics, the supervisor hears
+that from the wire and publishes on the daemon's topic.
 """
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from queue import Empty, SimpleQueue
-from typing import Any
+from typing import Any, Final
 
 from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.rmf import topics, words
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Transport
-from hal_fakes.demo.daemons import Wrong
+from hal_fakes.demo.daemons import Daemon, Wrong
 from hal_fakes.demo.journal import SETTLES_S, Journal
 from hal_fakes.plants.plant import Edge
 from hal_fakes.rmf import Party, Said
-from hal_fakes.rmf.robot import Phase, Robot
-from hal_fakes.rmf.supervisors import DoorSupervisor, LiftSupervisor
 
-PUBLISHED = (
-    topics.ADAPTER_LIFT_REQUESTS,
+TO_DAEMONS: Final[tuple[Topic[Any], ...]] = (
     topics.LIFT_REQUESTS,
-    topics.ADAPTER_DOOR_REQUESTS,
     topics.DOOR_REQUESTS,
-    topics.DOOR_SUPERVISOR_HEARTBEAT,
     topics.CHARGER_REQUESTS,
+    topics.CHARGER_CANCELS,
 )
-STATES = (topics.LIFT_STATES, topics.DOOR_STATES, topics.CHARGER_STATES)
-TO_NODES = (topics.LIFT_REQUESTS, topics.DOOR_REQUESTS, topics.CHARGER_REQUESTS)
-LOOK_EVERY_S = 0.1
+STATES: Final[tuple[Topic[Any], ...]] = (
+    topics.LIFT_STATES,
+    topics.DOOR_STATES,
+    topics.CHARGER_STATES,
+)
+PUBLISHED: Final[tuple[Topic[Any], ...]] = (
+    *TO_DAEMONS[:3],
+    topics.ADAPTER_LIFT_REQUESTS,
+    topics.ADAPTER_DOOR_REQUESTS,
+    topics.ADAPTER_CHARGER_REQUESTS,
+    topics.DOOR_SUPERVISOR_HEARTBEAT,
+    topics.FLEET_STATES,
+)
+LOOK_EVERY_S: Final = 0.05
 
 
 class World:
-    """One inbox for messages and edges; the day waits in `until`, and meanwhile RMF works."""
+    """One inbox for messages and edges; the day waits in `until`, and meanwhile RMF works.
+
+    `places`: where each robot is sent to charge or to wait. `alerts`: what a person was told.
+    """
 
     def __init__(
-        self, transport: Transport, journal: Journal, robot: Robot, check: Callable[[], None]
+        self,
+        transport: Transport,
+        daemons: Mapping[str, Daemon],
+        journal: Journal,
+        check: Callable[[], None],
     ) -> None:
         """`check` is called all the time, and raises when there is no point in going on."""
+        self.daemons = daemons
         self.journal = journal
-        self.robot = robot
-        self._parties: list[Party] = [LiftSupervisor(), DoorSupervisor(), robot]
+        self.places: dict[str, str] = {}
+        self.alerts: list[d.Alert] = []
+        self._parties: list[Party] = []
         self._check = check
+        self._transport = transport
         self._inbox: SimpleQueue[tuple[float, Topic[Any] | None, Any]] = SimpleQueue()
         self._publishers: dict[str, Publisher[Any]] = {
             topic.name: transport.publisher(topic) for topic in PUBLISHED
         }
-        heard = {topic.name: topic for party in self._parties for topic in party.subscribes}
-        for topic in {**heard, **{topic.name: topic for topic in STATES}}.values():
-            transport.subscribe(topic, self._to_inbox(topic))
+        self._heard: set[str] = set()
+        self._hear(*STATES, topics.CHARGING_ASSIGNMENTS, topics.ALERT)
+        for topic in TO_DAEMONS:  # what we send is noted when it is sent
+            transport.subscribe(topic, self._to_inbox(topic), others_only=True)
 
     def edge(self, edge: Edge) -> None:
         """A plant's edge; from any thread."""
         self._inbox.put((edge.at, None, edge))
 
-    def nodes_listen(self) -> bool:
-        """A node has matched each topic on which we send requests."""
-        return all(self._publishers[topic.name].matched() for topic in TO_NODES)
+    def join(self, *parties: Party) -> None:
+        """Somebody on RMF's side takes part from now on."""
+        self._parties += parties
+        self._hear(*(topic for party in parties for topic in party.subscribes))
 
-    # ---- what the day calls
+    # ---- what a day looks at
 
-    def begin(self, phase: Phase, text: str) -> None:
-        """The robot's fleet adapter starts a phase."""
-        self.note(text)
-        self._say(self.robot.begin(phase, time.time()))
+    def wall(self) -> float:
+        """RMF's clock (s since the epoch)."""
+        return time.time()
 
-    def say(self, said: Said) -> None:
-        """Publish one message."""
-        self._say([said])
+    def listened_to(self, *to: Topic[Any]) -> bool:
+        """A daemon has matched each of these topics, on which we send requests."""
+        return all(self._publishers[topic.name].matched() for topic in to)
 
-    def note(self, text: str) -> None:
-        """One line about the robot."""
-        self.journal.note("robot", text, time.monotonic(), self.robot.requester_id)
+    def door_is(self, door: str, mode: d.DoorModeValue) -> bool:
+        """The door's last state has this mode."""
+        latest = self.journal.latest(door)
+        return isinstance(latest, d.DoorState) and latest.current_mode.value == mode
+
+    def charger_is(self, charger: str, state: str, robot: str = "", error: str = "") -> bool:
+        """The charger's last state is this, for this robot, with this in its error message."""
+        latest = self.journal.latest(charger)
+        return (
+            isinstance(latest, d.ChargerState)
+            and words.word(d.ChargerStateValue, latest.state) == state
+            and robot in ("", latest.robot_name)
+            and error in latest.error_message
+        )
+
+    def alerted(self, code: str) -> bool:
+        """A person was told this."""
+        return any(alert.subtitle == code for alert in self.alerts)
+
+    # ---- what a day does
+
+    def say(self, said: Iterable[Said]) -> None:
+        """Publish, and note what goes to a daemon."""
+        for topic, message in said:
+            if topic in TO_DAEMONS:
+                self.journal.request(message, time.monotonic())  # type: ignore[arg-type]
+            self._publishers[topic.name].publish(message)
+
+    def press(self, device: str, signal_name: str, on: bool) -> None:
+        """A person or the building acts on a plant."""
+        self.daemons[device].order(f"press {device} {signal_name} {'on' if on else 'off'}")
+
+    def fail(self, device: str, part: str, mode: str) -> None:
+        """A part of a plant fails, or is mended (`ok`)."""
+        self.daemons[device].order(f"fail {device} {part} {mode}")
+
+    def note(self, text: str, who: str = "") -> None:
+        """One line about a robot, or about the demo."""
+        self.journal.note("robot" if who else "demo", text, time.monotonic(), who)
+
+    @contextmanager
+    def leg(self, name: str, text: str = "") -> Iterator[None]:
+        """A part of the day, timed; announced if there is a text."""
+        began_at = time.monotonic()
+        if text:
+            self.note(f"-- {name}: {text}")
+        yield
+        self.journal.legs[name] = time.monotonic() - began_at
 
     def until(
         self, ready: Callable[[], bool], within_s: float, what: str, repeat: Said | None = None
@@ -89,7 +153,7 @@ class World:
                 raise Wrong(f"waited {within_s:g} s for {what}")
             if repeat and time.monotonic() >= repeat_at:
                 repeat_at += 1.0
-                self._say([repeat])
+                self.say([repeat])
             self._turn(LOOK_EVERY_S)
 
     def pause(self, seconds: float) -> None:
@@ -102,8 +166,9 @@ class World:
 
     def _turn(self, timeout_s: float) -> None:
         self._check()
-        if self.robot.wake_at() <= time.time():
-            self._say(self.robot.tick(time.time()))
+        for party in self._parties:
+            if party.wake_at() <= time.time():
+                self.say(party.tick(time.time()))
         try:
             at, topic, what = self._inbox.get(timeout=timeout_s)
         except Empty:
@@ -116,17 +181,34 @@ class World:
         if topic is None:
             self.journal.edge(what)
             return
-        if topic in STATES:
-            self.journal.state(what, at)
+        self._journal(at, topic, what)
         for party in self._parties:
             if topic in party.subscribes:
-                self._say(party.hear(what, time.time()))
+                self.say(party.hear(what, time.time()))
 
-    def _say(self, said: Iterable[Said]) -> None:
-        for topic, message in said:
-            if topic in TO_NODES and not isinstance(message, d.SupervisorHeartbeat):
-                self.journal.request(message, time.monotonic())  # type: ignore[arg-type]
-            self._publishers[topic.name].publish(message)
+    def _journal(self, at: float, topic: Topic[Any], message: Any) -> None:
+        if topic in STATES:
+            self.journal.state(message, at)
+        elif topic in TO_DAEMONS:
+            self.journal.request(message, at)
+        elif isinstance(message, d.ChargingAssignments):
+            self._sent(message, at)
+        elif isinstance(message, d.Alert):
+            self.alerts.append(message)
+            self.journal.note("alert", f"{message.title}: {message.message}", at)
+
+    def _sent(self, message: d.ChargingAssignments, at: float) -> None:
+        for one in message.assignments:
+            place = f"{words.plain(d.ChargingMode, one.mode)} at {one.waypoint_name}"
+            if self.places.get(one.robot_name) != place:
+                self.places[one.robot_name] = place
+                self.journal.note("place", place, at, one.robot_name)
+
+    def _hear(self, *heard: Topic[Any]) -> None:
+        for topic in heard:
+            if topic.name not in self._heard:
+                self._heard.add(topic.name)
+                self._transport.subscribe(topic, self._to_inbox(topic))
 
     def _to_inbox(self, topic: Topic[Any]) -> Callable[[Any], None]:
         def put(message: Any) -> None:

@@ -17,24 +17,19 @@ import asyncio
 import itertools
 import random
 import threading
-from collections.abc import Coroutine, Iterable, Mapping
+from collections.abc import Coroutine, Iterable, Sequence
 from typing import Any, Final
 
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from drivers.hal.modbus.points import canonical
+from drivers.hal.modbus import Settings
+from hal_fakes.fake import Outside
 from hal_fakes.modbus.dead_man import DeadMan
 from hal_fakes.modbus.flash import CoilRequest
-from hal_fakes.modbus.register_door import RegisterDoor
 from hal_fakes.modbus.rtu import RtuLine
 from hal_fakes.modbus.units import FarSide, Units
-from hal_fakes.plants.plant import Plant
-from hal_fakes.plants.xnergy_rcu import ModbusRcu
-from hal_fakes.wiring import devices_on, wirings
 
-CELLS: Final = {("door", "register"): RegisterDoor, ("charger", "modbus"): ModbusRcu}
-"""What a unit consists of that has more than contacts, by kind and driver."""
 TRANSACTION: Final = 0
 UNIT: Final = 6
 """Where a reply on TCP has them."""
@@ -43,28 +38,14 @@ LOOK_S: Final = 0.02
 READY_S: Final = 10.0
 
 
-def serve(
-    settings: Any, plants: Mapping[str, Plant], config: Any, bus_name: str
-) -> "ModbusServer | RtuLine":
+def serve(settings: Settings, stations: Sequence[FarSide]) -> "ModbusServer | RtuLine":
     """Serve the devices of this bus on a free port of 127.0.0.1, or on a line of their own."""
-    devices = far_sides(settings, plants, config, bus_name)
+    dog = settings.module_watchdog
+    devices = [*map(DeadMan, dog.units if dog else ()), *stations]
     if settings.serial:
         slow_s = (settings.retries + 1.2) * settings.timeout_s
         return RtuLine(devices, settings.serial, slow_s)
     return ModbusServer(devices, slow_s=1.5 * settings.timeout_s)
-
-
-def far_sides(
-    settings: Any, plants: Mapping[str, Plant], config: Any, bus_name: str
-) -> list[FarSide]:
-    """What the units of this bus consist of."""
-    dog = settings.module_watchdog
-    dead_men = [DeadMan(unit) for unit in dog.units] if dog else []
-    made: Any = CELLS.get((config.kind, config.driver))
-    if made:
-        on_bus = devices_on(config, bus_name).items()
-        return [*dead_men, *(made(plants[name], one) for name, one in on_bus)]
-    return [*dead_men, *wirings(config, bus_name, plants, canonical)]
 
 
 class ModbusServer:
@@ -147,3 +128,6 @@ class ModbusServer:
 def _placeholder() -> SimDevice:
     """pymodbus wants to hold the registers itself; ours are the plants'."""
     return SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS))
+
+
+FAKE = Outside(serve)

@@ -18,6 +18,8 @@ TIME_AT_POWER_ON: Final = 100
 class DeadMan:
     """One unit's watchdog. Times are monotonic seconds."""
 
+    plant = None
+
     def __init__(self, unit: int) -> None:
         self.unit = unit
         self.points = frozenset(

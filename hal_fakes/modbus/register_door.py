@@ -7,6 +7,8 @@ from drivers.door.register import Settings, door_map, points
 from drivers.door.register_map import DoorMap, Status
 from drivers.hal.modbus.points import Point
 from drivers.hal.points import Wire
+from hal_fakes.fake import Fake
+from hal_fakes.plants import door
 from hal_fakes.plants.plant import Plant
 
 NONSENSE = 65535
@@ -72,3 +74,9 @@ class RegisterDoor:
         if self.plant.sense("opened"):
             return opened
         return closed if self.plant.sense("closed") else between
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: door.build(name, settings, contacts(settings)),
+    station=lambda plant, settings, bus: RegisterDoor(plant, settings),
+)

@@ -7,21 +7,37 @@ The same for a gateway (`hal_fakes/modbus.py`) and a serial line (`hal_fakes/mod
 import asyncio
 import time
 from collections.abc import Iterable
-from typing import Final, Literal, TypeAlias
+from typing import Final, Literal, Protocol, TypeAlias
 
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
 
 from drivers.hal.modbus.points import Point, Range, Table, parse
 from hal_fakes.modbus.dead_man import DeadMan
-from hal_fakes.modbus.register_door import RegisterDoor
 from hal_fakes.plants.plant import FailureMode, Plant
-from hal_fakes.plants.xnergy_rcu import ModbusRcu
 from hal_fakes.wiring import Wiring
 
 Part = Literal["unit", "server"]
 
-Cells: TypeAlias = RegisterDoor | ModbusRcu | DeadMan
+
+class Cells(Protocol):
+    """Registers and bits of one unit, with a plant behind them. `outputs`: what can be written."""
+
+    unit: int
+    points: frozenset[Point]
+    outputs: frozenset[Point]
+
+    @property
+    def plant(self) -> Plant | None:
+        """What is behind them; None for what a module has for itself."""
+
+    def get(self, point: Point, now: float) -> int:
+        """What is read there at `now` (monotonic s)."""
+
+    def set(self, point: Point, value: int, now: float) -> bool:
+        """A write; False where nothing can be written."""
+
+
 FarSide: TypeAlias = Wiring | Cells
 """What units can consist of."""
 
@@ -72,9 +88,9 @@ class Units:
         self._plants.setdefault(device.unit, [])
         if isinstance(device, DeadMan):
             self._dead_men.append(device)
-            return
-        for unit in (None, device.unit):
-            self._plants[unit].append(device.plant)
+        if device.plant:
+            for unit in (None, device.unit):
+                self._plants[unit].append(device.plant)
 
     def tick(self) -> None:
         """Let the modules' watchdogs trip, and their pulses end, when it is time; called often."""

@@ -18,18 +18,12 @@ takes ten times as long for it, `wrong` fails it, `garbage` loses contact while 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final, overload
+from typing import Any, Final
 
-from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import CURRENT_FLOWS, Activity
-from drivers.charger import can_frames as charger_can_frames
-from drivers.charger import canopen as charger_canopen
-from drivers.charger import modbus as charger_modbus
 from hal_fakes.plants.machine import Machine
-from hal_fakes.plants.pad import PadPlant
 from hal_fakes.plants.plant import FailureMode
 
-SWITCHED: Final = (charger_canopen.Settings, charger_can_frames.Settings, charger_modbus.Settings)
 HANDSHAKE_S: Final = 2.0
 SLOWNESS: Final = 10.0
 FILL_S: Final = 60.0
@@ -49,28 +43,6 @@ CAUSES: Final = {
 }
 ROBOTS_FAULTS: Final = ("authentication timeout", "communication lost while charging")
 PARTS: Final = ("receiver", "server", "headers", "body")
-
-
-@overload
-def build(name: str, settings: None) -> "ChargerPlant": ...
-
-
-@overload
-def build(name: str, settings: ChargerSettings) -> Machine: ...
-
-
-def build(name: str, settings: Any) -> Machine:
-    """A station with its robots; its code table is the wire's business (`hal_fakes/http.py`).
-
-    On CAN and Modbus it is one whose receiver is switched, with a pad that moves
-    (`hal_fakes/plants/pad.py`).
-    """
-    if settings is None:
-        return ChargerPlant(name)
-    if isinstance(settings, SWITCHED):
-        return PadPlant(name)
-    asked = getattr(settings, "range_check", None) is not None
-    return ChargerPlant(name, settings.receivers, settings.can_stop(), asked)
 
 
 @dataclass(frozen=True, slots=True)

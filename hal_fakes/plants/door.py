@@ -8,9 +8,11 @@ each command round, `garbage` stops half-way. At a Modbus module `unit` and `ser
 """
 
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import Final
 
+from bridges.door.settings import DoorSettings
 from drivers.hal.points import Wire
+from hal_fakes.fake import Fake
 from hal_fakes.plants.machine import Machine
 
 OPEN_S: Final = 2.0
@@ -19,16 +21,10 @@ AUTO_CLOSE_S: Final = 1.0
 SLOWNESS: Final = 5.0
 
 
-def build(name: str, settings: Any) -> "DoorPlant":
-    """The door that these settings are wired to."""
-    from drivers.door import dry_contact as door_dry_contact
-    from drivers.door import register as door_register
-    from hal_fakes.modbus.register_door import contacts
-
-    wired = door_dry_contact.wires
-    wires = contacts if isinstance(settings, door_register.Settings) else wired
+def build(name: str, settings: DoorSettings, wires: Iterable[Wire]) -> "DoorPlant":
+    """A door with these contacts and this relay."""
     every_s = settings.pulse.every_s if settings.pulse else 0.0
-    return DoorPlant(name, wires(settings), auto_close_s=max(AUTO_CLOSE_S, every_s))
+    return DoorPlant(name, wires, auto_close_s=max(AUTO_CLOSE_S, every_s))
 
 
 class DoorPlant(Machine):
@@ -123,3 +119,6 @@ class DoorPlant(Machine):
         if (direction, seconds) != self._course or self._arrives_at <= self.now:
             self._arrives_at = self.now + left * seconds
         self._course = (direction, seconds)
+
+
+FAKE = Fake(plant=build)

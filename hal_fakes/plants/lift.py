@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from bridges.lift.signals import Hazard, Side
 from drivers.lift.dry_contact import Settings, wires
 from drivers.lift.table import input_rows
+from hal_fakes.fake import Fake
 from hal_fakes.plants.lift_car import NEVER, Car, CarDoor
 from hal_fakes.plants.machine import Machine
 from hal_fakes.plants.plant import FailureMode
@@ -295,3 +296,6 @@ def _slowed(seconds: float, failure: FailureMode | None) -> float | None:
 
 def _bits(prefix: str, width: int, number: int) -> dict[str, bool]:
     return {f"{prefix}_bit{i}": bool(number >> i & 1) for i in range(width)}
+
+
+FAKE = Fake[Settings](plant=lambda name, settings, wires: build(name, settings))

@@ -1,14 +1,17 @@
 """What Xnergy's receiver (RCU) shows of the plant: its numbers, whether on CANopen or on Modbus."""
 
-from typing import Any, Final, cast
+from typing import Final, cast
 
 from bridges.charger.signals import Activity
-from drivers.charger.xnergy import CHECK_RANGE, ENABLE, IN_RANGE, READS, TICKS_PER_UNIT
+from drivers.charger.modbus import Settings, points
+from drivers.charger.xnergy import CHECK_RANGE, ENABLE, IN_RANGE, TICKS_PER_UNIT
 from drivers.hal.modbus.points import Point
-from drivers.hal.modbus.registers import at
-from hal_fakes.plants.pad import PadReading
+from hal_fakes.fake import Fake
+from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
 
+SIGNALS: Final = (ENABLE, CHECK_RANGE)
+"""What is written; the plant has the same names for it."""
 HANDSHAKE: Final = (1, 2, 3, 4)
 STATES: Final = {
     Activity.IDLE: 0,
@@ -31,7 +34,7 @@ RANGES: Final = {"none": 0, "ongoing": 0, "in": IN_RANGE, "out": 2, "failed": 24
 
 
 def words(reading: PadReading, latched: int = 0) -> dict[str, int]:
-    """The words by the names of `drivers.charger.xnergy.READS`. `latched`: errors before this one."""
+    """The words by the names of `drivers.charger.xnergy`. `latched`: errors before this one."""
     now = sum(ERRORS[fault] for fault in reading.faults)
     shadow = now | latched
     return {
@@ -43,8 +46,6 @@ def words(reading: PadReading, latched: int = 0) -> dict[str, int]:
         "volts": round(reading.volts * TICKS_PER_UNIT),
         "amps": round(reading.amps * TICKS_PER_UNIT),
         "range": RANGES[reading.range_result],
-        "device_c": round(reading.coil_c) - 5,
-        "coil_c": round(reading.coil_c),
     }
 
 
@@ -61,18 +62,14 @@ class ModbusRcu:
     `points`: what it has, `outputs` among it; `unit`: where.
     """
 
-    def __init__(self, plant: Plant, settings: Any) -> None:
+    def __init__(self, plant: Plant, settings: Settings) -> None:
         self.plant = plant
         self.unit: int = settings.unit
-        self._reads = {self._point(where.modbus): name for name, where in READS.items()}
-        self._signals = {
-            self._point(where.modbus): signal
-            for signal, where in (("enable", ENABLE), ("check_range", CHECK_RANGE))
-        }
-        self._coils = dict.fromkeys(self._signals, 0)
+        self._names = {point: name for name, point in points(settings).items()}
+        self._coils = {point: 0 for point, name in self._names.items() if name in SIGNALS}
         self._latched = 0
-        self.points = frozenset((*self._reads, *self._signals))
-        self.outputs = frozenset(self._signals)
+        self.points = frozenset(self._names)
+        self.outputs = frozenset(self._coils)
 
     def get(self, point: Point, now: float) -> int:
         """What is read there at `now` (monotonic s)."""
@@ -81,16 +78,18 @@ class ModbusRcu:
         self.plant.advance(now)
         found = words(cast(PadReading, self.plant.sense("reading")), self._latched)
         self._latched = found["latched_high"] << 16 | found["latched_low"]
-        return found[self._reads[point]] & 0xFFFF
+        return found[self._names[point]] & 0xFFFF
 
     def set(self, point: Point, value: int, now: float) -> bool:
         """A write; False where nothing can be written."""
-        if point not in self._signals:
+        if point not in self._coils:
             return False
         self._coils[point] = value
-        self.plant.drive(self._signals[point], bool(value), now)
+        self.plant.drive(self._names[point], bool(value), now)
         return True
 
-    def _point(self, place: str | None) -> Point:
-        assert place
-        return at(self.unit, place)
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: PadPlant(name),
+    station=lambda plant, settings, bus: ModbusRcu(plant, settings),
+)

@@ -7,10 +7,19 @@ from typing import Any
 from msgspec.structs import replace
 
 from bridges.charger import core
-from bridges.charger.core import Cancelled, Requested
+from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import ChargerLimits, Limits, robot
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
+from bridges.charger.settings import Durations as Limits
+from bridges.charger.settings import robot
+from bridges.charger.signals import (
+    Activity,
+    Cancelled,
+    ChargerOutputs,
+    ChargerSample,
+    Event,
+    Measured,
+    Requested,
+)
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 DURATIONS = Limits(misses=3, start_timeout_s=60.0, released_s=2.0)
@@ -39,7 +48,7 @@ ODD = Sampled(ChargerSample(A.UNKNOWN, 99))
 SILENT = IoFailed("192.168.1.60:80 refuses the connection")
 RIVAL = RivalSeen()
 RESET = OperatorReset()
-SCANS: dict[str, core.Event] = {
+SCANS: dict[str, Event] = {
     "idle": IDLE,
     "handshake": HANDSHAKE,
     "charging": CHARGING,
@@ -64,7 +73,7 @@ class Story:
 
     limits: ChargerLimits = LIMITS
     now: float = 0.0
-    memory: core.Memory = field(default_factory=lambda: core.initial(LIMITS, 0.0))
+    memory: Memory = field(default_factory=lambda: core.initial(LIMITS, 0.0))
     told: list[tuple[float, str, str]] = field(default_factory=list)
     refused: list[tuple[float, str]] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
@@ -72,7 +81,7 @@ class Story:
     outputs: ChargerOutputs = field(default_factory=ChargerOutputs)
     powered: list[bool | None] = field(default_factory=list)
 
-    def event(self, event: core.Event) -> "Story":
+    def event(self, event: Event) -> "Story":
         """Something happens now."""
         decision = core.decide(self.memory, event, self.now, self.limits)
         self.memory, self.outputs, self.report = decision.memory, decision.outputs, decision.report
@@ -107,7 +116,7 @@ class Story:
                 self.now += 1.0
         return self
 
-    def all(self, events: Iterable[core.Event]) -> "Story":
+    def all(self, events: Iterable[Event]) -> "Story":
         """Several events at once."""
         for event in events:
             self.event(event)

@@ -3,9 +3,16 @@
 import pytest
 
 from bridges.charger import core
-from bridges.charger.core import Cancelled, Requested
+from bridges.charger.memory import Memory
 from bridges.charger.report import ChargerReport
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
+from bridges.charger.signals import (
+    Activity,
+    Cancelled,
+    ChargerOutputs,
+    ChargerSample,
+    Measured,
+    Requested,
+)
 from bridges.core.decision import Fault, Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from tests.charger.story import (
@@ -490,7 +497,7 @@ def test_two_nodes_do_not_both_clear_an_error() -> None:
 
 
 def test_the_core_asks_to_be_woken_when_the_rival_is_due_to_be_gone() -> None:
-    seen = core.decide(core.Memory(), RIVAL, 7.0, LIMITS)
+    seen = core.decide(Memory(), RIVAL, 7.0, LIMITS)
     later = core.decide(seen.memory, IDLE, 12.0, LIMITS)
     assert (seen.wake_at, later.wake_at) == (12.0, float("inf"))
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from bridges.charger import KIND
-from bridges.charger.core import Cancelled, Requested
+from bridges.charger.memory import ChargerLimits
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import ChargerLimits, ChargerSettings, Limits
-from bridges.charger.signals import Measured
+from bridges.charger.settings import ChargerSettings, Durations
+from bridges.charger.signals import Cancelled, Measured, Requested
 from bridges.core.decision import RequestRefused
 from bridges.rmf.definitions import (
     ChargerCancel,
@@ -20,7 +20,7 @@ from bridges.rmf.definitions import (
 )
 from bridges.rmf.topics import CHARGER_CANCELS, CHARGER_REQUESTS
 
-SETTINGS = ChargerSettings(limits=Limits(misses=5))
+SETTINGS = ChargerSettings(limits=Durations(misses=5))
 RIGHT = ChargerRequest("charger_a", "tiny", "AMR01", Duration(30, 500_000_000), "coordinator-7")
 
 
@@ -118,7 +118,7 @@ def test_the_kind_finds_the_charger_in_each_of_its_messages() -> None:
 
 
 def test_the_limits_are_those_of_the_settings() -> None:
-    assert KIND.limits(SETTINGS, {}) == ChargerLimits(Limits(misses=5))
+    assert KIND.limits(SETTINGS, {}) == ChargerLimits(Durations(misses=5))
 
 
 def test_the_summary_says_that_a_robot_is_not_verified() -> None:

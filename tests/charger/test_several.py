@@ -10,7 +10,7 @@ import pytest
 from bridges.rmf.definitions import ChargerState, ChargerStateValue
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import CHARGER_STATES
-from bridges.serve.service import open_bus, service
+from bridges.serve.service import service
 from bridges.settings.load import load
 from tests.drivers.hal.http.far_end import Caller, Conversation, FarEnd, always, answer
 from tests.waiting import wait_until
@@ -45,7 +45,8 @@ def daemon(file: Path, **stations: Conversation) -> Iterator[list[ChargerState]]
         network = MemoryNetwork()
         states: list[ChargerState] = []
         MemoryTransport(network, "rmf").subscribe(CHARGER_STATES, states.append)
-        served = service(load(file), MemoryTransport(network, "chargers"), open_bus)
+        config = load(file)
+        served = service(config, MemoryTransport(network, "chargers"), config.open_bus)
         served.subscribe()
         for loop in served.loops:
             loop.start()

@@ -4,11 +4,11 @@ side of each, in virtual time, one poll a second."""
 import pytest
 from msgspec.structs import replace
 
-from bridges.charger.core import Cancelled, Requested
+from bridges.charger.memory import ChargerLimits
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import ChargerLimits, Limits
+from bridges.charger.settings import Durations
 from bridges.charger.signals import Activity as A
-from bridges.charger.signals import ChargerOutputs, ChargerSample, Measured
+from bridges.charger.signals import Cancelled, ChargerOutputs, ChargerSample, Measured, Requested
 from bridges.core.decision import Fault, Sampled, WriteFailed
 from bridges.rmf.definitions import ChargerStateValue as State
 from tests.charger.story import (
@@ -76,7 +76,7 @@ def test_power_is_given_when_the_right_receiver_is_seen_and_taken_when_the_batte
 
 
 def test_a_battery_is_full_at_the_configured_level() -> None:
-    limits = replace(FULL, t=Limits(full_percent=80.0))
+    limits = replace(FULL, t=Durations(full_percent=80.0))
     it = story(limits).event(AMR1).sees((A.CHARGING, ONE, 1), battery_percent=79.9)
     assert it.outputs.power is True
     it.sees((A.CHARGING, ONE, 1), battery_percent=80.0)
@@ -452,7 +452,7 @@ def test_a_cancel_while_the_station_is_lost_takes_the_power_as_soon_as_it_is_hea
 
 
 def test_an_operator_frees_a_lost_station_only_when_it_must_have_switched_off_by_itself() -> None:
-    limits = replace(FULL, t=Limits(peer_internal_timeout_s=15.0))
+    limits = replace(FULL, t=Durations(peer_internal_timeout_s=15.0))
     it = story(limits).event(AMR1).sees((A.CHARGING, ONE, 1)).all([SILENT] * 3)
     it.now = 15.9
     it.event(RESET)

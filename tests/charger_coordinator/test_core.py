@@ -1,28 +1,26 @@
 """The coordinator's rules one by one: its core alone, told by hand, in virtual time."""
 
+import dataclasses
 from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 from msgspec.structs import replace
 
+from bridges.charger.report import LOST, Diagnosis, diagnosis
 from bridges.charger.settings import Robot
-from bridges.charger.told import MESSAGES
 from bridges.charger_coordinator import core, keep
-from bridges.charger_coordinator.diagnosis import Side, on_pad, side
 from bridges.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
     ERROR,
     IDLE,
     RELEASED,
-    FleetSeen,
     Memory,
-    Shown,
-    Sighting,
-    Wanted,
+    Site,
 )
-from bridges.charger_coordinator.settings import site
+from bridges.charger_coordinator.report import on_pad
+from bridges.charger_coordinator.signals import FleetSeen, Sighting, StateHeard, Wanted
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf import definitions as d
 from tests.charger_coordinator.yard import RECEIVERS, settings
@@ -39,7 +37,9 @@ class Alone:
     now: float = 0.0
     memory: Memory = field(default_factory=lambda: core.initial("site", 0.0))
     said: list[tuple[float, str]] = field(default_factory=list)
-    shows: dict[str, Shown] = field(default_factory=lambda: {A: Shown(A, IDLE), B: Shown(B, IDLE)})
+    shows: dict[str, StateHeard] = field(
+        default_factory=lambda: {A: StateHeard(A, IDLE), B: StateHeard(B, IDLE)}
+    )
     seen: dict[Robot, Sighting] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
 
@@ -47,7 +47,7 @@ class Alone:
         self.hears(MaySpeak(True))
 
     def hears(self, event: Any) -> str:
-        decided = core.decide(self.memory, event, self.now, site(SETTINGS))
+        decided = core.decide(self.memory, event, self.now, Site.of(SETTINGS))
         self.memory = decided.memory
         self.faults = [str(fault) for fault in decided.report.faults]
         for _, message in decided.publish:
@@ -78,12 +78,12 @@ class Alone:
     def does(self, station: str, state: Any, error: str = "") -> None:
         """The station goes on so with the request that it was sent last."""
         grant = self.memory.grants[station]
-        self.shows[station] = Shown(station, state, grant.request_id, grant.robot, error)
+        self.shows[station] = StateHeard(station, state, grant.request_id, grant.robot, error)
 
 
-def busy(station: str) -> Shown:
+def busy(station: str) -> StateHeard:
     """A station that serves somebody who is none of ours."""
-    return Shown(station, CHARGING, "somebody-1", Robot("other", "robot"))
+    return StateHeard(station, CHARGING, "somebody-1", Robot("other", "robot"))
 
 
 # ---- who wants to be charged
@@ -111,7 +111,7 @@ def test_a_robot_that_is_full_gives_its_station_up_and_comes_back_only_when_it_i
     assert site_.run(1) == [(4.0, "charger_a: cancel")]
     site_.does(A, RELEASED)
     site_.run(1)
-    site_.shows[A] = Shown(A, IDLE)
+    site_.shows[A] = StateHeard(A, IDLE)
     site_.wants(ONE, "charger_a", 90.0)
     assert site_.run(30) == []
     site_.wants(ONE, "charger_a", 89.9)
@@ -125,7 +125,7 @@ def test_a_station_that_ends_a_charge_early_is_not_asked_again_until_the_battery
     for state in (CHARGING, RELEASED):
         site_.does(A, state)
         site_.run(1)
-    site_.shows[A] = Shown(A, IDLE)
+    site_.shows[A] = StateHeard(A, IDLE)
     assert site_.run(30) == []
     site_.wants(ONE, "charger_a", 89.0)
     assert site_.run(1) == [(34.0, "charger_a: AMR01")]
@@ -151,7 +151,7 @@ def test_the_queue_is_first_come_first_served() -> None:
     for who in (TWO, ONE, THREE):
         site_.wants(who)
         site_.run(1)
-    site_.shows[B] = Shown(B, IDLE)
+    site_.shows[B] = StateHeard(B, IDLE)
     assert site_.run(1) == [(4.0, "charger_b: AMR02")]
 
 
@@ -190,7 +190,7 @@ def test_a_station_that_takes_no_request_is_passed_over_and_the_wish_goes_to_the
 
 def test_a_robot_that_is_charged_unasked_where_it_stands_has_that_station() -> None:
     site_ = Alone()
-    site_.shows[A] = Shown(A, CHARGING, "unrequested/charger_a")
+    site_.shows[A] = StateHeard(A, CHARGING, "unrequested/charger_a")
     site_.wants(ONE, "charger_a")
     assert site_.run(10) == []
     assert site_.memory.station_of(ONE) == A
@@ -222,7 +222,7 @@ def test_a_robot_with_one_station_is_tried_there_twice_and_no_more() -> None:
         assert [text for _, text in site_.run(1)][-1:] == ["charger_b: AMR03"]
         site_.does(B, ERROR, "robot: handshake timeout")
         assert [text for _, text in site_.run(1)][-1:] == ["charger_b: cancel"]
-        site_.shows[B] = Shown(B, IDLE)
+        site_.shows[B] = StateHeard(B, IDLE)
     site_.run(1)
     assert site_.run(60) == []
     assert site_.faults == [
@@ -275,7 +275,7 @@ def test_a_robot_that_has_a_station_does_not_get_another_by_a_strangers_request(
     site_.wants(ONE)
     site_.run(1)
     site_.does(A, ASSIGNED)
-    site_.shows[B] = Shown(B, ASSIGNED, "somebody-1", ONE)
+    site_.shows[B] = StateHeard(B, ASSIGNED, "somebody-1", ONE)
     assert site_.run(5) == []
     assert site_.memory.station_of(ONE) == A
     assert list(site_.memory.grants) == [A]
@@ -312,7 +312,7 @@ def test_only_a_robot_refused_as_unasked_may_have_the_station_where_it_stands() 
         site_ = Alone()
         site_.shows[B] = busy(B)
         text = "wrong docking: tiny/AMR01 is not assigned here"
-        site_.shows[A] = Shown(A, ERROR, request_id, ONE, text)
+        site_.shows[A] = StateHeard(A, ERROR, request_id, ONE, text)
         site_.wants(ONE, "charger_a")
         assert [words for _, words in site_.run(1)] == said
 
@@ -320,35 +320,40 @@ def test_only_a_robot_refused_as_unasked_may_have_the_station_where_it_stands() 
 @pytest.mark.parametrize(
     ("text", "whose"),
     [
-        ("robot: authentication timeout", Side.ROBOT),
-        ("station: fan", Side.STATION),
-        ("out of service after: station: fan", Side.STATION),
-        ("Charger unreachable", Side.LOST),
-        ("Charger takes no commands", Side.LOST),
-        ("two nodes for one device", Side.LOST),
-        ("wrong docking: tiny/AMR01 is not assigned here", Side.PAD),
-        ("unknown receiver RX-1", Side.PAD),
-        ("unknown vendor state 99", Side.UNCLEAR),
-        ("", Side.UNCLEAR),
+        ("robot: authentication timeout", Diagnosis.ROBOT),
+        ("station: fan", Diagnosis.STATION),
+        ("out of service after: station: fan", Diagnosis.STATION),
+        ("Charger unreachable", Diagnosis.LOST),
+        ("Charger takes no commands", Diagnosis.LOST),
+        ("two nodes for one device", Diagnosis.LOST),
+        ("wrong docking: tiny/AMR01 is not assigned here", Diagnosis.PAD),
+        ("unknown receiver RX-1", Diagnosis.PAD),
+        ("unknown vendor state 99", Diagnosis.UNCLEAR),
+        ("", Diagnosis.UNCLEAR),
     ],
 )
-def test_the_side_at_fault_is_what_the_station_says(text: str, whose: Side) -> None:
-    assert side(text) is whose
+def test_the_side_at_fault_is_what_the_station_says(text: str, whose: Diagnosis) -> None:
+    assert diagnosis(text) is whose
 
 
 def test_the_fixed_texts_of_our_own_chargers_say_nothing_against_a_robot() -> None:
-    assert {side(text) for text in MESSAGES.values()} == {Side.LOST}
+    assert {diagnosis(text) for text in LOST.values()} == {Diagnosis.LOST}
 
 
 def test_who_stands_on_a_pad_is_read_from_its_error() -> None:
-    robots = [ONE, TWO, Robot("tiny", "AMR0")]
+    robots = dict.fromkeys((ONE, TWO, Robot("tiny", "AMR0")), ())
+    ours = dataclasses.replace(
+        Site.of(SETTINGS), robots=robots, receivers={**RECEIVERS, "RX, 1": TWO}
+    )
     texts = {
         "wrong docking: tiny/AMR02 stands here, tiny/AMR01 is expected": TWO,
         "wrong docking: tiny/AMR03 is not assigned here": None,
         "unknown receiver RX-1, tiny/AMR02 is expected": ONE,
         "unknown receiver RX-99": None,
+        'unknown receiver "RX, 1", tiny/AMR02 is expected': TWO,
+        "wrong docking: a text of another node": None,
     }
-    assert {text: on_pad(text, robots, RECEIVERS) for text in texts} == texts
+    assert {text: on_pad(text, ours) for text in texts} == texts
 
 
 # ---- what is kept

@@ -1,5 +1,6 @@
 """What comes in and what a file may say: ours or refused, by name."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,8 @@ import pytest
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator import KIND, messages
-from bridges.charger_coordinator.memory import CHARGING, Dedicated, Shown, Sighting
+from bridges.charger_coordinator.memory import CHARGING
+from bridges.charger_coordinator.signals import Dedicated, Sighting, StateHeard
 from bridges.core.decision import RequestRefused
 from bridges.rmf import definitions as d
 from bridges.settings.load import SettingsError, load
@@ -58,7 +60,7 @@ STATE = d.ChargerState(d.Time(), 3, "charger_a", "", "id", "tiny", "AMR01")
 
 
 def test_a_chargers_state_is_what_it_shows() -> None:
-    shown = Shown("charger_a", CHARGING, "id", ONE)
+    shown = StateHeard("charger_a", CHARGING, "id", ONE)
     assert messages.accept_state(STATE, SETTINGS, 0.0) == shown
 
 
@@ -98,6 +100,25 @@ def test_what_is_not_ours_is_refused_by_name(accept: Any, message: Any, kind: st
     with pytest.raises(RequestRefused) as refused:
         accept(message, SETTINGS, 0.0)
     assert refused.value.kind == kind
+
+
+@pytest.mark.parametrize(
+    ("accept", "message", "kind"),
+    [
+        (messages.accept_state, replace(STATE, error_message="x" * 10_001), "error_message"),
+        (messages.accept_state, replace(STATE, request_id="x" * 257), "request_id"),
+        (messages.accept_state, replace(STATE, robot_name="x" * 257), "robot_name"),
+        (
+            messages.accept_fleet,
+            d.FleetState("tiny", (d.RobotState("AMR01", task_id="x" * 257),)),
+            "task_id",
+        ),
+    ],
+)
+def test_endless_texts_are_not_kept(accept: Any, message: Any, kind: str) -> None:
+    with pytest.raises(RequestRefused) as refused:
+        accept(message, SETTINGS, 0.0)
+    assert refused.value.kind == f"impossible {kind}"
 
 
 def test_an_alert_is_sent_once_under_its_id_and_its_time() -> None:

@@ -6,7 +6,6 @@ from bridges.charger.settings import Robot
 from bridges.core.decision import OperatorReset
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
-from bridges.serve.service import GraphService
 from tests.charger_coordinator.yard import Yard
 
 
@@ -338,6 +337,5 @@ def test_a_request_sent_to_a_charger_directly_makes_that_robots_place() -> None:
     site.fleet.charge("AMR03", site.now)
     told = [what for _, what in site.run(15.0)]
     assert told == ["AMR02 -> CHARGE dock_b"]
-    service = GraphService(site.node)
-    queue = service.devices()["site"]["queue"]
-    assert (service.status()["passive"], queue) == (False, "tiny/AMR03")
+    queue = site.node.devices()["site"]["queue"]
+    assert (site.node.status()["passive"], queue) == (False, "tiny/AMR03")

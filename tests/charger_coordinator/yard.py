@@ -6,8 +6,11 @@ from typing import Any
 
 from bridges.charger import core as charger
 from bridges.charger import messages as charger_messages
-from bridges.charger.settings import ChargerLimits, ChargerSettings, Limits, Robot
-from bridges.charger.signals import Activity, ChargerSample, Measured, Side
+from bridges.charger.memory import ChargerLimits
+from bridges.charger.settings import ChargerSettings, Robot
+from bridges.charger.settings import Durations as Limits
+from bridges.charger.signals import Activity, ChargerSample, Measured
+from bridges.charger.signals import FaultSide as Side
 from bridges.charger_coordinator import KIND
 from bridges.charger_coordinator.settings import (
     Fleet as FleetSettings,
@@ -18,9 +21,10 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import duration
-from bridges.serve.device import Clock
+from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from hal_fakes.rmf.fleet import Fleet
+from tests.serve.virtual_graph import Disk
 
 STEP_S = 0.25
 GRAPH = {
@@ -130,19 +134,6 @@ class Charger:
 
 
 @dataclass
-class Kept:
-    """The state directory."""
-
-    kept: bytes | None = None
-
-    def read(self) -> bytes | None:
-        return self.kept
-
-    def write(self, kept: bytes) -> None:
-        self.kept = kept
-
-
-@dataclass
 class Yard:
     """All of them. `story`: (s, what) of everything worth telling, in order; `fills`: % per second."""
 
@@ -154,7 +145,7 @@ class Yard:
     story: list[tuple[float, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.network, self.kept = MemoryNetwork(), Kept()
+        self.network, self.kept = MemoryNetwork(), Disk()
         self.rmf = MemoryTransport(self.network, "rmf")
         self.chargers = {name: Charger(name, self.knows) for name in PLACES}
         homes = {f"AMR0{i}": f"wait_{i}" for i in (1, 2, 3)}
@@ -215,7 +206,7 @@ class Yard:
     def faults(self) -> list[str]:
         """What the coordinator's status shows."""
         return [
-            f"{f['code']}: {f['detail']}" for s in self.node.nodes for f in s.status()["faults"]
+            f"{f['code']}: {f['detail']}" for s in self.node.devices().values() for f in s["faults"]
         ]
 
     def _scan(self, station: Charger) -> None:

@@ -1,5 +1,4 @@
-"""`send` and `watch` around their pure parts: on the memory transport, and as processes on
-each wire."""
+"""`send` and `watch` around their pure parts: on the memory transport, and as processes on DDS."""
 
 import argparse
 import io
@@ -18,9 +17,11 @@ from msgspec.structs import replace as replace_struct
 
 from bridges.cli import main
 from bridges.commands import send, watch
-from bridges.commands.effects import Wish
 from bridges.commands.graph import add_graph_arguments, overridden
-from bridges.commands.wishes import Charge, ChargeCancel, DoorMove, LiftEnd, LiftRide
+from bridges.commands.requests import Request
+from bridges.commands.requests.charger import Charge, ChargeCancel
+from bridges.commands.requests.door import DoorMove
+from bridges.commands.requests.lift import LiftEnd, LiftRide
 from bridges.core.fields import Rmf
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -29,10 +30,9 @@ from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
 from bridges.settings.load import load
-from hal_fakes.domain import free_domain
 from hal_fakes.wire import Wire, wire
 from tests.rmf.zenoh_programs import Router
-from tests.waiting import wait_until
+from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 
 M = TypeVar("M", bound=d.Message)
 ME = "fleet/robot"
@@ -103,9 +103,9 @@ BUSY = replace(CHARGER, state=3, request_id="r1")
 
 
 @pytest.mark.parametrize(
-    ("states", "state", "wish"),
+    ("states", "state", "wanted"),
     [
-        (topics.LIFT_STATES, LIFT, LiftRide("Lift1", "L3", ME, direct=True, granted_only=False)),
+        (topics.LIFT_STATES, LIFT, LiftRide("Lift1", "L3", ME, direct=True)),
         (topics.LIFT_STATES, HELD, LiftEnd("Lift1", "", direct=True)),
         (topics.DOOR_STATES, DOOR, DoorMove("ward", True, ME, direct=True)),
         (topics.CHARGER_STATES, CHARGER, Charge("a", "fleet", "robot", "r1", 30)),
@@ -113,10 +113,10 @@ BUSY = replace(CHARGER, state=3, request_id="r1")
     ],
 )
 def test_a_request_reaches_the_device_once_and_its_effect_ends_the_command(
-    states: Topic[Any], state: d.Message, wish: Wish
+    states: Topic[Any], state: d.Message, wanted: Request
 ) -> None:
-    device, out = Device(states, wish.topic, state), io.StringIO()
-    assert send.send(Told(device), wish, 10.0, out) == 0
+    device, out = Device(states, wanted.topic, state), io.StringIO()
+    assert send.send(Told(device), wanted, 10.0, out) == 0
     assert [line.split()[2] for line in out.getvalue().splitlines()] == [
         *("state", "request", "state", "done")
     ]
@@ -129,14 +129,25 @@ def test_a_request_carries_the_time_at_which_it_was_sent() -> None:
     assert device.requests[0].request_time.sec > 1_700_000_000
 
 
+def test_what_comes_from_the_network_cannot_move_the_cursor(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    floors = ("L1\x1b[2J",)
+    device = Device(
+        topics.LIFT_STATES, topics.LIFT_REQUESTS, replace(LIFT, available_floors=floors)
+    )
+    assert send.send(Told(device), LiftRide("Lift1", "L3", ME, direct=True), 10, io.StringIO()) == 1
+    assert "\x1b" not in capsys.readouterr().err
+
+
 def test_the_reason_goes_to_standard_error_and_the_exit_code_is_1(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     device, out = Device(topics.LIFT_STATES, topics.LIFT_REQUESTS, LIFT), io.StringIO()
-    wish = LiftRide("Lift1", "L33", ME, direct=True, granted_only=False)
-    assert send.send(Told(device), wish, 10.0, out) == 1
+    request = LiftRide("Lift1", "L33", ME, direct=True)
+    assert send.send(Told(device), request, 10.0, out) == 1
     assert capsys.readouterr().err == (
-        "rmf-bridge send: Lift1 serves L1, L3: no 'L33'; did you mean 'L3'?\n"
+        "rmf-bridge send: Lift1 serves L1, L3, not 'L33'; did you mean 'L3'?\n"
     )
     assert device.requests == []
 
@@ -147,7 +158,7 @@ def test_once_prints_the_table_or_says_that_nothing_is_there(
     device, out = Device(topics.LIFT_STATES, topics.LIFT_REQUESTS, HELD), io.StringIO()
     assert watch.show_once(watch.listen_on(Told(device)), 0.01, out) == 0
     assert out.getvalue().splitlines()[1].split()[:6] == [
-        *("lift", "Lift1", "L1", "CLOSED", "UNKNOWN", ME)
+        *("lift", "Lift1", "car", "at", "L1,", "door")
     ]
     nobody = MemoryTransport(MemoryNetwork(), "alone")
     assert watch.show_once(watch.listen_on(nobody), 0.01, out) == 1
@@ -160,7 +171,7 @@ def test_once_prints_the_table_or_says_that_nothing_is_there(
 def parsed(line: str) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
     send.add_arguments(parser)
-    return parser.parse_args(line.split())
+    return parser.parse_args(line.split(), argparse.Namespace(typed=("send", *line.split())))
 
 
 @pytest.mark.parametrize(
@@ -183,15 +194,15 @@ def parsed(line: str) -> argparse.Namespace:
 )
 def test_a_command_line_that_contradicts_itself_exits_2(line: str) -> None:
     with pytest.raises(SystemExit) as left:
-        send.wish_of(parsed(line))
+        send.request_of(parsed(line))
     assert left.value.code == 2
 
 
 def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
-    first, second = (send.wish_of(parsed("charger a --robot f/r")) for _ in range(2))
+    first, second = (send.request_of(parsed("charger a --robot f/r")) for _ in range(2))
     assert isinstance(first, Charge)
     assert isinstance(second, Charge)
-    ids = [wish.request_id for wish in (first, second)]
+    ids = [request.request_id for request in (first, second)]
     assert ids[0] != ids[1]
     assert all(i.startswith("rmf_bridge_send-") for i in ids)
 
@@ -199,10 +210,7 @@ def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
 # --- as processes ------------------------------------------------------------------------------
 
 
-WIRES = sorted({wire(), "zenoh"})
-
-
-@pytest.fixture(params=WIRES)
+@pytest.fixture(params=sorted({wire(), "zenoh"}))
 def speaks(request: pytest.FixtureRequest) -> Wire:
     """The transport of both."""
     speaks: Wire = request.param
@@ -232,8 +240,9 @@ def command(line: str, speaks: Wire, domain: int) -> Iterator[subprocess.Popen[s
         process.communicate()
 
 
-def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(speaks: Wire) -> None:
-    domain = free_domain()
+def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(
+    speaks: Wire, domain: int
+) -> None:
     with device(speaks, domain) as node:
         states = node.publisher(topics.LIFT_STATES)
         requests: list[d.LiftRequest] = []
@@ -243,7 +252,7 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(speaks: Wire
             states.publish(LIFT)
             wait_until(lambda: requests, "the request arrives")
             states.publish(obeyed(LIFT, requests[0]))
-            out, error = process.communicate(timeout=20)
+            out, error = process.communicate(timeout=PATIENCE_S)
         assert (process.returncode, error) == (0, "")
         assert "done" in out
         assert replace(requests[0], request_time=d.Time()) == d.LiftRequest(
@@ -253,24 +262,25 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(speaks: Wire
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_watch_prints_changes_and_leaves_the_graph_at_once_when_told_to(
-    number: signal.Signals, speaks: Wire
+    speaks: Wire,
+    domain: int,
+    number: signal.Signals,
 ) -> None:
-    domain = free_domain()
     with device(speaks, domain) as node, command("watch", speaks, domain) as process:
         states = node.publisher(topics.DOOR_STATES)
         wait_until(lambda: states.matched() > 0, "watch listens to door_states")
         states.publish(DOOR)
         assert process.stdout is not None
-        assert process.stdout.readline().split()[1:4] == ["door", "ward", "CLOSED"]
+        assert process.stdout.readline().split()[1:4] == ["door", "ward", "closed"]
         process.send_signal(number)
-        assert process.wait(timeout=20) == 0
-        wait_until(lambda: states.matched() == 0, "watch has left the graph", patience_s=5)
+        assert process.wait(timeout=PATIENCE_S) == 0
+        wait_until(lambda: states.matched() == 0, "watch has left the graph", patience_s=LEASE_S)
 
 
 def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_door(
     speaks: Wire,
+    domain: int,
 ) -> None:
-    domain = free_domain()
     with (
         device(speaks, domain) as node,
         command("send door ward open --direct", speaks, domain) as process,
@@ -278,8 +288,8 @@ def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_doo
         heard = node.subscribe(topics.DOOR_REQUESTS, lambda _: None)
         wait_until(lambda: heard.matched() > 0, "send is there")
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=20) == 130
-        wait_until(lambda: heard.matched() == 0, "send has left the graph", patience_s=5)
+        assert process.wait(timeout=PATIENCE_S) == 130
+        wait_until(lambda: heard.matched() == 0, "send has left the graph", patience_s=LEASE_S)
 
 
 def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
@@ -298,7 +308,7 @@ def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
             wait_until(lambda: states.matched() > 0, "watch listens to door_states")
             states.publish(DOOR)
             assert process.stdout is not None
-            assert process.stdout.readline().split()[1:4] == ["door", "ward", "CLOSED"]
+            assert process.stdout.readline().split()[1:4] == ["door", "ward", "closed"]
             process.terminate()
         options = argparse.ArgumentParser()
         add_graph_arguments(options)

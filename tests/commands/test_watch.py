@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from bridges.commands import watch
+from bridges.commands.board import Board, Row, change_line, changes, repaint, table
 from bridges.commands.graph import Heard
-from bridges.commands.watch import Board, Row, change_line, changes, repaint, table
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import stamp
 from bridges.serve.diagnostics import diagnosis
@@ -36,10 +36,10 @@ def test_there_is_one_row_for_each_device_lifts_first_then_by_name() -> None:
     other = replace(LIFT, lift_name="A", session_id="")
     rows = board(CHARGER, DOOR, LIFT, other, LIFT).rows(100.2, WALL + 0.2)
     assert rows == [
-        Row("lift", "A", "L1 OPEN AGV", "-", "0.2 s", ""),
-        Row("lift", "Lift1", "L1 OPEN AGV", "fleet/robot", "0.2 s", ""),
-        Row("door", "ward", "CLOSED", "-", "0.2 s", ""),
-        Row("charger", "a", "IDLE", "-", "0.2 s", ""),
+        Row("lift", "A", "car at L1, door open, mode AGV", age="0.2 s"),
+        Row("lift", "Lift1", "car at L1, door open, mode AGV", "fleet/robot", age="0.2 s"),
+        Row("door", "ward", "closed", age="0.2 s"),
+        Row("charger", "a", "idle", age="0.2 s"),
     ]
 
 
@@ -63,7 +63,7 @@ def test_the_age_is_that_of_the_reading_and_an_old_one_is_marked(
 
 def test_a_device_that_was_never_read_has_no_age_and_is_stale() -> None:
     (row,) = board(replace(DOOR, door_time=d.Time())).rows(100.0, WALL)
-    assert (row.age, row.mark) == ("never", "STALE")
+    assert (row.age, row.mark) == ("never read", "STALE")
 
 
 def test_a_device_that_is_heard_no_more_is_marked_silent_and_not_stale() -> None:
@@ -75,9 +75,9 @@ def test_a_door_shows_who_the_supervisor_says_holds_it() -> None:
     sessions = (d.Session(d.Time(), "fleet/a"), d.Session(d.Time(), "fleet/b"))
     heartbeat = d.SupervisorHeartbeat((d.DoorSessions("ward", sessions),))
     (row,) = board(DOOR, heartbeat).rows(100.0, WALL)
-    assert row.holder == "fleet/a fleet/b"
+    assert row.held_by == "fleet/a fleet/b"
     (row,) = board(DOOR, heartbeat, d.SupervisorHeartbeat()).rows(100.0, WALL)
-    assert row.holder == "-"
+    assert row.held_by == "-"
 
 
 def told(kind: str, name: str, *codes: str, node: str = "node") -> d.DiagnosticArray:
@@ -96,7 +96,7 @@ def test_a_row_names_the_faults_that_its_daemon_and_its_supervisor_tell() -> Non
         told("door", "Lift1", "DOOR_SILENT"),
     )
     (row,) = heard.rows(100.0, WALL)
-    assert row.faults == "RMF_SILENT OVERLOAD HOLDER_SILENT"
+    assert row.faults == "RMF_SILENT; OVERLOAD; HOLDER_SILENT"
     heard.take(Heard(told("lift", "Lift1"), 101.0))
     assert [row.faults for row in heard.rows(101.0, WALL)] == ["HOLDER_SILENT"]
     assert [row.faults for row in heard.rows(104.0, WALL)] == [""]
@@ -113,9 +113,9 @@ def test_faults_have_a_column_when_there_are_any_and_are_a_change() -> None:
     first = board(LIFT, DOOR).rows(100.0, WALL)
     faulty = board(LIFT, DOOR, told("door", "ward", "DOOR_SILENT")).rows(100.0, WALL)
     assert table(faulty) == [
-        "kind  name   state        session or request  age      faults",
-        "lift  Lift1  L1 OPEN AGV  fleet/robot         0.0 s",
-        "door  ward   CLOSED       -                   0.0 s    DOOR_SILENT",
+        "kind  name   state                           held by      age    faults",
+        "lift  Lift1  car at L1, door open, mode AGV  fleet/robot  0.0 s",
+        "door  ward   closed                          -            0.0 s  DOOR_SILENT",
     ]
     (row,) = changes(first, faulty)
     assert change_line(row, WALL).endswith("age 0.0 s  DOOR_SILENT")
@@ -133,21 +133,22 @@ def test_a_pipe_gets_a_line_for_a_change_and_none_for_an_age() -> None:
     assert changes(first, older) == []
     assert [row.mark for row in changes(older, silent)] == ["SILENT 4 s", "SILENT 4 s"]
     assert changes(silent, silent_longer) == []
-    assert [row.state for row in changes(first, moved)] == ["OPEN"]
+    assert [row.state for row in changes(first, moved)] == ["open"]
 
 
 def test_a_change_line_can_be_grepped() -> None:
     (row,) = board(LIFT).rows(100.0, WALL)
     assert change_line(row, WALL).split()[1:] == [
-        *("lift", "Lift1", "L1", "OPEN", "AGV", "fleet/robot", "age", "0.0", "s")
+        *("lift", "Lift1", "car", "at", "L1,", "door", "open,", "mode", "AGV"),
+        *("fleet/robot", "age", "0.0", "s"),
     ]
 
 
 def test_the_table_is_aligned_under_its_heading() -> None:
     assert table(board(LIFT, DOOR).rows(100.0, WALL)) == [
-        "kind  name   state        session or request  age",
-        "lift  Lift1  L1 OPEN AGV  fleet/robot         0.0 s",
-        "door  ward   CLOSED       -                   0.0 s",
+        "kind  name   state                           held by      age",
+        "lift  Lift1  car at L1, door open, mode AGV  fleet/robot  0.0 s",
+        "door  ward   closed                          -            0.0 s",
     ]
 
 
@@ -207,6 +208,67 @@ def test_robots_are_shown_with_the_place_that_they_are_assigned_to_charge_or_to_
         (d.ChargingAssignment("AMR02", "wait_2", 1), d.ChargingAssignment("AMR01", "charger_a", 0)),
     )
     assert board(fleet).rows(100.0, WALL) == [
-        Row("robot", "tiny/AMR01", "CHARGE at charger_a", "-", "-", ""),
-        Row("robot", "tiny/AMR02", "WAIT at wait_2", "-", "-", ""),
+        Row("robot", "tiny/AMR01", "charge at charger_a"),
+        Row("robot", "tiny/AMR02", "wait at wait_2"),
     ]
+
+
+def daemon(node: str, kind: str, **status: object) -> d.DiagnosticArray:
+    """What a daemon says of itself, and of Lift1."""
+    lift = {"faults": [{"code": "OVERLOAD", "detail": "since 3 s"}], "input_age_s": 0.1}
+    return diagnosis(node, kind, status, {"Lift1": lift}, d.Time())
+
+
+def test_a_simulation_is_marked_and_a_simulated_supervisor_does_not_make_its_lift_one() -> None:
+    simulated = board(LIFT, daemon("node", "lift", simulated=True))
+    (row,) = simulated.rows(100.0, WALL)
+    assert row.cells()[-2:] == ("SIMULATED", "OVERLOAD (since 3 s)")
+    (row,) = board(LIFT, daemon("node", "lift_supervisor", simulated=True)).rows(100.0, WALL)
+    assert not row.simulated
+
+
+def test_seconds_that_run_are_no_news_and_a_word_is() -> None:
+    def said(detail: str) -> list[Row]:
+        status = {"faults": [{"code": "OVERLOAD", "detail": detail}], "waiting": "fleet/b (3 s)"}
+        told = diagnosis("node", "lift_supervisor", {}, {"Lift1": status}, d.Time())
+        return board(LIFT, told).rows(100.0, WALL)
+
+    assert changes(said("since 3 s"), said("since 4.5 s")) == []
+    assert changes(said("since 3 s"), said("gone")) == said("gone")
+
+
+def test_a_lift_shows_who_waits_for_it() -> None:
+    status = {"session": "fleet/robot", "waiting": "fleet/b (12 s)"}
+    supervisor = diagnosis("lift_supervisor", "lift_supervisor", {}, {"Lift1": status}, d.Time())
+    rows = board(LIFT, supervisor).rows(100.0, WALL)
+    assert table(rows) == [
+        "kind  name   state                           held by      waiting         age",
+        "lift  Lift1  car at L1, door open, mode AGV  fleet/robot  fleet/b (12 s)  0.0 s",
+    ]
+    assert "  waiting: fleet/b (12 s)  " in change_line(rows[0], WALL)
+
+
+def test_the_coordinator_has_a_row_with_its_queue_its_faults_and_whether_it_assigns() -> None:
+    site = {
+        "a": "CHARGING tiny/AMR01",
+        "queue": "tiny/AMR02, tiny/AMR03",
+        "faults": [{"code": "STATION_SILENT", "detail": "b: no ChargerState comes"}],
+        "input_age_s": 0.2,
+    }
+
+    def told(passive: bool) -> d.DiagnosticArray:
+        return diagnosis(
+            "coordinator", "charger_coordinator", {"passive": passive}, {"": site}, d.Time()
+        )
+
+    row = Row(
+        "coordinator",
+        "coordinator",
+        "assigns chargers",
+        waiting="tiny/AMR02, tiny/AMR03",
+        faults="STATION_SILENT (b: no ChargerState comes)",
+    )
+    assert board(told(passive=False)).rows(100.0, WALL) == [row]
+    passive = replace(row, state="passive: another node assigns chargers")
+    assert board(told(passive=True)).rows(100.0, WALL) == [passive]
+    assert board(told(passive=False)).rows(104.0, WALL) == []

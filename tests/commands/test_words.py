@@ -4,7 +4,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf import stamps, words
 
 
-def test_a_lift_state_reads_as_floor_door_mode_and_where_it_goes() -> None:
+def test_a_lift_state_says_where_the_car_is_and_goes_its_door_and_its_mode() -> None:
     state = d.LiftState(
         lift_name="Lift1",
         current_floor="L1",
@@ -14,14 +14,14 @@ def test_a_lift_state_reads_as_floor_door_mode_and_where_it_goes() -> None:
         current_mode=d.LiftMode.MODE_AGV,
         session_id="fleet/robot",
     )
-    assert words.condition(state) == "L1 CLOSED AGV going UP to L3"
+    assert words.condition(state) == "car at L1, going up, door closed, mode AGV, destination L3"
     assert words.holder(state) == "fleet/robot"
     assert words.device(state) == "Lift1"
 
 
 def test_a_lift_between_floors_without_motion_lines_claims_neither_floor_nor_motion() -> None:
     state = d.LiftState(motion_state=d.LiftMotion.MOTION_UNKNOWN, door_state=1)
-    assert words.condition(state) == "no-floor MOVING UNKNOWN"
+    assert words.condition(state) == "car at no known floor, door moving, mode UNKNOWN"
 
 
 def test_a_number_that_rmf_does_not_define_is_shown_as_a_number() -> None:
@@ -31,7 +31,7 @@ def test_a_number_that_rmf_does_not_define_is_shown_as_a_number() -> None:
 
 def test_a_name_from_the_network_cannot_move_the_cursor() -> None:
     state = d.LiftState(current_floor="L1\x1b[2J\n", session_id="a\rb")
-    assert words.condition(state) == "L1\\x1b[2J\\n CLOSED UNKNOWN"
+    assert words.condition(state) == "car at L1\\x1b[2J\\n, door closed, mode UNKNOWN"
     assert words.holder(state) == "a\\rb"
 
 
@@ -44,9 +44,9 @@ def test_a_charger_says_its_error_its_robot_and_how_long_it_takes() -> None:
         robot_name="robot",
         time_to_fully_charged=d.Duration(720),
     )
-    assert words.condition(failed) == "ERROR over temperature"
-    assert words.condition(charging) == "CHARGING full in 12 min"
-    assert words.holder(charging) == "r1 fleet/robot"
+    assert words.condition(failed) == "error: over temperature"
+    assert words.condition(charging) == "charging, full in 12 min"
+    assert words.holder(charging) == "fleet/robot (request r1)"
 
 
 def test_each_request_says_what_is_asked_and_by_whom() -> None:
@@ -58,11 +58,11 @@ def test_each_request_says_what_is_asked_and_by_whom() -> None:
         d.ChargerCancel("a", "r1"),
     ]
     assert [words.request(message) for message in asked] == [
-        "AGV_MODE to L3 door OPEN for fleet/robot",
-        "END_SESSION of fleet/robot",
-        "OPEN for door_supervisor",
-        "charge fleet/robot as r1",
-        "cancel r1",
+        "mode AGV, car to L3, door open, for fleet/robot",
+        "end the session of fleet/robot",
+        "door open, for door_supervisor",
+        "charge fleet/robot (request r1)",
+        "cancel request r1",
     ]
 
 

@@ -6,8 +6,10 @@ Judged from the event, the inputs, the outputs and the walk's ledger; the core's
 from typing import Any
 
 from bridges.core.decision import Sampled, WriteFailed
-from bridges.door.core import DoorMemory, OpenDoor, decide
-from bridges.door.settings import DoorLimits
+from bridges.door.core import decide
+from bridges.door.memory import DoorLimits
+from bridges.door.memory import Memory as DoorMemory
+from bridges.door.signals import OpenRequested as OpenDoor
 from bridges.rmf.definitions import DoorModeValue
 from tests.door.walk import UNLIKE, Step, World, burns, fresh, reading, sighted
 

@@ -2,20 +2,22 @@
 
 import math
 
+import pytest
 from msgspec.structs import replace
 
 from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen
-from bridges.door.core import CloseDoor, DoorReport, OpenDoor
-from bridges.door.settings import DoorLimits, Limits, Pulse
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.door.memory import DoorLimits
+from bridges.door.report import DoorReport
+from bridges.door.settings import Durations, Pulse
+from bridges.door.signals import CloseRequested, DoorOutputs, DoorSample, OpenRequested
 from bridges.rmf.definitions import DoorModeValue
 from tests.door.virtual import BETWEEN, BOTH, CLOSED, DEBOUNCED, OPEN, CoreAlone
 
-OPENS, CLOSES = OpenDoor("door_supervisor"), CloseDoor("door_supervisor")
+OPENS, CLOSES = OpenRequested("door_supervisor"), CloseRequested("door_supervisor")
 
 
 def limits(**durations: float) -> DoorLimits:
-    return DoorLimits(t=Limits(**durations), debounce=DEBOUNCED)
+    return DoorLimits(t=Durations(**durations), debounce=DEBOUNCED)
 
 
 def test_before_the_first_reading_a_door_is_offline_and_nothing_is_held() -> None:
@@ -237,6 +239,29 @@ def test_a_contact_half_seen_before_a_gap_must_be_seen_again() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("contact", "before", "after"),
+    [
+        ("closed", BETWEEN, CLOSED),
+        ("obstruction", replace(OPEN, obstruction=False), replace(OPEN, obstruction=True)),
+        ("fire", replace(OPEN, fire=False), replace(OPEN, fire=True)),
+    ],
+)
+def test_every_contact_half_seen_before_a_gap_must_be_seen_again(
+    contact: str, before: DoorSample, after: DoorSample
+) -> None:
+    core = CoreAlone(DoorLimits(debounce={contact: 0.5}))
+    core.sees(before, until=2.0)
+    core.sees(after, until=2.375)
+    core.hears(IoFailed("no reply"))
+    seen = []
+    for at in (2.5, 2.75, 2.875):
+        core.sees(after, until=at)
+        value = getattr(core.memory.senses, contact).value
+        seen.append(value == getattr(after, contact))
+    assert seen == [False, False, True]
+
+
 def test_a_door_read_once_before_a_gap_is_still_nowhere() -> None:
     core = CoreAlone()
     core.hears(IoFailed("no reply"))
@@ -351,7 +376,7 @@ def test_between_two_pulses_the_door_is_still_held() -> None:
 
 
 def test_without_contacts_a_door_is_open_by_the_clock_and_says_that_it_guesses() -> None:
-    core = CoreAlone(DoorLimits(t=Limits(open_delay_s=4.0, travel_s=6.0), estimated=True))
+    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=4.0, travel_s=6.0), estimated=True))
     core.sees(DoorSample(), until=10.0)
     core.hears(OPENS)
     opened = core.sees(DoorSample(), until=15.0)
@@ -369,7 +394,7 @@ def test_without_contacts_a_door_is_open_by_the_clock_and_says_that_it_guesses()
 
 
 def test_a_guess_begins_again_after_a_reading_that_failed() -> None:
-    core = CoreAlone(DoorLimits(t=Limits(open_delay_s=4.0), estimated=True))
+    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=4.0), estimated=True))
     core.hears(OPENS)
     core.sees(DoorSample(), until=5.0)
     core.sees(IoFailed("no reply"), until=5.5)
@@ -393,7 +418,7 @@ def test_a_guess_without_a_delay_is_never_open() -> None:
 
 
 def test_with_one_contact_only_the_other_end_is_a_guess() -> None:
-    core = CoreAlone(DoorLimits(t=Limits(open_delay_s=2.0), debounce=DEBOUNCED, estimated=True))
+    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=2.0), debounce=DEBOUNCED, estimated=True))
     closed = core.sees(DoorSample(closed=True), until=1.0)
     core.hears(OPENS)
     core.sees(DoorSample(closed=True), until=5.0)

@@ -4,8 +4,9 @@ import pytest
 
 from bridges.core.decision import Fault, RequestRefused
 from bridges.door import KIND, messages
-from bridges.door.core import CloseDoor, DoorReport, OpenDoor
-from bridges.door.settings import DoorLimits
+from bridges.door.memory import DoorLimits
+from bridges.door.report import DoorReport
+from bridges.door.signals import CloseRequested, OpenRequested
 from bridges.rmf import topics
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Time
 from tests.door.virtual import settings
@@ -18,8 +19,8 @@ def request(mode: int, requester: str = "door_supervisor") -> DoorRequest:
 
 
 def test_open_and_closed_can_be_asked() -> None:
-    assert messages.accept(request(2), SETTINGS) == OpenDoor("door_supervisor")
-    assert messages.accept(request(0), SETTINGS) == CloseDoor("door_supervisor")
+    assert messages.accept(request(2), SETTINGS) == OpenRequested("door_supervisor")
+    assert messages.accept(request(0), SETTINGS) == CloseRequested("door_supervisor")
 
 
 @pytest.mark.parametrize("mode", [1, 3, 4, 5, 7, 2**32 - 1])
@@ -30,6 +31,12 @@ def test_no_other_mode_can_be_asked(mode: int) -> None:
         "mode that cannot be asked",
         f"requested_mode {mode}; only OPEN (2) and CLOSED (0) can be",
     )
+
+
+def test_a_requester_has_a_longest_name() -> None:
+    with pytest.raises(RequestRefused) as caught:
+        messages.accept(DoorRequest(requester_id="x" * 257, door_name="ward_door"), SETTINGS)
+    assert caught.value.kind == "impossible requester_id"
 
 
 def test_a_request_that_nobody_has_filled_in_closes_no_door() -> None:

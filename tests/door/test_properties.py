@@ -7,10 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
-from bridges.door.core import RIVAL_QUIET_S, CloseDoor, DoorMemory, Event, OpenDoor, decide, initial
-from bridges.door.settings import DoorLimits, Limits, Pulse
-from bridges.door.signals import DoorSample
+from bridges.core.durations import RIVAL_QUIET_S
+from bridges.door.core import decide, initial
+from bridges.door.memory import DoorLimits, Memory
+from bridges.door.settings import Durations, Pulse
+from bridges.door.signals import CloseRequested, DoorSample, Event, OpenRequested
 from bridges.rmf.definitions import DoorModeValue
+from tests.depth import examples
 from tests.door.virtual import DEBOUNCED, Decided
 
 CONTACT = st.sampled_from([None, False, True])
@@ -18,8 +21,8 @@ SAMPLES = st.builds(DoorSample, opened=CONTACT, closed=CONTACT, obstruction=CONT
 EVENTS: st.SearchStrategy[Event] = st.one_of(
     SAMPLES.map(Sampled),
     SAMPLES.map(Sampled),
-    st.just(OpenDoor("a")),
-    st.just(CloseDoor("a")),
+    st.just(OpenRequested("a")),
+    st.just(CloseRequested("a")),
     st.just(IoFailed("no reply")),
     st.just(RivalSeen()),
     st.just(OperatorReset()),
@@ -30,7 +33,7 @@ STEPS = st.lists(
 LIMITS = st.builds(
     DoorLimits,
     t=st.builds(
-        Limits,
+        Durations,
         close_grace_s=st.sampled_from([0.0, 3.0]),
         open_delay_s=st.sampled_from([None, 4.0]),
         max_hold_s=st.sampled_from([None, 5.0]),
@@ -57,9 +60,9 @@ class Ledger:
         if self.ends_at is not None and now >= self.ends_at:
             self.wanted, self.ends_at = False, None
         match event:
-            case OpenDoor() if not decided.refused:
+            case OpenRequested() if not decided.refused:
                 self.wanted, self.ends_at = True, None
-            case CloseDoor() if self.wanted and self.ends_at is None:
+            case CloseRequested() if self.wanted and self.ends_at is None:
                 self.ends_at = now + self.limits.t.close_grace_s
                 self.wanted = self.ends_at > now
             case Sampled(sample):
@@ -84,7 +87,7 @@ def codes(decided: Decided) -> set[str]:
 
 def history(steps: list[tuple[float, Event]], limits: DoorLimits) -> Any:
     """Each step: its time, the ledger after it, and what was decided."""
-    memory: DoorMemory = initial(limits, 0.0)
+    memory: Memory = initial(limits, 0.0)
     ledger, now = Ledger(limits), 0.0
     for pause_s, event in steps:
         now += pause_s
@@ -94,7 +97,7 @@ def history(steps: list[tuple[float, Event]], limits: DoorLimits) -> Any:
         yield now, ledger, decided
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_the_hold_is_on_for_a_reason_and_off_without_one(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -107,7 +110,7 @@ def test_the_hold_is_on_for_a_reason_and_off_without_one(
         assert not (obstructed and ledger.wanted)
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_open_is_said_of_fresh_contacts_only(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -121,7 +124,7 @@ def test_open_is_said_of_fresh_contacts_only(
             assert decided.report.mode == DoorModeValue.MODE_OFFLINE
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_the_relay_follows_the_hold_and_nothing_else(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -132,7 +135,7 @@ def test_the_relay_follows_the_hold_and_nothing_else(
             assert decided.outputs.hold_open == decided.report.hold
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_the_stamp_is_the_time_of_the_last_reading(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -141,7 +144,7 @@ def test_the_stamp_is_the_time_of_the_last_reading(
         assert decided.report.read_at == ledger.read_at
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_a_decision_repeated_is_the_same_decision(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -157,7 +160,7 @@ def test_a_decision_repeated_is_the_same_decision(
         memory = once.memory
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_nothing_is_decided_otherwise_before_the_time_it_asked_to_be_woken(
     steps: list[tuple[float, Event]], limits: DoorLimits

@@ -6,17 +6,13 @@ from typing import Any
 import msgspec
 
 from bridges.core.decision import Decision, IoFailed, Sampled, WriteFailed
-from bridges.door.core import (
-    CloseDoor,
-    DoorMemory,
-    DoorReport,
-    Event,
-    OpenDoor,
-    decide,
-    initial,
-)
-from bridges.door.settings import DoorLimits
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.door.core import decide, initial
+from bridges.door.memory import DoorLimits
+from bridges.door.memory import Memory as DoorMemory
+from bridges.door.report import DoorReport
+from bridges.door.signals import CloseRequested as CloseDoor
+from bridges.door.signals import DoorOutputs, DoorSample, Event
+from bridges.door.signals import OpenRequested as OpenDoor
 from bridges.rmf.definitions import DoorModeValue
 from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires
@@ -158,7 +154,7 @@ class Door:
     def __init__(self, **changes: Any) -> None:
         self.settings = settings(**changes)
         self.limits = DoorLimits.of(self.settings, debounce(self.settings))
-        self.plant = build("door", self.settings)
+        self.plant = build("door", self.settings, wires(self.settings))
         self.bus = MemoryBus(Wiring(self.plant, wires(self.settings), str))
         self.now = 0.0
         self.told: list[tuple[float, str]] = []

@@ -4,7 +4,11 @@ from typing import Any
 
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.door_supervisor import core
-from bridges.door_supervisor.core import Closes, Decided, Limits, Memory, Opens, Shown
+from bridges.door_supervisor.core import Decided
+from bridges.door_supervisor.memory import Limits, Memory
+from bridges.door_supervisor.signals import CloseRequested as Closes
+from bridges.door_supervisor.signals import OpenRequested as Opens
+from bridges.door_supervisor.signals import StateHeard as Shown
 from bridges.rmf.definitions import DoorModeValue, DoorRequest
 
 SECOND_NS = 10**9

@@ -6,7 +6,9 @@ import pytest
 
 from bridges.core.graph_kind import MaySpeak
 from bridges.door_supervisor import core
-from bridges.door_supervisor.core import Limits
+from bridges.door_supervisor.memory import Limits
+from bridges.door_supervisor.report import DoorHoldReport
+from bridges.door_supervisor.signals import CloseRequested, OpenRequested
 from bridges.rmf.definitions import DoorModeValue
 from tests.door_supervisor.alone import Alone
 
@@ -196,7 +198,9 @@ def test_each_requester_has_a_clock_of_its_own() -> None:
 
 def test_who_sends_no_stamps_is_believed_in_the_order_of_arrival() -> None:
     desk = Alone()
-    for at, word in enumerate([core.Opens, core.Opens, core.Closes, core.Opens, core.Closes]):
+    for at, word in enumerate(
+        [OpenRequested, OpenRequested, CloseRequested, OpenRequested, CloseRequested]
+    ):
         desk.until(float(at))
         desk.hears(word("terminal", 0))
     assert desk.sent == [
@@ -239,7 +243,7 @@ def test_late_messages_with_a_break_or_the_same_stamp_never_add_up_to_a_clock_se
         desk.closes(aged=50.0)
     for second in range(12, 40):
         desk.until(float(second))
-        desk.hears(core.Closes("a", 1))
+        desk.hears(CloseRequested("a", 1))
     assert desk.holders == ["a"]
 
 
@@ -261,7 +265,7 @@ def test_a_requester_is_forgotten_a_minute_after_it_has_gone_and_holders_never_a
     desk.closes("b")
     desk.until(60.0)
     desk.opens("c")
-    assert set(desk.memory.voices) == {"a", "c"}
+    assert set(desk.memory.requesters) == {"a", "c"}
 
 
 def test_a_crowd_of_made_up_names_is_refused_and_the_holder_is_still_heard() -> None:
@@ -269,7 +273,7 @@ def test_a_crowd_of_made_up_names_is_refused_and_the_holder_is_still_heard() -> 
     desk.opens("a")
     for n in range(300):
         desk.opens(f"n{n}")
-    assert len(desk.memory.voices) == 200
+    assert len(desk.memory.requesters) == 200
     assert desk.refused == [(0.0, "too many requesters")] * 101
     desk.until(1.0)
     desk.closes("a")
@@ -378,12 +382,20 @@ def test_a_door_that_nobody_holds_may_be_silent_and_is_forgotten_after_a_minute(
 
 def test_the_report_names_the_holders_and_the_door_as_it_was_last_seen() -> None:
     desk = Alone()
-    assert desk.last.report == core.DoorHoldReport(None)
+    assert desk.last.report == DoorHoldReport(None)
     desk.until(1.0)
     desk.opens("b")
     desk.until(2.0)
     desk.shows("MOVING")
     desk.opens("a")
     report = desk.last.report
-    assert report == core.DoorHoldReport(2.0, DoorModeValue.MODE_MOVING, (("b", 1.0), ("a", 2.0)))
+    assert report == DoorHoldReport(2.0, DoorModeValue.MODE_MOVING, (("b", 1.0), ("a", 2.0)))
     assert report.news() == (DoorModeValue.MODE_MOVING, ("b", "a"))
+
+
+def test_a_holder_that_repeats_itself_takes_no_others_place() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.opens("b")
+    desk.opens("a")
+    assert desk.holders == ["a", "b"]

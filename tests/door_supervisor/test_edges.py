@@ -3,18 +3,13 @@
 import pytest
 
 from bridges.core.decision import RequestRefused
-from bridges.door_supervisor import KIND, core, limits, messages, quiet_s, table
-from bridges.door_supervisor.core import (
-    Closes,
-    DoorHoldReport,
-    Holder,
-    Limits,
-    Memory,
-    Opens,
-    Shown,
-)
+from bridges.core.fields import quiet_s
+from bridges.core.freshness import Requester
+from bridges.door_supervisor import KIND, core, keep, messages, report
+from bridges.door_supervisor.memory import Holder, Limits, Memory
+from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.settings import Settings
-from bridges.door_supervisor.voice import Voice
+from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 
@@ -36,8 +31,8 @@ def refused(message: d.DoorRequest, settings: Settings = ANY) -> str:
 
 def test_open_and_close_are_taken_with_their_senders_stamp_to_the_nanosecond() -> None:
     late = d.Time(2**31 - 1, 999_999_999)
-    assert messages.accept_request(request(), ANY, 0.0) == Opens("fleet/a", 5_000_000_007)
-    assert messages.accept_request(request(0, time=late), ANY, 0.0) == Closes(
+    assert messages.accept_request(request(), ANY, 0.0) == OpenRequested("fleet/a", 5_000_000_007)
+    assert messages.accept_request(request(0, time=late), ANY, 0.0) == CloseRequested(
         "fleet/a", 2_147_483_647_999_999_999
     )
 
@@ -59,6 +54,8 @@ def test_open_and_close_are_taken_with_their_senders_stamp_to_the_nanosecond() -
             request(7),
             "mode that cannot be asked: requested_mode 7; only OPEN (2) and CLOSED (0) can be",
         ),
+        (request(who="x" * 257), f"impossible requester_id: '{'x' * 40}'…, 257 characters"),
+        (request(door="x" * 257), f"impossible door_name: '{'x' * 40}'…, 257 characters"),
         (request(time=d.Time(-1, 0)), "impossible request_time: -1 s 0 ns"),
         (request(time=d.Time(1, 10**9)), "impossible request_time: 1 s 1000000000 ns"),
     ],
@@ -70,7 +67,7 @@ def test_half_filled_and_impossible_requests_are_refused(message: d.DoorRequest,
 def test_a_list_of_doors_keeps_the_others_out() -> None:
     mine = Settings(doors=["ward", "lab"])
     assert refused(request(door="gate"), mine) == "not ours: 'gate' is none of ward, lab"
-    assert messages.accept_request(request(door="lab"), mine, 0.0) == Opens(
+    assert messages.accept_request(request(door="lab"), mine, 0.0) == OpenRequested(
         "fleet/a", 5_000_000_007
     )
     with pytest.raises(RequestRefused, match="not ours"):
@@ -80,7 +77,7 @@ def test_a_list_of_doors_keeps_the_others_out() -> None:
 def test_a_state_is_taken_whatever_its_age_and_refused_with_a_mode_that_does_not_exist() -> None:
     for mode in d.DoorModeValue:
         state = d.DoorState(d.Time(), "ward", d.DoorMode(int(mode)))
-        assert messages.accept_state(state, ANY, 0.0) == Shown(mode)
+        assert messages.accept_state(state, ANY, 0.0) == StateHeard(mode)
     with pytest.raises(RequestRefused, match="unknown current_mode: 9"):
         messages.accept_state(d.DoorState(d.Time(), "ward", d.DoorMode(9)), ANY, 0.0)
 
@@ -104,7 +101,7 @@ def test_the_summary_says_who_holds_the_door_and_for_how_long() -> None:
 
 def test_the_settings_reach_the_core_and_the_quiet_start() -> None:
     settings = Settings(quiet_start_s=5.0, open_alarm_s=60.0)
-    assert (limits(settings), quiet_s(settings)) == (Limits(60.0), 5.0)
+    assert (Limits.of(settings), quiet_s(settings)) == (Limits(60.0), 5.0)
     assert list(ANY.problems()) == []
     assert [path for path, _ in Settings(doors=[]).problems()] == [("doors",)]
 
@@ -124,7 +121,7 @@ def held(door: str, **stamps: int) -> Memory:
 
 def test_the_heartbeat_lists_doors_and_holders_in_the_order_of_names() -> None:
     memories = {"b": held("b", z=10**9, y=2), "c": held("c"), "a": held("a", x=3)}
-    assert table.heartbeat(memories) == (
+    assert report.heartbeat(memories) == (
         topics.DOOR_SUPERVISOR_HEARTBEAT,
         d.SupervisorHeartbeat(
             (
@@ -139,30 +136,30 @@ def test_what_is_kept_changes_with_who_comes_and_goes_and_not_with_who_repeats_i
     memory = core.initial("ward", 0.0)
     written = []
     for second in range(10):
-        memory = core.decide(memory, Opens("a", second), float(second), Limits()).memory
-        written.append(table.persist({"ward": memory}))
+        memory = core.decide(memory, OpenRequested("a", second), float(second), Limits()).memory
+        written.append(keep.persist({"ward": memory}))
     assert set(written) == {b'{"version":1,"doors":{"ward":{"a":0}}}'}
-    memory = core.decide(memory, Opens("a", 13), 13.0, Limits()).memory
-    assert table.persist({"ward": memory}) == b'{"version":1,"doors":{"ward":{"a":13}}}'
-    memory = core.decide(memory, Closes("a", 14), 14.0, Limits()).memory
-    assert table.persist({"ward": memory}) == b'{"version":1,"doors":{}}'
+    memory = core.decide(memory, OpenRequested("a", 13), 13.0, Limits()).memory
+    assert keep.persist({"ward": memory}) == b'{"version":1,"doors":{"ward":{"a":13}}}'
+    memory = core.decide(memory, CloseRequested("a", 14), 14.0, Limits()).memory
+    assert keep.persist({"ward": memory}) == b'{"version":1,"doors":{}}'
 
 
 def test_a_restart_knows_the_holders_and_what_is_older_than_their_visit() -> None:
-    kept = table.persist(
+    kept = keep.persist(
         {"ward": held("ward", b=5, a=7), "lab": held("lab"), "gate": held("gate", c=1)}
     )
-    restored = table.restore(kept, Settings(doors=["ward", "lab"]), 50.0)
+    restored = keep.restore(kept, Settings(doors=["ward", "lab"]), 50.0)
     assert restored == {
         "ward": Memory(
             "ward",
             holders=(Holder("a", 50.0, 50.0, 7, 7), Holder("b", 50.0, 50.0, 5, 5)),
-            voices={"a": Voice(7, 50.0), "b": Voice(5, 50.0)},
+            requesters={"a": Requester(7, heard_at=50.0), "b": Requester(5, heard_at=50.0)},
         )
     }
-    stale = core.decide(restored["ward"], Closes("a", 6), 51.0, Limits())
+    stale = core.decide(restored["ward"], CloseRequested("a", 6), 51.0, Limits())
     assert stale.refused == "stale request"
-    assert set(table.restore(kept, ANY, 50.0)) == {"ward", "gate"}
+    assert set(keep.restore(kept, ANY, 50.0)) == {"ward", "gate"}
 
 
 @pytest.mark.parametrize(
@@ -182,4 +179,4 @@ def test_a_restart_knows_the_holders_and_what_is_older_than_their_visit() -> Non
 )
 def test_a_table_that_was_cut_or_spoilt_is_refused_as_a_whole(kept: bytes) -> None:
     with pytest.raises(ValueError, match="table"):
-        table.restore(kept, ANY, 0.0)
+        keep.restore(kept, ANY, 0.0)

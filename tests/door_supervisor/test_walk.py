@@ -1,23 +1,31 @@
 """Every history to a depth, and drawn ones: the rules once more, in other words.
 
 The walk: all 4^7 = 16384 histories of seven steps, 0.75 s apart, of two requesters who open and
-close (stamps in order); then all 6^5 = 7776 of late requests, states and leave to speak.
+close (stamps in order); then all 6^5 = 7776 of late requests, states and leave to speak. But for
+`make deep` they are two steps and one step shorter.
 """
 
+from collections.abc import Callable
+from copy import copy
 from itertools import product
 from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bridges.core.durations import GAP_S, REPEAT_S
 from bridges.core.graph_kind import MaySpeak, Woken
-from bridges.door_supervisor import core, table
-from bridges.door_supervisor.core import Closes, Limits, Memory, Opens, Shown
+from bridges.door_supervisor import core, keep
+from bridges.door_supervisor.memory import OPEN, Limits, Memory
 from bridges.door_supervisor.settings import Settings
+from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
 from bridges.rmf.definitions import DoorModeValue, DoorRequest
+from tests.depth import depth, examples
+from tests.walk import histories
 
 LIMITS = Limits(open_alarm_s=30.0)
 CLOCK_AHEAD = 1000
+STEP_S = 0.75
 
 
 class Ledger:
@@ -34,6 +42,12 @@ class Ledger:
         self.sent: list[tuple[float, int]] = []
         self.hears(MaySpeak(speaks))
 
+    def copy(self) -> "Ledger":
+        """The same from here on."""
+        made = copy(self)
+        made.holders, made.newest, made.sent = set(self.holders), dict(self.newest), [*self.sent]
+        return made
+
     def hears(self, event: Any) -> None:
         self._note(event)
         decided = core.decide(self.memory, event, self.now, LIMITS)
@@ -48,7 +62,7 @@ class Ledger:
         assert ("DOOR_HELD_OPEN" in codes) == bool(late)
         # Whoever asks is told of soon: a word is under way, or the last one was right.
         if self.speaks and self.holders:
-            assert self.memory.sent == core.OPEN or self.wake_at <= self.now + core.GAP_S
+            assert self.memory.sent == OPEN or self.wake_at <= self.now + GAP_S
 
     def until(self, at: float) -> None:
         while self.wake_at <= at:
@@ -58,10 +72,10 @@ class Ledger:
 
     def _note(self, event: Any) -> None:
         match event:
-            case Opens(who, stamp) if stamp >= self.newest.get(who, 0):
+            case OpenRequested(who, stamp) if stamp >= self.newest.get(who, 0):
                 self.newest[who] = stamp
                 self.holders.add(who)
-            case Closes(who, stamp) if stamp >= self.newest.get(who, 0):
+            case CloseRequested(who, stamp) if stamp >= self.newest.get(who, 0):
                 self.newest[who] = stamp
                 self.holders.discard(who)
             case MaySpeak(yes):
@@ -72,8 +86,8 @@ class Ledger:
         assert word == (DoorModeValue.MODE_OPEN if self.holders else DoorModeValue.MODE_CLOSED)
         if self.sent:
             at, before = self.sent[-1]
-            assert self.now >= at + core.GAP_S
-            assert self.now >= at + core.REPEAT_S or word != before or self.begins
+            assert self.now >= at + GAP_S
+            assert self.now >= at + REPEAT_S or word != before or self.begins
         self.sent.append((self.now, word))
         self.begins = False
 
@@ -82,43 +96,51 @@ def stamp(now: float, aged: float = 0.0) -> int:
     return int((CLOCK_AHEAD + now - aged) * 1e9)
 
 
-def test_every_history_of_two_requesters_to_depth_seven() -> None:
-    words = list(product((Opens, Closes), "ab"))
-    for history in product(words, repeat=7):
-        ledger = Ledger(speaks=True)
-        for step, (word, who) in enumerate(history):
-            ledger.until(step * 0.75)
-            ledger.hears(word(who, stamp(ledger.now)))
+def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
+    """The same with this event, heard now, and a step's time later."""
+    ledger = ledger.copy()
+    ledger.hears(event(ledger.now))
+    ledger.until(ledger.now + STEP_S)
+    return ledger
+
+
+def asked(ledger: Ledger, move: tuple[Any, str]) -> Ledger:
+    """The same after this word of this requester."""
+    word, who = move
+    return after(ledger, lambda now: word(who, stamp(now)))
+
+
+def test_every_history_of_two_requesters_to_depth() -> None:
+    words = list(product((OpenRequested, CloseRequested), "ab"))
+    for ledger, history in histories(Ledger(speaks=True), words, depth(5, 7), asked):
         ledger.until(6.0)
         last = {who: word for word, who in history}
-        held = Opens in last.values()
+        held = OpenRequested in last.values()
         words_sent = [word for _, word in ledger.sent]
-        opened = any(word is Opens for word, _ in history)
+        opened = any(word is OpenRequested for word, _ in history)
         assert words_sent[-1:] == ([2] if held else [0] if opened else [])
 
 
-def test_every_history_of_late_requests_states_and_leave_to_speak_to_depth_five() -> None:
-    steps: list[Any] = [
-        lambda now: Opens("a", stamp(now)),
-        lambda now: Closes("a", stamp(now)),
-        lambda now: Closes("a", stamp(now, aged=1.0)),
-        lambda now: Opens("a", stamp(now, aged=1.0)),
-        lambda now: Shown(DoorModeValue.MODE_OPEN),
-        lambda now: MaySpeak(int(now / 0.75) % 2 == 1),
+def test_every_history_of_late_requests_states_and_leave_to_speak_to_depth() -> None:
+    events: list[Callable[[float], Any]] = [
+        lambda now: OpenRequested("a", stamp(now)),
+        lambda now: CloseRequested("a", stamp(now)),
+        lambda now: CloseRequested("a", stamp(now, aged=1.0)),
+        lambda now: OpenRequested("a", stamp(now, aged=1.0)),
+        lambda now: StateHeard(DoorModeValue.MODE_OPEN),
+        lambda now: MaySpeak(int(now / STEP_S) % 2 == 1),
     ]
-    for history in product(steps, repeat=5):
-        ledger = Ledger(speaks=False)
-        for step, event in enumerate(history):
-            ledger.until(step * 0.75)
-            ledger.hears(event(ledger.now))
+    for ledger, _ in histories(Ledger(speaks=False), events, depth(4, 5), after):
         ledger.until(5.0)
 
 
 EVENTS = st.one_of(
     st.tuples(
-        st.sampled_from([Opens, Closes]), st.sampled_from("abc"), st.sampled_from([0, 0, 2, 5])
+        st.sampled_from([OpenRequested, CloseRequested]),
+        st.sampled_from("abc"),
+        st.sampled_from([0, 0, 2, 5]),
     ),
-    st.sampled_from(list(DoorModeValue)).map(Shown),
+    st.sampled_from(list(DoorModeValue)).map(StateHeard),
     st.booleans().map(MaySpeak),
     st.just(Woken()),
 )
@@ -142,15 +164,15 @@ def told(history: list[tuple[float, Any]]) -> Ledger:
 def _would_be_believed(ledger: Ledger, event: Any) -> bool:
     """Old requests long enough after the last are a clock set back, or of somebody forgotten:
     stories of their own (test_core)."""
-    if not isinstance(event, Opens | Closes) or event.stamp >= ledger.newest.get(
+    if not isinstance(event, OpenRequested | CloseRequested) or event.stamp >= ledger.newest.get(
         event.requester, 0
     ):
         return False
-    voice = ledger.memory.voices[event.requester]
-    return ledger.now > voice.heard_at + 9.0 or voice.doubted_at > voice.doubted_since
+    requester = ledger.memory.requesters[event.requester]
+    return ledger.now > requester.heard_at + 9.0 or requester.doubted_at > requester.doubted_since
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=examples(300), deadline=None, derandomize=True)
 @given(HISTORIES)
 def test_in_every_history_the_words_are_what_the_table_says_and_never_too_many(
     history: list[tuple[float, Any]],
@@ -159,17 +181,17 @@ def test_in_every_history_the_words_are_what_the_table_says_and_never_too_many(
     ledger.until(ledger.now + 10.0)
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=examples(300), deadline=None, derandomize=True)
 @given(HISTORIES)
 def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
     history: list[tuple[float, Any]],
 ) -> None:
     ledger = told(history)
-    kept = table.persist({"ward": ledger.memory})
-    restored = table.restore(kept, Settings(), 0.0)
+    kept = keep.persist({"ward": ledger.memory})
+    restored = keep.restore(kept, Settings(), 0.0)
     holders = {h.requester for memory in restored.values() for h in memory.holders}
     assert holders == ledger.holders
-    assert table.persist(restored) == kept
+    assert keep.persist(restored) == kept
     if restored:
         spoken = core.decide(restored["ward"], MaySpeak(True), 3.0, LIMITS)
         assert [
@@ -177,11 +199,11 @@ def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
         ] == [2]
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=examples(200), deadline=None, derandomize=True)
 @given(st.binary(max_size=60))
 def test_no_file_is_taken_by_halves(kept: bytes) -> None:
     try:
-        restored = table.restore(kept, Settings(), 0.0)
+        restored = keep.restore(kept, Settings(), 0.0)
     except ValueError:
         return
     assert all(memory.door == name for name, memory in restored.items())

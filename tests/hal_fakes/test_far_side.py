@@ -36,7 +36,7 @@ def simulation(config: Config, tmp_path: Path) -> Iterator[Simulation]:
 def test_a_real_bus_is_pointed_at_the_fake_and_moves_the_plant(
     simulation: Simulation, config: Config
 ) -> None:
-    bus = simulation.open_bus("module", config.buses["module"])
+    bus = simulation.open_bus("module")
     driver = create("ward_door", config.devices["ward_door"], bus)  # type: ignore[arg-type]
     story = Caller(simulation.socket_path("module"))
     driver.open()
@@ -58,7 +58,7 @@ def test_a_real_bus_is_pointed_at_the_fake_and_moves_the_plant(
 def test_closing_ends_it_and_removes_its_socket(
     simulation: Simulation, config: Config, tmp_path: Path
 ) -> None:
-    simulation.open_bus("module", config.buses["module"]).close()
+    simulation.open_bus("module").close()
     story = Caller(tmp_path / "plant.sock")
     assert story.say("follow") == "ok"
     simulation.close()
@@ -73,7 +73,7 @@ from bridges.settings.load import load
 from hal_fakes.simulate import Simulation
 config = load(sys.argv[1])
 simulation = Simulation(config, Path(sys.argv[2]))
-simulation.open_bus("module", config.buses["module"])
+simulation.open_bus("module")
 print("open", flush=True)
 sys.stdin.read()
 """
@@ -127,7 +127,7 @@ def test_one_that_cannot_start_is_a_hal_error_and_says_why(
 ) -> None:
     simulation = Simulation(config, tmp_path / "missing")
     with pytest.raises(HalError, match=r"^the simulated far side of bus module did not start"):
-        simulation.open_bus("module", config.buses["module"])
+        simulation.open_bus("module")
     wait_until(
         lambda: "cannot make the plant's control socket" in capfd.readouterr().err, "its log"
     )

@@ -14,7 +14,7 @@ SHIPPED = Path(__file__).parents[2] / "config" / "door_register.yaml"
 def test_the_shipped_register_doors_open_and_close_in_simulation(tmp_path: Path) -> None:
     config = load(SHIPPED)
     simulation = Simulation(config, tmp_path)
-    bus = simulation.open_bus("line", config.buses["line"])
+    bus = simulation.open_bus("line")
     try:
         doors = {name: create(name, s, bus) for name, s in config.devices.items()}  # type: ignore[arg-type]
         for door in doors.values():

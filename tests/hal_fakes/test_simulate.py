@@ -22,7 +22,7 @@ class SimulatedLift:
     """The shipped lift, at a quick pace, as the daemon has it."""
 
     def __init__(self, simulation: Simulation, config: Config) -> None:
-        self.bus = simulation.open_bus("header", config.buses["header"])
+        self.bus = simulation.open_bus("header")
         self._edge = threading.Event()
         self.bus.on_edge(self._edge.set)
         self.driver: LiftDryContact = create("Lift1", config.devices["Lift1"], self.bus)
@@ -104,7 +104,7 @@ def test_each_of_several_buses_has_a_socket_of_its_own(tmp_path: Path) -> None:
     file.write_text(text)
     config = load(file)
     simulation = Simulation(config, tmp_path)
-    buses = [simulation.open_bus(name, config.buses[name]) for name in config.buses]
+    buses = [simulation.open_bus(name) for name in config.buses]
     callers = [Caller(tmp_path / f"plant-{name}.sock") for name in config.buses]
     assert [c.say("press Lift2 fire_alarm on") for c in callers] == [
         "error no device 'Lift2'; there are Lift1",

@@ -6,10 +6,11 @@ Judged from the event, the inputs and the outputs; the core's own conclusions ar
 from typing import Any
 
 from bridges.core.decision import IoFailed, Sampled, WriteFailed
-from bridges.lift.core import Asked, Ended, Memory, decide
-from bridges.lift.limits import LiftLimits
+from bridges.lift.core import decide
+from bridges.lift.memory import LiftLimits, Memory
 from bridges.lift.report import LiftReport
-from bridges.lift.signals import Door, Hazard, LiftOutputs, Motion
+from bridges.lift.signals import Door, Ended, Hazard, LiftOutputs, Motion
+from bridges.lift.signals import Requested as Asked
 from bridges.rmf.definitions import LiftDoor
 from tests.lift.walk import Step, World, reading
 

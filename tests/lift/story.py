@@ -11,10 +11,11 @@ from typing import Any
 from msgspec.structs import replace
 
 from bridges.core.decision import OperatorReset
-from bridges.core.kind import Kind
+from bridges.core.kind import AnyDeviceKind
 from bridges.lift import KIND
-from bridges.lift.limits import LiftLimits
-from bridges.lift.settings import Floor, LiftSettings, Limits
+from bridges.lift.memory import LiftLimits
+from bridges.lift.settings import Durations as Limits
+from bridges.lift.settings import Floor, LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.rmf.definitions import (
     LiftDoor,
@@ -26,7 +27,8 @@ from bridges.rmf.definitions import (
     Message,
 )
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
-from bridges.serve.device import Clock, Node
+from bridges.serve.clock import Clock
+from bridges.serve.device import Node
 from drivers import DriverError
 
 SCAN_S = 0.05
@@ -194,7 +196,7 @@ class Story:
         debounce: dict[str, float] | None = None,
         fire_reset: Any = "auto",
         alarm: Any = "none",
-        kind: Kind = KIND,
+        kind: AnyDeviceKind = KIND,
         **limits: Any,
     ) -> None:
         self.building = building or Building()

@@ -3,9 +3,8 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.lift.drive import Channel, Relays
-from bridges.lift.limits import LiftLimits
-from bridges.lift.settings import LiftSettings, Limits
+from bridges.lift.memory import Channel, LiftLimits, Relays
+from bridges.lift.settings import Durations, LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from tests.lift.story import Building, Controller, Story
 
@@ -13,7 +12,7 @@ AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def limits(**changes: float) -> LiftLimits:
-    settings = LiftSettings(floors=["L1", "L2", "L3"], limits=Limits(**changes))  # type: ignore[arg-type]
+    settings = LiftSettings(floors=["L1", "L2", "L3"], limits=Durations(**changes))  # type: ignore[arg-type]
     return LiftLimits.of(settings, {})
 
 

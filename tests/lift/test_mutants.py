@@ -6,15 +6,24 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
-from bridges.lift.core import Asked, Ended, Memory, decide
-from bridges.lift.limits import LiftLimits
+from bridges.lift.core import decide
+from bridges.lift.memory import LiftLimits, Memory
 from bridges.lift.sensing import MOTION_MEMORY_S
-from bridges.lift.settings import Floor, LiftSettings, Limits
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.lift.settings import Durations, Floor, LiftSettings
+from bridges.lift.signals import (
+    Door,
+    Ended,
+    Hazard,
+    LiftOutputs,
+    LiftSample,
+    Motion,
+    Requested,
+    Side,
+)
 
 DEBOUNCE = {"floor": 0.08, "door": 0.03, "rear_door": 0.04, "agv_mode": 0.05, Hazard.FIRE: 0.06}
 AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
-ASKED = Asked("A", True, "L1")
+ASKED = Requested("A", True, "L1")
 
 
 class Told:
@@ -22,7 +31,7 @@ class Told:
 
     def __init__(self, debounce: dict[str, float] | None = None, **limits: Any) -> None:
         floors = {"L1": Floor(), "L2": Floor(side=Side.REAR), "L3": Floor()}
-        settings = LiftSettings(floors=floors, limits=Limits(**limits), fire_reset="manual")
+        settings = LiftSettings(floors=floors, limits=Durations(**limits), fire_reset="manual")
         self.limits = LiftLimits.of(settings, debounce or {})
         self.memory = Memory()
 
@@ -77,7 +86,7 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
         Fault("AGV_MODE_NOT_GRANTED", "no AGV mode status after 0.5 s"),
     ),
     "a car that does not come": (
-        [(0.0, AT_L1), (0.1, Asked("A", True, "L3")), (0.8, AT_L1)],
+        [(0.0, AT_L1), (0.1, Requested("A", True, "L3")), (0.8, AT_L1)],
         Fault("RUNTIME_LIMIT_EXCEEDED", "not at L3 after 0.6 s"),
     ),
     "a door that does not open": (
@@ -172,7 +181,7 @@ def test_the_end_of_a_wait_for_the_lift_wakes_the_core() -> None:
 
 def test_a_pulsed_call_that_a_hazard_cut_short_is_given_again_when_it_is_over() -> None:
     told = Told(stale_after_s=900.0, call_pulse_s=2.0, hazard_clear_s=1.0)
-    told(0.0, CLOSED)(1.0, Asked("A", True, "L3"))
+    told(0.0, CLOSED)(1.0, Requested("A", True, "L3"))
     assert told.decision.outputs.call == "L3"
     told(2.0, replace(CLOSED, hazards=frozenset({Hazard.EMERGENCY})))
     assert told.decision.outputs == LiftOutputs()
@@ -196,7 +205,7 @@ def test_a_short_grace_is_one_too() -> None:
 def test_in_the_instant_in_which_the_grace_ends_the_lift_is_anybodys() -> None:
     told = Told(release_grace_s=2.0)(0.0, AT_L1)(0.1, ASKED)(1.0, Ended("A"))
     told(2.9, AT_L1)
-    told(3.0, Asked("B", True, "L1"))
+    told(3.0, Requested("B", True, "L1"))
     assert told.decision.refused == ""
     assert told.decision.report.session == "B"
 

@@ -137,9 +137,9 @@ def test_an_end_is_honoured_whatever_its_fields_say_and_commands_no_car() -> Non
 def test_an_end_of_a_free_lift_changes_nothing() -> None:
     story = Story()
     story.run(1.0)
-    before = story.node._memory
+    before = story.node.subject.memory
     story.ends("A")
-    assert replace(story.node._memory, senses=before.senses) == before
+    assert replace(story.node.subject.memory, senses=before.senses) == before
     assert story.edges == []
 
 
@@ -377,6 +377,7 @@ def test_without_a_session_either_door_is_the_door() -> None:
     [
         (LiftRequest("Lift1", Time(), "", 1, "L1", 2), "empty session_id"),
         (LiftRequest("Lift1", Time(), "", 0, "L1", 2), "empty session_id"),
+        (LiftRequest("Lift1", Time(), "x" * 257, 1, "L1", 2), "impossible session_id"),
         (LiftRequest("Lift1", Time(), "A", 3, "L1", 2), "unknown request_type"),
         (LiftRequest("Lift1", Time(), "A", 1, "L1", 1), "unknown door_state"),
         (LiftRequest("Lift1", Time(), "A", 2, "", 2), "floor not served"),
@@ -410,7 +411,7 @@ def test_a_person_reads_the_state_in_a_few_words() -> None:
         "motion": "stopped",
         "session": "A",
         "destination": "L2",
-        "outputs": str(LiftOutputs(agv_request=True)),
+        "outputs": "agv_request yes",
         "faults": [],
         "input_age_s": 0.0,
         "refused": {},

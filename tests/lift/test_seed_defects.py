@@ -23,12 +23,12 @@ def test_defect_a_a_request_for_another_lift_changed_this_ones_session_and_desti
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L3")
-    before = story.node._memory
+    before = story.node.subject.memory
     for name in ("Lift2", "", "lift1"):
         request = LiftRequest(name, Time(), "B", int(AGV), "L1", 2)
         if KIND.device_name(request) == story.node.name:
             story.request(request)
-    assert story.node._memory == before
+    assert story.node.subject.memory == before
 
 
 def test_defect_b_agv_mode_was_never_asked_of_the_lift() -> None:
@@ -175,6 +175,5 @@ def test_defect_l_the_log_had_a_line_each_second(caplog: pytest.LogCaptureFixtur
             story.run(story.now + 1.0)
     lines = [r.getMessage() for r in caplog.records]
     assert lines == [
-        'refused device=Lift1 kind="held by A" '
-        "detail=\"Asked(session_id='B', agv=True, destination='L1')\""
+        'refused device=Lift1 kind="held by A" detail="session_id B, agv yes, destination L1"'
     ]

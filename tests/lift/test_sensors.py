@@ -4,8 +4,9 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.core.decision import Fault, Sampled
-from bridges.lift.core import Asked, Memory, decide
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
+from bridges.lift.core import decide
+from bridges.lift.memory import Memory
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Requested
 from bridges.rmf.definitions import LiftMotion
 from bridges.rmf.stamps import in_seconds
 from tests.lift.story import WALL, Building, Controller, Story
@@ -467,7 +468,7 @@ def test_an_estimated_door_that_stirs_is_not_there() -> None:
 
 def test_the_core_says_when_an_input_that_was_seen_for_the_first_time_will_count() -> None:
     rules = Story(Building(OPEN_AT_L1)).limits
-    before = decide(Memory(), Asked("A", True, "L1"), 0.0, rules)
+    before = decide(Memory(), Requested("A", True, "L1"), 0.0, rules)
     assert [fault.detail for fault in before.report.faults] == ["not read yet"]
     first = decide(before.memory, Sampled(OPEN_AT_L1), 10.0, rules)
     assert first.wake_at == 10.0 + rules.debounce_s("door")
@@ -486,3 +487,52 @@ def test_a_fault_is_news_and_its_words_are_not() -> None:
     lost = [replace(first, faults=(Fault("INPUTS_NOT_FRESH", f"timeout {i}"),)) for i in (1, 2)]
     assert lost[0].news() == lost[1].news() != first.news()
     assert replace(first, read_at=9.0).news() == first.news()
+
+
+class FloorsInAgvMode(Controller):
+    """Its floor code means something only in AGV mode (`valid_when`); its motion lines always do."""
+
+    def read(self) -> LiftSample:
+        sample = super().read()
+        return sample if sample.agv else replace(sample, level=None, floor_valid=False)
+
+
+def test_a_floor_code_is_believed_after_people_used_the_lift_while_it_meant_nothing() -> None:
+    lift = FloorsInAgvMode()
+    story = Story(lift)
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.until(lambda: story.state == "AGV, open at L3, A to L3")
+    story.ends("A")
+    story.run(story.now + 10.0)
+    lift.goal = 0
+    story.until(lambda: lift.standing)
+    story.run(story.now + 60.0)
+    assert (story.state, story.faults) == ("HUMAN, closed at ?", [])
+    story.asks("B", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, B to L1")
+    assert story.faults == []
+
+
+def test_between_valid_floor_codes_a_jump_is_no_position() -> None:
+    lift = FloorsInAgvMode()
+    story = Story(lift)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, A to L1")
+    lift.height = 2.0
+    story.run(story.now + 5.0)
+    assert (story.state, story.faults) == ("AGV, closed at ?, A to L1", ["POSITION_LOST"])
+
+
+def test_a_flicker_of_the_agv_line_makes_no_jump_a_position() -> None:
+    lift = FloorsInAgvMode()
+    story = Story(lift)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, A to L1")
+    lift.height = 2.0
+    story.run(story.now + 5.0)
+    lift.asked_at = story.now + 0.06
+    story.run(story.now + 5.0)
+    assert (story.state, story.faults) == ("AGV, closed at ?, A to L1", ["POSITION_LOST"])

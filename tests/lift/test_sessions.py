@@ -3,8 +3,8 @@
 import pytest
 
 from bridges.lift import KIND
-from bridges.lift.core import Asked, decide
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
+from bridges.lift.core import decide
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Requested
 from bridges.rmf.definitions import LiftRequest, LiftState
 from tests.lift.story import HUMAN, Building, Controller, Story
 
@@ -89,9 +89,9 @@ def test_the_grace_ends_at_its_time_even_for_a_request_that_comes_before_the_sca
     story = boarded()
     story.ends("A")
     story.run(6.9)
-    memory, rules = story.node._memory, story.limits
-    assert decide(memory, Asked("B", True, "L2"), 6.99, rules).refused
-    granted = decide(memory, Asked("B", True, "L2"), 7.0, rules)
+    memory, rules = story.node.subject.memory, story.limits
+    assert decide(memory, Requested("B", True, "L2"), 6.99, rules).refused
+    granted = decide(memory, Requested("B", True, "L2"), 7.0, rules)
     assert (granted.report.session, granted.memory.grace) == ("B", None)
 
 

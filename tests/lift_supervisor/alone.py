@@ -5,8 +5,12 @@ from typing import Any
 from bridges.core.decision import Decision
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.lift_supervisor import core
-from bridges.lift_supervisor.memory import Asked, Ended, Limits, Memory, Shown, Wish
+from bridges.lift_supervisor.memory import Limits, Memory
 from bridges.lift_supervisor.report import SupervisorReport
+from bridges.lift_supervisor.signals import Ended
+from bridges.lift_supervisor.signals import Requested as Asked
+from bridges.lift_supervisor.signals import StateHeard as Shown
+from bridges.lift_supervisor.signals import Target as Wish
 from bridges.rmf.definitions import LiftMode, LiftRequest
 
 MODES = {"AGV": LiftMode.MODE_AGV, "FIRE": LiftMode.MODE_FIRE, "OFFLINE": LiftMode.MODE_OFFLINE}

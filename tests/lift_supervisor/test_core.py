@@ -2,11 +2,13 @@
 
 import pytest
 
+from bridges.core.freshness import MAX_REQUESTERS
 from bridges.lift_supervisor import core
-from bridges.lift_supervisor.memory import Limits, Shown, Wish
+from bridges.lift_supervisor.memory import Limits
+from bridges.lift_supervisor.signals import StateHeard, Target
 from tests.lift_supervisor.alone import Alone
 
-TO_L3 = Wish(1, "L3", 2)
+TO_L3 = Target(1, "L3", 2)
 
 
 # --- one robot ---------------------------------------------------------------------------------
@@ -33,14 +35,14 @@ def test_a_state_that_does_not_show_what_was_asked_causes_one_repeat_each_at_1_h
 @pytest.mark.parametrize(
     "mismatch",
     [
-        Shown("", "L3", "", 2, 2),
-        Shown("a", "L1", "", 2, 2),
-        Shown("a", "L3", "L1", 2, 2),
-        Shown("a", "L1", "L3", 0, 2),
-        Shown("a", "L1", "L3", 1, 2),
+        StateHeard("", "L3", "", 2, 2),
+        StateHeard("a", "L1", "", 2, 2),
+        StateHeard("a", "L3", "L1", 2, 2),
+        StateHeard("a", "L1", "L3", 0, 2),
+        StateHeard("a", "L1", "L3", 1, 2),
     ],
 )
-def test_whatever_differs_causes_the_repeat(mismatch: Shown) -> None:
+def test_whatever_differs_causes_the_repeat(mismatch: StateHeard) -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(1.0)
@@ -48,8 +50,10 @@ def test_whatever_differs_causes_the_repeat(mismatch: Shown) -> None:
     assert desk.sent == [(0.0, "AGV a L3"), (1.0, "AGV a L3")]
 
 
-@pytest.mark.parametrize("match", [Shown("a", "L3", "", 2, 2), Shown("a", "L1", "L3", 2, 2)])
-def test_a_state_that_shows_what_was_asked_causes_none(match: Shown) -> None:
+@pytest.mark.parametrize(
+    "match", [StateHeard("a", "L3", "", 2, 2), StateHeard("a", "L1", "L3", 2, 2)]
+)
+def test_a_state_that_shows_what_was_asked_causes_none(match: StateHeard) -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(1.0)
@@ -315,6 +319,17 @@ def test_a_lift_that_was_never_heard_is_not_waited_for() -> None:
     assert core.idle(desk.memory, 60.0)
 
 
+def test_a_lift_whose_states_have_stopped_is_forgotten_unless_somebody_wants_it() -> None:
+    desk = Alone()
+    desk.shows("")
+    assert not core.idle(desk.memory, 59.0)
+    assert core.idle(desk.memory, 60.0)
+    desk.asks("a")
+    desk.shows("a")
+    desk.until(1000.0)
+    assert not core.idle(desk.memory, 1000.0)
+
+
 def test_who_ends_while_it_waits_leaves_the_queue() -> None:
     desk = Alone()
     desk.asks("a")
@@ -333,12 +348,12 @@ def test_a_queue_has_an_end() -> None:
     assert desk.refused == [(0.0, "queue full")]
 
 
-def test_voices_beyond_the_bound_are_forgotten_oldest_first() -> None:
+def test_requesters_beyond_the_bound_are_forgotten_oldest_first() -> None:
     desk = Alone()
-    for number in range(core.MAX_VOICES + 1):
+    for number in range(MAX_REQUESTERS + 1):
         desk.ends(f"robot {number}")
-    assert len(desk.memory.voices) == core.MAX_VOICES
-    assert "robot 0" not in desk.memory.voices
+    assert len(desk.memory.requesters) == MAX_REQUESTERS
+    assert "robot 0" not in desk.memory.requesters
 
 
 # --- who really has the lift -------------------------------------------------------------------

@@ -5,11 +5,12 @@ from msgspec.structs import replace
 
 from bridges.core.graph_kind import MaySpeak
 from bridges.lift_supervisor import core
-from bridges.lift_supervisor.memory import Asked, Claim, Limits, Wish
+from bridges.lift_supervisor.memory import Claim, Limits
 from bridges.lift_supervisor.report import SupervisorReport
+from bridges.lift_supervisor.signals import Requested, Target
 from tests.lift_supervisor.alone import Alone
 
-TO_L3 = Wish(1, "L3", 2)
+TO_L3 = Target(1, "L3", 2)
 
 
 # --- hazards -----------------------------------------------------------------------------------
@@ -193,5 +194,5 @@ def test_the_report_says_who_holds_who_waits_and_since_when() -> None:
 
 def test_a_request_is_remembered_as_it_was_last_asked() -> None:
     desk = Alone()
-    desk.hears(Asked("a", TO_L3, 1.0, 0.0))
+    desk.hears(Requested("a", TO_L3, 1.0, 0.0))
     assert desk.memory.claims == (Claim("a", TO_L3, 0.0, 0.0),)

@@ -6,9 +6,9 @@ import pytest
 
 from bridges.core.decision import Fault, RequestRefused
 from bridges.lift_supervisor import messages
-from bridges.lift_supervisor.memory import Asked, Ended, Shown, Wish
 from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings
+from bridges.lift_supervisor.signals import Ended, Requested, StateHeard, Target
 from bridges.rmf.definitions import LiftRequest, LiftState, Time
 
 ANY = Settings()
@@ -16,13 +16,13 @@ AGV = LiftRequest("Lift1", Time(100, 500_000_000), "fleet/a", 1, "L3", 2)
 
 
 def test_an_adapters_request_is_what_it_asks_with_its_stamp_and_age() -> None:
-    asked = Asked("fleet/a", Wish(1, "L3", 2), 100.5, 0.5)
+    asked = Requested("fleet/a", Target(1, "L3", 2), 100.5, 0.5)
     assert messages.accept_request(AGV, ANY, 101.0) == asked
 
 
 def test_human_mode_may_be_asked_without_a_floor() -> None:
     human = replace(AGV, request_type=2, destination_floor="", door_state=0)
-    asked = Asked("fleet/a", Wish(2, "", 0), 100.5, -0.5)
+    asked = Requested("fleet/a", Target(2, "", 0), 100.5, -0.5)
     assert messages.accept_request(human, ANY, 100.0) == asked
 
 
@@ -43,6 +43,11 @@ def test_an_end_is_taken_as_fleet_adapters_send_it_and_whatever_else_it_says() -
         ({"door_state": 1}, "unknown door_state"),
         ({"destination_floor": ""}, "no destination_floor"),
         ({"lift_name": "Lift2"}, "not ours"),
+        ({"session_id": "x" * 257}, "impossible session_id"),
+        ({"session_id": "x" * 257, "request_type": 0}, "impossible session_id"),
+        ({"destination_floor": "x" * 257}, "impossible destination_floor"),
+        ({"request_time": Time(-1, 0)}, "impossible request_time"),
+        ({"request_time": Time(1, 10**9)}, "impossible request_time"),
     ],
 )
 def test_what_cannot_be_asked_is_refused_by_name(changes: dict[str, object], kind: str) -> None:
@@ -54,10 +59,29 @@ def test_what_cannot_be_asked_is_refused_by_name(changes: dict[str, object], kin
 
 def test_a_state_is_what_it_shows() -> None:
     state = LiftState(Time(), "Lift1", ("L1", "L3"), "L1", "L3", 1, 1, (1, 2), 2, "fleet/a")
-    shown = Shown("fleet/a", "L1", "L3", 1, 2, ("L1", "L3"))
+    shown = StateHeard("fleet/a", "L1", "L3", 1, 2, ("L1", "L3"))
     assert messages.accept_state(state, ANY, 0.0) == shown
     with pytest.raises(RequestRefused):
         messages.accept_state(state, Settings(lifts=["Lift2"]), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({"lift_name": "x" * 257}, "impossible lift_name"),
+        ({"session_id": "x" * 257}, "impossible session_id"),
+        ({"current_floor": "x" * 257}, "impossible current_floor"),
+        ({"destination_floor": "x" * 257}, "impossible destination_floor"),
+        ({"available_floors": ("x" * 257,)}, "impossible available_floors"),
+        ({"available_floors": ("x",) * 1001}, "impossible available_floors"),
+    ],
+)
+def test_a_state_with_endless_texts_is_not_kept(changes: dict[str, object], kind: str) -> None:
+    state = replace(LiftState(lift_name="Lift1"), **changes)  # type: ignore[arg-type]
+    with pytest.raises(RequestRefused) as refusal:
+        messages.accept_state(state, ANY, 0.0)
+    assert refusal.value.kind == kind
+    assert len(str(refusal.value)) < 400
 
 
 def test_a_message_is_about_its_lift_and_is_stamped_when_it_is_sent() -> None:

@@ -9,7 +9,7 @@ from bridges.lift_supervisor.settings import Settings
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Subscription
-from bridges.serve.device import Clock
+from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 
 DISCOVERY_S = 0.3
@@ -59,7 +59,7 @@ def test_of_two_that_begin_at_once_exactly_one_serves_soon_and_for_good() -> Non
                 end.look()
         for node in nodes:
             node.round()
-        speaking.append(sum(node.may_speak for node in nodes))
+        speaking.append(sum(node.presence.may_speak for node in nodes))
         now += STEP_S
     assert 2 in speaking, "they did begin at once"
     assert set(speaking[round(30.0 / STEP_S) :]) == {1}

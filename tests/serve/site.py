@@ -15,7 +15,7 @@ from typing import Any
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
 from hal_fakes.wire import join, wire
-from tests.waiting import wait_until
+from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 YAML = """
@@ -54,7 +54,8 @@ class Module:
         assert self._far_side.stdout
         tcp = json.loads(self._far_side.stdout.readline())["tcp"]
         self.file = directory / "ward_door.yaml"
-        self.file.write_text(YAML.format(domain=domain, transport=transport, port=tcp["port"]))
+        self.yaml = YAML.format(domain=domain, transport=transport, port=tcp["port"])
+        self.file.write_text(self.yaml)
         self._follow = socket.socket(socket.AF_UNIX)
         self._follow.connect(str(path))
         self._follow.sendall(b"follow\n")
@@ -72,13 +73,22 @@ class Module:
         self.edges += [json.loads(line) for line in lines if line.startswith(b"{")]
         return [edge["value"] for edge in self.edges if edge["signal"] == "hold_open"]
 
+    def hang(self) -> None:
+        """The module answers nobody, and its relay stays as it is."""
+        self._far_side.send_signal(signal.SIGSTOP)
+
+    def go_on(self) -> None:
+        """It answers again."""
+        self._far_side.send_signal(signal.SIGCONT)
+
     def close(self) -> None:
         """Take the module off the wall."""
+        self.go_on()
         self._follow.close()
         assert self._far_side.stdin
         assert self._far_side.stdout
         self._far_side.stdin.close()
-        self._far_side.wait(10)
+        self._far_side.wait(PATIENCE_S)
         self._far_side.stdout.close()
 
 
@@ -98,7 +108,8 @@ def command(*arguments: str | Path) -> list[str]:
 
 def environment(**more: str) -> dict[str, str]:
     """This one's, as no service."""
-    own = {k: v for k, v in os.environ.items() if not k.startswith(("RMF_", "NOTIFY", "WATCHDOG"))}
+    units = ("RMF_", "NOTIFY", "WATCHDOG", "RUNTIME_DIR", "STATE_DIR", "SERVICE_RESULT")
+    own = {name: value for name, value in os.environ.items() if not name.startswith(units)}
     return own | more
 
 
@@ -119,10 +130,10 @@ class Daemon:
         """Until the log says so."""
         wait_until(lambda: text in self.log.read_text(), f"{text!r} in {self.log}")
 
-    def end(self, number: signal.Signals) -> int:
+    def end(self, number: int) -> int:
         """Send a signal and give the exit code."""
         self.process.send_signal(number)
-        return self.process.wait(20)
+        return self.process.wait(PATIENCE_S)
 
 
 @contextmanager
@@ -132,8 +143,23 @@ def daemon(file: Path, runtime_dir: Path, *options: str, **env: str) -> Iterator
     try:
         yield started
     finally:
-        started.process.kill()
-        started.process.wait()
+        started.process.terminate()
+        try:
+            started.process.wait(20)
+        finally:
+            started.process.kill()
+            started.process.wait()
+
+
+def hold_open(module: Module, graph: "Graph", running: Daemon) -> None:
+    """Ask until the relay holds the door."""
+    running.wait_for("ready")
+
+    def held() -> bool:
+        graph.ask(DoorModeValue.MODE_OPEN)
+        return module.relay() == [True]
+
+    wait_until(held, "the relay holds the door")
 
 
 class Graph:
@@ -148,6 +174,10 @@ class Graph:
     def ask(self, mode: DoorModeValue) -> None:
         """Send a request once the node has matched."""
         wait_until(self._requests.matched, "the node listens")
+        self.request(mode)
+
+    def request(self, mode: DoorModeValue) -> None:
+        """Send a request, whoever listens."""
         request = DoorRequest(
             door_name="ward_door", requester_id="r", requested_mode=DoorMode(int(mode))
         )

@@ -7,7 +7,6 @@ import pytest
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import DIAGNOSTICS, DOOR_STATES
 from bridges.serve.diagnostics import MOST, diagnosis, faults
-from hal_fakes.domain import free_domain
 from hal_fakes.wire import join
 from tests.serve.site import Module, daemon
 from tests.waiting import wait_until
@@ -30,7 +29,7 @@ def test_a_message_tells_of_the_daemon_and_of_each_device_with_its_faults_and_it
     None
 ):
     found = diagnosis("node", "lift", DAEMON, {"Lift1": LIFT}, AT)
-    daemons = values(kind="lift", simulated="False", pid="12", samples_dropped__door_requests="3")
+    daemons = values(kind="lift", simulated="no", pid="12", samples_dropped__door_requests="3")
     lifts = values(
         kind="lift",
         mode="AGV",
@@ -82,8 +81,9 @@ def test_a_flood_of_names_does_not_make_the_message_grow_without_end() -> None:
     assert len(diagnosis("node", "lift", {}, devices, AT).status) == 1 + MOST
 
 
-def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(tmp_path: Path) -> None:
-    domain = free_domain()
+def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(
+    domain: int, tmp_path: Path
+) -> None:
     module = Module(tmp_path, domain)
     listener = join("listener", domain)
     heard: list[d.DiagnosticArray] = []
@@ -102,8 +102,7 @@ def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(tmp_path: Pat
         listener.close()
 
 
-def test_diagnostics_can_be_left_off(tmp_path: Path) -> None:
-    domain = free_domain()
+def test_diagnostics_can_be_left_off(domain: int, tmp_path: Path) -> None:
     module = Module(tmp_path, domain)
     text = module.file.read_text()
     module.file.write_text(text.replace("rmf: {", "rmf: {diagnostics: false, "))

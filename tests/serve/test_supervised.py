@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from hal_fakes.domain import free_domain
 from tests.serve.site import Daemon, command, daemon, environment
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -30,8 +29,7 @@ class Building:
 
 
 @pytest.fixture
-def building(tmp_path: Path) -> Iterator[Building]:
-    domain = free_domain()
+def building(domain: int, tmp_path: Path) -> Iterator[Building]:
     options = ("--simulate", "--domain-id", str(domain))
     supervisor = daemon(CONFIG / "lift_supervisor.yaml", tmp_path / "supervisor", *options)
     lift = daemon(CONFIG / "lift_dry_contact.yaml", tmp_path / "lift", *options)
@@ -51,7 +49,7 @@ def test_a_lift_is_asked_for_through_the_supervisor_and_released_by_an_operator(
     building.supervisor.wait_for('holder="fleet/a')
     released = building.operator("release", "Lift1")
     assert released.returncode == 0, released.stdout + released.stderr
-    building.lift.wait_for('outputs="LiftOutputs(agv_request=False')
+    building.lift.wait_for("outputs device=Lift1 outputs=-")
 
 
 def test_two_supervisors_are_never_two_opinions(building: Building, tmp_path: Path) -> None:

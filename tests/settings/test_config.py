@@ -13,6 +13,7 @@ from bridges.core.fields import Rmf
 from bridges.settings import names as named
 from bridges.settings.load import Config, Problem, load
 from drivers.hal.points import Wire
+from tests.depth import examples
 from tests.settings.reading import RIGHT, changed, config_of
 
 GATE = {
@@ -31,7 +32,7 @@ HOLD = Wire("hold", "out", "A2", "high", path=("outputs", "hold"))
 
 
 def gate(raw: Any) -> Any:
-    return msgspec.convert(raw, named.driver_called("gate", "contact").Settings, str_keys=True)
+    return msgspec.convert(raw, named.driver_called("gate", "contact").settings, str_keys=True)
 
 
 def test_a_right_file_becomes_a_config(file: Path) -> None:
@@ -41,7 +42,7 @@ def test_a_right_file_becomes_a_config(file: Path) -> None:
         kind="gate",
         driver="contact",
         rmf=Rmf(transport="dds", domain_id=7),
-        buses={"header": named.bus_called("pins").Settings()},
+        buses={"header": named.bus_called("pins").settings()},
         devices={"north": gate(GATE)},
         bus_types={"header": "pins"},
     )
@@ -131,7 +132,7 @@ Quoting.add_representer(
 
 @pytest.mark.parametrize("flow", [True, False])
 def test_every_right_file_becomes_what_msgspec_makes_of_its_values(file: Path, flow: bool) -> None:
-    @settings(derandomize=True, max_examples=60, deadline=None, database=None)
+    @settings(derandomize=True, max_examples=examples(60), deadline=None, database=None)
     @given(st.dictionaries(NAMES, gates(), min_size=1, max_size=1))
     def check(devices: dict[str, Any]) -> None:
         raw = {"kind": "gate", "driver": "contact", "buses": {"b": {"type": "pins"}}}

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.settings.scalars import reads_as
+from tests.depth import examples
 from tests.settings.reading import RIGHT, changed, config_of, problems_of
 
 NAMES_THAT_ARE_NONE = {
@@ -67,7 +68,7 @@ PLAIN = st.one_of(
 )
 
 
-@settings(derandomize=True, max_examples=1500, deadline=None, database=None)
+@settings(derandomize=True, max_examples=examples(1500), deadline=None, database=None)
 @given(PLAIN)
 def test_every_text_that_pyyaml_takes_for_something_else_is_known(text: str) -> None:
     loader = yaml.SafeLoader("")
@@ -176,7 +177,7 @@ FIELDS = {
     "gain: x": "'gain' is the text 'x': a number is wanted",
     "loud: yes": "'loud' is written yes, which not every YAML reads alike: write true",
     "loud: N": "'loud' is written N, which not every YAML reads alike: write false",
-    'loud: "true"': "'loud' is the text 'true': true or false is wanted, without quotes",
+    'loud: "true"': "'loud' is the text \"true\": true or false is wanted, without quotes",
     "loud: 1": "'loud' is the number 1: true or false is wanted",
     "baud: 960": "'baud' is '960': 9600 or 19200 is wanted (did you mean '9600'?)",
     "label: A": "'label' is 'A': a small word is wanted",

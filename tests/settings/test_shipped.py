@@ -30,6 +30,7 @@ from bridges.commands.check import described
 from bridges.core.fields import Rmf
 from bridges.settings import names as named
 from bridges.settings.load import load
+from tests.depth import DEEP
 from tests.settings.reading import problems_of
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -158,9 +159,9 @@ def leaves(wanted: Type) -> Iterator[Type]:
 
 
 def test_every_field_of_every_driver_and_bus_is_of_a_sort_that_is_read() -> None:
-    structs = [Rmf, *(named.bus_called(name).Settings for name in named.bus_types())]
+    structs = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
     for kind in named.kind_names():
-        structs += [named.driver_called(kind, name).Settings for name in named.driver_names(kind)]
+        structs += [named.driver_called(kind, name).settings for name in named.driver_names(kind)]
     sorts = {type(leaf) for struct in structs for leaf in leaves(type_info(struct))}
     assert sorts <= {BoolType, EnumType, FloatType, IntType, LiteralType, NoneType, StrType}
     assert len(structs) >= 7
@@ -219,8 +220,8 @@ def test_every_key_that_is_taken_out_leaves_a_right_file_or_is_missed(
 def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file: Path) -> None:
     text = config.read_text()
     accepted, values = 0, list(scalars(composed(text)))
-    for node in values:
-        for trap in TRAPS:
+    for n, node in enumerate(values):
+        for trap in TRAPS if DEEP else TRAPS[n % 4 :: 4]:  # each kind of trap at a quarter of them
             found = problems_of(
                 file, f"{text[: node.start_mark.index]}{trap}{text[node.end_mark.index :]}"
             )

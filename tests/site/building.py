@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from bridges.charger import KIND as CHARGER
-from bridges.core.kind import Kind
+from bridges.core.kind import AnyDeviceKind
 from bridges.door import KIND as DOOR
 from bridges.lift import KIND as LIFT
 from bridges.settings.load import load
@@ -23,8 +23,8 @@ from drivers.charger import http as charger_http
 from drivers.door import dry_contact as door_dry_contact
 from drivers.door import register as door_register
 from drivers.lift import dry_contact as lift_dry_contact
-from hal_fakes.modbus.register_door import RegisterDoor
-from hal_fakes.plants import charger as charger_plant
+from hal_fakes import http_charger
+from hal_fakes.modbus.register_door import RegisterDoor, contacts
 from hal_fakes.plants import door as door_plant
 from hal_fakes.plants import lift as lift_plant
 from hal_fakes.plants.machine import Machine
@@ -46,7 +46,7 @@ class Device:
     """One device from its settings to its plant. `driver()`: a new one, as a new daemon has it."""
 
     name: str
-    kind: Kind
+    kind: AnyDeviceKind
     settings: Any
     plant: Machine
     far: Far
@@ -84,7 +84,7 @@ def _lift(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
 
 
 def _dry_door(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
-    plant = door_plant.build(name, settings)
+    plant = door_plant.build(name, settings, door_dry_contact.wires(settings))
     far = PointsFar(timeline, plant, door_dry_contact.wires(settings))
     return Device(
         name,
@@ -99,7 +99,7 @@ def _dry_door(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
 
 
 def _register_door(timeline: Timeline, name: str, settings: Any) -> Device:
-    plant = door_plant.build(name, settings)
+    plant = door_plant.build(name, settings, contacts(settings))
     far = RegisterFar(timeline, RegisterDoor(plant, settings))
     return Device(
         name,
@@ -119,7 +119,7 @@ def _charger(timeline: Timeline, name: str, clear_errors_per_h: int) -> Device:
         shipped.limits, start_timeout_s=45.0, clear_errors_per_h=clear_errors_per_h
     )
     settings = msgspec.structs.replace(shipped, limits=limits)
-    plant = charger_plant.build(name, settings)
+    plant = http_charger.build(name, settings)
     far = HttpFar(timeline, plant, settings)
     return Device(
         name,

@@ -7,17 +7,19 @@ out, so a scan there would decide what the last one did: that is why the day nee
 """
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
 from bridges.core.decision import OperatorReset
-from bridges.core.graph_kind import GraphKind
+from bridges.core.graph_kind import AnyGraphKind
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import LIFT_REQUESTS, Topic
 from bridges.rmf.transport import Publisher
-from bridges.serve.device import Clock, Node
-from bridges.serve.graph import GraphNode
+from bridges.serve.clock import Clock
+from bridges.serve.device import AnyNode, Node
+from bridges.serve.graph import AnyGraphNode, GraphNode
+from bridges.serve.subject import Status
 from hal_fakes.plants.plant import Edge
 from hal_fakes.rmf.supervisors import LiftSupervisor
 from tests.site.building import Device
@@ -52,7 +54,7 @@ class DeviceDaemon:
         self._air = air
         self._alarm = Alarm(timeline, self.scan)
         self._publishers: dict[str, Publisher[Any]] = {}
-        self._node: Node
+        self._node: AnyNode
         self._place: Place
 
     def start(self) -> None:
@@ -185,7 +187,7 @@ class GraphDaemon:
     """Serves a kind that lives on the graph alone. `wall_skew`: its clock is ahead (s)."""
 
     def __init__(
-        self, timeline: Timeline, air: Air, name: str, kind: GraphKind, wall_skew: float = 0.0
+        self, timeline: Timeline, air: Air, name: str, kind: AnyGraphKind, wall_skew: float = 0.0
     ) -> None:
         self.name = name
         self.kind = kind
@@ -196,7 +198,7 @@ class GraphDaemon:
         self._clock = Clock(lambda: timeline.now, lambda: EPOCH + timeline.now + wall_skew)
         self._alarm = Alarm(timeline, self._round)
         self._place: Place
-        self.node: GraphNode
+        self.node: AnyGraphNode
 
     def start(self) -> None:
         """A new one, which knows what it has kept."""
@@ -213,9 +215,9 @@ class GraphDaemon:
         self._alarm.set(NEVER)
         self._place.close()
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> Mapping[str, Status]:
         """Each subject's status, as the status file has it."""
-        return {subject.name: subject.status() for subject in self.node.nodes}
+        return self.node.devices()
 
     def _round(self) -> None:
         if self.alive:

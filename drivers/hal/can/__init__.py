@@ -1,286 +1,43 @@
 """CAN: one bus, on an interface of the kernel (SocketCAN) or an slcan adapter, through python-can.
 
-Everything happens in the thread of the loop. A reading takes whatever has come since the last one and
-gives each frame to the devices that want it; the rest is remembered by its id for a while, to say what
-is heard where a device is not. Nothing is sent but from a scan: no frame is ever handed to the kernel's
-or the library's cyclic sender, so that a daemon that hangs falls silent.
+    settings.py    what a YAML says
+    frames.py      frames, their ids and their names
+    bus.py         takes and gives out frames, pauses, and knows the bus's troubles
+    link.py        python-can: opens, reads, sends
+    broadcasts.py  one device that says its frames again and again, and is fed with ours
+    canopen.py     one CANopen node; sdo.py: the canopen library
 
-An interface that is down, gone or bus-off is closed and opened anew after a pause of 0.5 to 30 s, in
-which calls fail at once. A bus-off is over when a frame is heard again, or the controller says so;
-`restart-ms` of `ip link` makes the controller try.
+Only link.py and sdo.py import a library, and they are imported when a bus or a node is made.
 """
 
-import random
-import time
-from collections.abc import Callable, Iterable
-from typing import Annotated, Final, NamedTuple
+from drivers.hal import BusType
+from drivers.hal.can.bus import CanBus
+from drivers.hal.can.frames import EXTENDED, Frame, Wanted, named
+from drivers.hal.can.settings import Settings, Slcan, describe, warnings
 
-import msgspec
-
-from bridges.core.fields import Period
-from drivers.hal import Bus, HalError
-from drivers.hal.backoff import Backoff
-from drivers.hal.can.link import (
-    BITRATES,
-    EXTENDED,
-    Frame,
-    Link,
-    LinkDown,
-    Slcan,
-    Trouble,
-    Vendor,
-    slcan,
-    socketcan,
-)
-
-__all__ = ["EXTENDED", "CanBus", "Frame", "Settings", "Slcan", "Wanted", "named", "open_bus"]
-
-FRAMES_AT_ONCE: Final = 20_000
-"""A reading takes no more: a bus at 1 Mbit/s has 8,000 a second."""
-HANG_S: Final = 1.0
-"""A reading that comes so much later than it should shows that we hung."""
-ROUTES_MAX: Final = 4096
-RECENT_S: Final = 5.0
-OTHERS_MAX: Final = 64
-OTHERS_SHOWN: Final = 5
-
-Interface = Annotated[
-    str,
-    msgspec.Meta(
-        pattern=r"^[A-Za-z0-9._-]{1,15}$", extra={"pattern": "an interface's name, such as can0,"}
-    ),
+__all__ = [
+    "BUS",
+    "EXTENDED",
+    "CanBus",
+    "Frame",
+    "Settings",
+    "Slcan",
+    "Wanted",
+    "describe",
+    "named",
+    "open_bus",
+    "warnings",
 ]
-Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 
 
-class Settings(
-    msgspec.Struct,
-    frozen=True,
-    kw_only=True,
-    forbid_unknown_fields=True,
-    tag_field="type",
-    tag="can",
-):
-    """One CAN bus: `socketcan` or `slcan`, one of the two.
-
-    `socketcan`: the kernel's interface (`can0`), whose bitrate is set by `ip link`. Adapters of most
-    makers and the CAN boards of a Raspberry Pi are such.
-    `slcan`: an adapter on a serial port.
-    `timeout_s`: for an answer to one question, and for an adapter to take a frame.
-    `scan_s`: how often the devices are read, and their frames sent.
-    """
-
-    socketcan: Interface | None = None
-    slcan: Slcan | None = None
-    timeout_s: Timeout = 0.2
-    scan_s: Period = 0.2
-
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """What the fields cannot say one by one."""
-        if self.socketcan is None and self.slcan is None:
-            yield (), "says not which bus: write socketcan: can0, or slcan: {port: …, bitrate: …}"
-        elif self.socketcan and self.slcan:
-            yield ("slcan",), "a bus has socketcan or slcan: write a second bus for the other"
-        if self.slcan and self.slcan.bitrate not in BITRATES:
-            known = ", ".join(map(str, BITRATES))
-            yield ("slcan", "bitrate"), f"slcan adapters know {known}"
-
-
-def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
-    """What is legal but worth a look: (path, text)."""
-    if settings.slcan and not settings.slcan.port.startswith("/dev/serial/by-"):
-        port = settings.slcan.port
-        text = f"{port} may be another adapter after the next start: ls /dev/serial/by-id"
-        yield ("slcan", "port"), text
-
-
-def describe(settings: Settings) -> str:
-    """Where the bus is, for `check`."""
-    if settings.slcan:
-        return f"{settings.slcan.port}, {settings.slcan.bitrate // 1000} kbit/s"
-    return f"{settings.socketcan}, at the bitrate that `ip link` gave it"
-
-
-def open_bus(settings: Settings) -> "CanBus":
+def open_bus(settings: Settings) -> CanBus:
     """The way onto this bus; nothing is sent or heard yet."""
     return CanBus(settings)
 
 
-class Wanted(NamedTuple):
-    """Frames whose id has these bits where `mask` has ones; all of it where there is no mask."""
-
-    id: int
-    mask: int = 0xFFFF_FFFF
-
-    def fits(self, frame_id: int) -> bool:
-        """Is it one of them?"""
-        return (frame_id ^ self.id) & self.mask == 0
-
-
-Hear = Callable[[Frame, float], None]
-"""Takes a frame and when it was read (monotonic s)."""
-
-
-class CanBus(Bus):
-    """One bus and the devices on it. `clock`, `jitter` and `vendor` are a test's."""
-
-    def __init__(
-        self,
-        settings: Settings,
-        clock: Callable[[], float] = time.monotonic,
-        jitter: Callable[[], float] = random.random,
-        vendor: Vendor | None = None,
-    ) -> None:
-        self.settings = settings
-        self.now = clock
-        place = settings.slcan
-        self.where = place.port if place else str(settings.socketcan)
-        made = (lambda: slcan(place)) if place else (lambda: socketcan(self.where))
-        self._link = Link(vendor or made, self.where, settings.timeout_s)
-        self._jitter = jitter
-        self._backoffs = [Backoff(clock, jitter)]
-        self._wanted: list[tuple[Wanted, Hear]] = []
-        self._routes: dict[int, tuple[Hear, ...]] = {}
-        self._others: dict[int, float] = {}
-        self._trouble = Trouble("", bus_off=False)
-        self._trouble_at = float("-inf")
-        self._failing = False
-        self._taken_at = float("-inf")
-        self._deaf = False
-
-    def backoff(self) -> Backoff:
-        """Pauses for one device of this bus; `insist` ends them too."""
-        made = Backoff(self.now, self._jitter)
-        self._backoffs.append(made)
-        return made
-
-    def listen(self, wanted: Iterable[Wanted], hear: Hear) -> None:
-        """Have each of these frames given to `hear`, as long as the bus lives."""
-        self._wanted += [(one, hear) for one in wanted]
-        self._routes.clear()
-        self._others.clear()
-
-    def take(self) -> None:
-        """Give out what has come since the last time. Raises HalError.
-
-        After a hang nobody knows how old what has come is: it is thrown away.
-        """
-        self._deaf = self.now() - self._taken_at > HANG_S + self.settings.scan_s
-        try:
-            for _ in range(FRAMES_AT_ONCE):
-                if not self._step(0.0):
-                    break
-        finally:
-            self._deaf, self._taken_at = False, self.now()
-
-    def wait(self, heard: Callable[[], bool], within_s: float) -> bool:
-        """Take what comes until this is so, or for so long. Raises HalError."""
-        deadline = self.now() + within_s
-        while not heard():
-            left_s = deadline - self.now()
-            if left_s <= 0:
-                return False
-            self._step(left_s)
-            self._taken_at = self.now()
-        return True
-
-    def send(self, frame: Frame) -> None:
-        """Send a frame. Raises HalError; then it may have been sent or not."""
-        self._open()
-        try:
-            self._link.send(frame)
-        except LinkDown as error:
-            raise self._failed(str(error)) from error
-
-    def silence(self) -> str:
-        """What is known where somebody is not heard: the bus's own trouble, or who is heard instead."""
-        if self._trouble.text and (
-            self._trouble.bus_off or self.now() - self._trouble_at < RECENT_S
-        ):
-            return f"the bus has trouble: {self._trouble.text}"
-        others = self.others()
-        if not others:
-            return "nothing else is heard on the bus either: power, cable, termination, bitrate?"
-        shown = ", ".join(map(named, others[:OTHERS_SHOWN]))
-        return (
-            f"the bus works, and others are heard: {shown}{' …' if others[OTHERS_SHOWN:] else ''}"
-        )
-
-    def others(self) -> list[int]:
-        """The ids that were heard lately and that no device wants."""
-        now = self.now()
-        return sorted(found for found, at in self._others.items() if now - at < RECENT_S)
-
-    def insist(self) -> None:
-        """Try at once what is asked next, whatever the pauses: to switch off before the end."""
-        for backoff in self._backoffs:
-            backoff.insist()
-
-    def close(self) -> None:
-        """Let go of the interface."""
-        self._link.close()
-
-    def _open(self) -> None:
-        self._backoffs[0].check()
-        try:
-            self._link.open()
-        except LinkDown as error:
-            raise self._failed(str(error)) from error
-
-    def _step(self, wait_s: float) -> bool:
-        """Take one frame; False when none came."""
-        self._open()
-        try:
-            found = self._link.receive(wait_s)
-        except LinkDown as error:
-            raise self._failed(str(error)) from error
-        if isinstance(found, Trouble):
-            self._note(found)
-        elif found is not None and not self._deaf:
-            self._give(found)
-        return found is not None
-
-    def _give(self, frame: Frame) -> None:
-        if self._failing or self._trouble.text:
-            self._well()
-        routes = self._routes.get(frame.id)
-        if routes is None:
-            routes = self._route(frame.id)
-        now = self.now()
-        for hear in routes:
-            hear(frame, now)
-        if not routes and (frame.id in self._others or len(self._others) < OTHERS_MAX):
-            self._others[frame.id] = now
-
-    def _route(self, frame_id: int) -> tuple[Hear, ...]:
-        if len(self._routes) >= ROUTES_MAX:
-            self._routes.clear()
-            self._others.clear()
-        made = tuple(hear for wanted, hear in self._wanted if wanted.fits(frame_id))
-        self._routes[frame_id] = made
-        return made
-
-    def _note(self, trouble: Trouble) -> None:
-        """The controller speaks: of its troubles, or that it works again."""
-        self._trouble, self._trouble_at = trouble, self.now()
-        if trouble.bus_off:
-            raise self._failed(
-                f"CAN {self.where}: bus-off: the controller has left the bus after too many errors;"
-                " check bitrate, termination and cable, and set restart-ms so that it tries again"
-            )
-        if not trouble.text:
-            self._well()
-
-    def _well(self) -> None:
-        self._failing, self._trouble = False, Trouble("", bus_off=False)
-        self._backoffs[0].mended()
-
-    def _failed(self, text: str) -> HalError:
-        self._failing = True
-        self._link.close()
-        return self._backoffs[0].failed(text)
-
-
-def named(frame_id: int) -> str:
-    """An id as people write it: 0x58A, 0x18FF50E5."""
-    return f"0x{frame_id & ~EXTENDED:08X}" if frame_id & EXTENDED else f"0x{frame_id:03X}"
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    fake="hal_fakes.can",
+    warnings=warnings,
+)

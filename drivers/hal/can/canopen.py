@@ -7,18 +7,22 @@ take whatever comes on the reply's id for the answer, within its time limit or n
   and named when the answer does not come;
 - after a question that stays without an answer the node is left alone until its answer cannot come any
   more, LATE times the time that it had: a late reply is never the answer to the next question;
-- no question is sent twice.
+- no question is sent twice;
+- what takes power away is asked at once, whatever reading has failed before.
 
 A node that has gone pauses as every device does; its heartbeat or its start ends the pause.
 """
 
-import functools
-import logging
 import struct
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from drivers.hal import HalError
-from drivers.hal.can import CanBus, Frame, Wanted
+from drivers.hal.backoff import Backoff
+from drivers.hal.can.bus import CanBus
+from drivers.hal.can.frames import Frame, Wanted
+
+if TYPE_CHECKING:
+    from drivers.hal.can.sdo import Client
 
 LATE: Final = 3.0
 SDO_TO_NODE: Final = 0x600
@@ -43,6 +47,7 @@ class CanOpenNode:
         self._timeout_s = bus.settings.timeout_s
         self._beat_pause = bus.backoff()
         self._sdo_pause = bus.backoff()
+        self._safe_pause = bus.backoff()
         self._state = OPERATIONAL
         self._beat_at = float("-inf")
         self._asked: bytes | None = None
@@ -50,7 +55,7 @@ class CanOpenNode:
         self._stray = ""
         self._odd_beat = ""
         self._late_until = float("-inf")
-        self._client: Any = None
+        self._client = _client(self)
         bus.listen([Wanted(HEARTBEAT + node)], self._hear_beat)
         bus.listen([Wanted(SDO_FROM_NODE + node)], self._hear_reply)
 
@@ -70,7 +75,8 @@ class CanOpenNode:
 
     def read(self, index: int, subindex: int, octets: int) -> int:
         """An unsigned number of so many octets. Raises HalError."""
-        found = self._exchanged(f"read 0x{index:04X}:{subindex:02X}", "upload", index, subindex)
+        what = f"read 0x{index:04X}:{subindex:02X}"
+        found = self._exchanged(what, self._sdo_pause, "upload", index, subindex)
         number = bytes(found)[:octets]
         if len(number) < octets or any(found[octets:]):
             size = f"{len(found)} bytes ({found.hex(' ')})"
@@ -79,28 +85,32 @@ class CanOpenNode:
             )
         return int.from_bytes(number, "little")
 
-    def write(self, index: int, subindex: int, octets: int, number: int) -> None:
-        """Set an unsigned number. Raises HalError; then it may be set or not."""
+    def write(
+        self, index: int, subindex: int, octets: int, number: int, safe: bool = False
+    ) -> None:
+        """Set an unsigned number. Raises HalError; then it may be set or not.
+
+        `safe`: it takes power away, and waits for no pause that a reading has begun.
+        """
         what = f"write 0x{index:04X}:{subindex:02X}"
         payload = number.to_bytes(octets, "little")
-        self._exchanged(what, "download", index, subindex, payload)
+        pause = self._safe_pause if safe else self._sdo_pause
+        self._exchanged(what, pause, "download", index, subindex, payload)
 
-    def _exchanged(self, what: str, call: str, *arguments: Any) -> Any:
+    def _exchanged(self, what: str, pause: Backoff, call: str, *arguments: Any) -> Any:
         """One SDO transfer by the library. Raises HalError."""
-        owes = self._bus.now() < self._late_until and not self._sdo_pause.insisting
-        self._sdo_pause.check(not_yet=owes)
+        waits = pause is self._sdo_pause and not pause.insisting
+        pause.check(not_yet=waits and self._bus.now() < self._late_until)
         text = f"{self._name()}, {what}: "
-        if self._client is None:
-            self._client = _client(self)
         try:
             found = getattr(self._client, call)(*arguments)
         except TimeoutError:
-            raise self._sdo_pause.failed(text + self._no_reply()) from None
-        except _aborts() as error:
+            raise pause.failed(text + self._no_reply()) from None
+        except self._client.ABORTED as error:
             raise HalError(f"{text}refused: {error}") from error
-        except _failures() as error:
-            raise self._sdo_pause.failed(f"{text}no SDO reply to it ({error})") from error
-        self._sdo_pause.mended()
+        except self._client.FAILURES as error:
+            raise pause.failed(f"{text}no SDO reply to it ({error})") from error
+        pause.mended()
         return found
 
     def exchange(self, request: bytes) -> bytes:
@@ -130,6 +140,7 @@ class CanOpenNode:
         if self._state == 0:
             self.starts += 1
             self._sdo_pause.mended()
+            self._safe_pause.mended()
 
     def _hear_reply(self, frame: Frame, at: float) -> None:
         reply = frame.payload
@@ -161,35 +172,8 @@ class CanOpenNode:
         return f"CANopen node {self._node} at {self._bus.where}"
 
 
-@functools.cache
-def _aborts() -> type[Exception]:
-    from canopen import SdoAbortedError
+def _client(node: CanOpenNode) -> "Client":
+    """The library's, which is imported only here."""
+    from drivers.hal.can.sdo import Client
 
-    return SdoAbortedError
-
-
-@functools.cache
-def _failures() -> tuple[type[Exception], ...]:
-    from canopen import SdoCommunicationError
-
-    return (SdoCommunicationError, struct.error)
-
-
-def _client(node: CanOpenNode) -> Any:
-    """The library's SDO client, on an exchange of ours."""
-    from canopen import ObjectDictionary, SdoAbortedError
-    from canopen.sdo.client import SdoClient
-
-    logging.getLogger("canopen").setLevel(logging.CRITICAL)  # our HalErrors say it all
-
-    class Client(SdoClient):
-        def request_response(self, sdo_request: Any) -> bytes:
-            reply = node.exchange(bytes(sdo_request))
-            if reply[0] == ABORTED:
-                raise SdoAbortedError(int.from_bytes(reply[4:8], "little"))
-            return reply
-
-        def send_request(self, request: Any) -> None:
-            node.post(bytes(request))
-
-    return Client(0, 0, ObjectDictionary())  # type: ignore[no-untyped-call]
+    return Client(node.exchange, node.post)

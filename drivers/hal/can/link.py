@@ -12,35 +12,26 @@ python-can opens, reads and sends; what its interfaces leave open is settled her
 """
 
 import errno
-import functools
 import logging
 import os
 import select
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from typing import Any, Final
 
-import msgspec
+import can
+import serial
+from can import BusABC, Message
+from can.exceptions import CanInitializationError, error_check
+from can.interfaces.slcan import slcanBus
 
-from bridges.core.fields import Name
+from drivers.hal.can.frames import EXTENDED, Frame, LinkDown, Trouble
+from drivers.hal.can.settings import Slcan
 
-if TYPE_CHECKING:
-    from can import BusABC, Message
+logging.getLogger("can").setLevel(logging.CRITICAL)  # our texts say it all
 
-EXTENDED: Final = 1 << 31
-"""In a frame's id: it has 29 bits. (0x123 and an extended 0x123 are two.)"""
-BITRATES: Final = (
-    10_000,
-    20_000,
-    50_000,
-    83_300,
-    100_000,
-    125_000,
-    250_000,
-    500_000,
-    750_000,
-    1_000_000,
-)
+FAILURES: Final = (can.CanError, serial.SerialException, OSError, ValueError, IndexError)
+"""What python-can and what is below it may raise; ValueError and IndexError are its parser's."""
 IN_ONE_GO: Final = 4096
 """So many lines of an adapter that are no frames are read at once, and no more."""
 
@@ -58,76 +49,40 @@ TROUBLES: Final = {
 """Bits of an error frame's id (linux/can/error.h), the most telling first."""
 
 
-class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A serial or USB adapter that speaks slcan (LAWICEL).
-
-    `port`: its path; one in /dev/serial/by-id stays the same.
-    `bitrate`: of the CAN bus.
-    `baudrate`: of the serial port; USB adapters take any.
-    """
-
-    port: Name
-    bitrate: Annotated[int, msgspec.Meta(ge=10_000, le=1_000_000, extra={"unit": "bit/s"})]
-    baudrate: Annotated[int, msgspec.Meta(ge=9600, le=3_000_000, extra={"unit": "Bd"})] = 115_200
-
-
-class Frame(NamedTuple):
-    """One data frame; `id` with EXTENDED where it has 29 bits."""
-
-    id: int
-    payload: bytes
-
-
-class Trouble(NamedTuple):
-    """The bus's own, from an error frame. `text`: "" when the controller is well again."""
-
-    text: str
-    bus_off: bool
-
-
 Vendor = Callable[[], Any]
 """Opens python-can's bus."""
 
 
-class LinkDown(Exception):
-    """The interface cannot be used now. The text says what to look at."""
-
-
-def socketcan(interface: str) -> "BusABC":
+def socketcan(interface: str) -> BusABC:
     """An interface of the kernel, which has its bitrate from `ip link`."""
     from can.interfaces.socketcan import SocketcanBus
 
     return SocketcanBus(channel=interface)
 
 
-def slcan(settings: Slcan) -> "BusABC":
+def slcan(settings: Slcan) -> BusABC:
     """An adapter on a serial port, for us alone."""
-    bus: BusABC = _slcan_bus()(
+    return Adapter(
         settings.port,
         tty_baudrate=settings.baudrate,
         bitrate=settings.bitrate,
         sleep_after_open=0,
         timeout=0,
     )
-    return bus
 
 
-@functools.cache
-def _slcan_bus() -> Any:
-    from can.exceptions import CanInitializationError, error_check
-    from can.interfaces.slcan import slcanBus
+class Adapter(slcanBus):
+    """python-can's, which nobody else may open meanwhile, and whose writes do not wait without end."""
 
-    class Adapter(slcanBus):
-        def _write(self, string: str) -> None:
-            with error_check("Could not write to serial device"):
-                self.serialPortOrig.write(string.encode() + self.LINE_TERMINATOR)
+    def _write(self, string: str) -> None:
+        with error_check("Could not write to serial device"):
+            self.serialPortOrig.write(string.encode() + self.LINE_TERMINATOR)
 
-        def open(self) -> None:
-            with error_check(exception_type=CanInitializationError):
-                self.serialPortOrig.exclusive = True
-            super().open()
-
-    return Adapter
+    def open(self) -> None:
+        """For us alone."""
+        with error_check(exception_type=CanInitializationError):
+            self.serialPortOrig.exclusive = True
+        super().open()
 
 
 class Link:
@@ -144,10 +99,9 @@ class Link:
         """Have it open. Raises LinkDown."""
         if self._bus is not None:
             return
-        logging.getLogger("can").setLevel(logging.CRITICAL)  # our texts say it all
         try:
             self._bus = self._vendor()
-        except _failures() as error:
+        except FAILURES as error:
             raise LinkDown(self._explained(error)) from error
         self._readable = _selecting(self._bus)
 
@@ -159,7 +113,7 @@ class Link:
                 if self._readable and not self._readable(wait_s):
                     return None
                 message = self._bus.recv(0 if self._readable else wait_s)
-            except _failures() as error:
+            except FAILURES as error:
                 raise LinkDown(self._explained(error)) from error
             if message is None and self._readable is None:
                 return None
@@ -169,8 +123,6 @@ class Link:
 
     def send(self, frame: Frame) -> None:
         """Send it, or raise LinkDown. Taken by the interface is not yet heard by anybody."""
-        import can
-
         assert self._bus is not None
         message = can.Message(
             arbitration_id=frame.id & ~EXTENDED,
@@ -179,7 +131,7 @@ class Link:
         )
         try:
             self._bus.send(message, timeout=self._timeout_s)
-        except _failures() as error:
+        except FAILURES as error:
             raise LinkDown(self._explained(error)) from error
 
     def close(self) -> None:
@@ -187,11 +139,11 @@ class Link:
         bus, self._bus = self._bus, None
         if bus is None:
             return
-        with suppress(*_failures()):
+        with suppress(*FAILURES):
             bus.shutdown()
         port = getattr(bus, "serialPortOrig", None)
         if port is not None:  # python-can keeps the port of an adapter that has gone
-            with suppress(*_failures()):
+            with suppress(*FAILURES):
                 port.close()
 
     def _explained(self, error: BaseException) -> str:
@@ -215,16 +167,7 @@ _HINTS: Final = {
 }
 
 
-@functools.cache
-def _failures() -> tuple[type[Exception], ...]:
-    """What python-can and what is below it may raise; ValueError and IndexError are its parser's."""
-    import can
-    import serial
-
-    return (can.CanError, serial.SerialException, OSError, ValueError, IndexError)
-
-
-def _selecting(bus: "BusABC") -> Callable[[float], bool] | None:
+def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
     """How to wait for an slcan adapter's next byte; None where `recv` itself waits as it should."""
     port = getattr(bus, "serialPortOrig", None)
     if port is None:
@@ -233,7 +176,7 @@ def _selecting(bus: "BusABC") -> Callable[[float], bool] | None:
     return lambda wait_s: bool(select.select([descriptor], [], [], wait_s)[0])
 
 
-def _meaning(message: "Message") -> Frame | Trouble | None:
+def _meaning(message: Message) -> Frame | Trouble | None:
     """Data frames and the controller's troubles; remote and FD frames are nobody's here."""
     if message.is_error_frame:
         found = message.arbitration_id

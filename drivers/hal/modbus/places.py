@@ -2,11 +2,17 @@
 
 import re
 from collections.abc import Iterable
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 
 from bridges.core.fields import Name
+
+BAUDRATES: Final = (
+    *(300, 600, 1200, 2400, 4800, 9600, 14400, 19200, 28800, 38400, 56000, 57600, 76800, 115200),
+    *(128000, 230400, 250000, 256000, 460800, 500000, 921600, 1000000),
+)
+"""What UARTs are set to."""
 
 
 class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -48,6 +54,9 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         if not self.port.startswith("/"):
             text = "write the whole path, as `ls /dev/serial/by-id/*` prints it"
             yield ("port",), f"{self.port!r} is no serial port: {text}"
+        if self.baudrate not in BAUDRATES:
+            text = f"{self.baudrate} is no rate that units have: {', '.join(map(str, BAUDRATES))}"
+            yield ("baudrate",), text
 
     def warnings(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """What is legal and may be wrong one day."""

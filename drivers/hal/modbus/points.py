@@ -13,12 +13,24 @@ from typing import Final, Literal
 from drivers.hal.points import Wire
 
 Table = Literal["coil", "discrete input", "holding register", "input register"]
-"""A point is in one of the first two; registers are for `modbus_registers.py`."""
+"""A contact or relay is in one of the first two; registers are spelled in `registers.py`."""
 
-GAP_MAX: Final = 8
-"""Addresses between two points that are rather read along than asked for in two requests."""
-BITS_MAX: Final = 2000
-"""The most bits that one reply can carry (Modbus Application Protocol V1.1b3, 6.1 and 6.2)."""
+GAP_MAX: Final[dict[Table, int]] = {
+    "coil": 8,
+    "discrete input": 8,
+    "holding register": 0,
+    "input register": 0,
+}
+"""Addresses between two points that are rather read along than asked for in two requests. Not so
+between registers: a controller may lack what lies there, or take a reading for an acknowledgement.
+"""
+COUNT_MAX: Final[dict[Table, int]] = {
+    "coil": 2000,
+    "discrete input": 2000,
+    "holding register": 125,
+    "input register": 125,
+}
+"""The most that one reply can carry (Modbus Application Protocol V1.1b3, 6.1 to 6.4)."""
 
 _MODEL_DIGIT: Final[dict[Table, int]] = {"coil": 0, "discrete input": 1}
 _SPELLING: Final = re.compile(
@@ -29,7 +41,7 @@ _HOW: Final = "write 'unit 1 coil 0' or 'unit 1 discrete input 0'; addresses beg
 
 @dataclass(frozen=True, slots=True, order=True)
 class Point:
-    """One bit of one unit. `str` of it is its one spelling."""
+    """One bit or register of one unit. `str` of it is its one spelling."""
 
     unit: int
     table: Table
@@ -43,7 +55,7 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Bits of one table that are read with one request."""
+    """Neighbours of one table that are read with one request."""
 
     unit: int
     table: Table
@@ -56,7 +68,7 @@ class Range:
         return f"{self.table}s {self.start} to {self.start + self.count - 1}"
 
     def points(self) -> list[Point]:
-        """Every point in it, in the order of the reply's bits."""
+        """Every point in it, in the order of the reply."""
         return [Point(self.unit, self.table, self.start + i) for i in range(self.count)]
 
 
@@ -112,8 +124,11 @@ def _flash_problems(wire: Wire, output: Point) -> Iterable[str]:
         yield f"flash is at unit {flash.unit}, and the relay at unit {output.unit}: one is wrong"
 
 
-def ranges(points: Iterable[Point], gap: int = GAP_MAX) -> list[Range]:
-    """The fewest sensible requests that read all of these; gaps up to `gap` are read along."""
+def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
+    """The fewest sensible requests that read all of these; gaps up to `gap` are read along.
+
+    `gap`: None for what the table allows.
+    """
     found: list[Range] = []
     for point in sorted(set(points)):
         last = found[-1] if found else None
@@ -129,10 +144,11 @@ def pieces(whole: Range, points: Iterable[Point]) -> Sequence[Range]:
     return ranges(set(points).intersection(whole.points()), gap=0)
 
 
-def _joins(last: Range, point: Point, gap: int) -> bool:
+def _joins(last: Range, point: Point, gap: int | None) -> bool:
     same = (last.unit, last.table) == (point.unit, point.table)
-    near = point.address - (last.start + last.count) <= gap
-    return same and near and point.address - last.start < BITS_MAX
+    most = GAP_MAX[last.table] if gap is None else gap
+    near = point.address - (last.start + last.count) <= most
+    return same and near and point.address - last.start < COUNT_MAX[last.table]
 
 
 def _table(text: str, words: str) -> Table:

@@ -1,7 +1,7 @@
 """One serial line with Modbus RTU units: one question, one deadline, and silence between the frames.
 
-pyserial opens and configures the port; pymodbus makes frames and reads their contents. The waiting is
-ours: pymodbus's goes by the wall clock, and takes the first frame that fits for the answer.
+pyserial opens and configures the port; frames are made and read by pymodbus (`frames.py`). The waiting
+is ours. Imported with the first bus that needs it.
 
 RTU has no transaction number, so that a late reply looks like a prompt one. Hence:
 
@@ -16,20 +16,19 @@ A unit that is later than that still needs a longer `timeout_s`.
 """
 
 import errno
-import functools
 import os
 import select
 import termios
 import time
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
+
+import serial
 
 from drivers.hal.deadline import Deadline
+from drivers.hal.modbus import frames
 from drivers.hal.modbus.places import Serial
-from drivers.hal.modbus.wire import BadReply, Call, NoReply, Unreachable, failures, strict_replies
-
-if TYPE_CHECKING:
-    from pymodbus.pdu import ModbusPDU
+from drivers.hal.modbus.wire import Answer, BadReply, NoReply, Question, Unreachable
 
 LATE: Final = 3.0
 PARITY: Final = {"none": "N", "even": "E", "odd": "O"}
@@ -69,7 +68,6 @@ class Line:
 
     def connect(self) -> None:
         """Have the port open; a try begins then. Raises Unreachable."""
-        _client_class()  # a Pi loads the library for longer than a try may last
         if self._port is None:
             try:
                 self._port = self._opened()
@@ -77,16 +75,17 @@ class Line:
                 raise Unreachable(self._unreachable(error)) from error
         self._deadline.start(self._timeout_s)
 
-    def ask(self, function: int, call: Call) -> "ModbusPDU":
-        """The answer to one request: of this function, or an exception. Raises NoReply."""
+    def ask(self, question: Question) -> Answer:
+        """What answers this question. Raises NoReply."""
         try:
-            return call(_client_class()(self.exchange))
+            frame = self.exchange(frames.rtu_request(question))
+            return frames.rtu_answer(question, frame)
         except TimeoutError as error:
             raise NoReply(self._silence()) from error
         except (OSError, termios.error) as error:
             self.close()
             raise NoReply(f"the port broke ({_why(error)})") from error
-        except failures() as error:
+        except BadReply as error:
             raise NoReply(f"no Modbus reply to it ({error})") from error
 
     def exchange(self, request: bytes) -> bytes:
@@ -115,8 +114,6 @@ class Line:
                 port.close()
 
     def _opened(self) -> Any:
-        import serial
-
         port = serial.Serial(
             self._settings.port,
             self._settings.baudrate,
@@ -182,7 +179,7 @@ class Line:
         while more := self._heard(self._settings.gap_s):
             heard = (heard + more)[: 2 * FRAME_MAX]
         self._stray = heard
-        if not _is_frame(heard):
+        if not frames.crc_fits(heard):
             raise Noise(f"{_start(heard)} is no frame: a collision, noise or other line settings")
 
     def _silence(self) -> str:
@@ -210,20 +207,8 @@ def _answers(request: bytes, function: bytes) -> bool:
 
 def _complete(heard: bytes) -> int:
     """The size of the frame that these bytes begin with, once they are all there; else 0."""
-    if len(heard) < 5:  # the shortest reply is an exception
-        return 0
-    sort = _decoder().lookupPduClass(heard)
-    if sort is None:
-        raise BadReply(f"function {heard[1]} is not known")
-    size: int = sort.calculateRtuFrameSize(heard)
+    size = frames.rtu_size(heard)
     return size if size <= len(heard) else 0
-
-
-def _is_frame(heard: bytes) -> bool:
-    from pymodbus.framer import FramerRTU
-
-    crc = int.from_bytes(heard[-2:], "big")
-    return len(heard) >= 4 and FramerRTU.check_CRC(heard[:-2], crc)
 
 
 def _start(heard: bytes) -> str:
@@ -231,7 +216,7 @@ def _start(heard: bytes) -> str:
 
 
 def _checked(frame: bytes, request: bytes, heard: bytes) -> bytes:
-    if _is_frame(frame):
+    if frames.crc_fits(frame):
         return frame
     if request[1] not in WRITES and heard[: len(frame)] == request[: len(frame)]:
         raise BadReply("our own request comes back; does the adapter echo? say ignore_echo: true")
@@ -242,37 +227,3 @@ def _why(error: Exception) -> str:
     """termios.error is no OSError, and pyserial puts one text into another."""
     text = getattr(error, "strerror", None) or (error.args[-1] if error.args else error)
     return str(text)
-
-
-@functools.cache
-def _decoder() -> Any:
-    from pymodbus.pdu import DecodePDU
-
-    decoder = DecodePDU(is_server=False)
-    for reply in strict_replies():
-        decoder.register(reply)
-    return decoder
-
-
-@functools.cache
-def _client_class() -> Any:
-    """pymodbus's requests, on a line of ours."""
-    from pymodbus.client.mixin import ModbusClientMixin
-    from pymodbus.framer import FramerRTU
-
-    framer = FramerRTU(_decoder())
-
-    class Client(ModbusClientMixin[Any]):
-        def __init__(self, exchange: Any) -> None:
-            super().__init__()  # type: ignore[no-untyped-call]
-            self._exchange = exchange
-
-        def execute(self, no_response_expected: bool, request: "ModbusPDU") -> Any:
-            frame = self._exchange(framer.buildFrame(request))
-            reply = _decoder().decode(frame[1:-2])
-            if reply is None:
-                raise BadReply(f"{frame.hex(' ')} does not decode")
-            reply.dev_id = frame[0]
-            return reply
-
-    return Client

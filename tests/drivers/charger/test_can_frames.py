@@ -12,16 +12,16 @@ from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Mea
 from bridges.settings.load import SettingsError, load
 from drivers.charger import dbc
 from drivers.charger.can_frames import (
-    BUSES,
+    DRIVER,
     FrameDriver,
     Settings,
     create,
     describe,
     warnings,
-    wires,
 )
 from drivers.charger.can_map import PROFILE, FrameMap
 from drivers.hal import can as hal
+from drivers.profiles.texts import FOLDER
 from tests.drivers.hal.can.far_end import Reactive, failure
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_wiferion.yaml"
@@ -78,8 +78,8 @@ def charger() -> Iterator[Charger]:
 
 
 def test_the_driver_stands_on_can_and_has_no_wires() -> None:
-    assert BUSES == ("can",)
-    assert wires(Settings(profile="wiferion", setpoints=SETPOINTS)) == []
+    assert DRIVER.buses == ("can",)
+    assert list(DRIVER.wires(Settings(profile="wiferion", setpoints=SETPOINTS))) == []
 
 
 def test_a_published_status_frame_is_what_it_says(charger: Charger) -> None:
@@ -346,7 +346,7 @@ def test_a_frame_that_is_never_sent_is_a_problem() -> None:
 
 def test_a_map_in_the_yaml_is_read_like_a_profile(tmp_path: Path) -> None:
     text = EXAMPLE.read_text("utf-8")
-    profile = (dbc.FOLDER / "wiferion.yaml").read_text("utf-8")
+    profile = (FOLDER / "wiferion.yaml").read_text("utf-8")
     inline = profile[profile.index("map:") :].replace("\n", "\n    ")
     file = tmp_path / "charger.yaml"
     file.write_text(text.replace("profile: wiferion", inline.rstrip()), "utf-8")

@@ -8,14 +8,13 @@ import pytest
 
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings.load import SettingsError, load
+from drivers.charger import xnergy
 from drivers.charger.canopen import (
-    BUSES,
-    CanOpenCharger,
+    DRIVER,
     Settings,
     create,
     describe,
     warnings,
-    wires,
 )
 from drivers.hal import can as hal
 from tests.drivers.hal.can.far_end import Reactive, failure
@@ -38,7 +37,7 @@ class Receiver:
         self.bus = self.far.bus()
         self.driver = self.made()
 
-    def made(self, on_death: str = "stop") -> CanOpenCharger:
+    def made(self, on_death: str = "stop") -> xnergy.Receiver:
         """Another driver of it."""
         return create("c", Settings(node=10, on_death=on_death), self.bus)  # type: ignore[arg-type]
 
@@ -78,8 +77,8 @@ def receiver() -> Iterator[Receiver]:
 
 
 def test_the_driver_stands_on_can_and_has_no_wires() -> None:
-    assert BUSES == ("can",)
-    assert wires(Settings(node=10)) == []
+    assert DRIVER.buses == ("can",)
+    assert list(DRIVER.wires(Settings(node=10))) == []
 
 
 def test_a_reading_is_the_published_objects(receiver: Receiver) -> None:

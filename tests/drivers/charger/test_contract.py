@@ -11,7 +11,8 @@ from bridges.settings.load import load
 from drivers.charger import http as charger_http
 from drivers.charger import modbus as charger_modbus
 from drivers.hal import http, modbus
-from hal_fakes.http import HttpServer, Station
+from hal_fakes.http import HttpServer
+from hal_fakes.http_charger import HttpCharger as Station
 from hal_fakes.modbus import ModbusServer
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.pad import PadPlant

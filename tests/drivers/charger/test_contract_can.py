@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any, ClassVar
 
 import can
@@ -13,9 +14,9 @@ from drivers import DriverError
 from drivers.charger import can_frames as charger_can_frames
 from drivers.charger import canopen as charger_canopen
 from drivers.hal.can import CanBus, Settings, Slcan
-from hal_fakes.can import station
 from hal_fakes.can.side import CanSide, Medium, VirtualBus
 from hal_fakes.can.slcan_port import SlcanPort
+from hal_fakes.fake import Fake
 from hal_fakes.plants.pad import PadPlant
 from hal_fakes.realtime import RealTime
 from tests.drivers.charger.contract import (
@@ -83,8 +84,10 @@ def on_a_bus(driver: Any, plain: dict[str, Any], medium: Medium, bus: CanBus) ->
     """A bench whose station is on this medium."""
     settings = msgspec.convert(plain, driver.Settings)
     world = RealTime({"a": PadPlant("a", PACE)})
-    slow_s = 2 * TIMEOUT_S
-    side = CanSide(medium, [station(world.plants["a"], settings, slow_s)], slow_s)
+    fake: Fake[Any] = import_module(driver.DRIVER.fake).FAKE
+    assert fake.station
+    station: Any = fake.station(world.plants["a"], settings, Settings(timeout_s=TIMEOUT_S))
+    side = CanSide(medium, [station], slow_s=2 * TIMEOUT_S)
 
     def new(on_death: OnDeath) -> ChargerDriver:
         changed = msgspec.structs.replace(settings, on_death=on_death)

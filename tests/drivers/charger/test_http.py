@@ -9,16 +9,17 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridges.charger import core
-from bridges.charger.settings import ChargerLimits
+from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from bridges.settings.load import load
 from drivers import DriverError
-from drivers.charger.http import BUSES, Settings, create, describe, warnings, wires
+from drivers.charger.http import DRIVER, Settings, create, describe, warnings
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
 from drivers.hal import http as bus_file
+from tests.depth import examples
 
 CODES = Codes(idle=[0], handshake=[1, 2], charging=[5], stopping=[11], released=[7], error=[238])
 SETTINGS = Settings(codes=CODES)
@@ -37,7 +38,9 @@ class Station:
         self.calls.append(f"GET {path}")
         return self.answer  # type: ignore[no-any-return]
 
-    def send(self, path: str, method: str = "POST", body: str | None = None) -> None:
+    def send(
+        self, path: str, method: str = "POST", body: str | None = None, safe: bool = False
+    ) -> None:
         self.calls.append(f"{method} {path}" + (f" {body}" if body else ""))
         if self.fails:
             raise HalError("the answer is lost")
@@ -48,8 +51,8 @@ def read(answer: Any) -> ChargerSample:
 
 
 def test_the_driver_stands_on_http_and_has_no_wires() -> None:
-    assert BUSES == ("http",)
-    assert wires(SETTINGS) == []
+    assert DRIVER.buses == ("http",)
+    assert list(DRIVER.wires(SETTINGS)) == []
 
 
 @pytest.mark.parametrize(
@@ -76,7 +79,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf_and_none_is_passed_on_raw() -> 
     states: dict[State, set[int]] = {state: set() for state in State}
     for code in range(256):
         sample = create("a", made, Station({"state": code, "error_msg": ""})).read()
-        shown = core.decide(core.Memory(), Sampled(sample), 0.0, ChargerLimits.of(made)).report
+        shown = core.decide(Memory(), Sampled(sample), 0.0, ChargerLimits.of(made)).report
         states[shown.state].add(code)
         assert ("unknown vendor state" in shown.error_message) == (
             sample.activity is Activity.UNKNOWN
@@ -139,7 +142,7 @@ anything = st.recursive(
 )
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @example({"state": 5.0})
 @example({"state": "5"})
 @example({"State": 5})
@@ -263,9 +266,9 @@ def test_check_prints_addresses_and_meanings() -> None:
 
 
 def test_check_says_how_often_errors_are_cleared_and_which_meaning_has_no_code() -> None:
-    from bridges.charger.settings import Limits
+    from bridges.charger.settings import Durations
 
-    made = Settings(codes=Codes(idle=[0], charging=[5]), limits=Limits(clear_errors_per_h=2))
+    made = Settings(codes=Codes(idle=[0], charging=[5]), limits=Durations(clear_errors_per_h=2))
     rows = dict(describe(made, bus_file.Settings(api_base="tpu")))
     assert rows["clear error"] == (
         "POST http://tpu/clear_error, when an operator resets, and by itself at most 2 times an hour"

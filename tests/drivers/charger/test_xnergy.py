@@ -5,12 +5,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.charger import core
-from bridges.charger.settings import ChargerLimits
+from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from drivers.charger import xnergy
 from drivers.charger.xnergy import Orders, Told, settled, steer
+from tests.depth import examples
 
 WELL = {"state": 0, "error_low": 0, "error_high": 0, "range": 0}
 
@@ -23,7 +24,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf() -> None:
     states: dict[State, set[int]] = {state: set() for state in State}
     for code in range(256):
         made = xnergy.sample(words(state=code))
-        shown = core.decide(core.Memory(), Sampled(made), 0.0, ChargerLimits()).report
+        shown = core.decide(Memory(), Sampled(made), 0.0, ChargerLimits()).report
         states[shown.state].add(code)
         unknown = "unknown vendor state" in shown.error_message
         assert unknown == (made.activity is Activity.UNKNOWN) == (code not in xnergy.CODES)
@@ -90,18 +91,16 @@ def test_only_the_answer_yes_is_in_range_and_only_when_it_is_the_last_checks(res
     assert xnergy.sample(words(range=1), settled=False).measured.in_range is False
 
 
-def test_a_temperature_below_zero_is_below_zero() -> None:
-    assert [xnergy.celsius(word) for word in (25, 0, 0xFFFF)] == [25, 0, -1]
-
-
 any_word = st.integers(0, 0xFFFF)
 
 
-@settings(derandomize=True, max_examples=300, deadline=None)
+@settings(derandomize=True, max_examples=examples(300), deadline=None)
 @given(
     st.fixed_dictionaries(
         dict.fromkeys(("state", "error_low", "error_high"), any_word),
-        optional=dict.fromkeys(set(xnergy.READS) - {"state", "error_low", "error_high"}, any_word),
+        optional=dict.fromkeys(
+            {*xnergy.ALWAYS, *xnergy.IN_ERROR} - {"state", "error_low", "error_high"}, any_word
+        ),
     )
 )
 def test_whatever_the_words_are_only_state_5_is_charging(found: dict[str, int]) -> None:

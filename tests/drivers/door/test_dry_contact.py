@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from bridges.door.settings import DoorLimits, Limits, Pulse
+from bridges.door.memory import DoorLimits
+from bridges.door.settings import Durations, Pulse
 from bridges.door.signals import DoorOutputs, DoorSample
 from bridges.settings.load import load
 from drivers.door.dry_contact import create, debounce, warnings, wires
@@ -214,7 +215,7 @@ def test_the_cores_limits_are_those_of_the_yaml() -> None:
         inputs={"fire": FIRE}, on_fire="open", pulse={"on_s": 0.5, "every_s": 3.0}, limits={}
     )
     assert DoorLimits.of(door, debounce(door)) == DoorLimits(
-        t=Limits(),
+        t=Durations(),
         debounce={"opened": 0.0625, "closed": 0.0625, "fire": 0.0625},
         on_fire="open",
         pulse=Pulse(on_s=0.5, every_s=3.0),
@@ -230,7 +231,7 @@ def test_polarity_is_the_wires_and_the_sample_has_none() -> None:
 
 def test_an_output_is_written_when_it_differs_and_again_after_a_failed_reading() -> None:
     built = settings()
-    bus = MemoryBus(Wiring(build("door", built), wires(built), str))
+    bus = MemoryBus(Wiring(build("door", built, wires(built)), wires(built), str))
     driver = create("door", built, bus)
     driver.open()
     bus.written.clear()

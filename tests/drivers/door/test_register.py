@@ -16,7 +16,8 @@ from bridges.settings.load import SettingsError, load
 from drivers.door.register import PROFILE, Settings, decode, door_map, points
 from drivers.door.register_map import DoorMap
 from drivers.hal.modbus.points import Point
-from drivers.profiles import FOLDER
+from drivers.profiles.texts import FOLDER
+from tests.depth import examples
 from tests.door.virtual import CLOSED, CoreAlone
 from tests.settings.reading import problems_of as settings_problems
 
@@ -100,7 +101,7 @@ def test_the_obstruction_is_its_bit_alone() -> None:
     ]
 
 
-@tries(derandomize=True, max_examples=500)
+@tries(derandomize=True, max_examples=examples(500))
 @given(
     st.fixed_dictionaries(
         {

@@ -364,3 +364,24 @@ def test_what_works_and_deserves_a_second_look(
 def test_every_hazard_has_a_line_of_its_name() -> None:
     names = {h.value for h in Hazard}
     assert names <= set(settings().inputs.__struct_fields__)
+
+
+def test_what_is_unsafe_is_told_with_all_that_is_wrong_not_after_it() -> None:
+    wired = settings(floors=["B1", "G", "1", "G"], inputs=inputs(fire_alarm=line(40)))
+    assert found(wired) == [
+        ("floors", "a floor is named twice: delete one"),
+        (
+            "inputs.fire_alarm",
+            "unsafe: with its wire cut, a fire alarm reads clear; or accept_unsafe: {fire_alarm:"
+            " <why it is safe here>}",
+        ),
+    ]
+
+
+def test_agv_mode_that_no_output_asks_for_is_warned_of() -> None:
+    assert warned(settings(outputs={"door_open": coil(1)})) == [
+        (
+            "outputs",
+            "no agv_mode_request asks for AGV mode, and it is awaited: the lift must grant it alone",
+        )
+    ]

@@ -157,6 +157,7 @@ def test_lines_that_count_only_in_agv_mode_are_not_known_outside_it() -> None:
         motion=None,
         agv=False,
         hazards=frozenset({Hazard.CODE_BLUE}),
+        floor_valid=False,
     )
     assert sample(wired, "agv_mode", *asserted) == LiftSample(
         level=None,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bridges.rmf import definitions as d
-from hal_fakes.demo.charging_verdict import CHARGED, problems
+from hal_fakes.demo.charging import CHARGED, problems
 from hal_fakes.demo.journal import Journal
 from tests.hal_fakes.demo.test_demo import directory, running
 
@@ -17,7 +17,7 @@ __all__ = ["directory"]
 
 def demo(directory: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "hal_fakes.demo.charging"],
+        [sys.executable, "-m", "hal_fakes.demo", "charging"],
         env={"TMPDIR": str(directory), "PATH": "/usr/bin:/bin"},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
@@ -26,7 +26,7 @@ def demo(directory: Path) -> subprocess.Popen[str]:
     )
 
 
-@pytest.mark.timeout(180)
+@pytest.mark.long
 def test_five_situations_are_dealt_with_by_three_daemons_on_one_graph(directory: Path) -> None:
     process = demo(directory)
     try:

@@ -9,10 +9,9 @@ import yaml
 
 from bridges.rmf import definitions as d
 from bridges.rmf.words import Stated
-from hal_fakes.demo import day
-from hal_fakes.demo.__main__ import FILES, summary
 from hal_fakes.demo.journal import Journal
-from hal_fakes.demo.verdict import RELAYS, problems
+from hal_fakes.demo.ride import DEMO, FROM, LIFT, RELAYS, TO, problems
+from hal_fakes.demo.stage import summary
 from hal_fakes.plants.plant import Edge
 
 ME = "demo/robot"
@@ -86,7 +85,7 @@ def state_after(states: list[Stated], after: Stated) -> Callable[[Journal], None
         ),
         (
             state_after([replace(FREE, session_id="fleet/other")], LIFT_STATES[0]),
-            "Lift1's sessions were ['', 'fleet/other', 'demo/robot', '']",
+            "Lift1's sessions were: none, fleet/other, demo/robot, none",
         ),
         (
             state_after([replace(CHARGER, state=200)], ASSIGNED),
@@ -94,11 +93,11 @@ def state_after(states: list[Stated], after: Stated) -> Callable[[Journal], None
         ),
         (
             state_after([replace(ASSIGNED, request_id="")], ASSIGNED),
-            "charger_a showed ('', 'demo', 'robot') when ASSIGNED, expected ('demo-1', ",
+            "charger_a was assigned for demo/robot, expected demo/robot (request demo-1)",
         ),
         (
             state_after([replace(CHARGER, request_id="demo-1")], CHARGER),
-            "charger_a showed ('demo-1', '', '') when IDLE, expected ('', '', '')",
+            "charger_a was idle for request demo-1, expected nobody",
         ),
     ],
 )
@@ -114,11 +113,11 @@ def test_a_day_on_which_nothing_happened_is_not_right() -> None:
 
 def test_the_devices_and_floors_of_the_day_are_those_of_the_shipped_files() -> None:
     named: dict[str, Any] = {}
-    for file in FILES.values():
+    for file in DEMO.files.values():
         content = yaml.safe_load(file.read_text())
         named |= content.get("lifts", {}) | content.get("doors", {}) | content.get("chargers", {})
-    assert list(named) == list(FILES)
-    assert {day.FROM, day.TO} <= set(named[day.LIFT]["floors"])
+    assert list(named) == list(DEMO.files)
+    assert {FROM, TO} <= set(named[LIFT]["floors"])
 
 
 # --- the journal -------------------------------------------------------------------------------
@@ -139,7 +138,7 @@ def test_lines_come_in_the_order_in_which_things_happened_not_in_which_they_were
     assert lines == [
         "   0.250 s  relay    Lift1       call_L3 on\n",
         "   0.400 s  sensor   Lift1       agv_mode off\n",
-        "   0.500 s  state    Lift1       L1 CLOSED HUMAN\n",
+        "   0.500 s  state    Lift1       car at L1, door closed, mode HUMAN\n",
     ]
 
 
@@ -180,7 +179,7 @@ def test_colour_is_only_for_a_terminal() -> None:
 def test_the_summary_says_what_was_done_and_how_much_it_took() -> None:
     journal = right_day()
     journal.legs = {"door": 4.1, "lift": 11.9}
-    assert summary(journal) == (
+    assert summary(DEMO, journal) == (
         "\nRIGHT: the robot went through the door, rode from L1 to L3 and charged; every relay is off."
         "\n       10 relay edges, 0 requests, 19 states\n       door 4.1 s, lift 11.9 s\n"
     )

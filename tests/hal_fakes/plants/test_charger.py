@@ -3,7 +3,7 @@
 import pytest
 
 from bridges.charger.signals import Activity
-from hal_fakes.plants.charger import ChargerPlant, build
+from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.plant import Edge, FailureMode, Plant
 
 
@@ -21,7 +21,7 @@ def parked(*failures: tuple[str, FailureMode]) -> ChargerPlant:
 
 
 def test_a_plant_is_one() -> None:
-    plant: Plant = build("charger_a", None)
+    plant: Plant = ChargerPlant("charger_a")
     assert (plant.name, plant.edges, plant.next_at()) == ("charger_a", [], float("inf"))
 
 
@@ -218,7 +218,7 @@ def test_a_range_check_takes_a_moment() -> None:
 
 
 def test_what_does_not_exist_cannot_be_pressed_driven_or_broken() -> None:
-    plant = build("a", None)
+    plant = ChargerPlant("a")
     with pytest.raises(
         ValueError, match=r"there are foreign_object, out_of_range, over_temp.*, robot, str"
     ):

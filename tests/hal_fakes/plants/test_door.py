@@ -2,6 +2,7 @@
 
 import pytest
 
+from drivers.door.dry_contact import wires
 from drivers.hal.points import Wire
 from hal_fakes.plants.door import DoorPlant, build
 from tests.door.virtual import settings
@@ -141,7 +142,8 @@ def test_a_door_on_pins_has_no_module_to_fail() -> None:
 
 
 def test_an_operator_for_pulses_waits_for_the_next_one() -> None:
-    door = build("door", settings(pulse={"on_s": 0.5, "every_s": 3.0}))
+    pulsed = settings(pulse={"on_s": 0.5, "every_s": 3.0})
+    door = build("door", pulsed, wires(pulsed))
     for second in range(0, 30, 3):
         door.drive("hold_open", True, float(second))
         door.drive("hold_open", False, second + 0.5)

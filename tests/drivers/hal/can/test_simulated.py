@@ -31,7 +31,7 @@ class Site:
         config = load(CONFIG / f"{file}.yaml")
         self.name = name
         self._simulation = Simulation(config, directory)
-        self.bus = self._simulation.open_bus("can", config.buses["can"])
+        self.bus = self._simulation.open_bus("can")
         self.driver = driver.create(name, config.devices[name], self.bus)
         self.driver.open()
         self._caller = Caller(self._simulation.socket_path("can"))

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-import drivers.hal
+import drivers.hal.gpio
 from tests.drivers.hal.gpio.lgpio_stand_in import StandIn
 
 
@@ -23,4 +23,4 @@ def forget() -> None:
     """Nobody has imported lgpio."""
     for module in ("gpiozero.pins.lgpio", "drivers.hal.gpio.pins"):
         sys.modules.pop(module, None)
-    vars(drivers.hal).pop("_gpio_pins", None)
+    vars(drivers.hal.gpio).pop("pins", None)

@@ -245,11 +245,11 @@ def test_a_chip_that_may_not_be_opened_asks_for_the_group(
     lgpio: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lgpio.chips = {}
-    from drivers.hal.gpio import pins as _gpio_pins
+    from drivers.hal.gpio import pins
 
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     with pytest.raises(HalError) as refused:
-        _gpio_pins.open_factory(0, dev(tmp_path, 0))
+        pins.open_factory(0, dev(tmp_path, 0))
     assert str(refused.value) == (
         f"{tmp_path}/gpiochip0: no permission: the daemon's user must be in the group gpio"
     )

@@ -16,11 +16,12 @@ from drivers import DriverError
 from drivers.charger.http import HttpCharger, create
 from drivers.charger.state_codes import Codes
 from drivers.hal.http import HttpBus
-from hal_fakes.http import HttpServer, Station, serve
-from hal_fakes.plants.charger import Reading, build
+from hal_fakes.fake import plants_on, stations_on
+from hal_fakes.http import HttpServer, serve
+from hal_fakes.http_charger import HttpCharger as Station
+from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import FailureMode
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import plants_on
 from tests.waiting import wait_until
 
 EXAMPLE = Path(__file__).parents[4] / "config" / "charger_http.yaml"
@@ -34,7 +35,7 @@ class Fake:
         settings = msgspec.structs.replace(config.buses["tpu"], timeout_s=timeout_s)
         self.world = RealTime(plants_on(config, "tpu"))
         self.plant = self.world.plants["charger_a"]
-        self.server: HttpServer = serve(settings, self.world.plants, config, "tpu")
+        self.server: HttpServer = serve(settings, stations_on(config, "tpu", self.world.plants))
         pointed = msgspec.structs.replace(settings, **self.server.replace)
         calls = iter(range(10**6))
         self.bus = HttpBus(pointed, clock=lambda: 1000.0 * next(calls))
@@ -101,7 +102,7 @@ def test_a_maker_with_few_numbers_shows_the_nearest() -> None:
     ("progress", "code"), [(0.0, 1), (0.16, 1), (0.17, 2), (0.5, 4), (0.99, 10), (1.0, 10)]
 )
 def test_the_numbers_of_a_handshake_follow_one_another(progress: float, code: int) -> None:
-    station = Station(build("a", None), load(EXAMPLE).devices["charger_a"])
+    station = Station(ChargerPlant("a"), load(EXAMPLE).devices["charger_a"])
     reading = Reading(Activity.HANDSHAKE, progress, "", {})
     assert json.loads(station.body(reading)) == {"state": code, "error_msg": ""}
 

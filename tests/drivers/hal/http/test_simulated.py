@@ -26,7 +26,7 @@ def test_a_robot_that_is_pressed_onto_the_pad_is_charged_and_the_child_ends_with
 ) -> None:
     config = load(EXAMPLE)
     simulation = Simulation(config, tmp_path)
-    bus = simulation.open_bus("tpu", config.buses["tpu"])
+    bus = simulation.open_bus("tpu")
     assert isinstance(bus, HttpBus)
     driver = create("charger_a", config.devices["charger_a"], bus)
     assert driver.read().activity is Activity.IDLE

@@ -8,10 +8,13 @@ import struct
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
+import msgspec
 import pytest
 
 from drivers.hal.modbus import ModbusBus, Serial, Settings, Tcp
+from drivers.hal.modbus.watchdog import Watchdog
 from drivers.hal.points import HalError
 
 Reply = Callable[[bytes], bytes | None]
@@ -161,6 +164,7 @@ def bus_to(
     timeout_s: float = 2.0,
     retries: int = 1,
     ignore_echo: bool = False,
+    module_watchdog: dict[str, Any] | None = None,
 ) -> ModbusBus:
     """A bus to this port of this machine, whose pauses follow the clock and have no jitter."""
     settings = Settings(
@@ -168,6 +172,7 @@ def bus_to(
         serial=serial(port, ignore_echo) if isinstance(port, str) else None,
         timeout_s=timeout_s,
         retries=retries,
+        module_watchdog=msgspec.convert(module_watchdog, Watchdog | None),
     )
     opened.append(ModbusBus(settings, clock or Time(), lambda: 0.0))
     return opened[-1]

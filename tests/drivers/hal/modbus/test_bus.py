@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from drivers.hal.modbus.wire import Connection
+from drivers.hal.modbus.tcp import Connection
 from tests.drivers.hal.modbus.module import Module, Time, bits_reply, bus_to, door, fails, frame
 
 IN0 = "unit 1 discrete input 0"
@@ -140,8 +140,8 @@ def test_closing_many_doors_on_a_dead_bus_costs_one_try(module: Module) -> None:
     for lines in doors:
         lines.claim()
     module.close()
-    assert isinstance(bus._connection, Connection)
-    dialler = bus._connection._dialler
+    assert isinstance(bus._wire, Connection)
+    dialler = bus._wire._dialler
     dialled = dialler.dialled
     for lines in doors:
         lines.close()

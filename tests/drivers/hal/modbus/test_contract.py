@@ -5,8 +5,8 @@ What is TCP's alone is in `test_bus.py`, and the line's alone in `test_rtu.py`.
 
 import pytest
 
-from drivers.hal.modbus import EXCEPTIONS
 from drivers.hal.modbus.points import parse, ranges
+from drivers.hal.modbus.wire import EXCEPTIONS
 from drivers.hal.points import HalError
 from tests.drivers.hal.modbus.module import Module, Time, bits_reply, bus_to, door, fails, frame
 
@@ -161,7 +161,7 @@ def test_the_jitter_only_shortens_a_pause(either: Module) -> None:
     either.reply = lambda request: frame(request, b"\x82\x0b")
     clock = Time()
     bus = bus_to(either.port, clock)
-    bus._units[1] = type(bus._link)(clock, lambda: 1.0)
+    bus._units[1, False] = type(bus._link)(clock, lambda: 1.0)
     fails(bus, IN0)
     clock.now = 0.39
     fails(bus, IN0)

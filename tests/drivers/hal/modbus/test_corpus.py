@@ -52,8 +52,8 @@ def _check(module: Module, case: Recorded) -> None:
     driver = create("door", DOOR, bus)
 
     def read() -> DoorSample | None:
-        while bus._connection.owes(1):
-            bus._connection.begin(1)
+        while bus._wire.owes(1):
+            bus._wire.begin(1)
         clock.now += 60.0
         try:
             return driver.read()

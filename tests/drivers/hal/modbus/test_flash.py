@@ -10,9 +10,9 @@ import pytest
 
 from bridges.commands.check import described
 from bridges.core.decision import Sampled, WriteFailed
-from bridges.door.core import CloseDoor, Event, OpenDoor, decide, initial
-from bridges.door.settings import DoorLimits
-from bridges.door.signals import DoorOutputs
+from bridges.door.core import decide, initial
+from bridges.door.memory import DoorLimits
+from bridges.door.signals import CloseRequested, DoorOutputs, Event, OpenRequested
 from bridges.settings.load import load
 from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires
@@ -89,7 +89,11 @@ def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, s
     driver = claimed(module, clock=clock, timeout_s=0.1)
     limits = DoorLimits.of(settings, debounce(settings))
     memory, told = initial(limits, 0.0), list[tuple[float, str]]()
-    said: dict[float, Event] = {1.0: OpenDoor("a"), 3.0: OpenDoor("b"), 6.0: CloseDoor("a")}
+    said: dict[float, Event] = {
+        1.0: OpenRequested("a"),
+        3.0: OpenRequested("b"),
+        6.0: CloseRequested("a"),
+    }
     for now in (scan * SCAN_S for scan in range(120)):
         clock.now += 60.0
         decision = decide(memory, Sampled(driver.read()), now, limits)

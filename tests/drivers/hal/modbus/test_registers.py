@@ -4,18 +4,10 @@ import struct
 
 import pytest
 
+from drivers.hal.modbus.lines import Lines
 from drivers.hal.modbus.points import Point
-from drivers.hal.modbus.registers import (
-    READ_REGISTERS,
-    REGISTERS,
-    TABLES,
-    WRITABLE,
-    RegisterLines,
-    at,
-    place,
-    read,
-    write,
-)
+from drivers.hal.modbus.registers import REGISTERS, TABLES, WRITABLE, at, place
+from drivers.hal.modbus.wire import READS, WRITES
 from drivers.hal.points import HalError
 from tests.drivers.hal.modbus.module import Module, Time, bus_to, frame
 
@@ -33,7 +25,7 @@ def test_neighbours_are_asked_for_together_and_nothing_besides(either: Module) -
     either.reply = lambda request: frame(
         request, bytes((request[7], 2 * request[11], *(0x12, 0x34) * request[11]))
     )
-    image = read(bus_to(either.port), [I0, H9, H1, H0])
+    image = bus_to(either.port).cells([I0, H9, H1, H0])
     assert image == dict.fromkeys((H0, H1, H9, I0), 0x1234)
     asked = [request[6:].hex() for request in either.asked]
     assert asked == ["010300000002", "010300090001", "010400000001"]
@@ -41,15 +33,15 @@ def test_neighbours_are_asked_for_together_and_nothing_besides(either: Module) -
 
 def test_a_register_is_written_with_function_6(either: Module) -> None:
     either.reply = lambda request: frame(request, request[7:12])
-    write(bus_to(either.port), H9, 0xABCD)
+    bus_to(either.port).write(H9, 0xABCD)
     assert [request[6:].hex() for request in either.asked] == ["01060009abcd"]
 
 
 def test_a_coil_is_written_and_read_as_one(either: Module) -> None:
     either.coils[1, 4] = False
     bus = bus_to(either.port)
-    write(bus, COIL, 1)
-    assert read(bus, [COIL]) == {COIL: 1}
+    bus.write(COIL, 1)
+    assert bus.cells([COIL]) == {COIL: 1}
     assert [request[6:].hex() for request in either.asked] == ["01050004ff00", "010100040001"]
 
 
@@ -68,7 +60,7 @@ def test_a_coil_is_written_and_read_as_one(either: Module) -> None:
 def test_a_reply_that_does_not_answer_is_no_reading(module: Module, pdu: str) -> None:
     module.reply = lambda request: frame(request, bytes.fromhex(pdu))
     with pytest.raises(HalError, match=r"no Modbus reply to it|no reply within"):
-        read(bus_to(module.port, Time(), timeout_s=0.05, retries=0), [H0])
+        bus_to(module.port, Time(), timeout_s=0.05, retries=0).cells([H0])
 
 
 @pytest.mark.parametrize(
@@ -77,11 +69,11 @@ def test_a_reply_that_does_not_answer_is_no_reading(module: Module, pdu: str) ->
 def test_the_echo_of_another_write_is_no_success(module: Module, pdu: str) -> None:
     module.reply = lambda request: frame(request, bytes.fromhex(pdu))
     with pytest.raises(HalError):
-        write(bus_to(module.port, Time(), timeout_s=0.05, retries=0), H9, 0xABCD)
+        bus_to(module.port, Time(), timeout_s=0.05, retries=0).write(H9, 0xABCD)
 
 
 def test_closing_what_was_never_claimed_sends_nothing(module: Module) -> None:
-    RegisterLines(bus_to(module.port), {}, H9, 0).close()
+    Lines(bus_to(module.port), {}, {"command": H9}, {"command": 0}).close()
     assert module.asked == []
 
 
@@ -90,7 +82,7 @@ def test_an_exception_is_named(module: Module) -> None:
     with pytest.raises(
         HalError, match="read holding register 0: exception 2, illegal data address"
     ):
-        read(bus_to(module.port), [H0])
+        bus_to(module.port).cells([H0])
 
 
 @pytest.mark.parametrize(
@@ -128,4 +120,4 @@ def test_what_is_no_place_is_refused_with_what_to_write(text: str, reason: str) 
 def test_a_base_moves_every_address() -> None:
     assert at(3, "input register 2", 100) == Point(3, "input register", 102)
     assert {*REGISTERS, *WRITABLE} <= {*TABLES}
-    assert set(READ_REGISTERS) == set(REGISTERS)
+    assert (set(READS), set(WRITES)) == (set(TABLES), set(WRITABLE))

@@ -14,7 +14,8 @@ import pytest
 
 from bridges.settings.load import load
 from drivers.hal.modbus import Serial, Settings, Tcp, warnings
-from drivers.hal.modbus.wire import Connection, NoReply, Unreachable
+from drivers.hal.modbus.tcp import Connection
+from drivers.hal.modbus.wire import NoReply, Question, Unreachable
 from tests.drivers.hal.modbus.module import Module, door
 
 
@@ -46,14 +47,10 @@ def test_a_connection_that_is_reset_is_no_reply() -> None:
         connection = Connection("127.0.0.1", listener.getsockname()[1], 5.0)
         connection.connect()
         far_end, _ = listener.accept()
-
-        def ask_and_lose(client: Any) -> Any:
-            far_end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-            far_end.close()
-            return client.read_coils(0, count=1, device_id=1)
-
+        far_end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        far_end.close()
         with pytest.raises(NoReply, match="the connection broke"):
-            connection.ask(1, ask_and_lose)
+            connection.ask(Question(1, 1, 0, 1))
         connection.close()
 
 
@@ -170,9 +167,13 @@ def test_loading_the_vendors_library_costs_the_first_request_none_of_its_time(
     assert either.functions() == [1]
 
 
-def test_the_vendors_library_is_loaded_with_the_first_connection_and_its_server_never() -> None:
-    before = "import drivers.hal.modbus, drivers.door.dry_contact"
+def test_the_vendors_libraries_are_loaded_with_the_first_bus_and_their_server_never() -> None:
+    before = "import drivers.hal.modbus as m, drivers.door.dry_contact, drivers.door.register"
     assert loaded(before) == set()
-    after = loaded(f"{before}; from drivers.hal.modbus.wire import _client_class; _client_class()")
-    assert "pymodbus.client" in after
-    assert {m for m in after if m.startswith(("pymodbus.server", "aiohttp"))} == set()
+    tcp = loaded(f"{before}; m.open_bus(m.Settings(tcp=m.Tcp(host='a')))")
+    line = "m.Serial(port='/dev/a', baudrate=9600, parity='none', stopbits=1)"
+    rtu = loaded(f"{before}; m.open_bus(m.Settings(serial={line}))")
+    assert "pymodbus.framer.socket" in tcp
+    assert {m for m in tcp if m.startswith(("pymodbus.server", "aiohttp", "serial"))} == set()
+    assert {m for m in rtu if m.startswith(("pymodbus.server", "aiohttp"))} == set()
+    assert "serial" in rtu

@@ -5,6 +5,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from drivers.hal import Bus, BusType
+
 
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The module."""
@@ -20,5 +22,9 @@ def canonical(point: str) -> str:
     return point
 
 
-def open_bus(settings: Settings) -> None:
+def open_bus(settings: Settings) -> Bus:
     """Never."""
+    raise NotImplementedError
+
+
+BUS = BusType(settings=Settings, open_bus=open_bus, canonical=canonical)

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 import msgspec
 
+from drivers.hal import Bus, BusType
 from drivers.hal.points import Wire
 
 
@@ -40,5 +41,15 @@ def wire_problems(wire: Wire) -> Iterable[str]:
         yield "A8 cannot drive"
 
 
-def open_bus(settings: Settings) -> None:
+def open_bus(settings: Settings) -> Bus:
     """Never."""
+    raise NotImplementedError
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+    canonical=canonical,
+    describe=describe,
+    wire_problems=wire_problems,
+)

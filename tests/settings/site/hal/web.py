@@ -2,6 +2,8 @@
 
 import msgspec
 
+from drivers.hal import Bus, BusType
+
 
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The server."""
@@ -9,5 +11,12 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     host: str
 
 
-def open_bus(settings: Settings) -> None:
+def open_bus(settings: Settings) -> Bus:
     """Never."""
+    raise NotImplementedError
+
+
+BUS = BusType(
+    settings=Settings,
+    open_bus=open_bus,
+)

@@ -8,9 +8,9 @@ import msgspec
 from msgspec import Meta
 
 from bridges.core.fields import DeviceSettings, Name, Seconds
+from drivers import Driver
+from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Output, Wire
-
-BUSES = ("pins", "module")
 
 Code = Annotated[int, Meta(ge=0, le=15)]
 
@@ -84,3 +84,13 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
     """Legal, but worth a look."""
     if settings.limits.loud:
         yield ("limits", "loud"), "it will be loud"
+
+
+def create(name: str, settings: Settings, bus: object) -> Driver[None, None]:
+    """Never."""
+    raise NotImplementedError
+
+
+DRIVER = DriverType(
+    settings=Settings, buses=("pins", "module"), create=create, wires=wires, warnings=warnings
+)

@@ -1,9 +1,9 @@
 """A driver without wires."""
 
 from bridges.core.fields import DeviceSettings, Name
+from drivers import Driver
+from drivers.driver_type import DriverType
 from tests.settings.site.hal import web
-
-BUSES = ("web",)
 
 
 class Settings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -15,3 +15,11 @@ class Settings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=
 def describe(settings: Settings, bus: web.Settings) -> list[tuple[str, str]]:
     """What it talks to."""
     return [("polls", f"http://{bus.host}/{settings.page}"), ("identity", "not verified")]
+
+
+def create(name: str, settings: Settings, bus: object) -> Driver[None, None]:
+    """Never."""
+    raise NotImplementedError
+
+
+DRIVER = DriverType(settings=Settings, buses=("web",), create=create, describe=describe)

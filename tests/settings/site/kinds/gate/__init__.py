@@ -2,14 +2,14 @@
 
 from typing import Any, cast
 
-from bridges.core.kind import Kind
+from bridges.core.kind import AnyDeviceKind, Kind
 
 
 def _unused(*_: Any) -> Any:
     raise AssertionError("the loader decides nothing")
 
 
-KIND = Kind(
+KIND: AnyDeviceKind = Kind(
     name="gate",
     devices_key="gates",
     states=cast(Any, None),

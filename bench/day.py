@@ -1,0 +1,48 @@
+"""How fast a simulated day goes by: two robots ride two lifts all day, through our supervisor."""
+
+import time
+from pathlib import Path
+
+from bench.figures import Tables
+from hal_fakes.rmf.phases import EndLiftSession, RequestLift
+from hal_fakes.rmf.robot import Phase
+from tests.lift_supervisor.world import LiftNode, OurSupervisor, Rider
+from tests.serve.virtual_graph import World
+
+DAY_S = 86400.0
+
+
+def measure(scratch: Path) -> Tables:
+    """Seconds of ours, and rides."""
+    began = time.perf_counter()
+    world = World()
+    for name in ("Lift1", "Lift2"):
+        _Lift(world, name)
+    OurSupervisor(world)
+    trips = [("L1", "L3"), ("L3", "L1")] * 2000  # more than fit into a day
+    robots = [_Rider(world, f"fleet/{name}", *trips) for name in ("a", "b")]
+    while world.now < DAY_S:
+        world.run(min(world.now + 3600.0, DAY_S))
+        world.sent.clear()
+    rides = sum(len(robot.rode) for robot in robots)
+    day = {"took s": time.perf_counter() - began, "rides": rides}
+    return {"24 simulated hours": {"2 robots, 2 lifts": day}}
+
+
+class _Lift(LiftNode):
+    SCAN_S = 0.9  # and at every wake_at, request and edge: between them nothing can change
+
+
+class _Rider(Rider):
+    """Takes the two lifts in turn, and has something to do for a minute between its rides."""
+
+    REST_S = 60.0
+
+    def _phase(self) -> Phase:
+        lift = f"Lift{1 + len(self.trips) % 2}"
+        pickup, target = self.trips[0]
+        return [
+            RequestLift(lift, pickup, inside=False),
+            RequestLift(lift, target, inside=True),
+            EndLiftSession(lift),
+        ][self._step]

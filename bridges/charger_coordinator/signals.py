@@ -1,0 +1,59 @@
+"""What the coordinator's core hears from the graph: fleets, stations, schedules and operators."""
+
+import msgspec
+
+from bridges.charger.settings import Robot
+from bridges.core.decision import OperatorReset
+from bridges.core.graph_kind import MaySpeak, Woken
+from bridges.rmf.definitions import ChargerStateValue
+
+
+class Sighting(msgspec.Struct, frozen=True):
+    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING. `place`: the waypoint
+    of ours at which it stands; None for none."""
+
+    who: Robot
+    charges: bool
+    place: str | None
+    battery_percent: float
+    task_id: str
+
+
+class FleetSeen(msgspec.Struct, frozen=True):
+    """A FleetState, of the robots that we know."""
+
+    robots: tuple[Sighting, ...]
+
+
+class StateHeard(msgspec.Struct, frozen=True):
+    """A ChargerState. `robot`: None where it names none."""
+
+    station: str
+    state: ChargerStateValue
+    request_id: str = ""
+    robot: Robot | None = None
+    error: str = ""
+
+
+class Wanted(msgspec.Struct, frozen=True):
+    """An operator wants this robot charged; `station`: there rather than elsewhere, "" anywhere."""
+
+    robot: Robot
+    station: str
+    request_id: str
+    start_timeout_s: float
+
+
+class Unwanted(msgspec.Struct, frozen=True):
+    """An operator's wish is withdrawn."""
+
+    request_id: str
+
+
+class Dedicated(msgspec.Struct, frozen=True):
+    """Somebody else's charging assignments: robot -> the station that it is to use."""
+
+    stations: tuple[tuple[Robot, str], ...]
+
+
+Event = FleetSeen | StateHeard | Wanted | Unwanted | Dedicated | MaySpeak | OperatorReset | Woken

@@ -1,0 +1,262 @@
+"""What `watch` shows: rows made from messages and a time. Pure.
+
+RMF's states have no place for faults, queues and simulations: our daemons tell those on `/diagnostics`.
+"""
+
+import re
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from bridges.commands.graph import SILENT_AFTER_S, Heard
+from bridges.rmf import definitions as d
+from bridges.rmf import words
+from bridges.serve import diagnostics
+
+KINDS: Final = {d.LiftState: "lift", d.DoorState: "door", d.ChargerState: "charger"}
+COORDINATOR: Final = "charger_coordinator"
+HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
+SECONDS: Final = re.compile(r"\d+(\.\d+)? s\b")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One device, the chargers' coordinator, or a robot with the place that it is assigned to.
+
+    `waiting`: the supervisor's or coordinator's queue. `age`: that of the reading. `mark`: why not to
+    trust the row. `simulated`: no hardware is behind it. `faults`: what the daemons that serve it tell.
+    """
+
+    kind: str
+    name: str
+    state: str
+    held_by: str = "-"
+    waiting: str = ""
+    age: str = "-"
+    mark: str = ""
+    simulated: bool = False
+    faults: str = ""
+
+    @property
+    def wrong(self) -> bool:
+        """It deserves a look."""
+        return bool(self.mark or self.faults)
+
+    def cells(self) -> tuple[str, ...]:
+        """As in a table, under HEADINGS."""
+        marks = " ".join(
+            word for word in ("SIMULATED" if self.simulated else "", self.mark) if word
+        )
+        state = (self.kind, self.name, self.state, self.held_by)
+        return (*state, self.waiting, self.age, marks, self.faults)
+
+    def news(self) -> tuple[object, ...]:
+        """What is worth a line when it changes: seconds that run are not."""
+        told = (self.state, self.held_by, self.waiting, self.mark, self.faults)
+        return (self.simulated, *(SECONDS.sub("", text) for text in told))
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """A daemon's last word about one device; `at`: when it came (monotonic s)."""
+
+    at: float
+    kind: str
+    status: d.DiagnosticStatus
+
+    def value(self, key: str) -> str:
+        """One of its values; "" and "-" are none."""
+        found = next((pair.value for pair in self.status.values if pair.key == key), "")
+        return "" if found == "-" else found
+
+    @property
+    def of_daemon(self) -> bool:
+        """It is about the daemon itself, not about a device."""
+        return self.status.name == f"{self.status.hardware_id}: daemon"
+
+    @property
+    def device(self) -> tuple[str, str]:
+        """The kind and name of the device; a supervisor's are those of its lift or door."""
+        return self.kind.removesuffix("_supervisor"), self.status.hardware_id
+
+    def faults(self) -> Iterator[str]:
+        """`OVERLOAD (since 3 s)` for each."""
+        for code in diagnostics.faults(self.status):
+            detail = self.value(code)
+            yield f"{code} ({detail})" if detail else code
+
+
+class Board:
+    """The latest of each device."""
+
+    def __init__(self) -> None:
+        self._latest: dict[tuple[str, str], Heard] = {}
+        self._requesters: dict[str, str] = {}
+        self._places: dict[str, str] = {}
+        self._diagnoses: dict[str, Diagnosis] = {}
+
+    def take(self, heard: Heard) -> None:
+        """One message."""
+        match heard.message:
+            case d.SupervisorHeartbeat():
+                self._requesters = {
+                    door.door_name: " ".join(s.requester_id for s in door.sessions)
+                    for door in heard.message.all_sessions
+                }
+            case d.ChargingAssignments(fleet_name=fleet):
+                for one in heard.message.assignments:
+                    place = f"{words.plain(d.ChargingMode, one.mode)} at {one.waypoint_name}"
+                    self._places[words.printable(f"{fleet}/{one.robot_name}")] = place
+            case d.DiagnosticArray():
+                for status in heard.message.status:
+                    self._diagnose(status, heard.at)
+            case state:
+                key = (KINDS[type(state)], words.device(state))
+                self._latest[key] = heard
+
+    def rows(self, now: float, wall: float) -> list[Row]:
+        """By kind and name. `now` is monotonic, `wall` the clock that stamps are compared with."""
+        devices = sorted(self._latest.items(), key=_order)
+        rows = [self._device(kind, name, heard, now, wall) for (kind, name), heard in devices]
+        return [*rows, *self._coordinators(now), *self._robots()]
+
+    def _diagnose(self, status: d.DiagnosticStatus, at: float) -> None:
+        """Of ours, by `<node>: <device>`. Others write diagnostics too, and do not say our `kind`."""
+        kind = next((pair.value for pair in status.values if pair.key == "kind"), "")
+        diagnosis = Diagnosis(at, kind, status)
+        if (
+            diagnosis.device in self._latest
+            or kind == COORDINATOR
+            or (kind and diagnosis.of_daemon)
+        ):
+            self._diagnoses[status.name] = diagnosis
+
+    def _device(self, kind: str, name: str, heard: Heard, now: float, wall: float) -> Row:
+        state = heard.message
+        found = [
+            one for one in self._current(now) if one.device == (kind, name) and not one.of_daemon
+        ]
+        held_by = words.holder(state)
+        if isinstance(state, d.DoorState):
+            held_by = words.printable(self._requesters.get(state.door_name, ""))
+        return Row(
+            kind,
+            words.printable(name),
+            words.condition(state),
+            held_by or "-",
+            words.printable(", ".join(filter(None, (one.value("waiting") for one in found)))),
+            _age(words.stamped_at(state), wall),
+            _mark(heard, now, wall),
+            any(one.kind == kind and self._simulated(one, now) for one in found),
+            _faults(found),
+        )
+
+    def _coordinators(self, now: float) -> Iterator[Row]:
+        for diagnosis in self._current(now):
+            if diagnosis.kind != COORDINATOR or diagnosis.of_daemon:
+                continue
+            daemon = self._daemon(diagnosis, now)
+            passive = daemon is not None and diagnostics.PASSIVE in daemon.status.message
+            queue = diagnosis.value("queue")
+            yield Row(
+                "coordinator",
+                words.printable(diagnosis.status.name.partition(": ")[0]),
+                "passive: another node assigns chargers" if passive else "assigns chargers",
+                waiting=words.printable(queue),
+                simulated=self._simulated(diagnosis, now),
+                faults=_faults([diagnosis]),
+            )
+
+    def _robots(self) -> Iterator[Row]:
+        for who, place in sorted(self._places.items()):
+            yield Row("robot", who, words.printable(place))
+
+    def _current(self, now: float) -> list[Diagnosis]:
+        return [one for one in self._diagnoses.values() if now - one.at <= SILENT_AFTER_S]
+
+    def _daemon(self, diagnosis: Diagnosis, now: float) -> Diagnosis | None:
+        node = diagnosis.status.name.partition(": ")[0]
+        daemon = self._diagnoses.get(f"{node}: daemon")
+        return daemon if daemon in self._current(now) else None
+
+    def _simulated(self, diagnosis: Diagnosis, now: float) -> bool:
+        daemon = self._daemon(diagnosis, now)
+        return daemon is not None and diagnostics.SIMULATED in daemon.status.message
+
+
+def _faults(found: Iterable[Diagnosis]) -> str:
+    texts = [text for diagnosis in found for text in diagnosis.faults()]
+    return words.printable("; ".join(dict.fromkeys(texts)))
+
+
+def _order(entry: tuple[tuple[str, str], Heard]) -> tuple[int, str]:
+    (kind, name), _ = entry
+    return list(KINDS.values()).index(kind), name
+
+
+def _age(stamped_at: float, wall: float) -> str:
+    if stamped_at == 0:
+        return "never read"
+    age = wall - stamped_at
+    if age < 60:
+        return f"{age:.1f} s"
+    return f"{age / 60:.0f} min" if age < 7200 else f"{age / 3600:.0f} h"
+
+
+def _mark(heard: Heard, now: float, wall: float) -> str:
+    silent_s = now - heard.at
+    age = wall - words.stamped_at(heard.message)
+    if silent_s > SILENT_AFTER_S:
+        return f"SILENT {silent_s:.0f} s"
+    if age < -SILENT_AFTER_S:
+        return "CLOCK AHEAD"
+    return "STALE" if age - silent_s > SILENT_AFTER_S else ""
+
+
+def table(rows: Iterable[Row]) -> list[str]:
+    """The rows in columns, under a heading; a queue or faults have a column where there are any."""
+    shown = [row.cells() for row in rows]
+    if not shown:
+        return ["nothing heard yet"]
+    optional = ("waiting", "", "faults")
+    columns = [
+        [heading, *cells]
+        for heading, *cells in zip(HEADINGS, *shown, strict=True)
+        if heading not in optional or any(cells)
+    ]
+    widths = [max(map(len, column)) for column in columns]
+    lines = zip(*columns, strict=True)
+    return ["  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in lines]
+
+
+def changes(before: list[Row], after: list[Row]) -> list[Row]:
+    """The rows that say something else than they did, ages and running seconds apart."""
+    known = {(row.kind, row.name): row.news() for row in before}
+    return [row for row in after if known.get((row.kind, row.name)) != row.news()]
+
+
+def change_line(row: Row, wall: float) -> str:
+    """A changed row as one line, to be read in a pipe."""
+    clock = time.strftime("%H:%M:%S", time.localtime(wall)) + f".{int(wall * 1000) % 1000:03d}"
+    kind, name, state, held_by, waiting, age, marks, faults = row.cells()
+    parts = [clock, f"{kind:<7}", f"{name:<12}", f"{state:<38}", held_by]
+    parts += [f"waiting: {waiting}"] if waiting else []
+    parts += [f"age {age}", *filter(None, (marks, faults))]
+    return "  ".join(parts)
+
+
+def repaint(rows: list[Row], lines_before: int, columns: int, lines: int) -> tuple[str, int]:
+    """What brings a terminal that shows `lines_before` lines of the table to these rows.
+
+    Returns it with the number of lines then shown. No line wraps and nothing scrolls away.
+    """
+    shown = table(rows)
+    if len(shown) >= lines:
+        shown = [*shown[: lines - 2], f"… and {len(shown) - lines + 2} more"]
+    marked = {i for i, row in enumerate(rows, start=1) if row.wrong}
+    text = f"\x1b[{lines_before}A" if lines_before else ""
+    for i, line in enumerate(shown):
+        line = line[: columns - 1]
+        text += f"\r\x1b[K\x1b[31m{line}\x1b[0m\n" if i in marked else f"\r\x1b[K{line}\n"
+    return text + "\x1b[J", len(shown)

@@ -1,0 +1,81 @@
+"""When `send` sends, when it is over, and what it says when nothing has come of it.
+
+Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as RMF does
+it. Only a state heard after the first request counts: the one before may show the same for another
+reason. What each request asks for, and what fulfils it, is in `requests/`.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from bridges.commands.graph import SILENT_AFTER_S
+from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen
+from bridges.rmf import words
+
+REPEAT_S: Final = 1.0
+PATIENCE_S: Final = 2.0
+"""States come at 1 Hz: whoever has not been heard for two periods is mentioned."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One look: a request to send now, something worth saying once, or the end."""
+
+    send: words.Requested | None = None
+    hint: str = ""
+    outcome: Done | Failed | None = None
+
+
+def step(request: Request, seen: Seen, now: float) -> Step:
+    """What to do now."""
+    over = request.outcome(seen)
+    if over is not None:
+        return Step(outcome=over)
+    if now >= seen.began_at + seen.timeout_s:
+        return Step(outcome=Failed(_reason(request, seen, now)))
+    hint = _hint(request, seen, now)
+    return Step(request.message(seen), hint) if _may_send(request, seen, now) else Step(hint=hint)
+
+
+def _may_send(request: Request, seen: Seen, now: float) -> bool:
+    if seen.last_sent_at is not None:
+        return now >= seen.last_sent_at + REPEAT_S
+    heard_or_late = request.ready(seen) or now >= seen.began_at + PATIENCE_S
+    return seen.listeners > 0 and heard_or_late
+
+
+def _hint(request: Request, seen: Seen, now: float) -> str:
+    """What a person can do at once: nobody has to wait for the timeout to read it."""
+    if now < seen.began_at + PATIENCE_S:
+        return ""
+    if seen.first_sent_at is None and seen.listeners == 0:
+        return _said(request.nobody())
+    if not seen.states:
+        return _said(request.unheard(seen.names))
+    if seen.first_sent_at is None or now < seen.first_sent_at + PATIENCE_S:
+        return ""
+    obstacle = _first(request.obstacles(seen))
+    return _said(obstacle) if obstacle.remedy else ""
+
+
+def _reason(request: Request, seen: Seen, now: float) -> str:
+    """Why the time ran out, and where to look next."""
+    if seen.first_sent_at is None and seen.listeners == 0:
+        return _said(request.nobody())
+    if not seen.states:
+        return _said(request.unheard(seen.names))
+    silent_s = now - seen.states[-1].at
+    if silent_s > SILENT_AFTER_S:
+        return f"{request.name} fell silent {silent_s:.0f} s ago: is its daemon still running?"
+    obstacle = _first(request.obstacles(seen))
+    state = words.described(seen.latest())
+    return _said(obstacle._replace(text=f"{obstacle.text} (last state: {state})"))
+
+
+def _first(obstacles: Iterable[Obstacle]) -> Obstacle:
+    return next(obstacle for obstacle in obstacles if obstacle.present)
+
+
+def _said(obstacle: Obstacle) -> str:
+    return f"{obstacle.text}; {obstacle.remedy}" if obstacle.remedy else obstacle.text

@@ -1,0 +1,124 @@
+"""A ride, as RequestLift.cpp asks for it, and the end of a session, as EndLiftSession.cpp does."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen, nearest
+from bridges.rmf import definitions as d
+from bridges.rmf import topics, words
+
+SHUT_OUT: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
+
+
+class _Lift(Request):
+    __slots__ = ()
+    kind = "lift"
+    states, own = topics.LIFT_STATES, topics.LIFT_REQUESTS
+    adapter = topics.ADAPTER_LIFT_REQUESTS
+
+    @property
+    def _release(self) -> str:
+        return self.line.other("send", "lift", self.name, "--end")
+
+
+@dataclass(frozen=True, slots=True)
+class LiftRide(_Lift):
+    """The session, and the car at this floor with its door open, as a fleet adapter asks for it."""
+
+    floor: str
+    session: str
+    granted_only: bool = False
+
+    def message(self, seen: Seen) -> d.LiftRequest:
+        """AGV_MODE with DOOR_OPEN, whatever is wanted: fleets send nothing else."""
+        return d.LiftRequest(
+            lift_name=self.name,
+            session_id=self.session,
+            request_type=d.LiftRequestType.REQUEST_AGV_MODE,
+            destination_floor=self.floor,
+            door_state=d.LiftRequestDoor.DOOR_OPEN,
+        )
+
+    def outcome(self, seen: Seen) -> Done | Failed | None:
+        """The four fields that RequestLift waits for; a floor not served fails at once."""
+        latest = seen.latest()
+        if latest and latest.available_floors and self.floor not in latest.available_floors:
+            floors = ", ".join(latest.available_floors)
+            near = nearest(self.floor, latest.available_floors)
+            return Failed(f"{self.name} serves {floors}, not '{self.floor}'{near}")
+        if not self._fulfilled(seen.answer()):
+            return None
+        where = "" if self.granted_only else f" at {self.floor}, door open,"
+        return Done(f"{self.name} is{where} held by {self.session}; to end that: {self._release}")
+
+    def _fulfilled(self, state: d.LiftState | None) -> bool:
+        if state is None or state.session_id != self.session:
+            return False
+        arrived = (state.current_floor, state.door_state) == (self.floor, d.LiftDoor.DOOR_OPEN)
+        return self.granted_only or arrived
+
+    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+        """Session, mode, or where the car got stuck."""
+        state: d.LiftState = seen.latest()
+        name, session, mode = self.name, state.session_id, state.current_mode
+        word = words.word(d.LiftMode, mode)
+        return (
+            Obstacle(
+                session not in ("", self.session),
+                f"{name} is held by {session}",
+                f"to end that session: {self._release}",
+            ),
+            Obstacle(mode in SHUT_OUT, f"{name} serves no robot while its mode is {word}"),
+            Obstacle(not session, f"{name} did not grant the session: its daemon's log says why"),
+            Obstacle(
+                mode != d.LiftMode.MODE_AGV,
+                f"{name} granted the session, but its mode is {word}, not AGV"
+                " (a key switch, or still in use)",
+            ),
+            Obstacle(
+                state.current_floor != self.floor,
+                f"{name} granted the session, but the car has not come to {self.floor}",
+            ),
+            Obstacle(True, f"the car is at {self.floor}, but its door is not seen open"),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class LiftEnd(_Lift):
+    """The session over: `session`, or that of the first LiftState when it is ""."""
+
+    session: str = ""
+
+    def _ending(self, seen: Seen) -> str:
+        first: str = seen.states[0].message.session_id if seen.states else ""
+        return self.session or first
+
+    def message(self, seen: Seen) -> d.LiftRequest | None:
+        """END_SESSION as fleets send it: no floor, door 0."""
+        session = self._ending(seen)
+        if not session:
+            return None
+        return d.LiftRequest(
+            lift_name=self.name,
+            session_id=session,
+            request_type=d.LiftRequestType.REQUEST_END_SESSION,
+        )
+
+    def outcome(self, seen: Seen) -> Done | None:
+        """The state shows another session, or none."""
+        session = self._ending(seen)
+        if seen.states and not session:
+            return Done(f"{self.name} has no session: nothing to end")
+        answer = seen.answer()
+        if answer is None or answer.session_id == session:
+            return None
+        return Done(f"{self.name} is no longer held by {session}")
+
+    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+        """Only a supervisor that drops the request can stand between."""
+        if self.direct:
+            return (Obstacle(True, f"{self.name} still shows the session: its log says why"),)
+        text = f"{self.name} still shows the session: the supervisor may have dropped the request"
+        there = self.line.again_with("--direct")
+        return (Obstacle(True, text, f"to ask the lift's daemon itself: {there}"),)

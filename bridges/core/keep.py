@@ -1,0 +1,28 @@
+"""What a kind keeps across a restart: JSON with a version, read whole or not at all."""
+
+from typing import Annotated, TypeVar
+
+import msgspec
+from msgspec import Meta
+
+Text = Annotated[str, Meta(min_length=1)]
+
+
+class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a kind's file holds. `version`: of its fields."""
+
+    version: int
+
+
+R = TypeVar("R", bound=Record)
+
+
+def read(kept: bytes, record: type[R], version: int, what: str) -> R:
+    """The record in these bytes. ValueError if they are not `what`, of this version."""
+    try:
+        found = msgspec.json.decode(kept, type=record)
+    except msgspec.MsgspecError as error:
+        raise ValueError(f"not {what}: {error}") from error
+    if found.version != version:
+        raise ValueError(f"version {found.version} of {what}; this daemon reads {version}")
+    return found

@@ -1,0 +1,16 @@
+"""Texts from the graph have a longest length: anybody can send them, and they are kept."""
+
+from typing import Final
+
+from bridges.core.decision import RequestRefused
+
+LONGEST_NAME: Final = 256
+LONGEST_TEXT: Final = 10_000
+"""Of a ChargerState's error_message."""
+
+
+def check_length(longest: int = LONGEST_NAME, /, **fields: str) -> None:
+    """Raise RequestRefused for the first of these fields (name=text) that is too long."""
+    for field, text in fields.items():
+        if len(text) > longest:
+            raise RequestRefused(f"impossible {field}", f"{text[:40]!r}…, {len(text)} characters")

@@ -1,0 +1,98 @@
+"""What the door's core remembers from scan to scan, and the limits that it is given."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+import msgspec
+
+from bridges.core.debounce import Settled
+from bridges.core.durations import NEVER, RIVAL_QUIET_S
+from bridges.door.settings import DoorSettings, Durations, Pulse
+
+
+class DoorLimits(msgspec.Struct, frozen=True):
+    """A door's fixed facts as its core needs them. `t`: the durations; `debounce`: s by signal."""
+
+    t: Durations = Durations()
+    debounce: Mapping[str, float] = {}
+    estimated: bool = False
+    on_fire: Literal["open", "release"] = "release"
+    pulse: Pulse | None = None
+
+    @classmethod
+    def of(cls, settings: DoorSettings, debounce: Mapping[str, float]) -> "DoorLimits":
+        """From the YAML and the wiring's debounce by signal."""
+        return cls(
+            settings.limits,
+            debounce,
+            settings.feedback == "estimated",
+            settings.on_fire or "release",
+            settings.pulse,
+        )
+
+
+Contact = Settled[bool | None]
+"""One input with its debounce. Where it is not wired, both value and candidate are None."""
+
+
+class Senses(msgspec.Struct, frozen=True):
+    """Each contact (None: not read yet); when all were last read, and since when without a miss.
+
+    `lost`, `errors`: the last reading's (`DoorSample`).
+    """
+
+    opened: Contact | None = None
+    closed: Contact | None = None
+    obstruction: Contact | None = None
+    fire: Contact | None = None
+    read_at: float | None = None
+    linked_since: float | None = None
+    lost: str = ""
+    errors: tuple[str, ...] = ()
+
+
+class Memory(msgspec.Struct, frozen=True):
+    """Everything that the next decision needs to know of the past. Times are monotonic seconds.
+
+    `latched_at`: since when RMF wants the door open. `close_at`: when a CLOSE releases the hold.
+    `held_since`: since when the hold has been as `held` says. `closing`: our hold has ended and the
+    door has not been seen closed since. `between_since`: since when the door is at neither limit;
+    `shut_since`: since when it is not fully open.
+    """
+
+    latched_at: float | None = None
+    close_at: float | None = None
+    held: bool = False
+    held_since: float = 0.0
+    closing: bool = False
+    senses: Senses = Senses()
+    between_since: float | None = None
+    shut_since: float | None = None
+    rival_at: float | None = None
+    io_failure: str = ""
+
+
+def rivalled(memory: Memory, now: float) -> bool:
+    """Does another node publish this door's states?"""
+    return memory.rival_at is not None and now < memory.rival_at + RIVAL_QUIET_S
+
+
+def travel_ends_at(memory: Memory, limits: DoorLimits) -> float:
+    """When a door at neither limit is overdue; a change of the hold starts the time again."""
+    if memory.between_since is None:
+        return NEVER
+    return max(memory.between_since, memory.held_since) + limits.t.travel_s
+
+
+def opening_ends_at(memory: Memory, limits: DoorLimits) -> float:
+    """When a door that is held should have opened; NEVER for one that is open or not held."""
+    if memory.shut_since is None or not memory.held:
+        return NEVER
+    return max(memory.shut_since, memory.held_since) + limits.t.open_timeout_s
+
+
+def too_long_at(memory: Memory, limits: DoorLimits) -> float:
+    """When RMF will have held the door for too long."""
+    if memory.latched_at is None or limits.t.max_hold_s is None:
+        return NEVER
+    return memory.latched_at + limits.t.max_hold_s

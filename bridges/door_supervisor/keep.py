@@ -1,0 +1,59 @@
+"""Who holds which door: what a restart must not forget.
+
+It is kept before the heartbeat tells it: a robot drives on by the heartbeat.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Final
+
+import msgspec
+from msgspec import Meta
+
+from bridges.core import keep
+from bridges.core.freshness import SECOND_NS, Requester
+from bridges.core.keep import Text
+from bridges.door_supervisor.memory import Holder, Memory
+from bridges.door_supervisor.report import by_name
+from bridges.door_supervisor.settings import Settings
+
+VERSION: Final = 1
+Stamp = Annotated[int, Meta(ge=0, lt=2**31 * SECOND_NS)]
+
+
+class Record(keep.Record, frozen=True, forbid_unknown_fields=True):
+    """`doors`: door -> requester -> the stamp (ns) of its present visit's first OPEN."""
+
+    doors: dict[Text, dict[Text, Stamp]]
+
+
+def persist(memories: Mapping[str, Memory]) -> bytes:
+    """What the next start needs; the same bytes as long as nobody comes or goes."""
+    doors = {
+        name: {holder.requester: holder.visit for holder in by_name(memory)}
+        for name, memory in sorted(memories.items())
+        if memory.holders
+    }
+    return msgspec.json.encode(Record(VERSION, doors))
+
+
+def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
+    """The memories at start, from what `persist` gave, for the doors still served.
+
+    ValueError if it is not that. How long each has held its door is counted anew: the clock that it
+    was counted by is gone.
+    """
+    found = keep.read(kept, Record, VERSION, "a table of who holds which door")
+    served = found.doors if settings.doors is None else set(settings.doors)
+    return {
+        door: _restored(door, holders, now)
+        for door, holders in found.doors.items()
+        if door in served
+    }
+
+
+def _restored(door: str, holders: Mapping[str, int], now: float) -> Memory:
+    return Memory(
+        door,
+        holders=tuple(Holder(who, now, now, stamp, stamp) for who, stamp in holders.items()),
+        requesters={who: Requester(stamp, heard_at=now) for who, stamp in holders.items()},
+    )

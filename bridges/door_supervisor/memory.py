@@ -1,0 +1,93 @@
+"""What the door supervisor's core remembers of one door, and the limits that it is given."""
+
+from typing import Final
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.core.durations import AGES_AGO, NEVER, SILENT_S
+from bridges.core.freshness import Requesters
+from bridges.door_supervisor.settings import Settings
+from bridges.rmf.definitions import DoorModeValue
+
+VISIT_S: Final = 2.5
+"""A robot that waits for a door repeats itself at 1 Hz; after so much silence it has come again."""
+
+CLOSED: Final = DoorModeValue.MODE_CLOSED
+MOVING: Final = DoorModeValue.MODE_MOVING
+OPEN: Final = DoorModeValue.MODE_OPEN
+
+
+class Limits(msgspec.Struct, frozen=True):
+    """The duration (s) that the site has set for one door."""
+
+    open_alarm_s: float = 600.0
+
+    @classmethod
+    def of(cls, settings: Settings) -> "Limits":
+        """From the YAML."""
+        return cls(settings.open_alarm_s)
+
+
+class Holder(msgspec.Struct, frozen=True):
+    """Who holds the door open: since when by our clock, and the `stamp` of its latest OPEN.
+
+    `asked_at`: when that came. `visit`: the stamp of the first OPEN of its present visit, which does
+    not change while it repeats itself.
+    """
+
+    requester: str
+    since: float
+    asked_at: float
+    stamp: int
+    visit: int
+
+    def repeats(self, stamp: int, now: float) -> "Holder":
+        """The holder after another OPEN."""
+        again = now > self.asked_at + VISIT_S
+        return replace(self, asked_at=now, stamp=stamp, visit=stamp if again else self.visit)
+
+
+class Memory(msgspec.Struct, frozen=True):
+    """Everything that outlives an event.
+
+    `holders`: in the order in which they came. `requesters`: what was heard of each of late.
+    `mode`: the door's last, heard at `shown_at`. `sent`: the last request to the door's node since we
+    may speak; `prompted`: it is worth repeating.
+    """
+
+    door: str
+    may_speak: bool = False
+    holders: tuple[Holder, ...] = ()
+    requesters: Requesters = {}
+    mode: DoorModeValue | None = None
+    shown_at: float = AGES_AGO
+    sent: DoorModeValue | None = None
+    sent_at: float = AGES_AGO
+    prompted: bool = False
+
+    @property
+    def wanted(self) -> DoorModeValue:
+        """What the door's node should hear."""
+        return OPEN if self.holders else CLOSED
+
+    @property
+    def owed(self) -> bool:
+        """The door's node has not been told yet. A CLOSE is owed only where OPEN was sent."""
+        return self.wanted != self.sent and (self.wanted == OPEN or self.sent == OPEN)
+
+    @property
+    def disagrees(self) -> bool:
+        """The door's state is not what is wanted, and it can be changed."""
+        return self.mode == MOVING or self.mode == (CLOSED if self.holders else OPEN)
+
+    @property
+    def silent_at(self) -> float:
+        """When the door will have been silent for too long, for those who hold it."""
+        if not self.holders:
+            return NEVER
+        return max(self.shown_at, self.holders[0].since) + SILENT_S
+
+    def holder(self, requester: str) -> Holder | None:
+        """This requester, if it holds the door."""
+        return next((h for h in self.holders if h.requester == requester), None)

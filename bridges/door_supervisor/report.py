@@ -1,0 +1,78 @@
+"""What RMF's heartbeat, the log and the status file are told of doors and of who holds them.
+
+Fleet adapters rely on the heartbeat: DoorOpen ends only when it lists its robot, DoorClose when it
+does not, and a robot that is listed for a door it does not hold sends CLOSE (rmf_ros2,
+RobotContext.cpp _check_door_supervisor). RMF's own sends it on adapter requests alone, so a session
+of a fleet adapter that was restarted stays for ever; ours goes out each second as well.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import msgspec
+
+from bridges.core.decision import Fault
+from bridges.core.freshness import SECOND_NS
+from bridges.door_supervisor.memory import Holder, Limits, Memory
+from bridges.rmf.definitions import (
+    DoorModeValue,
+    DoorSessions,
+    Session,
+    SupervisorHeartbeat,
+    Time,
+)
+from bridges.rmf.topics import DOOR_SUPERVISOR_HEARTBEAT, Topic
+
+
+class DoorHoldReport(msgspec.Struct, frozen=True):
+    """One door, for the log and the status file. Times are monotonic seconds.
+
+    `holders`: each requester and since when. `mode`: of the door's last state, at `read_at`.
+    """
+
+    read_at: float | None
+    mode: DoorModeValue | None = None
+    holders: tuple[tuple[str, float], ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+    def news(self) -> Any:
+        """What is worth a line in the log."""
+        return self.mode, tuple(requester for requester, _ in self.holders)
+
+
+def report(memory: Memory, now: float, limits: Limits) -> DoorHoldReport:
+    """One door as it is now."""
+    return DoorHoldReport(
+        read_at=None if memory.mode is None else memory.shown_at,
+        mode=memory.mode,
+        holders=tuple((holder.requester, holder.since) for holder in memory.holders),
+        faults=tuple(_faults(memory, now, limits)),
+    )
+
+
+def _faults(memory: Memory, now: float, limits: Limits) -> Iterator[Fault]:
+    late = [h.requester for h in memory.holders if now >= h.since + limits.open_alarm_s]
+    if late:
+        yield Fault("DOOR_HELD_OPEN", f"longer than {limits.open_alarm_s:g} s by {', '.join(late)}")
+    if now >= memory.silent_at:
+        yield Fault("DOOR_SILENT", "no DoorState comes")
+
+
+def heartbeat(memories: Mapping[str, Memory]) -> tuple[Topic[Any], SupervisorHeartbeat]:
+    """All doors that somebody holds, and by whom, in the order of names."""
+    doors = tuple(
+        DoorSessions(name, tuple(map(_session, by_name(memory))))
+        for name, memory in sorted(memories.items())
+        if memory.holders
+    )
+    return DOOR_SUPERVISOR_HEARTBEAT, SupervisorHeartbeat(doors)
+
+
+def by_name(memory: Memory) -> list[Holder]:
+    """The door's holders in the order of names."""
+    return sorted(memory.holders, key=lambda holder: holder.requester)
+
+
+def _session(holder: Holder) -> Session:
+    sec, nanosec = divmod(holder.stamp, SECOND_NS)
+    return Session(Time(sec, nanosec), holder.requester)

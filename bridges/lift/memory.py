@@ -1,0 +1,203 @@
+"""What the lift's core remembers from scan to scan, and the limits that it is given."""
+
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Generic, Literal, TypeVar
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.core.debounce import Settled
+from bridges.core.decision import Fault
+from bridges.core.durations import AGES_AGO, NEVER
+from bridges.lift.settings import Durations, LiftSettings
+from bridges.lift.signals import Door, Hazard, LiftOutputs, Motion, Side, Stop
+
+T = TypeVar("T")
+Waiting = Literal["agv", "floor", "door"]
+
+
+class LiftLimits(msgspec.Struct, frozen=True, dict=True):
+    """A lift's fixed facts as its core needs them.
+
+    `stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations.
+    `debounce`: s by signal.
+    """
+
+    stops: Mapping[str, Stop]
+    t: Durations = Durations()
+    debounce: Mapping[str, float] = {}
+    fire_reset: Literal["auto", "manual"] = "auto"
+    alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
+
+    @classmethod
+    def of(cls, settings: LiftSettings, debounce: Mapping[str, float]) -> "LiftLimits":
+        """From the YAML and the wiring's debounce (s) by signal."""
+        return cls(settings.stops(), settings.limits, debounce, settings.fire_reset, settings.alarm)
+
+    def debounce_s(self, signal: str) -> float:
+        """How long a change of this signal must last."""
+        return self.debounce.get(signal, 0.0)
+
+    @cached_property
+    def levels(self) -> Mapping[str, int]:
+        """Each landing's place in the shaft, 0 for the lowest."""
+        landings = dict.fromkeys(stop.level for stop in self.stops.values())
+        return {level: place for place, level in enumerate(landings)}
+
+    def floors_between(self, level: str, other: str) -> int:
+        """How many floors a car skips that is seen at one landing and then at the other."""
+        return abs(self.levels[level] - self.levels[other]) - 1
+
+    def floor_name(self, level: str, preferred: str) -> str:
+        """RMF's name for a landing: `preferred` where that is one, else the first."""
+        if preferred in self.stops and self.stops[preferred].level == level:
+            return preferred
+        return next(name for name, stop in self.stops.items() if stop.level == level)
+
+    def side(self, floor: str) -> Side:
+        """Which of the car's doors serves this floor."""
+        return self.stops[floor].side
+
+
+class Position(msgspec.Struct, frozen=True):
+    """`trusted`: the floor last believed, last seen at `seen_at`; `suspect`: one that cannot be.
+
+    `moved_at`: when the car was last not seen standing.
+    """
+
+    trusted: str | None = None
+    seen_at: float = 0.0
+    suspect: str | None = None
+    moved_at: float | None = None
+
+
+class Senses(msgspec.Struct, frozen=True):
+    """Every input with its debounce, and when all were last read."""
+
+    read_at: float | None = None
+    code: Settled[tuple[str | None, str]] | None = None
+    doors: tuple[Settled[Door | None] | None, Settled[Door | None] | None] = (None, None)
+    motion: Settled[Motion | None] | None = None
+    agv: Settled[bool | None] | None = None
+    hazards: dict[Hazard, Settled[bool]] = {}
+    position: Position = Position()
+
+
+class Session(msgspec.Struct, frozen=True):
+    """Who holds the lift, what they asked, and how far we are with it.
+
+    `boarded`: an open door at the destination has been published for this session: a robot may be
+    inside. `agv_seen`: AGV mode is on for our request. `arrived`: the car stood at the destination.
+    `call_at`: when the present call began. `waiting`, `since`: what we wait for. `tries`: how often
+    that has failed; `retry_at`: outputs stay off until then (inf: latched).
+    """
+
+    id: str
+    agv: bool
+    destination: str
+    asked_at: float
+    boarded: bool = False
+    agv_seen: bool = False
+    arrived: bool = False
+    call_at: float | None = None
+    waiting: Waiting | None = None
+    since: float = 0.0
+    tries: int = 0
+    retry_at: float | None = None
+    fault: Fault | None = None
+
+
+class Grace(msgspec.Struct, frozen=True):
+    """After END: the session that may come back, until when."""
+
+    session: Session
+    until: float
+
+
+class Channel(msgspec.Struct, Generic[T], frozen=True):
+    """One output or one group of exclusive ones: what is on, since when off, recent switchings on."""
+
+    on: T | None = None
+    off_at: float = AGES_AGO
+    ons: tuple[float, ...] = ()
+
+    def step(
+        self, wanted: T | None, now: float, ready_at: float, limits: LiftLimits
+    ) -> "Channel[T]":
+        """The next state: off at once, and on, or changed, only after its rest and `ready_at`."""
+        if self.on is not None:
+            return self if wanted == self.on else replace(self, on=None, off_at=now)
+        if wanted is None or now < self.may_switch_on_at(now, ready_at, limits):
+            return self
+        return Channel(wanted, self.off_at, (*self.recent(now), now))
+
+    def recent(self, now: float) -> tuple[float, ...]:
+        """When it was switched on during the last minute."""
+        return tuple(at for at in self.ons if now - at < 60.0)
+
+    def may_switch_on_at(self, now: float, ready_at: float, limits: LiftLimits) -> float:
+        """The earliest time at which it may be energised."""
+        recent = self.recent(now)
+        most = limits.t.max_cycles_per_min
+        rested_at = recent[-most] + 60.0 if len(recent) >= most else AGES_AGO
+        return max(self.off_at + limits.t.min_off_s, ready_at, rested_at)
+
+
+class Relays(msgspec.Struct, frozen=True):
+    """Every output with its history. A call and a door command exclude each other in time."""
+
+    agv: Channel[bool] = Channel()
+    call: Channel[str] = Channel()
+    hold: Channel[Side] = Channel()
+
+    def outputs(self) -> LiftOutputs:
+        """What the driver is to write."""
+        return LiftOutputs(bool(self.agv.on), self.call.on, self.hold.on)
+
+    def step(self, wanted: LiftOutputs, now: float, limits: LiftLimits) -> "Relays":
+        """Move every output towards what is wanted, as far as is allowed now."""
+        agv = self.agv.step(wanted.agv_request or None, now, AGES_AGO, limits)
+        rested_at = self._rested_at(limits) if agv.on else NEVER
+        call_ready_at = NEVER if self.hold.on else rested_at
+        call = self.call.step(wanted.call, now, call_ready_at, limits)
+        hold_ready_at = NEVER if self.call.on or call.on else rested_at
+        hold = self.hold.step(wanted.hold_door, now, hold_ready_at, limits)
+        return Relays(agv, call, hold)
+
+    def changes_at(self, wanted: LiftOutputs, now: float, limits: LiftLimits) -> float:
+        """When an output that is wanted and still off may come on; always later than `now`."""
+        agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, AGES_AGO, limits)
+        ready_at = max(agv_at, self._rested_at(limits))
+        due = []
+        if wanted.agv_request and not self.agv.on:
+            due.append(agv_at)
+        if wanted.call and not self.call.on:
+            due.append(self.call.may_switch_on_at(now, ready_at, limits))
+        if wanted.hold_door and not self.hold.on:
+            due.append(self.hold.may_switch_on_at(now, ready_at, limits))
+        return max(min(due, default=NEVER), math.nextafter(now, NEVER))
+
+    def _rested_at(self, limits: LiftLimits) -> float:
+        """When neither call nor door command has been on for `dead_time_s`."""
+        return max(self.call.off_at, self.hold.off_at) + limits.t.dead_time_s
+
+
+class Memory(msgspec.Struct, frozen=True):
+    """Everything that outlives a scan.
+
+    `io_fault`: what reading or writing said that has just failed. `unwritten_since`: since when
+    each scan's outputs could not be written; `write_failed`: those of the last scan.
+    """
+
+    senses: Senses = Senses()
+    session: Session | None = None
+    grace: Grace | None = None
+    relays: Relays = Relays()
+    fire_latched: bool = False
+    alarmed: bool = False
+    rival_at: float | None = None
+    io_fault: str = ""
+    unwritten_since: float | None = None
+    write_failed: bool = False

@@ -1,0 +1,54 @@
+"""What the lift supervisor's core hears from the graph: adapters' requests and lifts' states."""
+
+import msgspec
+
+from bridges.core.decision import OperatorReset
+from bridges.core.graph_kind import MaySpeak, Woken
+
+
+class Target(msgspec.Struct, frozen=True):
+    """What a session asks of the lift, as LiftRequest has it."""
+
+    request_type: int
+    floor: str
+    door: int
+
+
+class Requested(msgspec.Struct, frozen=True):
+    """An adapter's request for AGV or HUMAN mode; `stamp` is its own (s), `age_s` by our clock."""
+
+    session: str
+    target: Target
+    stamp: float
+    age_s: float
+
+
+class Ended(msgspec.Struct, frozen=True):
+    """An adapter's, or an operator's, END_SESSION, whatever its other fields say."""
+
+    session: str
+    stamp: float
+    age_s: float
+
+
+class StateHeard(msgspec.Struct, frozen=True):
+    """A LiftState."""
+
+    session: str
+    floor: str
+    destination: str
+    door: int
+    mode: int
+    floors: tuple[str, ...] = ()
+
+    def satisfies(self, session: str, target: Target) -> bool:
+        """Does it show what was asked? The rule is rmf_lift_supervisor's."""
+        there = target.floor == self.floor and not self.destination
+        return (
+            (target.floor == self.destination or there)
+            and target.door == self.door
+            and session == self.session
+        )
+
+
+Event = Requested | Ended | StateHeard | MaySpeak | Woken | OperatorReset

@@ -1,0 +1,91 @@
+"""A thread that serves: rounds, one after the other, until it is stopped."""
+
+import threading
+from typing import Protocol
+
+from bridges.serve.clock import Clock
+
+LEAST_GAP_S = 0.001
+"""Time alone never asks for rounds faster than this."""
+
+
+class Bell(Protocol):
+    """What wakes a thread (`bridges.serve.inbox.Inbox`)."""
+
+    def wait(self, timeout_s: float) -> bool: ...
+
+    def close(self) -> None: ...
+
+    @property
+    def closed(self) -> bool: ...
+
+
+class Rounds(Protocol):
+    """What is served in rounds: the devices of a bus, or a kind without hardware.
+
+    Its thread is the only one that calls it, and tests call it without a thread, in their own time.
+    """
+
+    @property
+    def name(self) -> str:
+        """What the thread is called."""
+
+    @property
+    def inbox(self) -> Bell:
+        """What wakes it between its times."""
+
+    @property
+    def wake_at(self) -> float:
+        """When the next round is due if nothing is heard (monotonic s)."""
+
+    @property
+    def ready(self) -> bool:
+        """It does what it is for."""
+
+    def round(self) -> None:
+        """Take what was heard, and do what is due."""
+
+    def end(self) -> bool:
+        """Outputs off, and everything let go. False when that could not be verified."""
+
+
+class Serving:
+    """One thread of a service, as the daemon sees it. `scans` counts finished rounds."""
+
+    def __init__(self, serves: Rounds, clock: Clock) -> None:
+        self.scans = 0
+        self._serves = serves
+        self._clock = clock
+        self._safe = False
+        self._thread = threading.Thread(target=self._run, name=serves.name, daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self, timeout_s: float) -> bool:
+        """End after the round under way, outputs off; False if it does not end, or not safely."""
+        self._serves.inbox.close()
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive() and self._safe
+
+    @property
+    def alive(self) -> bool:
+        """False when it has ended, by stop or by a defect of ours."""
+        return self._thread.is_alive()
+
+    @property
+    def ready(self) -> bool:
+        """It has been through its first round, and does what it is for."""
+        return self.scans > 0 and self._serves.ready
+
+    def _run(self) -> None:
+        serves = self._serves
+        try:
+            while not serves.inbox.closed:
+                wait_s = serves.wake_at - self._clock.monotonic()
+                serves.inbox.wait(max(wait_s, LEAST_GAP_S))
+                serves.round()
+                self.scans += 1
+        finally:
+            self._safe = serves.end()

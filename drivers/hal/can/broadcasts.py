@@ -1,0 +1,116 @@
+"""One device that says its frames again and again, and lives on frames that it is fed.
+
+What it said last counts while it is fresh. It is fed from the scan, each frame at its pace and never by
+a cyclic sender: a daemon that hangs stops feeding.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+from drivers.hal import HalError
+from drivers.hal.can.bus import CanBus
+from drivers.hal.can.frames import EXTENDED, Frame, Wanted, named
+
+NEVER = float("-inf")
+
+
+class Said(NamedTuple):
+    """A frame of the device's. `mask`: the bits of its id that count. `fresh_s`: how long it does.
+
+    `needed`: without it there is no reading.
+    """
+
+    id: int
+    mask: int
+    length: int
+    fresh_s: float
+    needed: bool
+
+
+class Broadcasts:
+    """The frames of one device by their names."""
+
+    def __init__(self, bus: CanBus, frames: Mapping[str, Said]) -> None:
+        self._bus = bus
+        self._frames = frames
+        self._pause = bus.backoff()
+        self._heard: dict[str, tuple[bytes, float]] = {}
+        self._odd: dict[str, str] = {}
+        self._sent_at: dict[int, float] = {}
+        for name, said in frames.items():
+            bus.listen([Wanted(said.id, said.mask | EXTENDED)], self._hearer(name, said.length))
+
+    def read(self) -> dict[str, bytes]:
+        """Every frame that is fresh; waits for one that is needed. Raises HalError."""
+        self._bus.take()
+        if self._missing():
+            self._pause.check()
+            if not self._bus.wait(lambda: not self._missing(), self._bus.settings.timeout_s):
+                raise self._pause.failed(self._silent())
+        else:
+            self._odd.clear()
+        self._pause.mended()
+        return self._fresh()
+
+    def read_after(self, first: str, others: Iterable[str]) -> dict[str, bytes]:
+        """The same once these have come after the `first`, or have had their time. Raises HalError."""
+        since = self._at(first)
+        self._bus.wait(
+            lambda: all(self._at(name, since) > since for name in others),
+            self._bus.settings.timeout_s,
+        )
+        return self._fresh()
+
+    def check_pace(self, frame: str, every_s: float) -> None:
+        """Can the scan keep it? Raises HalError."""
+        scan_s = self._bus.settings.scan_s
+        if every_s < scan_s:
+            raise HalError(
+                f"{frame} must be sent every {every_s:g} s, and a scan is"
+                f" every {scan_s:g} s: set the bus's scan_s to {every_s:g} or less"
+            )
+
+    def feed(self, frame_id: int, every_s: float, payload: Callable[[], bytes]) -> bool:
+        """Send a frame if it is due in this scan; True when it was. Raises HalError."""
+        now, slack_s = self._bus.now(), self._bus.settings.scan_s / 2
+        if now < self._sent_at.get(frame_id, NEVER) + every_s - slack_s:
+            return False
+        self._bus.send(Frame(frame_id, payload()))
+        self._sent_at[frame_id] = now
+        return True
+
+    def feed_at_once(self) -> None:
+        """Every frame is due: it says something else from now on."""
+        self._sent_at.clear()
+
+    def _hearer(self, name: str, length: int) -> Callable[[Frame, float], None]:
+        def hear(heard: Frame, at: float) -> None:
+            if len(heard.payload) == length:
+                self._heard[name] = (heard.payload, at)
+            else:
+                size = f"{len(heard.payload)} bytes, where the map has {length}"
+                self._odd[name] = f"one ({named(heard.id)}) of {size}"
+
+        return hear
+
+    def _at(self, name: str, otherwise: float = NEVER) -> float:
+        return self._heard[name][1] if name in self._heard else otherwise
+
+    def _is_fresh(self, name: str) -> bool:
+        return self._bus.now() - self._at(name) < self._frames[name].fresh_s
+
+    def _fresh(self) -> dict[str, bytes]:
+        return {name: payload for name, (payload, _) in self._heard.items() if self._is_fresh(name)}
+
+    def _missing(self) -> str:
+        """The first frame that is needed and not fresh; "" when all are."""
+        needed = (name for name, said in self._frames.items() if said.needed)
+        return next((name for name in needed if not self._is_fresh(name)), "")
+
+    def _silent(self) -> str:
+        name = self._missing()
+        said = self._frames[name]
+        text = f"no {name} ({named(said.id)}) at {self._bus.where} within {said.fresh_s:g} s"
+        if odd := self._odd.pop(name, ""):
+            return f"{text}, but {odd}: is it another make?"
+        return f"{text}: {self._bus.silence()}"

@@ -1,0 +1,203 @@
+"""CAN: one bus, on an interface of the kernel (SocketCAN) or an slcan adapter, through python-can.
+
+Everything happens in the thread of the loop. A reading takes whatever has come since the last one and
+gives each frame to the devices that want it; the rest is remembered by its id for a while, to say what
+is heard where a device is not. Nothing is sent but from a scan: no frame is ever handed to the kernel's
+or the library's cyclic sender, so that a daemon that hangs falls silent.
+
+An interface that is down, gone or bus-off is closed and opened anew after a pause of 0.5 to 30 s, in
+which calls fail at once. A bus-off is over when a frame is heard again, or the controller says so;
+`restart-ms` of `ip link` makes the controller try.
+"""
+
+import random
+import time
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, Final
+
+from drivers.hal import Bus, HalError
+from drivers.hal.backoff import Backoff
+from drivers.hal.can.frames import Frame, Hear, LinkDown, Trouble, Wanted, named
+from drivers.hal.can.settings import Settings
+
+if TYPE_CHECKING:
+    from drivers.hal.can.link import Link
+
+FRAMES_AT_ONCE: Final = 20_000
+"""A reading takes no more: a bus at 1 Mbit/s has 8,000 a second."""
+HANG_S: Final = 1.0
+"""A reading that comes so much later than it should shows that we hung."""
+ROUTES_MAX: Final = 4096
+RECENT_S: Final = 5.0
+OTHERS_MAX: Final = 64
+OTHERS_SHOWN: Final = 5
+
+Vendor = Callable[[], Any]
+"""Opens python-can's bus."""
+
+
+class CanBus(Bus):
+    """One bus and the devices on it. `clock`, `jitter` and `vendor` are a test's."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        clock: Callable[[], float] = time.monotonic,
+        jitter: Callable[[], float] = random.random,
+        vendor: Vendor | None = None,
+    ) -> None:
+        self.settings = settings
+        self.now = clock
+        self.where = settings.slcan.port if settings.slcan else str(settings.socketcan)
+        self._link = _link(settings, self.where, vendor)
+        self._jitter = jitter
+        self._backoffs = [Backoff(clock, jitter)]
+        self._wanted: list[tuple[Wanted, Hear]] = []
+        self._routes: dict[int, tuple[Hear, ...]] = {}
+        self._others: dict[int, float] = {}
+        self._trouble = Trouble("", bus_off=False)
+        self._trouble_at = float("-inf")
+        self._failing = False
+        self._taken_at = float("-inf")
+        self._deaf = False
+
+    def backoff(self) -> Backoff:
+        """Pauses for one device of this bus; `insist` ends them too."""
+        made = Backoff(self.now, self._jitter)
+        self._backoffs.append(made)
+        return made
+
+    def listen(self, wanted: Iterable[Wanted], hear: Hear) -> None:
+        """Have each of these frames given to `hear`, as long as the bus lives."""
+        self._wanted += [(one, hear) for one in wanted]
+        self._routes.clear()
+        self._others.clear()
+
+    def take(self) -> None:
+        """Give out what has come since the last time. Raises HalError.
+
+        After a hang nobody knows how old what has come is: it is thrown away.
+        """
+        self._deaf = self.now() - self._taken_at > HANG_S + self.settings.scan_s
+        try:
+            for _ in range(FRAMES_AT_ONCE):
+                if not self._step(0.0):
+                    break
+        finally:
+            self._deaf, self._taken_at = False, self.now()
+
+    def wait(self, heard: Callable[[], bool], within_s: float) -> bool:
+        """Take what comes until this is so, or for so long. Raises HalError."""
+        deadline = self.now() + within_s
+        while not heard():
+            left_s = deadline - self.now()
+            if left_s <= 0:
+                return False
+            self._step(left_s)
+            self._taken_at = self.now()
+        return True
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame. Raises HalError; then it may have been sent or not."""
+        self._open()
+        try:
+            self._link.send(frame)
+        except LinkDown as error:
+            raise self._failed(str(error)) from error
+
+    def silence(self) -> str:
+        """What is known where somebody is not heard: the bus's own trouble, or who is heard instead."""
+        if self._trouble.text and (
+            self._trouble.bus_off or self.now() - self._trouble_at < RECENT_S
+        ):
+            return f"the bus has trouble: {self._trouble.text}"
+        others = self.others()
+        if not others:
+            return "nothing else is heard on the bus either: power, cable, termination, bitrate?"
+        shown = ", ".join(map(named, others[:OTHERS_SHOWN]))
+        return (
+            f"the bus works, and others are heard: {shown}{' …' if others[OTHERS_SHOWN:] else ''}"
+        )
+
+    def others(self) -> list[int]:
+        """The ids that were heard lately and that no device wants."""
+        now = self.now()
+        return sorted(found for found, at in self._others.items() if now - at < RECENT_S)
+
+    def insist(self) -> None:
+        """Try at once what is asked next, whatever the pauses: to switch off before the end."""
+        for backoff in self._backoffs:
+            backoff.insist()
+
+    def close(self) -> None:
+        """Let go of the interface."""
+        self._link.close()
+
+    def _open(self) -> None:
+        self._backoffs[0].check()
+        try:
+            self._link.open()
+        except LinkDown as error:
+            raise self._failed(str(error)) from error
+
+    def _step(self, wait_s: float) -> bool:
+        """Take one frame; False when none came."""
+        self._open()
+        try:
+            found = self._link.receive(wait_s)
+        except LinkDown as error:
+            raise self._failed(str(error)) from error
+        if isinstance(found, Trouble):
+            self._note(found)
+        elif found is not None and not self._deaf:
+            self._give(found)
+        return found is not None
+
+    def _give(self, frame: Frame) -> None:
+        if self._failing or self._trouble.text:
+            self._well()
+        routes = self._routes.get(frame.id)
+        if routes is None:
+            routes = self._route(frame.id)
+        now = self.now()
+        for hear in routes:
+            hear(frame, now)
+        if not routes and (frame.id in self._others or len(self._others) < OTHERS_MAX):
+            self._others[frame.id] = now
+
+    def _route(self, frame_id: int) -> tuple[Hear, ...]:
+        if len(self._routes) >= ROUTES_MAX:
+            self._routes.clear()
+            self._others.clear()
+        made = tuple(hear for wanted, hear in self._wanted if wanted.fits(frame_id))
+        self._routes[frame_id] = made
+        return made
+
+    def _note(self, trouble: Trouble) -> None:
+        """The controller speaks: of its troubles, or that it works again."""
+        self._trouble, self._trouble_at = trouble, self.now()
+        if trouble.bus_off:
+            raise self._failed(
+                f"CAN {self.where}: bus-off: the controller has left the bus after too many errors;"
+                " check bitrate, termination and cable, and set restart-ms so that it tries again"
+            )
+        if not trouble.text:
+            self._well()
+
+    def _well(self) -> None:
+        self._failing, self._trouble = False, Trouble("", bus_off=False)
+        self._backoffs[0].mended()
+
+    def _failed(self, text: str) -> HalError:
+        self._failing = True
+        self._link.close()
+        return self._backoffs[0].failed(text)
+
+
+def _link(settings: Settings, where: str, vendor: Vendor | None) -> "Link":
+    """The way onto the bus. Only here python-can is imported."""
+    from drivers.hal.can.link import Link, slcan, socketcan
+
+    place = settings.slcan
+    made = (lambda: slcan(place)) if place else (lambda: socketcan(where))
+    return Link(vendor or made, where, settings.timeout_s)

@@ -1,0 +1,90 @@
+"""`type: can` of a device YAML: which bus, and how long it may take."""
+
+from collections.abc import Iterable
+from typing import Annotated, Final
+
+import msgspec
+
+from bridges.core.fields import Name, Period
+
+BITRATES: Final = (
+    10_000,
+    20_000,
+    50_000,
+    83_300,
+    100_000,
+    125_000,
+    250_000,
+    500_000,
+    750_000,
+    1_000_000,
+)
+
+Interface = Annotated[
+    str,
+    msgspec.Meta(
+        pattern=r"^[A-Za-z0-9._-]{1,15}$", extra={"pattern": "an interface's name, such as can0,"}
+    ),
+]
+Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
+
+
+class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A serial or USB adapter that speaks slcan (LAWICEL).
+
+    `port`: its path; one in /dev/serial/by-id stays the same.
+    `bitrate`: of the CAN bus.
+    `baudrate`: of the serial port; USB adapters take any.
+    """
+
+    port: Name
+    bitrate: Annotated[int, msgspec.Meta(ge=10_000, le=1_000_000, extra={"unit": "bit/s"})]
+    baudrate: Annotated[int, msgspec.Meta(ge=9600, le=3_000_000, extra={"unit": "Bd"})] = 115_200
+
+
+class Settings(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    forbid_unknown_fields=True,
+    tag_field="type",
+    tag="can",
+):
+    """One CAN bus: `socketcan` or `slcan`, one of the two.
+
+    `socketcan`: the kernel's interface (`can0`), whose bitrate is set by `ip link`. Adapters of most
+    makers and the CAN boards of a Raspberry Pi are such.
+    `slcan`: an adapter on a serial port.
+    `timeout_s`: for an answer to one question, and for an adapter to take a frame.
+    `scan_s`: how often the devices are read, and their frames sent.
+    """
+
+    socketcan: Interface | None = None
+    slcan: Slcan | None = None
+    timeout_s: Timeout = 0.2
+    scan_s: Period = 0.2
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """What the fields cannot say one by one."""
+        if self.socketcan is None and self.slcan is None:
+            yield (), "says not which bus: write socketcan: can0, or slcan: {port: …, bitrate: …}"
+        elif self.socketcan and self.slcan:
+            yield ("slcan",), "a bus has socketcan or slcan: write a second bus for the other"
+        if self.slcan and self.slcan.bitrate not in BITRATES:
+            known = ", ".join(map(str, BITRATES))
+            yield ("slcan", "bitrate"), f"slcan adapters know {known}"
+
+
+def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+    """What is legal but worth a look: (path, text)."""
+    if settings.slcan and not settings.slcan.port.startswith("/dev/serial/by-"):
+        port = settings.slcan.port
+        text = f"{port} may be another adapter after the next start: ls /dev/serial/by-id"
+        yield ("slcan", "port"), text
+
+
+def describe(settings: Settings) -> str:
+    """Where the bus is, for `check`."""
+    if settings.slcan:
+        return f"{settings.slcan.port}, {settings.slcan.bitrate // 1000} kbit/s"
+    return f"{settings.socketcan}, at the bitrate that `ip link` gave it"

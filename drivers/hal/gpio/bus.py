@@ -1,0 +1,194 @@
+"""The pins of one header: claimed, sampled, driven and let go, through gpiozero's pins."""
+
+import logging
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from bridges.log import pairs
+from drivers.hal import Bus, HalError
+from drivers.hal.every import Every
+from drivers.hal.gpio.dead_man import AFTER_S, DeadMan
+from drivers.hal.gpio.header import canonical, describe
+from drivers.hal.points import Pull
+
+log = logging.getLogger(__name__)
+
+DROPPED = (
+    f"no scan finished for {AFTER_S:g} s: the dead-man dropped every output. Find out why (the log,"
+    " the load of this machine), then `rmf-bridge reset`"
+)
+
+
+class GpioBus(Bus):
+    """The pins of one header, for the devices of one thread."""
+
+    canonical = staticmethod(canonical)
+
+    def __init__(self, factory: Any, clock: Callable[[], float]) -> None:
+        self.factory = factory
+        self._wake: Callable[[], None] | None = None
+        self._devices: list[GpioLines] = []
+        self._dead_man = DeadMan(self._drop, clock)
+
+    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> "GpioLines":
+        """Canonical inputs with their pull, outputs with their safe level (True is high)."""
+        self._devices.append(GpioLines(self, dict(inputs), dict(outputs)))
+        return self._devices[-1]
+
+    def on_edge(self, wake: Callable[[], None]) -> None:
+        """Call `wake` from gpiozero's thread when an input may have changed. It must not raise."""
+        self._wake = wake
+
+    def edge(self, ticks: Any, state: Any) -> None:
+        """An input has changed: gpiozero's signature."""
+        if self._wake is not None:
+            self._wake()
+
+    def scanned(self) -> None:
+        """Feed the dead-man."""
+        self._dead_man.fed()
+
+    def _drop(self) -> None:
+        for device in self._devices:
+            device.drop()
+        log.critical(pairs("dead_man", reason=DROPPED))
+
+    def close(self) -> None:
+        """Every output to its safe level, and let go of the chip."""
+        self._wake = None
+        self._dead_man.close()
+        for device in self._devices:
+            device.close()
+        try:
+            self.factory.close()
+        except _failures():
+            return  # the kernel releases what is left when the process ends
+
+
+class GpioLines:
+    """The pins of one device (`drivers.hal.points.Lines`), by their BCM names."""
+
+    def __init__(
+        self, bus: GpioBus, inputs: dict[str, Pull | None], outputs: dict[str, bool]
+    ) -> None:
+        self._bus = bus
+        self._pulls = inputs
+        self._safe = outputs
+        self._claimed: dict[str, Any] = {}
+        self._dropped = False
+
+    def claim(self) -> None:
+        """Outputs at their safe level first, each in one call; then inputs. All, or none."""
+        self._release()
+        self._dropped = False
+        try:
+            for point, level in self._safe.items():
+                with _hal_errors(point):
+                    self._pin(point).output_with_state(level)
+            for point, pull in self._pulls.items():
+                with _hal_errors(point):
+                    self._claim_input(point, pull)
+        except HalError:
+            self._release()
+            raise
+
+    def read(self) -> dict[str, bool]:
+        """Every input's level, read now. Raises HalError."""
+        self._check()
+        return self._levels(self._pulls)
+
+    def write(self, levels: Mapping[str, bool]) -> None:
+        """Drive these outputs; off is tried for each, whatever becomes of others. Raises HalError."""
+        every = Every()
+        for point, level in levels.items():
+            if level != self._safe[point]:
+                every.check()
+                self._check()
+            with every.one(), _hal_errors(point):
+                self._of(point).state = level
+        every.check()
+        if self._dropped and levels.items() - self._safe.items():
+            self.drop()  # it happened meanwhile: what was just driven is dropped too
+            self._check()
+
+    def drop(self) -> None:
+        """Every output to its safe level until the next claim, from any thread. Does not raise."""
+        self._dropped = True
+        for point, level in self._safe.items():
+            if point in self._claimed:
+                try:
+                    self._claimed[point].state = level
+                except _failures():
+                    continue  # the others must still drop
+
+    def outputs(self) -> dict[str, bool]:
+        """The outputs' levels as the chip says. Raises HalError."""
+        return self._levels(self._safe)
+
+    def close(self) -> None:
+        """Outputs to their safe level, and let go."""
+        self._release()
+
+    def _check(self) -> None:
+        if self._dropped:
+            raise HalError(DROPPED)
+
+    def _levels(self, points: Iterable[str]) -> dict[str, bool]:
+        levels = {}
+        for point in points:
+            with _hal_errors(point):
+                levels[point] = bool(self._of(point).state)
+        return levels
+
+    def _of(self, point: str) -> Any:
+        if point not in self._claimed:
+            raise HalError(f"{describe(point)} is not claimed")
+        return self._claimed[point]
+
+    def _pin(self, point: str) -> Any:
+        """Reserved before it is touched: gpiozero refuses a pin that another device holds."""
+        self._bus.factory.reserve_pins(self, point)
+        self._claimed[point] = self._bus.factory.pin(point)
+        return self._claimed[point]
+
+    def _claim_input(self, point: str, pull: Pull | None) -> None:
+        pin = self._pin(point)
+        pin.input_with_pull("floating" if pull in (None, "none") else pull)
+        pin.edges = "both"
+        pin.when_changed = self._bus.edge
+
+    def _conflicts_with(self, other: object) -> bool:
+        """gpiozero asks the requester of a pin about its holder."""
+        return other is not self
+
+    def _release(self) -> None:
+        for point, pin in self._claimed.items():
+            try:
+                pin.close()
+            except _failures():
+                continue  # the others must still be let go
+            finally:
+                self._bus.factory.release_pins(self, point)
+        self._claimed.clear()
+
+    def __repr__(self) -> str:
+        return f"another device of this daemon ({', '.join([*self._safe, *self._pulls])})"
+
+
+def _failures() -> tuple[type[Exception], ...]:
+    """What gpiozero and lgpio raise; lgpio only where it is loaded."""
+    from gpiozero import GPIOZeroError
+
+    lgpio = sys.modules.get("lgpio")
+    return (GPIOZeroError, OSError, *((lgpio.error,) if lgpio else ()))
+
+
+@contextmanager
+def _hal_errors(point: str) -> Iterator[None]:
+    try:
+        yield
+    except _failures() as error:
+        text = getattr(error, "value", error)  # lgpio's errors print in quotes
+        raise HalError(f"{describe(point)}: {text}") from error

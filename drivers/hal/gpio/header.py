@@ -1,0 +1,81 @@
+"""The 40-pin header: how its pins are spelled, and what cannot be right about a wire on one.
+
+Points are `BCM17` or `J8:11`; a bare number is refused, as it is the commonest wiring mistake.
+"""
+
+import re
+from collections.abc import Iterable
+
+from drivers.hal.points import Wire
+
+# The 40-pin header, the same on every Raspberry Pi since the B+ (2014): position -> BCM number.
+# fmt: off
+J8 = {
+    3: 2, 5: 3, 7: 4, 8: 14, 10: 15, 11: 17, 12: 18, 13: 27, 15: 22, 16: 23, 18: 24, 19: 10,
+    21: 9, 22: 25, 23: 11, 24: 8, 26: 7, 27: 0, 28: 1, 29: 5, 31: 6, 32: 12, 33: 13, 35: 19,
+    36: 16, 37: 26, 38: 20, 40: 21,
+}
+# fmt: on
+POSITION = {bcm: position for position, bcm in J8.items()}
+SUPPLY = {1: "3.3 V", 2: "5 V", 4: "5 V", 17: "3.3 V"}
+
+FIXED_PULL_UP = ("BCM2", "BCM3")
+HAT_EEPROM = ("BCM0", "BCM1")
+
+
+def canonical(point: str) -> str:
+    """`J8:7` and `BCM4` are `BCM4`. Raises ValueError with what to write instead."""
+    if found := re.fullmatch(r"BCM(0|[1-9][0-9]?)", point):
+        if int(found[1]) in POSITION:
+            return point
+        raise ValueError(f"{point} is not on the 40-pin header, which has BCM0 to BCM27")
+    if found := re.fullmatch(r"J8:([1-9][0-9]?)", point):
+        return _at(int(found[1]))
+    if found := re.fullmatch(r"(?:gpio|bcm)[ _:]?0*([0-9]{1,2})", point, re.IGNORECASE):
+        raise ValueError(f"{point!r} is not a pin's name: write BCM{found[1]}")
+    if point.isdecimal():
+        raise ValueError(
+            f"{point!r} may be a position or a BCM number: write BCM{point} or J8:{point}"
+        )
+    raise ValueError(f"{point!r} is not a pin: write BCM17, or J8:11 for a position on the header")
+
+
+def _at(position: int) -> str:
+    if position in J8:
+        return f"BCM{J8[position]}"
+    if position > 40:
+        raise ValueError(f"J8:{position} does not exist: the header has positions 1 to 40")
+    raise ValueError(f"J8:{position} is {SUPPLY.get(position, 'ground')}, not a GPIO pin")
+
+
+def describe(point: str) -> str:
+    """`BCM4 = J8:7`, for the table that an electrician reads."""
+    name = canonical(point)
+    return f"{name} = J8:{POSITION[int(name[3:])]}"
+
+
+def boot_level(point: str) -> bool:
+    """The level to which a pin is pulled from power-on until it is claimed.
+
+    BCM0-8 up, BCM9-27 down (BCM2835 ARM Peripherals, table 6-31, and its successors).
+    """
+    return int(canonical(point)[3:]) <= 8
+
+
+def wire_problems(wire: Wire) -> Iterable[str]:
+    """What cannot be right about this wire on a header pin."""
+    try:
+        name = canonical(wire.point)
+    except ValueError:
+        return  # reported where points are spelled
+    if wire.direction == "in":
+        if wire.pull is None:
+            yield "pull is missing: say up, down, or none where an external resistor is fitted"
+        elif name in FIXED_PULL_UP and wire.pull != "up":
+            yield f"{name} has a fixed 1.8 kΩ pull-up: write pull: up, or use another pin"
+    elif wire.pull is not None:
+        yield "an output has no pull"
+    elif wire.flash is not None:
+        yield "flash is for modules that time pulses; a pin's are timed here: leave it out"
+    elif name in HAT_EEPROM:
+        yield f"{name} belongs to the HAT EEPROM, and the firmware drives it at boot: use another"

@@ -1,0 +1,168 @@
+"""The units of one TCP connection or serial line: asked one by one, with retries and pauses.
+
+- A request has `timeout_s` from the lookup of the name to the last byte of the reply, and is tried
+  `retries` times more. That a late reply or half a frame is never taken for the answer to another
+  question is the work of `tcp.py` (new connections) and `rtu.py` (silence). Only what may be repeated
+  is: a repeat of a read or a write changes nothing, of a pulse it does.
+- A connection or port that cannot be opened pauses the bus, a unit that fails pauses that unit, from
+  0.5 to 30 s; meanwhile calls fail at once with the same text. After a pause there is one try until the
+  unit answers again: a dead unit costs the others one `timeout_s` a pause, and no more.
+- What switches off has pauses of its own at each unit, so that no reading that fails keeps it waiting.
+
+A gateway that waits for its serial units longer than `timeout_s` makes the others wait too: set its
+own timeout below ours.
+"""
+
+import functools
+import random
+import time
+from collections.abc import Callable, Iterable, Mapping
+
+from drivers.hal import Bus, HalError
+from drivers.hal.backoff import Backoff
+from drivers.hal.modbus.dead_man import Guard, Watchdogs
+from drivers.hal.modbus.lines import Image, Lines
+from drivers.hal.modbus.points import Point, Range, canonical, parse
+from drivers.hal.modbus.settings import Settings
+from drivers.hal.modbus.wire import (
+    COIL_ON,
+    EXCEPTIONS,
+    READS,
+    WRITES,
+    Answer,
+    NoReply,
+    Question,
+    Refused,
+    Unreachable,
+    Wire,
+)
+from drivers.hal.points import Pull
+
+
+class ModbusBus(Bus):
+    """One TCP connection or serial line, and the units there (also a `drivers.hal.points.PointsBus`).
+
+    `clock` and `jitter` are a test's in place of the real ones; `now` is that clock.
+    """
+
+    canonical = staticmethod(canonical)
+
+    def __init__(
+        self,
+        settings: Settings,
+        clock: Callable[[], float] = time.monotonic,
+        jitter: Callable[[], float] = random.random,
+    ) -> None:
+        self.now = clock
+        self._settings = settings
+        self._wire, self._where = _way(settings)
+        self._backoff = functools.partial(Backoff, clock, jitter)
+        self._link = self._backoff()
+        self._units: dict[tuple[int, bool], Backoff] = {}
+        self._watchdogs = Watchdogs(self, settings.module_watchdog, clock)
+
+    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> Lines:
+        """Canonical inputs, and coils with their safe level (True is 1)."""
+        return Lines(
+            self, {n: parse(n) for n in inputs}, {n: parse(n) for n in outputs}, dict(outputs)
+        )
+
+    def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:
+        """These bits (0 or 1) or registers, by one request. Raises HalError."""
+        question = Question(asked.unit, READS[asked.table], asked.start, asked.count)
+        found = self._ask(f"read {asked}", question, safe)
+        return dict(zip(asked.points(), found.values, strict=True))
+
+    def cells(self, points: Iterable[Point]) -> dict[Point, int]:
+        """These bits and registers, by as few requests as will do. Raises HalError."""
+        return Image(self, points).read()
+
+    def write(self, point: Point, value: int, safe: bool = False) -> None:
+        """Set this coil (0 or 1) or register. Raises HalError; then it may be set or not."""
+        coil = point.table == "coil"
+        sent = (COIL_ON if value else 0) if coil else value
+        what = f"write {'coil' if coil else 'register'} {point.address}"
+        self._ask(what, Question(point.unit, WRITES[point.table], point.address, sent), safe)
+
+    def flash(self, place: Point, on_s: float) -> None:
+        """Have the module time a pulse, by "flash on" of Waveshare's Modbus RTU Relay boards.
+
+        Function 5 at an address of its own for each relay (0x0200 and the relay's number, from 0), with
+        tenths of a second in place of a coil's two values; the reply is its echo. The maker's manual,
+        protocol V2: `01 05 02 00 00 07 8D B0` has relay 0 of unit 1 on for 0.7 s. Asked again, the time
+        begins again: so it is sent once. Raises HalError; then it may pulse.
+        """
+        question = Question(place.unit, WRITES["coil"], place.address, round(on_s * 10))
+        self._ask(f"flash at coil {place.address:#x}", question, once=True)
+
+    def guard(self, units: Iterable[int]) -> Guard:
+        """The modules' own watchdogs, for a device with outputs at these units."""
+        return self._watchdogs.guard(units)
+
+    def scanned(self) -> None:
+        """Keep the modules' watchdogs from tripping."""
+        self._watchdogs.scanned()
+
+    def insist(self) -> None:
+        """Try at once what is asked next, whatever the pauses: to switch off before the end."""
+        for backoff in (self._link, *self._units.values()):
+            backoff.insist()
+
+    def close(self) -> None:
+        """Hang up."""
+        self._wire.close()
+
+    def _ask(self, what: str, question: Question, safe: bool = False, once: bool = False) -> Answer:
+        """The unit's good answer. `once`: a repeat would change something. Raises HalError."""
+        unit = question.unit
+        backoff = self._units.setdefault((unit, safe), self._backoff())
+        self._link.check()
+        backoff.check(not_yet=backoff.probing and self._wire.owes(unit))
+        text = f"modbus unit {unit} at {self._where}, {what}: "
+        tries = 1 if once or backoff.probing else self._settings.retries + 1
+        if not backoff.insisting:
+            self._wire.begin(unit)
+        answer, reason = self._tried(question, tries)
+        if answer is None:
+            raise backoff.failed(f"{text}{reason}, tried {tries}x")
+        if answer.exception:
+            raise self._refused(backoff, unit, text, answer.exception)
+        backoff.mended()
+        return answer
+
+    def _tried(self, question: Question, tries: int) -> tuple[Answer | None, str]:
+        """An answer, or why there was none in so many tries. Raises HalError without a connection."""
+        reason = ""
+        for _ in range(tries):
+            try:
+                self._wire.connect()
+                answer = self._wire.ask(question)
+            except Unreachable as error:
+                raise self._link.failed(str(error)) from error
+            except NoReply as error:
+                reason = str(error)
+            else:
+                self._link.mended()
+                return answer, ""
+        return None, reason
+
+    def _refused(self, backoff: Backoff, unit: int, text: str, code: int) -> HalError:
+        """An exception. One about the question itself shows that the unit lives: no pause."""
+        self._watchdogs.refused(unit, code)
+        text += f"exception {code}, {EXCEPTIONS.get(code, EXCEPTIONS[9])}"
+        if code not in (1, 2, 3):
+            backoff.failed(text)
+        return Refused(text, code)
+
+
+def _way(settings: Settings) -> tuple[Wire, str]:
+    """How to reach the units, and where that is, for texts. Only here the libraries are imported."""
+    if settings.serial:
+        from drivers.hal.modbus.rtu import Line
+
+        return Line(settings.serial, settings.timeout_s), settings.serial.port
+    from drivers.hal.modbus.tcp import Connection
+
+    assert settings.tcp  # or `problems` has said so
+    host, port = settings.tcp.host, settings.tcp.port
+    return Connection(host, port, settings.timeout_s), f"{host}:{port}"

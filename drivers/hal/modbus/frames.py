@@ -1,0 +1,189 @@
+"""pymodbus, kept to what it is good at: frames and their contents. Imported with the first bus.
+
+Its decoders let too much through, so each reply is decoded by a stricter one. Its client is not used:
+it waits for the timeout anew after each byte and by the wall clock, looks up names without limit,
+repeats requests on a connection that may still hold late replies, and takes the reply to another
+function for an answer. Its server, which costs 15 MB, is never imported.
+"""
+
+import logging
+import struct
+from typing import Final
+
+from pymodbus.exceptions import ModbusException
+from pymodbus.framer.rtu import FramerRTU
+from pymodbus.framer.socket import FramerSocket
+from pymodbus.pdu import DecodePDU, ModbusPDU
+from pymodbus.pdu.bit_message import (
+    ReadCoilsRequest,
+    ReadCoilsResponse,
+    ReadDiscreteInputsRequest,
+    WriteSingleCoilRequest,
+    WriteSingleCoilResponse,
+)
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersRequest,
+    ReadHoldingRegistersResponse,
+    ReadInputRegistersRequest,
+    WriteSingleRegisterRequest,
+    WriteSingleRegisterResponse,
+)
+
+from drivers.hal.modbus.wire import Answer, BadReply, Question
+
+logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # our HalErrors say it all
+
+FAILURES: Final = (ModbusException, struct.error, IndexError, ValueError)
+"""What pymodbus raises about bytes that are no reply."""
+
+
+class CoilRequest(WriteSingleCoilRequest):
+    """Function 5 with any value, not only a coil's two: some modules take a time there."""
+
+    def encode(self) -> bytes:
+        """Address and value."""
+        return struct.pack(">HH", self.address, *self.registers)
+
+
+REQUESTS: Final[dict[int, type[ModbusPDU]]] = {
+    1: ReadCoilsRequest,
+    2: ReadDiscreteInputsRequest,
+    3: ReadHoldingRegistersRequest,
+    4: ReadInputRegistersRequest,
+    5: CoilRequest,
+    6: WriteSingleRegisterRequest,
+}
+
+
+class Coils(ReadCoilsResponse):
+    """Bits, as many as it says."""
+
+    def decode(self, data: bytes) -> None:
+        """Raises ValueError for another number of bytes."""
+        if len(data) < 2 or data[0] != len(data) - 1:
+            raise ValueError("its byte count is wrong")
+        super().decode(data)
+
+
+class DiscreteInputs(Coils):
+    """The same of another table."""
+
+    function_code = 2
+
+
+class HoldingRegisters(ReadHoldingRegistersResponse):
+    """Registers, as many as it says."""
+
+    def decode(self, data: bytes) -> None:
+        """Raises ValueError for another number of bytes."""
+        if len(data) < 3 or data[0] != len(data) - 1 or data[0] % 2:
+            raise ValueError("its byte count is wrong")
+        super().decode(data)
+
+
+class InputRegisters(HoldingRegisters):
+    """The same of another table."""
+
+    function_code = 4
+
+
+class CoilEcho(WriteSingleCoilResponse):
+    """A coil's address and value, which pymodbus would take for 1 whatever it is."""
+
+    def decode(self, data: bytes) -> None:
+        """Raises ValueError for another number of bytes."""
+        if len(data) != 4:
+            raise ValueError("it is no coil's value")
+        super().decode(data)
+        self.registers = [int.from_bytes(data[2:], "big")]
+
+
+class RegisterEcho(WriteSingleRegisterResponse):
+    """A register's address and value."""
+
+    def decode(self, data: bytes) -> None:
+        """Raises ValueError for another number of bytes."""
+        if len(data) != 4:
+            raise ValueError("it is no register's value")
+        super().decode(data)
+
+
+DECODER: Final = DecodePDU(is_server=False)
+for _reply in (Coils, DiscreteInputs, HoldingRegisters, InputRegisters, CoilEcho, RegisterEcho):
+    DECODER.register(_reply)
+TCP: Final = FramerSocket(DECODER)
+RTU: Final = FramerRTU(DECODER)
+
+
+def tcp_request(question: Question, number: int) -> bytes:
+    """The frame that asks this on TCP; `number` is the transaction's, not 0. Raises BadReply."""
+    return TCP.buildFrame(_request(question, number))
+
+
+def tcp_answer(question: Question, number: int, heard: bytes) -> tuple[int, Answer | None]:
+    """How many bytes were used, and the answer if it is there. Raises BadReply."""
+    try:
+        used, reply = TCP.handleFrame(heard, question.unit, number)
+    except FAILURES as error:
+        raise BadReply(str(error)) from error
+    return used, None if reply is None else _answer(question, reply)
+
+
+def rtu_request(question: Question) -> bytes:
+    """The frame that asks this on a serial line. Raises BadReply."""
+    return RTU.buildFrame(_request(question))
+
+
+def rtu_answer(question: Question, frame: bytes) -> Answer:
+    """What a frame whose CRC is right says. Raises BadReply."""
+    try:
+        reply = DECODER.decode(frame[1:-2])
+    except FAILURES as error:
+        raise BadReply(str(error)) from error
+    if reply is None:
+        raise BadReply(f"{frame.hex(' ')} does not decode")
+    return _answer(question, reply)
+
+
+def rtu_size(heard: bytes) -> int:
+    """The size of the reply that these bytes begin with; 0 while too few are there. Raises BadReply."""
+    if len(heard) < 5:  # the shortest reply is an exception
+        return 0
+    try:
+        sort = DECODER.lookupPduClass(heard)
+        if sort is None:
+            raise BadReply(f"function {heard[1]} is not known")
+        return sort.calculateRtuFrameSize(heard)
+    except FAILURES as error:
+        raise BadReply(str(error)) from error
+
+
+def crc_fits(frame: bytes) -> bool:
+    """Are these bytes a frame of a serial line?"""
+    crc = int.from_bytes(frame[-2:], "big")
+    return len(frame) >= 4 and FramerRTU.check_CRC(frame[:-2], crc)
+
+
+def _request(question: Question, number: int = 0) -> ModbusPDU:
+    function, where = question.function, (question.unit, number, question.address)
+    if function in (5, 6):
+        return REQUESTS[function](*where, registers=[question.value])
+    return REQUESTS[function](*where, count=question.value)
+
+
+def _answer(question: Question, reply: ModbusPDU) -> Answer:
+    """Does it answer the question? Raises BadReply."""
+    function, asked = question.function, question.value
+    if reply.function_code & 0x7F != function:
+        raise BadReply(f"function {reply.function_code} instead of {function}")
+    if reply.isError():
+        return Answer(exception=reply.exception_code)
+    if function in (5, 6):
+        if (reply.address, reply.registers) != (question.address, [asked]):
+            raise BadReply("the echo of another write")
+        return Answer((asked,))
+    found = reply.bits if function in (1, 2) else reply.registers
+    if len(found) != (-(-asked // 8) * 8 if function in (1, 2) else asked):
+        sort = "bits" if function in (1, 2) else "registers"
+        raise BadReply(f"{len(found)} {sort} for {asked}")
+    return Answer(tuple(int(value) for value in found[:asked]))

@@ -1,0 +1,199 @@
+"""One device's coils and registers: claimed, read, written, read back and let go in one way.
+
+Nothing is written before a first good reading of what is written. What is written is read back, and
+looked at again in each reading: a module that restarts with its outputs off, or whose watchdog has
+tripped, is noticed. What goes to its safe value is tried for each output, whatever fails meanwhile:
+another output, an input, the unit's watchdog.
+"""
+
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from typing import Protocol
+
+from drivers.hal import HalError
+from drivers.hal.every import Every
+from drivers.hal.modbus.dead_man import Guard
+from drivers.hal.modbus.points import Point, Range, parse, pieces, ranges
+from drivers.hal.modbus.wire import ILLEGAL_ADDRESS, Refused
+from drivers.hal.points import Flash
+
+
+class Units(Protocol):
+    """What lines need of a bus. `safe`: it is for switching off, and waits for no unit's pause."""
+
+    def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:
+        """One request. Raises HalError."""
+
+    def write(self, point: Point, value: int, safe: bool = False) -> None:
+        """Set a coil or register. Raises HalError; then it may be set or not."""
+
+    def flash(self, place: Point, on_s: float) -> None:
+        """Have the module time a pulse. Raises HalError; then it may pulse."""
+
+    def guard(self, units: Iterable[int]) -> Guard:
+        """The modules' own watchdogs."""
+
+    def insist(self) -> None:
+        """Try at once what is asked next."""
+
+
+class Image:
+    """Points that are read together, in as few requests as their units take."""
+
+    def __init__(self, units: Units, points: Iterable[Point]) -> None:
+        self._units = units
+        self._points = set(points)
+        self._ranges = ranges(self._points)
+
+    def read(self, safe: bool = False, every: Every | None = None) -> dict[Point, int]:
+        """Bits (0 or 1) and registers, read now. Raises HalError.
+
+        With `every` those that can be read, whatever fails.
+        """
+        image: dict[Point, int] = {}
+        asked = list(self._ranges)
+        while asked:
+            with _tried(every):
+                image |= self._part(asked.pop(0), asked, safe)
+        return image
+
+    def _part(self, part: Range, asked: list[Range], safe: bool) -> dict[Point, int]:
+        """One request. A module may lack the addresses in a gap: from now on they are left out."""
+        try:
+            return self._units.read(part, safe)
+        except Refused as refusal:
+            parts = pieces(part, self._points)
+            if refusal.code != ILLEGAL_ADDRESS or len(parts) == 1:
+                raise
+        asked[:0] = parts
+        at = self._ranges.index(part)
+        self._ranges[at : at + 1] = parts
+        return {}
+
+
+class Lines:
+    """What one device reads and what drives it (`drivers.hal.points.Lines`), by names.
+
+    `safe`: each output's value that asks for nothing. `readable`: outputs can be read back; those that
+    cannot are written anew each time, so that a controller that has restarted hears it again.
+    """
+
+    def __init__(
+        self,
+        units: Units,
+        inputs: Mapping[str, Point],
+        outputs: Mapping[str, Point],
+        safe: Mapping[str, int],
+        readable: bool = True,
+    ) -> None:
+        self._units = units
+        self._inputs = dict(inputs)
+        self._outputs = dict(outputs)
+        self._safe = dict(safe)
+        self._readable = readable
+        self._back = Image(units, outputs.values() if readable else ())
+        self._all = Image(units, [*inputs.values(), *(outputs.values() if readable else ())])
+        self._set: dict[str, int] = {}
+        self._touched = False
+        self._claimed = False
+        self._guard = units.guard(point.unit for point in outputs.values())
+
+    def claim(self) -> None:
+        """Read each output and bring it to its safe value; once only.
+
+        Inputs are asked only where outputs cannot be, to see that the unit answers. Claimed again after
+        a failure it only reads: the outputs are as they were, or as the next write says. A door that is
+        held must not drop because one reply was lost.
+        """
+        self._set.clear()
+        every = Every()
+        with every.one():
+            self._guard.check()
+        found = self._back.read(every=every)
+        if not self._claimed:
+            names = (n for n, p in self._outputs.items() if p in found or not self._readable)
+            self._write({name: self._safe[name] for name in names}, every)
+        every.check()
+        if not self._readable:
+            self._all.read()
+        self._claimed = True
+
+    def read(self) -> dict[str, int]:
+        """Every input's value. Raises HalError, also when an output is not as it was written.
+
+        After a failure what was written counts as unknown.
+        """
+        known, self._set = self._set, {}
+        self._guard.check()
+        image = self._all.read()
+        self._verify(known, image)
+        self._set = known
+        return {name: image[point] for name, point in self._inputs.items()}
+
+    def bring(self, values: Mapping[str, int]) -> None:
+        """Set those of these outputs that are not known to be so."""
+        changed = {n: value for n, value in values.items() if self._set.get(n) != value}
+        self.write(changed if self._readable else values)
+
+    def write(self, values: Mapping[str, int]) -> None:
+        """Set these outputs, and read them back. Raises HalError; then they are unknown."""
+        every = Every()
+        self._write(values, every)
+        every.check()
+
+    def flash(self, point: str, flash: Flash) -> None:
+        """Ask the module for this pulse. Its coil reads 1, then 0 by itself: it is not compared."""
+        self._touched = True
+        self._set.pop(point, None)
+        self._units.flash(parse(flash.point), flash.on_s)
+
+    def outputs(self) -> dict[str, int] | None:
+        """The outputs, read now; None where they cannot be."""
+        image = self._back.read()
+        return {n: image[p] for n, p in self._outputs.items()} if self._readable else None
+
+    def make_safe(self) -> None:
+        """Every output to its safe value, whatever was known. Raises HalError."""
+        self.write(self._safe)
+
+    def close(self) -> None:
+        """The same, one try for each unit whatever the pauses; not if nothing was ever driven."""
+        if not self._touched:
+            return
+        self._units.insist()
+        unheard = Every()  # nobody is left to tell
+        for name, point in self._outputs.items():
+            with unheard.one():
+                self._units.write(point, self._safe[name], safe=True)
+
+    def _write(self, values: Mapping[str, int], every: Every) -> None:
+        """Off first; nothing goes on after a failure. Then each is read back."""
+        self._touched = self._touched or bool(values)
+        safe = {name for name, value in values.items() if value == self._safe[name]}
+        written: dict[str, int] = {}
+        for name in sorted(values, key=lambda name: name not in safe):
+            self._set.pop(name, None)
+            if name in safe or not every.failure:
+                with every.one():
+                    self._units.write(self._outputs[name], values[name], safe=name in safe)
+                    written[name] = values[name]
+        self._read_back(written, safe=len(safe) == len(values), every=every)
+
+    def _read_back(self, written: Mapping[str, int], safe: bool, every: Every) -> None:
+        points = [self._outputs[name] for name in written] if self._readable else []
+        with every.one():
+            self._verify(written, Image(self._units, points).read(safe))
+            self._set |= written
+
+    def _verify(self, written: Mapping[str, int], image: Mapping[Point, int]) -> None:
+        for name, value in written.items():
+            point = self._outputs[name]
+            if image.get(point, value) != value:
+                raise HalError(
+                    f"{point} reads {image[point]} after {value:d} was written: the module has"
+                    " restarted, its watchdog has tripped, or somebody else writes it"
+                )
+
+
+def _tried(every: Every | None) -> AbstractContextManager[None]:
+    return nullcontext() if every is None else every.one()

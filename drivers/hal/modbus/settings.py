@@ -1,0 +1,53 @@
+"""`type: modbus` of a device YAML: where the units are, and how long they may take."""
+
+from collections.abc import Iterable
+from typing import Annotated
+
+import msgspec
+
+from bridges.core.fields import Period
+from drivers.hal.modbus.places import Serial, Tcp
+from drivers.hal.modbus.watchdog import Watchdog
+
+Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
+
+
+class Settings(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    forbid_unknown_fields=True,
+    tag_field="type",
+    tag="modbus",
+):
+    """A module, or a gateway or serial line with several units: `tcp` or `serial`, one of the two.
+
+    `tcp`: where the module or gateway listens.
+    `serial`: the serial line (Modbus RTU).
+    `timeout_s`: for one try of one request.
+    `retries`: how many more tries a request gets.
+    `scan_s`: how often every input is read.
+    `module_watchdog`: the modules' own dead-man switch for their outputs.
+    """
+
+    tcp: Tcp | None = None
+    serial: Serial | None = None
+    timeout_s: Timeout = 0.3
+    retries: Annotated[int, msgspec.Meta(ge=0, le=5)] = 1
+    scan_s: Period = 0.1
+    module_watchdog: Watchdog | None = None
+
+    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+        """What the fields cannot say one by one."""
+        if self.tcp is None and self.serial is None:
+            yield (), "says not where the units are: write tcp: {host: …} or serial: {port: …}"
+        elif self.tcp and self.serial:
+            yield ("serial",), "a bus has tcp or serial: write a second bus for the other"
+
+
+def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+    """What is legal but worth a look: (path, text)."""
+    for path, text in settings.serial.warnings() if settings.serial else ():
+        yield ("serial", *path), text
+    for path, text in settings.module_watchdog.warnings() if settings.module_watchdog else ():
+        yield ("module_watchdog", *path), text

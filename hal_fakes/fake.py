@@ -1,0 +1,109 @@
+"""Fakes are found as drivers are: `DRIVER` and `BUS` name a module, and its `FAKE` stands in for them.
+
+Only this file imports one by its name. A driver that names none has the plant of its kind,
+`hal_fakes/plants/<kind>.py`, at the far end of its own wires.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Generic, Protocol, TypeAlias, TypeVar
+
+from bridges.settings.load import Config
+from drivers.hal import Bus, HalError
+from drivers.hal.points import Wire
+from hal_fakes.plants.plant import Plant
+from hal_fakes.realtime import RealTime
+from hal_fakes.wiring import Wiring
+
+Settings = TypeVar("Settings")
+Station = TypeVar("Station")
+
+
+@dataclass(frozen=True)
+class Fake(Generic[Settings]):
+    """One sort of controller.
+
+    `plant(name, settings, wires)`: its physics; `wires` is the driver's table.
+    `station(plant, settings, settings of the bus)`: what the bus's fake puts on the bus, with that
+    plant behind it. None: the plant's contacts stand there, as a `Wiring`.
+    """
+
+    plant: Callable[[str, Settings, Sequence[Wire]], Plant]
+    station: Callable[[Plant, Settings, Any], object] | None = None
+
+
+class Server(Protocol):
+    """A far side that a process can stand on.
+
+    `replace`: what must stand in the bus's settings instead
+    (`{"tcp": {"host": "127.0.0.1", "port": 41234}}`).
+    """
+
+    replace: dict[str, Any]
+
+    def close(self) -> None:
+        """Stop serving. Does not raise."""
+
+
+@dataclass(frozen=True)
+class Outside(Generic[Settings, Station]):
+    """The far side of a bus, in a process of its own.
+
+    `serve(settings, stations)`: starts a real server on 127.0.0.1, or on a line of its own, and returns
+    at once. The plants behind the stations may be called from any thread; somebody else keeps their
+    time.
+    """
+
+    serve: Callable[[Settings, Sequence[Station]], Server]
+
+
+@dataclass(frozen=True)
+class Inside(Generic[Settings, Station]):
+    """The far side of a bus that cannot leave the daemon's process.
+
+    `open_bus(settings, stations, world)`: the real bus, with these on it.
+    """
+
+    open_bus: Callable[[Settings, Sequence[Station], RealTime], Bus]
+
+
+FarSide: TypeAlias = Inside[Any, Any] | Outside[Any, Any]
+
+
+def plants_on(config: Config, bus: str) -> dict[str, Plant]:
+    """A new plant for each device on this bus."""
+    fake = _fake(config)
+    return {
+        name: fake.plant(name, config.devices[name], config.wires(name))
+        for name in config.devices_on(bus)
+    }
+
+
+def stations_on(config: Config, bus: str, plants: Mapping[str, Plant]) -> list[Any]:
+    """What stands on this bus, with the devices' plants behind it."""
+    station = _fake(config).station
+    if station is None:
+        canonical = config.bus_type(bus).canonical
+        return [
+            Wiring(plants[name], config.wires(name), canonical) for name in config.devices_on(bus)
+        ]
+    return [
+        station(plants[name], config.devices[name], config.buses[bus])
+        for name in config.devices_on(bus)
+    ]
+
+
+def far_side(config: Config, bus: str) -> FarSide:
+    """The far side of this bus. Raises HalError where its type has none."""
+    name = config.bus_type(bus).fake
+    if not name:
+        raise HalError(f"a bus of type {config.bus_types[bus]} cannot be simulated: it has no fake")
+    found: FarSide = import_module(name).FAKE
+    return found
+
+
+def _fake(config: Config) -> Fake[Any]:
+    name = config.driver_type.fake or f"hal_fakes.plants.{config.kind}"
+    found: Fake[Any] = import_module(name).FAKE
+    return found

@@ -1,0 +1,127 @@
+"""A charging station that answers HTTP: its plant in the maker's numbers or words and fields.
+
+`GET state_path` answers what the station does; clearing, start, stop and range check do what they are
+called.
+"""
+
+import json
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any, Final, cast
+
+from bridges.charger.signals import Activity
+from drivers.charger.http import Settings
+from hal_fakes.fake import Fake
+from hal_fakes.plants.charger import ROBOTS_FAULTS, ChargerPlant, Reading
+from hal_fakes.plants.plant import Plant
+
+NEAREST: Final = {
+    Activity.HANDSHAKE: Activity.IDLE,
+    Activity.STOPPING: Activity.CHARGING,
+    Activity.RELEASED: Activity.IDLE,
+}
+"""What a maker shows who has no number of its own for an activity."""
+
+
+def build(name: str, settings: Settings) -> ChargerPlant:
+    """The station that these settings speak to, with the robots that it knows."""
+    asked = settings.range_check is not None
+    return ChargerPlant(name, settings.receivers, settings.can_stop(), asked)
+
+
+class HttpCharger:
+    """A station (`hal_fakes.http.Station`): one plant with the numbers and paths of its maker."""
+
+    def __init__(self, plant: Plant, settings: Settings) -> None:
+        self.plant = plant
+        self.reads = settings.state_path
+        self.commands: Mapping[tuple[str, str], tuple[str, bool]] = dict(_commands(settings))
+        self._settings = settings
+        self._lists: Mapping[Activity, list[int]] = settings.codes.lists()
+        self._words: Mapping[int | str, str] = {
+            code: word for word, code in settings.state_words.items()
+        }
+        self._last: bytes | None = None
+
+    def reading(self) -> Reading:
+        """What the station does now."""
+        self.plant.advance(time.monotonic())
+        return cast(Reading, self.plant.sense("reading"))
+
+    def obey(self, signal: str, asserted: bool) -> None:
+        """Somebody has asked for it."""
+        self.plant.drive(signal, asserted, time.monotonic())
+
+    def answer(self) -> bytes:
+        """The answer to `GET state_path` now."""
+        return self.body(self.reading())
+
+    def body(self, reading: Reading) -> bytes:
+        """The answer that shows this reading; wrong where the server is told to be."""
+        server, body = reading.failures.get("server"), reading.failures.get("body")
+        if server == "stuck" and self._last is not None:
+            return self._last
+        code: int | str = self._unknown() if body == "wrong" else self._code(reading)
+        if server == "wrong":
+            code = str(code)
+        self._last = json.dumps(self._answer(code, reading)).encode()
+        return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
+
+    def _answer(self, code: int | str, reading: Reading) -> dict[str, Any]:
+        """Everything where the YAML says that it is."""
+        fields, answer = self._settings.fields, dict[str, Any]()
+        _put(answer, fields.state, self._words.get(code, code))
+        _put(answer, fields.error_text, reading.error_text)
+        if fields.receiver_id:
+            _put(answer, fields.receiver_id, reading.receiver or None)
+        if where := fields.in_range:
+            yes = where.when[0] if where.when else True
+            no = next(n for n in range(256) if n not in where.when) if where.when else False
+            _put(answer, where.field, yes if reading.in_range else no)
+        percent = None if reading.battery is None else 100 * reading.battery
+        for name, value in (("battery_percent", percent), *_numbers(reading)):
+            if number := getattr(fields, name):
+                _put(answer, number.field, None if value is None else value / number.scale)
+        return answer
+
+    def _code(self, reading: Reading) -> int:
+        if reading.error_text in ROBOTS_FAULTS and self._settings.codes.robot_error:
+            return self._settings.codes.robot_error[0]
+        nearest = NEAREST.get(reading.activity, Activity.ERROR)
+        codes = self._lists[reading.activity] or self._lists[nearest] or [self._unknown()]
+        return codes[min(int(reading.progress * len(codes)), len(codes) - 1)]
+
+    def _unknown(self) -> int:
+        known = {code for codes in self._lists.values() for code in codes}
+        return next(code for code in range(100, 65536) if code not in known)
+
+
+def _commands(settings: Settings) -> Iterator[tuple[tuple[str, str], tuple[str, bool]]]:
+    """Method and path of each command, and what it does to the plant."""
+    yield ("POST", settings.clear_error_path), ("clear_error", True)
+    for call, signal, asserted in (
+        (settings.start, "power", True),
+        (settings.stop, "power", False),
+        (settings.range_check, "range_check", True),
+    ):
+        if call:
+            yield (call.method, call.path), (signal, asserted)
+
+
+def _numbers(reading: Reading) -> list[tuple[str, float | None]]:
+    names = ("volts", "amps", "time_to_full_s")
+    return [(name, getattr(reading, name)) for name in names]
+
+
+def _put(answer: dict[str, Any], field: str, value: Any) -> None:
+    """A value at its place; list items have no place here."""
+    *above, last = field.split(".")
+    for name in above:
+        answer = answer.setdefault(name, {})
+    answer[last] = value
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: build(name, settings),
+    station=lambda plant, settings, bus: HttpCharger(plant, settings),
+)

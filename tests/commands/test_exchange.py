@@ -1,0 +1,430 @@
+"""`send`, in virtual time: what it sends when, when it is content, and what it says when not."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import pytest
+
+from bridges.commands.exchange import step
+from bridges.commands.graph import CommandLine, Heard
+from bridges.commands.requests import Done, Failed, Request, Seen
+from bridges.commands.requests.charger import Charge, ChargeCancel, QueuedCancel, QueuedCharge
+from bridges.commands.requests.door import DoorMove
+from bridges.commands.requests.lift import LiftEnd, LiftRide
+from bridges.rmf import definitions as d
+from bridges.rmf import topics, words
+from bridges.rmf.topics import Topic
+
+ME, OTHER = "fleet/robot", "fleet/other"
+LINE = CommandLine(("send", "…"), ("--direct", "--localhost"))
+RIDE = LiftRide("Lift1", "L3", ME, direct=True, line=LINE)
+LIFT = d.LiftState(
+    lift_name="Lift1",
+    available_floors=("L1", "L2", "L3"),
+    current_floor="L1",
+    current_mode=d.LiftMode.MODE_HUMAN,
+)
+GRANTED = replace(LIFT, session_id=ME, current_mode=2)
+ARRIVED = replace(GRANTED, current_floor="L3", door_state=2)
+DOOR = d.DoorState(door_name="ward", current_mode=d.DoorMode(0))
+CHARGER = d.ChargerState(state=1, charger_name="a")
+
+
+@dataclass
+class Told:
+    """What a run of `send` did: when it sent, what, its hints, how it ended and when."""
+
+    sent: list[tuple[float, words.Requested]]
+    hints: list[str]
+    outcome: Done | Failed
+    at: float
+
+
+def tell(
+    request: Request,
+    story: Iterable[tuple[float, d.Message]] = (),
+    *,
+    listeners: int = 1,
+    listen_from: float = 0.0,
+    timeout_s: float = 10.0,
+) -> Told:
+    """Look every 0.1 s from 0 on; each message of the story arrives at its time."""
+    left = sorted(story, key=lambda entry: entry[0])
+    seen, told = Seen(0.0, timeout_s), Told([], [], Done(""), 0.0)
+    for tick in range(10_000):
+        now = round(tick * 0.1, 1)
+        while left and left[0][0] <= now:
+            seen = take(seen, request, Heard(left[0][1], left.pop(0)[0]))
+        seen = replace(seen, listeners=listeners if now >= listen_from else 0)
+        todo = step(request, seen, now)
+        if todo.hint and todo.hint not in told.hints:
+            told.hints.append(todo.hint)
+        if todo.outcome is not None:
+            told.outcome, told.at = todo.outcome, now
+            return told
+        if todo.send is not None:
+            told.sent.append((now, todo.send))
+            first = now if seen.first_sent_at is None else seen.first_sent_at
+            seen = replace(seen, first_sent_at=first, last_sent_at=now)
+    raise AssertionError("it never ended")
+
+
+def take(seen: Seen, request: Request, heard: Heard) -> Seen:
+    if isinstance(heard.message, d.SupervisorHeartbeat):
+        return replace(seen, heartbeat=heard)
+    name = words.device(heard.message)
+    seen = replace(seen, names=seen.names | {name})
+    return replace(seen, states=(*seen.states, heard)) if request.about(heard.message) else seen
+
+
+def every_second(state: d.Message, until: float = 20.0) -> list[tuple[float, d.Message]]:
+    return [(0.5 + n, state) for n in range(int(until))]
+
+
+def heartbeat(*requesters: str) -> d.SupervisorHeartbeat:
+    sessions = tuple(d.Session(d.Time(), requester) for requester in requesters)
+    return d.SupervisorHeartbeat((d.DoorSessions("ward", sessions),))
+
+
+# --- when it sends -----------------------------------------------------------------------------
+
+
+def test_a_lift_is_asked_for_as_fleets_ask_once_a_second_until_it_is_there() -> None:
+    told = tell(RIDE, [(0.5, LIFT), (1.5, GRANTED), (2.5, GRANTED), (2.8, ARRIVED)])
+    request = d.LiftRequest("Lift1", d.Time(), ME, 1, "L3", 2)
+    assert told == Told(
+        [(0.5, request), (1.5, request), (2.5, request)],
+        [],
+        Done(
+            "Lift1 is at L3, door open, held by fleet/robot;"
+            " to end that: rmf-bridge send lift Lift1 --end --direct --localhost"
+        ),
+        2.8,
+    )
+
+
+def test_a_request_waits_for_a_first_state_but_not_for_ever() -> None:
+    assert [at for at, _ in tell(RIDE, timeout_s=3.5).sent] == [2.0, 3.0]
+
+
+def test_nothing_is_sent_while_nobody_listens_and_a_supervisor_is_missed() -> None:
+    typed = ("send", "lift", "Lift1", "L3", "--session", "my robot", "--localhost")
+    request = LiftRide("Lift1", "L3", ME, line=CommandLine(typed, ("--localhost",)))
+    told = tell(request, every_second(LIFT), listeners=0, timeout_s=5.0)
+    missed = (
+        "no lift supervisor runs in this domain: nobody subscribes to adapter_lift_requests;"
+        " to ask the lift's daemon itself:"
+        " rmf-bridge send lift Lift1 L3 --session 'my robot' --localhost --direct"
+    )
+    assert told == Told([], [missed], Failed(missed), 5.0)
+
+
+def test_a_listener_that_comes_late_is_served() -> None:
+    told = tell(RIDE, [(0.5, LIFT), (4.2, ARRIVED)], listen_from=4.0)
+    assert [at for at, _ in told.sent] == [4.0]
+    assert isinstance(told.outcome, Done)
+
+
+@pytest.mark.parametrize(
+    ("direct", "lift", "door"),
+    [
+        (True, topics.LIFT_REQUESTS, topics.DOOR_REQUESTS),
+        (False, topics.ADAPTER_LIFT_REQUESTS, topics.ADAPTER_DOOR_REQUESTS),
+    ],
+)
+def test_requests_go_to_the_supervisors_unless_direct(
+    direct: bool, lift: Topic[d.LiftRequest], door: Topic[d.DoorRequest]
+) -> None:
+    assert LiftRide("x", "L1", ME, direct=direct).topic == lift
+    assert LiftEnd("x", "", direct=direct).topic == lift
+    assert DoorMove("x", True, ME, direct=direct).topic == door
+    assert Charge("x", "f", "r", "id", 0).topic == topics.CHARGER_REQUESTS
+    assert ChargeCancel("x", "id").topic == topics.CHARGER_CANCELS
+
+
+# --- lifts -------------------------------------------------------------------------------------
+
+
+def test_an_arrival_seen_before_the_request_is_not_our_effect() -> None:
+    told = tell(RIDE, [(0.5, ARRIVED)], listen_from=1.0, timeout_s=3.0)
+    assert isinstance(told.outcome, Failed)
+
+
+@pytest.mark.parametrize(
+    "nearly",
+    [
+        replace(ARRIVED, session_id=OTHER),
+        replace(ARRIVED, session_id=""),
+        replace(ARRIVED, current_floor="L2"),
+        replace(ARRIVED, current_floor=""),
+        replace(ARRIVED, door_state=1),
+    ],
+)
+def test_three_of_the_four_fields_are_not_an_arrival(nearly: d.LiftState) -> None:
+    assert isinstance(tell(RIDE, every_second(nearly)).outcome, Failed)
+
+
+def test_granted_only_is_content_with_the_session() -> None:
+    request = LiftRide("Lift1", "L3", ME, True, direct=True)
+    told = tell(request, [(0.5, LIFT), (1.0, GRANTED)])
+    assert told.at == 1.0
+    assert isinstance(told.outcome, Done)
+
+
+def test_a_floor_that_is_not_served_fails_at_once_with_the_nearest_name() -> None:
+    request = LiftRide("Lift1", "l3", ME, direct=True)
+    told = tell(request, every_second(LIFT))
+    assert told == Told(
+        [], [], Failed("Lift1 serves L1, L2, L3, not 'l3'; did you mean 'L3'?"), 0.5
+    )
+
+
+@pytest.mark.parametrize(
+    ("state", "reason"),
+    [
+        (
+            replace(LIFT, session_id=OTHER, current_mode=2),
+            "Lift1 is held by fleet/other"
+            " (last state: car at L1, door closed, mode AGV, held by fleet/other);"
+            " to end that session: rmf-bridge send lift Lift1 --end --direct --localhost",
+        ),
+        (
+            replace(LIFT, current_mode=3),
+            "Lift1 serves no robot while its mode is FIRE"
+            " (last state: car at L1, door closed, mode FIRE)",
+        ),
+        (
+            LIFT,
+            "Lift1 did not grant the session: its daemon's log says why"
+            " (last state: car at L1, door closed, mode HUMAN)",
+        ),
+        (
+            replace(LIFT, session_id=ME),
+            "Lift1 granted the session, but its mode is HUMAN, not AGV (a key switch, or still in use)"
+            " (last state: car at L1, door closed, mode HUMAN, held by fleet/robot)",
+        ),
+        (
+            GRANTED,
+            "Lift1 granted the session, but the car has not come to L3"
+            " (last state: car at L1, door closed, mode AGV, held by fleet/robot)",
+        ),
+        (
+            replace(ARRIVED, door_state=1),
+            "the car is at L3, but its door is not seen open"
+            " (last state: car at L3, door moving, mode AGV, held by fleet/robot)",
+        ),
+    ],
+)
+def test_a_ride_that_fails_says_what_stands_in_its_way(state: d.LiftState, reason: str) -> None:
+    told = tell(RIDE, every_second(state))
+    assert (told.outcome, told.at) == (Failed(reason), 10.0)
+
+
+def test_what_a_person_can_do_about_it_is_said_within_seconds_and_not_only_at_the_end() -> None:
+    held = replace(LIFT, session_id=OTHER, current_mode=2)
+    told = tell(RIDE, every_second(held), timeout_s=4.0)
+    assert told.hints == [
+        "Lift1 is held by fleet/other;"
+        " to end that session: rmf-bridge send lift Lift1 --end --direct --localhost"
+    ]
+
+
+def test_a_simulation_that_is_not_heard_is_looked_for_on_loopback() -> None:
+    typed = ("send", "lift", "Lift1", "L3", "--session", "me", "--direct")
+    request = LiftRide("Lift1", "L3", "me", direct=True, line=CommandLine(typed, ("--direct",)))
+    assert tell(request, listeners=0).hints == [
+        "no lift daemon runs in this domain: nobody subscribes to lift_requests;"
+        " for a simulation, which is on the loopback interface:"
+        " rmf-bridge send lift Lift1 L3 --session me --direct --localhost"
+    ]
+
+
+def test_a_name_that_nobody_has_is_compared_with_those_heard() -> None:
+    there = every_second(replace(LIFT, lift_name="lift1")) + every_second(
+        replace(LIFT, lift_name="Goods")
+    )
+    text = "no 'Lift1' on lift_states; there: Goods, lift1; did you mean 'lift1'?"
+    told = tell(RIDE, there)
+    assert (told.hints, told.outcome) == ([text], Failed(text))
+
+
+def test_a_graph_without_any_state_is_called_that() -> None:
+    text = "nothing is heard on lift_states: no daemon of it runs in this domain and network"
+    told = tell(RIDE)
+    assert (told.hints, told.outcome) == ([text], Failed(text))
+
+
+def test_a_daemon_that_falls_silent_is_the_reason() -> None:
+    told = tell(RIDE, every_second(GRANTED, until=3.0))
+    assert told.outcome == Failed("Lift1 fell silent 8 s ago: is its daemon still running?")
+
+
+def test_end_takes_the_holder_from_the_first_state_and_sends_what_fleets_send() -> None:
+    told = tell(LiftEnd("Lift1", "", direct=True), [(0.5, GRANTED), (1.2, GRANTED), (1.8, LIFT)])
+    end = d.LiftRequest("Lift1", d.Time(), ME, 0, "", 0)
+    assert told == Told(
+        [(0.5, end), (1.5, end)], [], Done("Lift1 is no longer held by fleet/robot"), 1.8
+    )
+
+
+def test_end_without_a_state_sends_nothing_as_it_knows_no_holder() -> None:
+    told = tell(LiftEnd("Lift1", "", direct=True), timeout_s=5.0)
+    assert told.sent == []
+    assert isinstance(told.outcome, Failed)
+
+
+def test_end_of_a_free_lift_is_done_before_it_begins() -> None:
+    told = tell(LiftEnd("Lift1", "", direct=True), every_second(LIFT))
+    assert told == Told([], [], Done("Lift1 has no session: nothing to end"), 0.5)
+
+
+def test_end_of_a_given_session_is_sent_once_even_to_a_lift_that_does_not_show_it() -> None:
+    told = tell(LiftEnd("Lift1", ME, direct=True), every_second(LIFT))
+    assert [at for at, _ in told.sent] == [0.5]
+    assert told.outcome == Done("Lift1 is no longer held by fleet/robot")
+
+
+# --- doors -------------------------------------------------------------------------------------
+
+
+def moved(mode: int) -> d.DoorState:
+    return replace(DOOR, current_mode=d.DoorMode(mode))
+
+
+def test_a_door_is_open_when_it_says_so_after_our_request() -> None:
+    request = DoorMove("ward", True, ME, direct=True)
+    told = tell(request, [(0.5, moved(2)), (1.2, moved(1)), (1.9, moved(2))], listen_from=1.0)
+    asked = d.DoorRequest(d.Time(), ME, "ward", d.DoorMode(2))
+    assert told == Told([(1.0, asked)], [], Done("ward is open"), 1.9)
+
+
+def test_through_the_supervisor_an_open_door_counts_once_the_heartbeat_lists_us() -> None:
+    request = DoorMove("ward", True, ME, direct=False)
+    told = tell(request, [*every_second(moved(2)), (2.2, heartbeat(OTHER)), (3.3, heartbeat(ME))])
+    assert (told.outcome, told.at) == (Done("ward is open"), 3.3)
+    alone = tell(request, every_second(moved(2)))
+    assert alone.outcome == Failed(
+        "ward is there, but no heartbeat of a door supervisor confirms it (last state: open)"
+    )
+
+
+def test_through_the_supervisor_a_closed_door_is_not_ours_while_the_heartbeat_lists_us() -> None:
+    request = DoorMove("ward", False, ME, direct=False)
+    story = [*every_second(moved(0)), (0.7, heartbeat(ME)), (2.2, heartbeat())]
+    told = tell(request, [(0.5, moved(2)), (0.6, moved(0)), *story])
+    assert (told.outcome, told.at) == (Done("ward is closed"), 2.2)
+
+
+@pytest.mark.parametrize(
+    ("opened", "mode", "reason"),
+    [
+        (True, 0, "ward did not open"),
+        (True, 3, "the daemon does not reach the controller of ward"),
+        (True, 4, "the contacts of ward contradict each other, or it took too long"),
+        (False, 2, "ward is held open by fleet/other"),
+    ],
+)
+def test_a_door_that_fails_says_why(opened: bool, mode: int, reason: str) -> None:
+    request = DoorMove("ward", opened, ME, direct=False)
+    told = tell(request, [*every_second(moved(mode)), (1.0, heartbeat(OTHER))])
+    assert isinstance(told.outcome, Failed)
+    assert told.outcome.text.startswith(f"{reason} (last state: ")
+
+
+def test_a_door_that_stays_open_with_nobody_holding_it_is_blocked() -> None:
+    told = tell(DoorMove("ward", False, ME, direct=True), every_second(moved(2)))
+    assert told.outcome == Failed(
+        "ward was released, but something keeps it open (last state: open)"
+    )
+
+
+# --- chargers ----------------------------------------------------------------------------------
+
+CHARGE = Charge("a", "fleet", "robot", "r1", 30)
+
+
+@pytest.mark.parametrize("state", [2, 3, 4])
+def test_a_charger_that_shows_our_request_has_taken_it(state: int) -> None:
+    told = tell(CHARGE, [(0.5, CHARGER), (1.6, replace(CHARGER, state=state, request_id="r1"))])
+    request = d.ChargerRequest("a", "fleet", "robot", d.Duration(30), "r1")
+    assert told.sent == [(0.5, request), (1.5, request)]
+    assert isinstance(told.outcome, Done)
+
+
+@pytest.mark.parametrize(
+    ("state", "reason"),
+    [
+        (
+            CHARGER,
+            "a did not take the request: its daemon's log says why (last state: idle)",
+        ),
+        (
+            replace(CHARGER, state=3, request_id="r0"),
+            "a serves request r0 (last state: charging, for request r0);"
+            " to cancel that: rmf-bridge send charger a --cancel r0",
+        ),
+        (
+            replace(CHARGER, state=200, request_id="r1", error_message="foreign object"),
+            "a reports an error: foreign object (last state: error: foreign object, for request r1)",
+        ),
+    ],
+)
+def test_a_charger_that_does_not_serve_us_says_why(state: d.ChargerState, reason: str) -> None:
+    assert tell(CHARGE, every_second(state)).outcome == Failed(reason)
+
+
+@pytest.mark.parametrize("after", [CHARGER, replace(CHARGER, state=4, request_id="r1")])
+def test_a_cancel_is_done_when_the_charger_lets_go(after: d.ChargerState) -> None:
+    held = replace(CHARGER, state=3, request_id="r1")
+    told = tell(ChargeCancel("a", "r1"), [(0.5, held), (1.2, held), (1.8, after)])
+    cancel = d.ChargerCancel("a", "r1")
+    assert told == Told(
+        [(0.5, cancel), (1.5, cancel)], [], Done("a no longer serves request r1"), 1.8
+    )
+
+
+def test_a_cancel_of_an_id_that_the_charger_never_showed_is_a_mistake() -> None:
+    held = replace(CHARGER, state=3, request_id="r2")
+    told = tell(ChargeCancel("a", "r1"), [(0.5, held), (1.5, held)])
+    assert told.outcome == Failed("a does not serve request 'r1' (state: charging, for request r2)")
+
+
+# --- the chargers' coordinator -----------------------------------------------------------------
+
+QUEUE = QueuedCharge("any", "fleet", "robot", "r1", 30, line=CommandLine((), ("--localhost",)))
+OTHERS = replace(CHARGER, state=3, request_id="r9", robot_fleet="fleet", robot_name="other")
+
+
+def test_a_request_for_any_charger_is_done_when_one_of_them_shows_the_robot() -> None:
+    given = replace(
+        CHARGER, charger_name="b", state=2, request_id="x", robot_fleet="fleet", robot_name="robot"
+    )
+    assert [QUEUE.about(state) for state in (CHARGER, OTHERS, given)] == [False, False, True]
+    told = tell(QUEUE, [(0.5, OTHERS), (1.2, given)])
+    request = d.ChargerRequest("", "fleet", "robot", d.Duration(30), "r1")
+    assert told.sent == [(0.5, request)]
+    assert told.hints == []
+    assert told.outcome == Done("b is assigned for fleet/robot")
+
+
+def test_a_robot_that_waits_is_said_to_wait_and_how_to_withdraw_it() -> None:
+    waits = tell(QUEUE, every_second(OTHERS), timeout_s=5.0)
+    text = (
+        "no charger serves fleet/robot yet: it waits in the charger coordinator's queue"
+        " (`rmf-bridge watch` shows it), or was refused (the coordinator's log says why);"
+        " to withdraw the request: rmf-bridge send charger any --queue --cancel r1 --localhost"
+    )
+    assert (waits.hints, waits.outcome) == ([text], Failed(text))
+
+
+def test_a_charger_of_ones_own_choice_is_named_in_the_request() -> None:
+    request = QueuedCharge("a", "fleet", "robot", "r1", 30)
+    assert tell(request, []).sent[0][1] == d.ChargerRequest(
+        "a", "fleet", "robot", d.Duration(30), "r1"
+    )
+
+
+def test_a_withdrawal_is_done_when_it_is_sent() -> None:
+    told = tell(QueuedCancel("any", "r1"), [])
+    assert told.sent == [(2.0, d.ChargerCancel("", "r1"))]
+    assert told.outcome == Done("the charger coordinator was told that request r1 is withdrawn")

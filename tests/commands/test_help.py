@@ -1,0 +1,42 @@
+"""What `--help` says: each command with an example, and each example is a right command line."""
+
+import argparse
+import importlib
+import shlex
+
+import pytest
+
+from bridges import cli
+
+
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_the_help_of_each_command_ends_with_an_example(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        cli.main([command, "--help"])
+    assert left.value.code == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert words.endswith(f"example: rmf-bridge {cli.COMMANDS[command][1]}")
+
+
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_each_example_is_a_right_command_line(command: str) -> None:
+    name, *arguments = shlex.split(cli.COMMANDS[command][1], comments=False)
+    assert name == command
+    if ">" in arguments:
+        arguments = arguments[: arguments.index(">")]
+    parser = argparse.ArgumentParser()
+    module = importlib.import_module(f"bridges.commands.{command.replace('-', '_')}")
+    module.add_arguments(parser)
+    parser.parse_args(arguments)
+
+
+@pytest.mark.parametrize("kind", ["lift", "door", "charger"])
+def test_the_help_of_each_request_ends_with_an_example(
+    kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        cli.main(["send", kind, "--help"])
+    words = " ".join(capsys.readouterr().out.split())
+    assert f"example: rmf-bridge send {kind} " in words

@@ -1,0 +1,46 @@
+"""A door with a latch that is released, and one contact that sees it shut: one file is all of it."""
+
+from bridges.door.settings import DoorSettings
+from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.driver_type import DriverType
+from drivers.hal.points import Input, Output, Points, PointsBus, Wire
+
+
+class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The latch and its contact."""
+
+    latch: Output
+    shut: Input
+
+
+def wires(settings: Settings) -> list[Wire]:
+    """The table."""
+    shut, latch = settings.shut, settings.latch
+    return [
+        Wire("closed", "in", shut.point, shut.active, shut.pull, 0.05, ("shut",)),
+        Wire("hold_open", "out", latch.point, latch.active, path=("latch",)),
+    ]
+
+
+class Door:
+    """One door (`drivers.Driver[DoorSample, DoorOutputs]`)."""
+
+    def __init__(self, points: Points) -> None:
+        self._points = points
+        self.open, self.make_safe, self.close = points.open, points.make_safe, points.close
+
+    def read(self) -> DoorSample:
+        """Every input, read now."""
+        return DoorSample(closed=self._points.read()["closed"])
+
+    def write(self, outputs: DoorOutputs) -> None:
+        """The latch."""
+        self._points.write({"hold_open": outputs.hold_open})
+
+
+def create(name: str, settings: Settings, bus: PointsBus) -> Door:
+    """One door on its bus."""
+    return Door(Points(wires(settings), bus))
+
+
+DRIVER = DriverType(settings=Settings, buses=("gpio", "modbus"), create=create, wires=wires)

@@ -1,0 +1,58 @@
+"""A door that is asked and told in words."""
+
+from typing import Protocol
+
+from bridges.core.fields import Name
+from bridges.door.settings import DoorSettings
+from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.driver_type import DriverType
+
+
+class Asks(Protocol):
+    """A bus that takes questions in words."""
+
+    def ask(self, question: str) -> str:
+        """One answer. Raises HalError."""
+
+
+class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A door by the name that it has on its line."""
+
+    called: Name
+
+
+class LineDoor:
+    """One door (`drivers.Driver[DoorSample, DoorOutputs]`)."""
+
+    def __init__(self, settings: Settings, bus: Asks) -> None:
+        self._name = settings.called
+        self._bus = bus
+
+    def open(self) -> None:
+        """It is let go."""
+        self.make_safe()
+
+    def read(self) -> DoorSample:
+        """Its limits."""
+        where = self._bus.ask(f"{self._name} where")
+        return DoorSample(opened=where == "open", closed=where == "closed")
+
+    def write(self, outputs: DoorOutputs) -> None:
+        """Hold it or let it go."""
+        self._bus.ask(f"{self._name} {'hold' if outputs.hold_open else 'release'}")
+
+    def make_safe(self) -> None:
+        """Let it go."""
+        self._bus.ask(f"{self._name} release")
+
+    def close(self) -> None:
+        """Nothing is left to do."""
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("line",),
+    create=lambda name, settings, bus: LineDoor(settings, bus),
+    describe=lambda settings, bus: [("asks", f"{settings.called} at {bus.host}:{bus.port}")],
+    fake="hal_fakes.line_door",
+)

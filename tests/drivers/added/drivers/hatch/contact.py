@@ -1,0 +1,7 @@
+"""A hatch on contacts, as a door's."""
+
+from dataclasses import replace
+
+from drivers.door.dry_contact import DRIVER as DOOR
+
+DRIVER = replace(DOOR, buses=("modbus",))

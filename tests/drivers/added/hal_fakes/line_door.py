@@ -1,0 +1,42 @@
+"""A door that answers in words: the plant of every door behind them."""
+
+import time
+from typing import Any
+
+from drivers.hal.points import Wire
+from hal_fakes.fake import Fake
+from hal_fakes.plants import door
+from hal_fakes.plants.plant import Plant
+
+CONTACTS = [
+    Wire("opened", "in", "opened", "high"),
+    Wire("closed", "in", "closed", "high"),
+    Wire("hold_open", "out", "hold_open", "high"),
+]
+
+
+class LineDoor:
+    """One station."""
+
+    def __init__(self, plant: Plant, called: str) -> None:
+        self._plant = plant
+        self._called = called
+
+    def answer(self, question: str) -> str:
+        """Where it is, or that it has been held or released."""
+        name, _, verb = question.rpartition(" ")
+        if name != self._called:
+            return ""
+        now = time.monotonic()
+        self._plant.advance(now)
+        if verb != "where":
+            self._plant.drive("hold_open", verb == "hold", now)
+            return "done"
+        opened, closed = self._plant.sense("opened"), self._plant.sense("closed")
+        return "open" if opened else "closed" if closed else "between"
+
+
+FAKE: Fake[Any] = Fake(
+    plant=lambda name, settings, wires: door.build(name, settings, CONTACTS),
+    station=lambda plant, settings, bus: LineDoor(plant, settings.called),
+)

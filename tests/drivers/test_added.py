@@ -1,0 +1,158 @@
+"""Drivers, kinds and bus types are added by files alone: checked, run, simulated, no table edited."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hal_fakes.domain import free_domain
+from tests.serve.site import ROOT, command, daemon, environment
+from tests.waiting import wait_until
+
+ADDED = Path(__file__).parent / "added"
+ROOMS = ("bridges", "drivers", "hal_fakes")
+
+LATCH = """
+kind: door
+driver: latch
+rmf: {{transport: dds, network: localhost, domain_id: {domain}}}
+buses: {{b: {bus}}}
+doors:
+  ward_door:
+    feedback: estimated
+    limits: {{open_delay_s: 2}}
+    latch: {{point: unit 1 coil 0, active: high}}
+    shut: {{point: unit 1 discrete input 0, active: high}}
+"""
+LINE = """
+kind: door
+driver: line
+rmf: {{transport: dds, network: localhost, domain_id: {domain}}}
+buses: {{b: {bus}}}
+doors: {{ward_door: {{called: left wing}}}}
+"""
+HATCH = """
+kind: hatch
+driver: contact
+rmf: {{transport: dds, network: localhost, domain_id: {domain}}}
+buses: {{b: {bus}}}
+hatches:
+  ward_door:
+    inputs:
+      opened: {{point: unit 1 discrete input 0, active: high}}
+      closed: {{point: unit 1 discrete input 1, active: high}}
+    outputs: {{hold_open: {{point: unit 1 coil 0, active: high}}}}
+"""
+ON_MODBUS = {"type": "modbus", "tcp": {"host": "192.0.2.1", "port": 502}, "timeout_s": 2}
+ON_A_LINE = {"type": "line", "host": "192.0.2.1"}
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the rooms, with what is added put beside what is there."""
+    made = tmp_path_factory.mktemp("house")
+    for room in ROOMS:
+        shutil.copytree(ROOT / room, made / room)
+        if (ADDED / room).exists():
+            shutil.copytree(ADDED / room, made / room, dirs_exist_ok=True)
+    return made
+
+
+class Site:
+    """One file, and whoever is asked about it in the house that we stand in."""
+
+    def __init__(self, here: Path, text: str, bus: dict[str, Any]) -> None:
+        self.here, self._text = here, text
+        self._domain = free_domain()
+        self._bus = bus
+        self.file = here / "ward.yaml"
+        self.point_at({})
+
+    def point_at(self, replace: dict[str, Any]) -> None:
+        """Write the file, with its bus pointed at this far side."""
+        bus = json.dumps(self._bus | replace)
+        self.file.write_text(self._text.format(domain=self._domain, bus=bus))
+
+    def check(self) -> list[str]:
+        """The rows that `check` prints of the door."""
+        done = subprocess.run(
+            command("check", self.file), env=environment(), capture_output=True, text=True
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        rows = [" ".join(line.split()) for line in done.stdout.splitlines()]
+        return [row for row in rows if row.startswith("ward_door ")]
+
+    @contextmanager
+    def far_side(self) -> Iterator[dict[str, Any]]:
+        """The far side of the bus by itself; what the bus's settings must say of it."""
+        socket = ["--socket", str(self.here / "plant.sock")]
+        child = [sys.executable, "-m", "hal_fakes", str(self.file), "b", *socket]
+        pipe = subprocess.PIPE
+        with subprocess.Popen(child, env=environment(), stdin=pipe, stdout=pipe) as running:
+            assert running.stdin
+            assert running.stdout
+            yield json.loads(running.stdout.readline())
+            running.stdin.close()
+
+    def served(self, *options: str) -> dict[str, Any]:
+        """What the status file says of the door once it is known where it is; and it ends well."""
+        status = self.here / "run" / "status.json"
+        with daemon(self.file, self.here / "run", *options) as running:
+            running.wait_for("ready")
+            wait_until(lambda: status.exists() and "CLOSED" in status.read_text(), "it is closed")
+            told: dict[str, Any] = json.loads(status.read_text())
+            assert running.end(signal.SIGTERM) == 0
+        return told
+
+
+CHECKED = {
+    "one file": [
+        "ward_door closed unit 1 discrete input 0 (10001) in high - 0.05 s - not asserted",
+        "ward_door hold_open unit 1 coil 0 (00001) out high - - low not asserted",
+    ],
+    "a kind": [
+        "ward_door opened unit 1 discrete input 0 (10001) in high - 0.05 s - not asserted",
+        "ward_door closed unit 1 discrete input 1 (10002) in high - 0.05 s - not asserted",
+        "ward_door hold_open unit 1 coil 0 (00001) out high - - low not asserted",
+    ],
+    "a bus type too": ["ward_door asks left wing at 192.0.2.1:4000"],
+}
+SITES: dict[str, tuple[str, dict[str, Any]]] = {
+    "one file": (LATCH, ON_MODBUS),
+    "a kind": (HATCH, ON_MODBUS),
+    "a bus type too": (LINE, ON_A_LINE),
+}
+
+
+@pytest.fixture(params=SITES)
+def sort(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def site(sort: str, house: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Site:
+    monkeypatch.chdir(house)
+    return Site(tmp_path, *SITES[sort])
+
+
+def test_it_is_checked(site: Site, sort: str) -> None:
+    assert site.check() == CHECKED[sort]
+
+
+def test_it_is_simulated(site: Site) -> None:
+    told = site.served("--simulate")
+    assert (told["simulated"], told["devices"]["ward_door"]["mode"]) == (True, "CLOSED")
+
+
+def test_it_is_run(site: Site) -> None:
+    with site.far_side() as replace:
+        site.point_at(replace)
+        told = site.served()
+    assert (told["simulated"], told["devices"]["ward_door"]["mode"]) == (False, "CLOSED")

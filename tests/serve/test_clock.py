@@ -1,0 +1,17 @@
+from bridges.rmf.definitions import Time
+from bridges.serve.clock import Clock, Pace
+
+
+def test_a_stamp_is_the_wall_clock_now_less_the_age_of_the_reading_and_0_for_never() -> None:
+    clock = Clock(lambda: 100.0, lambda: 1000.0)
+    assert clock.stamp(97.5) == Time(997, 500_000_000)
+    assert clock.stamp(None) == Time(0, 0)
+
+
+def test_what_is_told_is_told_each_second_at_once_when_it_changes_and_10_times_a_second_at_most() -> (
+    None
+):
+    pace = Pace()
+    assert pace.due_at("IDLE") < 0.0
+    pace.told("IDLE", 5.0)
+    assert (pace.due_at("IDLE"), pace.due_at("CHARGING")) == (6.0, 5.1)

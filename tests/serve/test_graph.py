@@ -1,0 +1,256 @@
+"""A kind without hardware in service: what the node around the core does, on real transports."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from bridges.lift_supervisor import KIND
+from bridges.lift_supervisor.settings import Settings
+from bridges.rmf.definitions import LiftRequest, LiftState, Time
+from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.stamps import stamp
+from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.rmf.transport import Transport
+from bridges.serve import graph as graph_node
+from bridges.serve.clock import Clock
+from bridges.serve.graph import GraphNode
+from bridges.serve.presence import SPREAD_MOST_S
+from bridges.serve.serving import Serving
+from hal_fakes import wire
+from tests.rmf.domains import domain_of_this_run
+from tests.waiting import wait_until
+
+WALL = 1_800_000_000.0
+
+
+class Site:
+    """Our node on a memory network, with a fleet adapter and a lift's node as tests play them."""
+
+    def __init__(self, settings: Settings | None = None, **more: Any) -> None:
+        self.now = 0.0
+        self.network = MemoryNetwork()
+        self.transport = MemoryTransport(self.network, "supervisor")
+        clock = Clock(lambda: self.now, lambda: WALL + self.now)
+        self.node = GraphNode(KIND, settings or Settings(), self.transport, clock, **more)
+        self.node.subscribe()
+        self.others = MemoryTransport(self.network, "others")
+        self.adapter = self.others.publisher(ADAPTER_LIFT_REQUESTS)
+        self.lift = self.others.publisher(LIFT_STATES)
+        self.sent: list[LiftRequest] = []
+        self.others.subscribe(LIFT_REQUESTS, self.sent.append)
+        self.node.round()
+
+    def until(self, at: float) -> None:
+        """Rounds as the thread would make them."""
+        while self.node.wake_at <= at:
+            self.now = max(self.now, self.node.wake_at)
+            self.node.round()
+        self.now = at
+
+    def asks(self, session: str = "fleet/a", lift: str = "Lift1") -> LiftRequest:
+        """An adapter asks."""
+        request = LiftRequest(lift, stamp(WALL + self.now), session, 1, "L3", 2)
+        self.adapter.publish(request)
+        self.node.round()
+        return request
+
+
+def test_after_its_quiet_start_what_an_adapter_asks_is_passed_on_with_our_stamp() -> None:
+    site = Site()
+    site.until(2.99)
+    asked = site.asks()
+    assert site.sent == []
+    site.until(3.0)
+    assert site.sent == [replace(asked, request_time=stamp(WALL + 3.0))]
+
+
+def test_until_it_may_speak_it_is_no_publisher_to_anybody() -> None:
+    site = Site()
+    ear = site.others.subscribe(LIFT_REQUESTS, lambda request: None)
+    site.until(2.99)
+    assert ear.matched() == 0
+    site.until(3.0)
+    assert ear.matched() == 1
+
+
+def test_while_another_publishes_it_is_passive_and_says_so_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level("INFO")
+    site = Site()
+    site.until(4.0)
+    rival = MemoryTransport(site.network, "rival")
+    rival.publisher(LIFT_REQUESTS)
+    site.until(4.5)
+    site.asks()
+    site.until(60.0)
+    assert (site.sent, site.node.status()["passive"]) == ([], True)
+    rival.close()
+    site.until(60.25)
+    site.asks()
+    site.until(63.0)
+    assert site.sent == []
+    site.until(60.25 + 3.0 + SPREAD_MOST_S + 0.3)
+    assert [request.session_id for request in site.sent] == ["fleet/a"]
+    ours = [r.getMessage() for r in caplog.records if r.name.startswith("bridges.serve.")]
+    assert [text for text in ours if not text.startswith("state")] == [
+        "active kind=lift_supervisor",
+        'passive kind=lift_supervisor reason="another node does the same"',
+        "other_node_gone kind=lift_supervisor",
+        "active kind=lift_supervisor",
+    ]
+
+
+def test_lifts_are_served_apart_and_those_not_named_not_at_all() -> None:
+    site = Site(Settings(lifts=["Lift1", "Lift2"]))
+    site.until(3.0)
+    for lift in ("Lift1", "Lift2", "Lift3"):
+        site.asks(lift=lift)
+    assert [request.lift_name for request in site.sent] == ["Lift1", "Lift2"]
+    assert site.node.refused == {"not ours": 1}
+
+
+def test_a_topic_may_have_another_name_on_site() -> None:
+    def named(topic: Topic[Any]) -> Topic[Any]:
+        return topic.named(f"site_{topic.name}")
+
+    site = Site(named=named)
+    site.until(3.0)
+    heard: list[LiftRequest] = []
+    site.others.subscribe(named(LIFT_REQUESTS), heard.append)
+    adapter = site.others.publisher(named(ADAPTER_LIFT_REQUESTS))
+    adapter.publish(LiftRequest("Lift1", stamp(WALL + 3.0), "fleet/a", 1, "L3", 2))
+    site.node.round()
+    assert [request.session_id for request in heard] == ["fleet/a"]
+
+
+def test_what_is_refused_is_counted_by_name_and_logged_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    site = Site()
+    site.until(3.0)
+    for _ in range(3):
+        site.asks(session="")
+    site.adapter.publish(replace(site.asks(), request_time=Time(1, 0)))
+    site.node.round()
+    assert site.node.refused == {"empty session_id": 3, "stale request": 1}
+    refused = [r.getMessage() for r in caplog.records if r.getMessage().startswith("refused")]
+    assert len(refused) == 2
+
+
+def test_made_up_names_do_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(graph_node, "MAX_SUBJECTS", 3)
+    site = Site()
+    site.until(3.0)
+    for number in range(5):
+        site.asks(lift=f"lift {number}")
+    assert (len(site.node.subjects), site.node.refused) == (3, {"too many names": 2})
+    site.until(63.0)
+    assert site.node.subjects == {}
+
+
+def test_the_status_says_who_holds_each_lift_who_waits_and_what_is_wrong() -> None:
+    site = Site()
+    site.until(3.0)
+    site.asks("fleet/a")
+    site.asks("fleet/b")
+    site.lift.publish(LiftState(lift_name="Lift1", current_floor="L1", session_id="fleet/a"))
+    site.node.round()
+    site.until(8.0)
+    assert site.node.status() == {"passive": False, "other_publishers": 0, "refused": {}}
+    assert site.node.devices() == {
+        "Lift1": {
+            "session": "fleet/a",
+            "holder": "fleet/a (5 s)",
+            "waiting": "fleet/b (5 s)",
+            "faults": [{"code": "LIFT_SILENT", "detail": "no LiftState comes"}],
+            "input_age_s": 5.0,
+        }
+    }
+
+
+def test_faults_are_logged_when_they_come_and_when_they_go(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level("INFO")
+    site = Site()
+    site.until(3.0)
+    site.asks()
+    state = LiftState(lift_name="Lift1", session_id="fleet/a")
+    site.lift.publish(state)
+    site.node.round()
+    site.until(9.0)
+    site.asks("fleet/b")
+    site.until(10.0)
+    site.lift.publish(state)
+    site.node.round()
+    lines = [r.getMessage() for r in caplog.records if "Lift1" in r.getMessage()]
+    assert lines == [
+        "state subject=Lift1 session=- holder=- waiting=-",
+        'state subject=Lift1 session=- holder="fleet/a (0 s)" waiting=-',
+        'state subject=Lift1 session=fleet/a holder="fleet/a (0 s)" waiting=-',
+        'fault subject=Lift1 code=LIFT_SILENT detail="no LiftState comes"',
+        'state subject=Lift1 session=fleet/a holder="fleet/a (6 s)" waiting="fleet/b (0 s)"',
+        'fault_over subject=Lift1 code=LIFT_SILENT detail="no LiftState comes"',
+    ]
+
+
+def test_a_lost_wire_is_logged_and_does_not_end_it(caplog: pytest.LogCaptureFixture) -> None:
+    site = Site()
+    site.until(3.0)
+    site.adapter.publish(LiftRequest("Lift1", stamp(WALL + 3.0), "fleet/a", 1, "L3", 2))
+    site.transport.close()
+    site.node.round()
+    assert "not_published topic=lift_requests" in caplog.text
+    site.until(4.0)
+    assert site.node.devices()["Lift1"]["holder"] == "fleet/a (1 s)"
+
+
+# --- with its thread, and on the wire ----------------------------------------------------------
+
+
+@pytest.fixture(params=["memory", "wire"])
+def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]:
+    network, nodes = MemoryNetwork(), list[Transport]()
+
+    def join(name: str) -> Transport:
+        if request.param == "memory":
+            nodes.append(MemoryTransport(network, name))
+        else:
+            nodes.append(wire.join(name, domain_of_this_run()))
+        return nodes[-1]
+
+    yield join
+    for node in nodes:
+        node.close()
+
+
+def test_in_a_thread_it_serves_until_it_is_stopped(join: Callable[[str], Transport]) -> None:
+    """One that is passive for a rival hears of its end, and speaks; to others it is one publisher."""
+    others, ours, rival = join("others"), join("supervisor"), join("rival")
+    rival.publisher(LIFT_REQUESTS)
+    heard: list[LiftRequest] = []
+    ear = others.subscribe(LIFT_REQUESTS, heard.append)
+    adapter = others.publisher(ADAPTER_LIFT_REQUESTS)
+    wait_until(lambda: ear.matched() == 1, "the rival is there")
+    kind = replace(KIND, quiet_s=lambda settings: 0.5)
+    clock = Clock(time.monotonic, time.time)
+    node = GraphNode(kind, Settings(), ours, clock)
+    thread, presence = Serving(node, clock), node.presence
+    node.subscribe()
+    assert not thread.ready
+    thread.start()
+    wait_until(lambda: thread.ready and presence.rivals == 1, "the rival is seen")
+    rival.close()
+    wait_until(lambda: presence.may_speak, "it speaks")
+    wait_until(lambda: ear.matched() == 1 and presence.rivals == 0, "its own is no rival")
+    request = LiftRequest("Lift1", stamp(time.time()), "fleet/a", 1, "L3", 2)
+    adapter.publish(request)
+    wait_until(lambda: heard, "the request is passed on")
+    assert replace(heard[0], request_time=request.request_time) == request
+    assert thread.alive
+    assert thread.stop(5.0)
+    assert not thread.alive

@@ -1,0 +1,100 @@
+"""What every type allows and nobody means is refused, or warned of, by name."""
+
+from pathlib import Path
+
+import pytest
+
+from bridges.settings.load import load
+from tests.settings.reading import problems_of
+
+DOOR = """\
+kind: door
+driver: dry_contact
+buses:
+  module: {type: modbus, tcp: {host: 192.168.1.50}}
+doors:
+  ward:
+    inputs:
+      opened: {point: unit 1 discrete input 0, active: high}
+      closed: {point: unit 1 discrete input 1, active: high}
+    outputs:
+      hold_open: {point: unit 1 coil 0, active: high}
+"""
+LINE = "serial: {port: /dev/serial/by-id/x, baudrate: 9600, parity: none, stopbits: 1}"
+TCP = "tcp: {host: 192.168.1.50}"
+
+
+def door(bus: str = TCP, rmf: str = "{}", limits: str = "{}") -> str:
+    """The door with these changes."""
+    text = DOOR.replace(TCP, bus).replace("buses:", f"rmf: {rmf}\nbuses:")
+    return f"{text}    limits: {limits}\n"
+
+
+def warnings_of(file: Path, text: str) -> list[str]:
+    """What is warned of, as `line:column: text`."""
+    file.write_text(text)
+    return [str(w).removeprefix(f"{file}:") for w in load(file).warnings]
+
+
+def test_the_door_itself_is_right_and_warns_of_nothing(file: Path) -> None:
+    assert warnings_of(file, door()) == []
+
+
+REFUSED = {
+    "a bus that is read too seldom": (
+        door(f"{TCP}, scan_s: 2", limits="{stale_after_s: 1.5}"),
+        "13:29: stale_after_s is 1.5, and its bus is read every 2 s (scan_s): it would never be in"
+        " service; read more often",
+    ),
+    "a timeout of nothing": (
+        door(limits="{open_timeout_s: 0}"),
+        "13:30: 'open_timeout_s' is 0: a number from 1 to 86400 s is wanted",
+    ),
+    "a topic that RMF has not": (
+        door(rmf="{topics: {dor_states: x}}"),
+        "3:16: unknown topic 'dor_states': did you mean 'door_states'? known here: ",
+    ),
+    "a rate that no unit has": (
+        door(LINE.replace("9600", "9800")),
+        "5:72: 9800 is no rate that units have: 300, 600, 1200, 2400, 4800, 9600, ",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_it_is_refused(file: Path, what: str) -> None:
+    text, problem = REFUSED[what]
+    found = problems_of(file, text)
+    assert len(found) == 1
+    assert found[0].startswith(problem)
+
+
+WARNED = {
+    "milliseconds": (
+        door(limits="{close_grace_s: 3000}"),
+        "13:29: warning: 'ward': close_grace_s is 3000 s, 50 minutes: if milliseconds are meant,"
+        " write 3",
+    ),
+    "an hour that is meant": (
+        door(limits="{max_hold_s: 7200}"),
+        "13:26: warning: 'ward': max_hold_s is 7200 s, 2.0 hours: if milliseconds are meant,"
+        " write 7.2",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", WARNED)
+def test_it_is_warned_of(file: Path, what: str) -> None:
+    text, warning = WARNED[what]
+    assert warnings_of(file, text) == [warning]
+
+
+def test_an_alarm_that_is_believed_late_is_warned_of(file: Path) -> None:
+    fire = (
+        "    outputs:",
+        "      fire: {point: unit 1 discrete input 2, active: low, debounce_s: 10}",
+    )
+    text = door().replace(fire[0], f"{fire[1]}\n{fire[0]}") + "    on_fire: open\n"
+    assert warnings_of(file, text) == [
+        "11:71: warning: 'ward': fire is believed only after 10 s: contacts bounce for 0.05 s"
+    ]

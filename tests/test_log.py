@@ -1,0 +1,66 @@
+"""What log lines say: words of the field, and no Python."""
+
+import logging
+from dataclasses import dataclass
+
+import pytest
+
+from bridges.door.signals import DoorOutputs
+from bridges.lift.signals import LiftOutputs, Side
+from bridges.log import _Formatter, pairs, plain
+from bridges.rmf.definitions import LiftMode
+
+
+@dataclass(frozen=True)
+class Asked:
+    session_id: str
+    agv: bool
+    at: float = 0.0
+    floors: tuple[str, ...] = ()
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (
+            LiftOutputs(agv_request=True, call="L3", hold_door=Side.FRONT),
+            "agv_request yes, call L3, hold_door front",
+        ),
+        (LiftOutputs(agv_request=False, call=None, hold_door=None), "-"),
+        (DoorOutputs(hold_open=True), "hold_open yes"),
+        (
+            Asked("you", agv=True, floors=("L1", "L2")),
+            "session_id you, agv yes, at 0.0, floors L1, L2",
+        ),
+        (LiftMode.MODE_AGV, "MODE_AGV"),
+        ({"lift_requests": 3, "door_requests": 1}, "lift_requests 3, door_requests 1"),
+        ({"a"}, "a"),
+        ([], "-"),
+        (None, "-"),
+        (True, "yes"),
+        (False, "no"),
+        (0, "0"),
+        (0.25, "0.25"),
+        (OSError("no such file"), "no such file"),
+    ],
+)
+def test_a_value_is_said_in_words_without_python(value: object, text: str) -> None:
+    assert plain(value) == text
+
+
+def test_a_line_says_what_is_driven_as_a_person_would() -> None:
+    outputs = LiftOutputs(agv_request=True, call="L3", hold_door=None)
+    assert pairs("outputs", device="Lift1", outputs=outputs) == (
+        'outputs device=Lift1 outputs="agv_request yes, call L3"'
+    )
+
+
+def test_a_log_line_stays_one_line_whatever_is_in_it() -> None:
+    line = pairs("refused", device="Lift 1", detail='a "b"\nc', floor="")
+    assert line == 'refused device="Lift 1" detail="a \'b\'\\nc" floor=""'
+
+
+@pytest.mark.parametrize(("level", "prefix"), [(logging.INFO, "<6>"), (logging.ERROR, "<3>")])
+def test_under_systemd_every_line_carries_its_priority(level: int, prefix: str) -> None:
+    record = logging.LogRecord("x", level, "", 0, "one\ntwo", (), None)
+    assert _Formatter(journal=True).format(record) == f"{prefix}one\n{prefix}two"
