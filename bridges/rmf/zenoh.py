@@ -71,6 +71,7 @@ class ZenohTransport:
         self._look_at = time.monotonic() + LOOK_EVERY_S
         self._wants_router = not loopback and zenoh_config.mode(self._settings) == "client"
         self._trouble = ""
+        self._closing: list[threading.Thread] = []
         self._neighbours: dict[str, zenoh.WhatAmI] = {}
         self._join()
         if self._session is None and not self._wants_router:
@@ -121,6 +122,8 @@ class ZenohTransport:
             self._thread.join()
         with self._lock:
             self._leave()
+        for closing in self._closing:
+            closing.join()
 
     # --- the session ---------------------------------------------------------------------------
 
@@ -134,7 +137,7 @@ class ZenohTransport:
         try:
             session = _opened(ways)
         except zenoh.ZError as error:
-            self._trouble = str(error)
+            self._trouble = str(error).partition(" at /")[0]  # it names a line of its source
             return
         way, name = WAYS[self._settings.keys], str(session.zid())
         self._keys: Keys = way(self._domain_id, name, self.name)
@@ -172,20 +175,26 @@ class ZenohTransport:
                 publisher.leave()
 
     def _leave(self) -> None:
-        """Close the session; the ends keep nothing of it."""
+        """Give up the session. It is closed beside us: by a link that is dead that takes 10 s.
+
+        What was declared in it is kept until then: to forget it sooner may block us.
+        """
         session, self._session = self._session, None
-        if session:
-            session.close()  # type: ignore[no-untyped-call]
-        for end in self._ends:  # not before: a declaration that is only forgotten may block us
-            end.place = None
+        held = [end.give_up() for end in self._ends]
         self._deaf.clear()
         self._neighbours = {}
+        if session:
+            held += [self._presence, self._events]
+            closing = threading.Thread(target=_close, args=(session, held), daemon=True)
+            closing.start()
+            self._closing.append(closing)
 
     def _join_anew(self) -> None:
         with self._lock:
             if self._closed:
                 return
             self._leave()
+            self._closing = [closing for closing in self._closing if closing.is_alive()]
             try:
                 self._join()
                 for end in self._ends:
@@ -270,6 +279,12 @@ def _opened(ways: list[dict[str, Any]]) -> zenoh.Session:
         if further:
             return _opened(further)
         raise
+
+
+def _close(session: zenoh.Session, held: list[Any]) -> None:
+    with suppress(zenoh.ZError):  # by a dead link nobody hears the farewell
+        session.close()  # type: ignore[no-untyped-call]
+    held.clear()
 
 
 def _give_back() -> None:
