@@ -16,7 +16,7 @@ import msgspec
 
 from bridges.core.fields import Rmf
 from bridges.rmf import words
-from bridges.rmf.topics import Topic
+from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Transport, TransportError
 
 SILENT_AFTER_S = 3.0
@@ -147,7 +147,7 @@ class Inbox:
     def __init__(
         self,
         transport: Transport,
-        *topics: Topic[Any],
+        *topics: AnyTopic,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._waiting: SimpleQueue[Heard] = SimpleQueue()
