@@ -220,5 +220,5 @@ def test_a_choice_is_compared_as_it_is_written(file: Path) -> None:
 
 def test_a_long_value_is_shown_in_part(file: Path) -> None:
     assert problems_of(file, changed("dds", "x" * 1000)) == [
-        f"3:18: 'transport' is '{'x' * 37}...': write auto, dds or ros2"
+        f"3:18: 'transport' is '{'x' * 37}...': write auto, dds, ros2 or zenoh"
     ]
