@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from bridges.lift.signals import Door, Motion
+from bridges.lift.signals import Door, LiftOutputs, Motion
 from bridges.settings.load import load
 from drivers.lift.dry_contact import Settings
 from tests.depth import depth
@@ -84,7 +84,7 @@ def test_a_call_that_brings_no_agv_mode_is_given_up_after_its_time() -> None:
     _, story = called(agv=False)
     assert story.outputs.call == "L3"
     story.run(7.0)
-    assert (story.outputs.call, story.faults) == (None, ["AGV_MODE_NOT_GRANTED"])
+    assert (story.outputs, story.faults) == (LiftOutputs(), ["AGV_MODE_NOT_GRANTED"])
 
 
 def test_agv_mode_that_ends_on_the_way_is_a_fault_and_is_called_for_again() -> None:
