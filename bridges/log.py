@@ -43,10 +43,10 @@ def _listed(parts: Iterator[str]) -> str:
 
 
 def _set(record: object) -> Iterator[tuple[str, object]]:
-    names = getattr(record, "__struct_fields__", None) or [
-        field.name
-        for field in dataclasses.fields(record)  # type: ignore[arg-type]
-    ]
+    if isinstance(record, msgspec.Struct):
+        names = record.__struct_fields__
+    else:
+        names = tuple(field.name for field in dataclasses.fields(record))  # type: ignore[arg-type]
     for name in names:
         part = getattr(record, name)
         if part is not None and part is not False and part not in ("", ()):

@@ -1,3 +1,4 @@
+import signal
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -10,12 +11,23 @@ ON_WIRES = ("commands", "drivers", "hal_fakes", "rmf", "serve", "site")
 WIRES_HANG_AFTER_S = 900
 """No test that passes takes so long, however busy the machine is."""
 
+signal.signal(
+    signal.SIGHUP, signal.SIG_DFL
+)  # nohup, or a CI's shell, has daemons inherit another one
+
 _deselected: list[str] = []
 
 
 @pytest.fixture
 def domain() -> Iterator[int]:
     """A DDS domain for this test, in which nobody else on this machine is."""
+    with domain_for_a_while() as free:
+        yield free
+
+
+@pytest.fixture(scope="module")
+def module_domain() -> Iterator[int]:
+    """One that the tests of a file share."""
     with domain_for_a_while() as free:
         yield free
 

@@ -117,17 +117,18 @@ def _numbers(section: Any) -> list[tuple[str, ...]]:
 
 
 def _bus(config: Config, bus: str, devices: Sequence[str]) -> list[str]:
+    """The wires of its devices, and what those say that have none."""
     wires = [(name, wire) for name in devices for wire in config.wires(name)]
-    if wires:
-        point = config.bus_type(bus).describe
-        return aligned([HEADINGS, *(_row(name, wire, point(wire.point)) for name, wire in wires)])
-    describe = config.driver_type.describe
-    rows = [
-        (name, what, text)
-        for name in devices
-        for what, text in describe(config.devices[name], config.buses[bus]) or [("", "")]
-    ]
-    return aligned(rows)
+    point = config.bus_type(bus).describe
+    table = [_row(name, wire, point(wire.point)) for name, wire in wires]
+    rows = [row for name in devices for row in _described(config, name, bus)]
+    return [*aligned([HEADINGS, *table] if table else []), *aligned(rows)]
+
+
+def _described(config: Config, name: str, bus: str) -> list[tuple[str, str, str]]:
+    describe = config.driver_type(name).describe
+    rows = [(name, *row) for row in describe(config.devices[name], config.buses[bus])]
+    return rows if rows or config.wires(name) else [(name, "", "")]
 
 
 def _row(device: str, wire: Wire, point: str) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from typing import Any
 
 from bridges.core.fields import Rmf
 from bridges.rmf import words
-from bridges.rmf.topics import Topic
+from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Transport
 
 SILENT_AFTER_S = 3.0
@@ -122,7 +122,7 @@ class Inbox:
     def __init__(
         self,
         transport: Transport,
-        *topics: Topic[Any],
+        *topics: AnyTopic,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._waiting: SimpleQueue[Heard] = SimpleQueue()

@@ -1,7 +1,7 @@
 """A device YAML becomes a Config, or a SettingsError that names every problem with its place.
 
     kind: lift              a folder of bridges/ that holds a KIND
-    driver: dry_contact     a file of drivers/
+    driver: dry_contact     a file of drivers/<kind>/; a device may name another as its own `driver:`
     rmf: {...}              bridges.core.fields.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
     lifts: {name: {...}}    the kind's own key; what each holds is the driver's `settings`
@@ -35,7 +35,7 @@ from bridges.settings.nodes import (
     read,
     unknown,
 )
-from bridges.settings.plausible import milliseconds, stale_readings
+from bridges.settings.plausible import milliseconds, out_of_step
 from bridges.settings.values import BROKEN, Entry, Spot, Values, below, is_none, locate
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
 from drivers.driver_type import AnyDriver
@@ -80,14 +80,14 @@ class Config:
         """The names of the devices that stand on this bus."""
         return [name for name in self.devices if self.bus_of(name) == bus]
 
-    @property
-    def driver_type(self) -> AnyDriver:
-        """The driver of its devices."""
-        return named.driver_called(self.kind, self.driver)
+    def driver_type(self, device_name: str) -> AnyDriver:
+        """The driver of a device: its own, or the file's."""
+        own: str | None = self.devices[device_name].driver
+        return named.driver_called(self.kind, own or self.driver)
 
     def wires(self, device_name: str) -> list[Wire]:
         """A device's wiring table; empty where its driver has none."""
-        return list(self.driver_type.wires(self.devices[device_name]))
+        return list(self.driver_type(device_name).wires(self.devices[device_name]))
 
     def bus_type(self, name: str) -> AnyBus:
         """What the bus of this name is."""
@@ -135,6 +135,7 @@ class _Reading:
         self._kind_name = ""
         self._driver: AnyDriver | None = None
         self._driver_name = ""
+        self._own_drivers: dict[str, AnyDriver | None] = {}
         self._rmf = Rmf()
         self._buses: dict[str, _Bus] = {}
         self._devices: dict[str, Any] = {}
@@ -165,6 +166,8 @@ class _Reading:
         if not isinstance(self._kind, GraphKind):
             self._read_driver(below(self._top.node, "driver"))
         sections = self._values.known(entries, self._top, self._keys())
+        if self._kind and self._kind.devices_key in sections:
+            self._read_own_drivers(sections[self._kind.devices_key].value)
         if "rmf" in sections:
             self._read_rmf(sections["rmf"].spot())
         if "buses" in sections:
@@ -198,6 +201,18 @@ class _Reading:
         if name:
             self._driver_name = name
             self._driver = named.driver_called(self._kind_name, name)
+
+    def _read_own_drivers(self, devices: Node) -> None:
+        """The devices that name a driver of their own; None where there is none of that name."""
+        for key, value in devices.value if isinstance(devices, MappingNode) else ():
+            own = below(value, "driver")
+            if own and isinstance(key, ScalarNode) and not is_none(own.value):
+                name = self._word(own, named.driver_names(self._kind_name))
+                driver = named.driver_called(self._kind_name, name) if name else None
+                self._own_drivers[key.value] = driver
+
+    def _driver_of(self, device: str) -> AnyDriver | None:
+        return self._own_drivers.get(device, self._driver)
 
     def _read_rmf(self, spot: Spot) -> None:
         self._rmf = self._values.make(Rmf, spot)
@@ -280,20 +295,31 @@ class _Reading:
         return self._word(entry, allowed)
 
     def _allowed_types(self) -> list[str]:
-        """The bus types that the driver can stand on; all while the driver is not known."""
-        types = named.bus_types()
-        return [t for t in types if t in self._driver.buses] if self._driver else types
+        """The bus types that the drivers can stand on; all while one of them is not known."""
+        types, drivers = named.bus_types(), [self._driver, *self._own_drivers.values()]
+        return [t for t in types if not all(d and t not in d.buses for d in drivers)]
 
     def _read_devices(self, spot: Spot) -> None:
         entries = self._names(spot, (self._kind.name if self._kind else ""))
         buses = [self._bus_name(entry) for entry in entries]
         for entry, bus in zip(entries, buses, strict=True):
-            if self._driver:
-                self._devices[entry.name] = self._device(entry, bus, self._driver)
+            driver = self._driver_of(entry.name)
+            if driver and self._can_stand(entry, bus, driver):
+                self._devices[entry.name] = self._device(entry, bus, driver)
         for name in self._buses:
             if entries and name not in buses and None not in buses:
                 text = f"no device stands on the bus '{name}': delete it, or name it in a 'bus:'"
                 self._page.note(self._buses[name].entry.key, text)
+
+    def _can_stand(self, device: Entry, bus: str | None, driver: AnyDriver) -> bool:
+        """Can the device's own driver stand on its bus? The file's was looked at with the bus."""
+        kind = self._buses[bus].type if bus else None
+        if kind is None or kind in driver.buses:
+            return True
+        on = f"the bus '{bus}' is '{kind}', but the driver of '{device.name}' stands on"
+        where = below(device.value, "bus") or below(device.value, "driver") or device
+        self._page.note(where.where(), f"{on} {either(driver.buses)}")
+        return False
 
     def _bus_name(self, device: Entry) -> str | None:
         """The bus of a device; None where that cannot be told."""
@@ -336,12 +362,12 @@ class _Reading:
         wires = list(driver.wires(settings))
         wiring.wires(wires, spot)
         wiring.claims(driver.claims(settings), spot)
-        signals = [wire.signal for wire in wires]
+        signals = [*(wire.signal for wire in wires), *driver.unwired(settings)]
         note_unknown_signals(self._page, settings.accept_unsafe, signals, spot)
 
     def _check_pace(self, settings: DeviceSettings, spot: Spot, bus: str | None) -> None:
         read = self._buses[bus].settings if bus else BROKEN
-        for path, text in () if read is BROKEN else stale_readings(settings, read):
+        for path, text in () if read is BROKEN else out_of_step(settings, read):
             self._page.note(locate(spot, path).where(), text)
 
     def _collect_warnings(self, settings: Any, spot: Spot, driver: AnyDriver) -> None:

@@ -74,10 +74,16 @@ def _allow_type(components: dict[str, Any], ref: dict[str, Any]) -> None:
 
 
 def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[str, Any]:
+    """A file with this driver; a device may name another driver of the kind."""
+    of_kind = [other for other in shapes() if other.kind == shape.kind]
     kinds_of_bus = [
         {"allOf": [by_type[buses[name]], {"properties": {"type": {"const": name}}}]}
-        for name in shape.type.buses
-        if name in buses
+        for name in buses
+        if any(name in other.type.buses for other in of_kind)
+    ]
+    devices = [
+        {"allOf": [by_type[other.type.settings], _named_by_device(other, shape)]}
+        for other in of_kind
     ]
     return {
         "type": "object",
@@ -90,10 +96,16 @@ def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[
             "buses": {"type": "object", "additionalProperties": {"oneOf": kinds_of_bus}},
             shape.devices_key: {
                 "type": "object",
-                "additionalProperties": by_type[shape.type.settings],
+                "additionalProperties": {"oneOf": devices},
             },
         },
     }
+
+
+def _named_by_device(driver: Shape, of_file: Shape) -> dict[str, Any]:
+    """Only the file's own driver need not be named by a device."""
+    required = [] if driver == of_file else ["driver"]
+    return {"required": required, "properties": {"driver": {"const": driver.driver}}}
 
 
 def _graph_file(kind: AnyGraphKind, by_type: dict[Any, Any]) -> dict[str, Any]:

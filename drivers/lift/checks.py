@@ -77,7 +77,9 @@ def missing(
 def notes(settings: LiftSettings, fire: bool) -> Iterator[Problem]:
     """What the site decides. `fire`: a fire is told by the lift."""
     if fire and settings.alarm == "none":
-        text = "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)"
+        text = (
+            "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)"
+        )
         yield ("alarm",), text
 
 

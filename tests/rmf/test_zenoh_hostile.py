@@ -10,7 +10,6 @@ from bridges.rmf.cdr import encode
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import LIFT_REQUESTS
 from bridges.rmf.zenoh import ZenohTransport
-from hal_fakes.domain import free_domain
 from tests.rmf.zenoh_hostile import FLOOD
 from tests.rmf.zenoh_programs import meeting
 from tests.waiting import wait_until
@@ -21,9 +20,8 @@ the wildcard are the next two."""
 
 
 def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arrive(
-    caplog: pytest.LogCaptureFixture,
+    domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
-    domain = free_domain()
     good = d.LiftRequest("Lift1", d.Time(5, 6), "fleet/robot", 1, "L3", 2)
     type_key = f"rmf_lift_msgs::msg::dds_::LiftRequest_/{type_hash(d.LiftRequest)}"
     token = f"@ros2_lv/{domain}/5e/0/7/MP/%/%/liar/%lift_requests/{type_key}/::,10:,:,:,,"
@@ -53,9 +51,8 @@ def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arr
     ]
 
 
-def test_nothing_forged_is_taken_for_a_message() -> None:
+def test_nothing_forged_is_taken_for_a_message(domain: int) -> None:
     """The hash in a key is part of it: another one is another key; a wildcard is no key of ours."""
-    domain = free_domain()
     received: list[d.LiftRequest] = []
     node = ZenohTransport("listener", domain, loopback=True)
     liar = ZenohTransport("liar", domain, loopback=True)

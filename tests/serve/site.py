@@ -18,6 +18,8 @@ from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
 from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
+PATIENT = "stale_after_s: 30"
+"""A busy machine that keeps the daemon from scanning for a while does not take its door away."""
 YAML = """
 kind: door
 driver: dry_contact
@@ -26,7 +28,7 @@ buses:
   module: {{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}}}
 doors:
   ward_door:
-    limits: {{close_grace_s: 0}}
+    limits: {{close_grace_s: 0, stale_after_s: 30}}
     inputs:
       opened: {{point: "unit 1 discrete input 0", active: high}}
       closed: {{point: "unit 1 discrete input 1", active: high}}

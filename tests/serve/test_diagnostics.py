@@ -8,7 +8,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf.dds import DdsTransport
 from bridges.rmf.topics import DIAGNOSTICS, DOOR_STATES
 from bridges.serve.diagnostics import MOST, diagnosis, faults
-from tests.serve.site import Module, daemon
+from tests.serve.site import PATIENT, Module, daemon
 from tests.waiting import wait_until
 
 AT = d.Time(7, 8)
@@ -85,6 +85,7 @@ def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(
     domain: int, tmp_path: Path
 ) -> None:
     module = Module(tmp_path, domain)
+    module.file.write_text(module.yaml.replace(PATIENT, "stale_after_s: 1"))
     listener = DdsTransport("listener", domain, loopback=True)
     heard: list[d.DiagnosticArray] = []
     listener.subscribe(DIAGNOSTICS, heard.append)

@@ -13,7 +13,7 @@ import pytest
 from bridges.rmf.definitions import DoorModeValue
 from tests.rmf.conftest import ROS2
 from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment, hold_open
-from tests.waiting import PATIENCE_S, wait_until
+from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 
@@ -39,7 +39,7 @@ def test_a_signal_releases_the_relay_and_leaves_the_graph_at_once(
     with daemon(module.file, tmp_path / "run") as running:
         hold_open(module, graph, running)
         assert running.end(number) == 0
-        assert graph.heard.matched() == 0
+        wait_until(lambda: graph.heard.matched() == 0, "it has left the graph", LEASE_S)
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["lock"]
 

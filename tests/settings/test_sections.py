@@ -280,3 +280,25 @@ def test_a_driver_without_wires_has_no_signals_to_accept(file: Path) -> None:
 def test_unsafe_wiring_needs_a_reason(file: Path) -> None:
     text = changed("    limits:", '    accept_unsafe: {hold: ""}\n    limits:')
     assert problems_of(file, text) == ["15:27: 'hold' has 0 characters: 1 to 128 are allowed"]
+
+
+OWN = TWO_BUSES.replace("type: module, host: h", "type: web, host: h").replace(
+    "  north:\n", "  south: {driver: web, bus: box, page: side}\n  north:\n    bus: header\n"
+)
+
+
+def test_a_device_may_have_a_driver_of_its_own(file: Path) -> None:
+    config = config_of(file, OWN)
+    drivers = {name: config.driver_type(name).settings.__module__ for name in config.devices}
+    assert drivers == {"south": "drivers.gate.web", "north": "drivers.gate.contact"}
+    assert [bool(config.wires(name)) for name in ("south", "north")] == [False, True]
+
+
+def test_a_devices_own_driver_is_one_of_its_kind(file: Path) -> None:
+    (problem,) = problems_of(file, OWN.replace("driver: web", "driver: wep"))
+    assert problem == "8:19: 'driver' is 'wep': contact or web is wanted (did you mean 'web'?)"
+
+
+def test_a_devices_own_driver_stands_on_its_bus(file: Path) -> None:
+    (problem,) = problems_of(file, OWN.replace("bus: box", "bus: header"))[1:]
+    assert problem.endswith("the bus 'header' is 'pins', but the driver of 'south' stands on web")

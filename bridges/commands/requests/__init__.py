@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from bridges.commands.graph import CommandLine, Heard
 from bridges.rmf import words
-from bridges.rmf.topics import Topic
+from bridges.rmf.topics import AnyTopic
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,13 +88,13 @@ class Request:
     line: CommandLine = field(default=CommandLine(), kw_only=True)
 
     kind: ClassVar[str]
-    states: ClassVar[Topic[Any]]
-    own: ClassVar[Topic[Any]]
-    adapter: ClassVar[Topic[Any] | None] = None
+    states: ClassVar[AnyTopic]
+    own: ClassVar[AnyTopic]
+    adapter: ClassVar[AnyTopic | None] = None
     listener: ClassVar[str] = ""
 
     @property
-    def topic(self) -> Topic[Any]:
+    def topic(self) -> AnyTopic:
         """The daemon's own, or the one that fleet adapters use."""
         return self.own if self.direct or self.adapter is None else self.adapter
 

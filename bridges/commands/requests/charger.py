@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.stamps import duration
-from bridges.rmf.topics import Topic
+from bridges.rmf.topics import AnyTopic
 
 ANY: Final = "any"
 SERVING: Final = (
@@ -33,7 +33,7 @@ class Charge(_Charger):
     request_id: str
     start_timeout_s: float
 
-    own: ClassVar[Topic[Any]] = topics.CHARGER_REQUESTS
+    own: ClassVar[AnyTopic] = topics.CHARGER_REQUESTS
 
     def message(self, seen: Seen) -> d.ChargerRequest:
         """The same id each time, so that a repeat is no new request."""
@@ -75,7 +75,7 @@ class ChargeCancel(_Charger):
 
     request_id: str
 
-    own: ClassVar[Topic[Any]] = topics.CHARGER_CANCELS
+    own: ClassVar[AnyTopic] = topics.CHARGER_CANCELS
 
     def message(self, seen: Seen) -> d.ChargerCancel:
         """By its id."""

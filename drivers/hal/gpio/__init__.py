@@ -18,7 +18,14 @@ import msgspec
 from bridges.core.fields import Period
 from drivers.hal import BusType, HalError
 from drivers.hal.gpio.bus import GpioBus
-from drivers.hal.gpio.header import J8, boot_level, canonical, describe, wire_problems, wire_warnings
+from drivers.hal.gpio.header import (
+    J8,
+    boot_level,
+    canonical,
+    describe,
+    wire_problems,
+    wire_warnings,
+)
 
 __all__ = [
     "BUS",
