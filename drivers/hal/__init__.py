@@ -51,7 +51,8 @@ class BusType(Generic[Settings]):
     A bus with points also has
     `canonical(point)`: one spelling; ValueError says what to write instead;
     `describe(point)`: every spelling, for the table that an electrician reads;
-    `wire_problems(wire)`: what cannot be right about this wire on this bus.
+    `wire_problems(wire)`: what cannot be right about this wire on this bus;
+    `wire_warnings(wire)`: what is legal about it but worth a look.
     """
 
     settings: type[Settings]
@@ -62,6 +63,7 @@ class BusType(Generic[Settings]):
     canonical: Callable[[str], str] = str
     describe: Callable[[str], str] = str
     wire_problems: Callable[[Wire], Iterable[str]] = lambda wire: ()
+    wire_warnings: Callable[[Wire], Iterable[str]] = lambda wire: ()
 
 
 AnyBus: TypeAlias = BusType[Any]
