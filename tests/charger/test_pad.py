@@ -8,6 +8,7 @@ from bridges.charger.pad import Misplaced, misplaced_in
 from bridges.charger.report import Diagnosis, diagnosis, error_text
 from bridges.charger.settings import Robot
 from bridges.charger.signals import Activity, ChargerSample
+from tests.depth import examples
 
 ODD = st.sampled_from([*' ,"/\\\n', "stands here", " is expected", "unknown receiver ", ""])
 NAMES = st.one_of(st.text(), st.lists(st.one_of(ODD, st.text(max_size=3))).map("".join))
@@ -19,7 +20,7 @@ MISPLACED = st.one_of(
 )
 
 
-@settings(max_examples=1000, deadline=None, derandomize=True)
+@settings(max_examples=examples(1000), deadline=None, derandomize=True)
 @given(MISPLACED)
 def test_every_id_survives_the_text(misplaced: Misplaced) -> None:
     assert misplaced_in(misplaced.text) == misplaced

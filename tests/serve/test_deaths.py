@@ -17,6 +17,7 @@ import pytest
 
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.signals import ENDING, WRITES
+from tests.depth import depth
 from tests.serve.site import (
     YAML,
     Graph,
@@ -101,10 +102,21 @@ def test_the_rule_leaves_out_crashes_and_what_ends_nothing_by_default() -> None:
     }
 
 
-NAMED = sorted(n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX))
+USUAL = [
+    signal.SIGHUP,
+    signal.SIGINT,
+    signal.SIGQUIT,
+    signal.SIGTERM,
+    signal.SIGTSTP,
+    signal.SIGRTMAX,
+]
+EVERY = [n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX)]
+"""Of the realtime signals the first and the last."""
 
 
-@pytest.mark.parametrize("number", NAMED, ids=lambda number: signal.Signals(number).name)
+@pytest.mark.parametrize(
+    "number", depth(USUAL, sorted(EVERY)), ids=lambda number: signal.Signals(number).name
+)
 def test_every_signal_that_would_end_or_suspend_the_daemon_releases_the_relay(
     module: Module, graph: Graph, tmp_path: Path, number: signal.Signals
 ) -> None:
