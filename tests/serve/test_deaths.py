@@ -316,7 +316,7 @@ def test_a_start_first_switches_off_what_a_dead_daemon_left_on_under_another_yam
         assert len(list((tmp_path / "run").glob("claimed-*"))) == 1
 
 
-def test_hardware_that_a_dead_daemon_left_on_and_that_does_not_answer_is_tried_on(
+def test_hardware_that_a_dead_daemon_left_on_is_tried_until_it_answers(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     with daemon(module.file, tmp_path / "run", **SERVICE) as running:
@@ -369,7 +369,7 @@ def test_no_descriptor_left_ends_no_daemon(module: Module, graph: Graph, tmp_pat
     assert module.relay() == [True, False]
 
 
-def test_a_stranger_is_told_what_to_do_and_switches_nothing(
+def test_a_user_without_permission_is_told_what_to_do_and_switches_nothing(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     with tempfile.TemporaryDirectory(dir="/tmp") as base:
@@ -392,7 +392,7 @@ def test_a_stranger_is_told_what_to_do_and_switches_nothing(
             assert module.relay() == [True]
 
 
-def test_gpio_without_lgpio_or_permission_is_told_in_a_line(tmp_path: Path) -> None:
+def test_missing_lgpio_or_permission_is_told_in_one_line(tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
     done = _told("outputs-off", file, "--runtime-dir", tmp_path / "run")
     assert done.returncode == 1
