@@ -174,9 +174,7 @@ def test_an_old_position_of_a_robot_keeps_no_station() -> None:
     assert site_.run(1) == [(30.0, "charger_a: AMR01")]
 
 
-def test_a_station_that_takes_no_request_is_passed_over_and_the_request_goes_to_the_end_of_the_queue() -> (
-    None
-):
+def test_a_station_that_takes_no_request_is_passed_over_and_its_request_is_queued_last() -> None:
     site_ = Alone()
     site_.shows[B] = busy(B)
     site_.wants(ONE)

@@ -55,9 +55,7 @@ def test_an_operator_has_the_robot_on_the_pad_charged_ad_hoc() -> None:
     ]
 
 
-def test_of_stacked_robots_the_second_goes_to_the_other_station_and_the_third_waits_until_it_is_called() -> (
-    None
-):
+def test_stacked_robots_go_to_both_stations_and_the_third_waits_until_it_is_called() -> None:
     site = yard()
     site.fleet.charge("AMR01", site.now)
     site.run(6.0)

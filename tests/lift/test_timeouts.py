@@ -214,9 +214,7 @@ def test_rmf_silent_with_a_robot_inside_holds_and_warns() -> None:
     assert story.faults == []
 
 
-def test_outputs_that_cannot_be_written_are_tried_again_and_soon_become_a_fault_with_all_outputs_off() -> (
-    None
-):
+def test_outputs_that_cannot_be_written_soon_become_a_fault_with_all_outputs_off() -> None:
     story = lift("L1", Door.OPEN, agv=True)
     story.run(5.0)
     story.building.unwritable = "no answer from the relay module"
