@@ -2,10 +2,9 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-# Byte code is kept, whatever this shell says, and not beside the sources: eight workers and some hundred
-# processes of `make test` would compile the same files otherwise, for more CPU than the tests take.
+# Byte code is kept, whatever this shell says: otherwise each worker and each daemon of `make test` compiles
+# every file anew.
 export PYTHONDONTWRITEBYTECODE :=
-export PYTHONPYCACHEPREFIX := $(CURDIR)/.venv/bytecode
 
 .PHONY: help demo demo-charging test deep test-ros lint format bench flood soak torture mutate clean
 help:

@@ -100,7 +100,9 @@ def test_a_restart_closes_nothing_and_the_next_heartbeat_lists_who_holds() -> No
     ]
 
 
-def test_what_cannot_be_kept_is_still_told_and_what_was_spoilt_is_left_out() -> None:
+def test_a_table_that_cannot_be_written_is_still_published_and_damaged_entries_are_left_out() -> (
+    None
+):
     graph = Graph()
     graph.until(4.0)
     graph.disk.full = True

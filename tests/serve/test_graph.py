@@ -67,7 +67,7 @@ def test_after_its_quiet_start_what_an_adapter_asks_is_passed_on_with_our_stamp(
     assert site.sent == [replace(asked, request_time=stamp(WALL + 3.0))]
 
 
-def test_until_it_may_speak_it_is_no_publisher_to_anybody() -> None:
+def test_before_its_quiet_start_is_over_it_has_no_publisher() -> None:
     site = Site()
     ear = site.others.subscribe(LIFT_REQUESTS, lambda request: None)
     site.until(2.99)
@@ -198,7 +198,9 @@ def test_faults_are_logged_when_they_come_and_when_they_go(
     ]
 
 
-def test_a_lost_wire_is_logged_and_does_not_end_it(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_lost_transport_is_logged_and_does_not_end_the_daemon(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     site = Site()
     site.until(3.0)
     site.adapter.publish(LiftRequest("Lift1", stamp(WALL + 3.0), "fleet/a", 1, "L3", 2))
@@ -228,7 +230,9 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
         node.close()
 
 
-def test_in_a_thread_it_serves_until_it_is_stopped(join: Callable[[str], Transport]) -> None:
+def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
+    join: Callable[[str], Transport],
+) -> None:
     """One that is passive for a rival hears of its end, and speaks; to others it is one publisher."""
     others, ours, rival = join("others"), join("supervisor"), join("rival")
     rival.publisher(LIFT_REQUESTS)

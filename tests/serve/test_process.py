@@ -61,7 +61,7 @@ def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_th
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
 
 
-def test_outputs_that_cannot_be_verified_off_are_said_so(module: Module, tmp_path: Path) -> None:
+def test_outputs_that_cannot_be_verified_off_are_reported(module: Module, tmp_path: Path) -> None:
     module.file.write_text(YAML.format(domain=module.domain, transport=wire(), port=1))
     done = subprocess.run(
         command("outputs-off", module.file, "--runtime-dir", tmp_path / "run"),
