@@ -26,7 +26,7 @@ from zenoh.handlers import Callback
 
 from bridges.core.fields import Zenoh
 from bridges.log import pairs
-from bridges.rmf import network, zenoh_config
+from bridges.rmf import network, notices, zenoh_config
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
@@ -61,6 +61,7 @@ class ZenohTransport:
         self._loopback = loopback
         self._lock = threading.Lock()
         self._closed = False
+        self._failed = False
         self._ends: Ends = ()
         self._deaf: set[str] = set()
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
@@ -81,7 +82,9 @@ class ZenohTransport:
 
     def publisher(self, topic: Topic[M]) -> ZenohPublisher[M]:
         """Declare a publisher with `topic.publish` QoS."""
-        publisher = ZenohPublisher(topic, self._orders.put, self._withdraw, self._lives, self._deaf)
+        publisher = ZenohPublisher(
+            topic, self._orders.put, self._withdraw, lambda: self.lives, self._deaf
+        )
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             self._attach(publisher)
             self._ends += (publisher,)
@@ -107,6 +110,11 @@ class ZenohTransport:
     def wall(self) -> float:
         """The wall clock (s since the epoch)."""
         return time.time()
+
+    @property
+    def lives(self) -> bool:
+        """Its thread hears; whether a router answers is another matter."""
+        return not self._closed and self._thread.is_alive()
 
     def close(self) -> None:
         """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
@@ -154,9 +162,7 @@ class ZenohTransport:
             self._deaf.add(self._keys.token("MS", end.topic, number))
         end.create(self._session, self._keys, number)
 
-    def _neighbour(
-        self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent
-    ) -> None:
+    def _neighbour(self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent) -> None:
         """A router or peer is there, or has gone. On zenoh's thread, which holds what asking the
         session about its neighbours would wait for: so we keep count of them."""
         if event.kind == zenoh.SampleKind.PUT:
@@ -196,17 +202,29 @@ class ZenohTransport:
 
     # --- our thread ----------------------------------------------------------------------------
 
-    def _lives(self) -> bool:
-        return not self._closed and self._thread.is_alive()
-
     def _listen(self) -> None:
-        while not self._closed:
+        failures = 0
+        while not self._closed and failures < notices.FAILURES:
             try:
                 order = self._orders.get(timeout=None if self._loopback else LOOK_EVERY_S)
             except Empty:
                 order = _nothing
-            order()
-            self._follow_network()
+            try:
+                order()
+                self._follow_network()
+                failures = 0
+            except Exception as error:  # noqa: BLE001 - logged by _recover
+                failures += 1
+                self._recover(error)
+
+    def _recover(self, error: Exception) -> None:
+        """Something failed that nobody foresaw: say it once, and have a new session."""
+        if not self._failed:
+            log.exception(pairs("reader_failed", node=self.name, reason=error))
+        self._failed = True
+        if not self._loopback:
+            self._look_at = time.monotonic() + LOOK_EVERY_S
+            self._join_anew()
 
     def _follow_network(self) -> None:
         """Join anew when the addresses are others than those with which we joined."""
@@ -244,7 +262,11 @@ class ZenohTransport:
         if linked:
             log.info(pairs("linked", node=self.name, connect=where))
         else:
-            log.warning(pairs("not_linked", node=self.name, connect=where, reason=NOBODY, last=self._trouble))
+            log.warning(
+                pairs(
+                    "not_linked", node=self.name, connect=where, reason=NOBODY, last=self._trouble
+                )
+            )
 
     @contextmanager
     def _reporting(self, text: str) -> Iterator[None]:

@@ -18,6 +18,7 @@ from bridges.core.decision import (
     RequestRefused,
     RivalSeen,
     Sampled,
+    Suspended,
     WriteFailed,
     X,
 )
@@ -27,6 +28,7 @@ from bridges.log import pairs, plain
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.serve.clock import Clock, Pace
+from bridges.serve.contained import Contained
 from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Publish, Status, Subject
 from drivers import Driver, DriverError
@@ -65,7 +67,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self.wake_at = AGES_AGO
         self._kind = kind
         self._settings = settings
-        self._driver = driver
+        self._driver = Contained(name, driver, clock)
         self._publish = publish
         self._clock = clock
         self._refusals = Refusals()
@@ -93,6 +95,10 @@ class Node(Generic[S, L, M, X, E, O, R]):
         except RequestRefused as refusal:
             self._refusals.add(refusal.kind, refusal.detail, device=self.name)
             return None
+
+    def was_suspended(self, for_s: float) -> None:
+        """Nothing was scanned for so long (s): whatever was believed may be past."""
+        self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
 
     def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:
         """Read, decide with each event, write, publish."""

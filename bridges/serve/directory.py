@@ -149,7 +149,7 @@ class Once:
     def __init__(self) -> None:
         self._wrong: dict[str, str] = {}
 
-    def failed(self, what: str, error: OSError) -> None:
+    def failed(self, what: str, error: Exception) -> None:
         """It did not work; it is tried again."""
         if what not in self._wrong:
             log.warning(pairs("not_written", what=what, reason=error))

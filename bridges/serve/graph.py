@@ -88,6 +88,11 @@ class GraphNode(Generic[S, L, M, E, R]):
         self.inbox.wake()
 
     @property
+    def finished(self) -> int:
+        """Nothing within a round."""
+        return 0
+
+    @property
     def ready(self) -> bool:
         """It listens. (A passive node is in order: the other one speaks.)"""
         return True
