@@ -21,7 +21,7 @@ from bridges.rmf.topics import DIAGNOSTICS
 from bridges.rmf.transport import Publisher, TransportError
 from bridges.serve import guard, record, signals
 from bridges.serve.diagnostics import diagnosis
-from bridges.serve.directory import KeptFile, Once, RuntimeDirectory, state_file
+from bridges.serve.directory import KEPT, KeptFile, Once, RuntimeDirectory, state_file
 from bridges.serve.guard import Guard
 from bridges.serve.notify import notify, watchdog_s
 from bridges.serve.predecessor import Predecessor
@@ -74,7 +74,7 @@ class Daemon:
         if config.buses and not simulated:
             runtime.claim(ours)  # before anything is: `outputs-off` goes by it
             self._guard = Guard(outputs_off) if guard.needed() else None
-        kept = None if simulated else KeptFile(state_file(config.path))
+        kept = None if simulated else KeptFile(state_file(config.path), runtime.path / KEPT)
         open_bus = open_bus or config.open_bus
         self._service = service(config, self._transport, open_bus, kept, unsafe)
         self._loops = self._service.loops

@@ -275,5 +275,5 @@ def test_a_reading_in_the_instant_in_which_the_last_one_is_too_old_starts_afresh
     told = Told(DEBOUNCE)(0.0, AT_L1)(0.5, AT_L1)(1.5, AT_L1)
     shown = told.decision.report
     assert (shown.mode, shown.floor, told.faults) == (LiftMode.MODE_OFFLINE, "", ())
-    told(1.53, AT_L1)
+    told(1.6, AT_L1)
     assert told.decision.report.floor == "L1"

@@ -81,9 +81,7 @@ def joining(transport: str, domain: int) -> Join:
             return ZenohTransport(name, domain, loopback=True, settings=ZENOH[transport])
         # Imported here: there may be no ROS.
         module = importlib.import_module(f"bridges.rmf.{transport}")
-        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[
-            transport
-        ]
+        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
         node: Transport = getattr(module, kind)(name, domain, loopback=True)
         return node
 

@@ -115,7 +115,7 @@ def test_a_sample_has_the_key_the_bytes_and_the_attachment_of_rmw_zenoh(
 def test_the_first_sample_of_a_publisher_is_number_one() -> None:
     attachment = zenoh_keys.attachment(1, 2, bytes(range(16)))
     assert attachment.hex() == (
-        "0100000000000000" "0200000000000000" "10" "000102030405060708090a0b0c0d0e0f"
+        "0100000000000000020000000000000010000102030405060708090a0b0c0d0e0f"
     )
     assert zenoh_keys.sender(attachment) == bytes(range(16))
     assert zenoh_keys.sender(attachment[:-1]) is None

@@ -87,7 +87,9 @@ def test_a_node_that_starts_before_its_router_is_there_as_soon_as_it_is(
     lift, rmf = site.node("lift", endpoint, mode=mode), site.node("rmf", endpoint, mode=mode)
     talk = Talk(lift, rmf)
     alarm = lift.publisher(FIRE_ALARM_TRIGGER)
-    with suppress(TransportError):  # a client says that it has no session; it retains it all the same
+    with suppress(
+        TransportError
+    ):  # a client says that it has no session; it retains it all the same
         alarm.publish(d.Bool(True))
     rang: list[d.Bool] = []
     rmf.subscribe(FIRE_ALARM_TRIGGER, rang.append)
@@ -328,9 +330,11 @@ def test_a_node_on_loopback_takes_no_notice_of_the_settings_and_opens_no_other_a
     finally:
         node.close()
     for config in zenoh_config.on_loopback(DOMAIN):
-        endpoints = [*config["connect/endpoints"], *config["listen/endpoints"]] if (
-            "connect/endpoints" in config
-        ) else config["listen/endpoints"]
+        endpoints = (
+            [*config["connect/endpoints"], *config["listen/endpoints"]]
+            if ("connect/endpoints" in config)
+            else config["listen/endpoints"]
+        )
         assert all(map(zenoh_config.is_local, endpoints))
         assert config["scouting/multicast/enabled"] is False
 
