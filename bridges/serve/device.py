@@ -196,7 +196,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
     def _identity(self, fault: Fault) -> object:
         """With another detail it is another fault, but for a bus's own words: they change with each
         attempt."""
-        return fault.code if fault.detail in self._bus_words else fault
+        return fault.code if fault.detail in ("", *self._bus_words) else fault
 
 
 AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]
