@@ -118,7 +118,7 @@ def _drive(
     session, grace, relays = memory.session, memory.grace, memory.relays
     outputs = LiftOutputs()
     if session and drive.serves(session, allowed, now, limits):
-        session = drive.advance(session, view, bool(relays.agv.on), now, limits)
+        session = drive.advance(session, view, relays, now, limits)
         outputs = drive.wanted(session, view, now, limits)
     elif session:
         session = drive.paused(session)

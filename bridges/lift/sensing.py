@@ -298,6 +298,8 @@ def _faults(senses: Senses) -> tuple[Fault, ...]:
     for name, seen in zip(("door", "rear door"), senses.doors, strict=True):
         if seen and seen.value is Door.BOTH:
             found.append(Fault("DOOR_CONTACTS_CONTRADICT", f"{name} reads open and closed"))
+        if seen and seen.value is Door.UNKNOWN:
+            found.append(Fault("DOOR_CODE_ILLEGAL", f"the {name}'s number means nothing"))
     if senses.motion and senses.motion.value is Motion.CONTRADICTORY:
         found.append(Fault("MOTION_CONTRADICTORY", "the motion lines cannot all be true"))
     return tuple(found)

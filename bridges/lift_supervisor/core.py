@@ -71,7 +71,7 @@ def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
     message = wanted(memory)
     due = now >= _due_at(memory, message)
     if due:
-        memory = replace(memory, sent=message, sent_at=now, prompted=False)
+        memory = replace(memory, sent=message, last_sent=message, sent_at=now, prompted=False)
     may_come = tuple(alarms(memory, now, limits))
     return Decision(
         memory,
@@ -270,7 +270,8 @@ def _due_at(memory: Memory, message: LiftRequest | None) -> float:
     if message is None:
         return NEVER
     new = memory.sent is None or (message != memory.sent and message.request_type != END)
-    return due_at(memory.sent_at, new=new, again=memory.prompted)
+    said = memory.sent is None and message == memory.last_sent  # in another turn, the same words
+    return due_at(memory.sent_at, new=new and not said, again=memory.prompted or said)
 
 
 def _wake_at(memory: Memory, due: list[float], now: float, limits: Limits) -> float:

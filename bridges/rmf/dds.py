@@ -18,19 +18,20 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 from weakref import WeakValueDictionary
 
 from cyclonedds import core
 from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.internal import DDS, dds_infinity
+from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.log import pairs
 from bridges.rmf import network, notices
-from bridges.rmf.dds_ends import DdsPublisher, DdsSubscription
+from bridges.rmf.dds_ends import AnyPublisher, AnySubscription, DdsPublisher, DdsSubscription
 from bridges.rmf.definitions import Message
 from bridges.rmf.graph import NodeOnGraph
 from bridges.rmf.idl import sample_type
@@ -41,6 +42,7 @@ from bridges.rmf.transport import TransportError
 log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=Message)
+E = TypeVar("E", bound=core.Entity)
 
 CANNOT_JOIN: Final = (
     "is a network interface up, and does CYCLONEDDS_URI, if set, name one that exists? "
@@ -54,7 +56,7 @@ ERRORS: Final = 1 | 2
 """Cyclone's fatal errors and errors. Its warnings are a line for each malformed datagram, which anybody
 can send; its binding has no call for the mask, and its configuration does not reach them."""
 
-_domains: WeakValueDictionary[tuple[int, str], Any] = WeakValueDictionary()
+_domains: WeakValueDictionary[tuple[int, str], Domain] = WeakValueDictionary()
 _domains_lock = threading.Lock()
 
 
@@ -72,10 +74,10 @@ class DdsTransport:
         self._lock = threading.Lock()
         self._closed = False
         self._failed = False
-        self._entities: list[Any] = []
-        self._topics: dict[str, Any] = {}
-        self._ends: tuple[DdsPublisher[Any] | DdsSubscription[Any], ...] = ()
-        self._subscriptions: tuple[DdsSubscription[Any], ...] = ()
+        self._entities: list[core.Entity] = []
+        self._topics: dict[str, DdsTopic] = {}
+        self._ends: tuple[AnyPublisher | AnySubscription, ...] = ()
+        self._subscriptions: tuple[AnySubscription, ...] = ()
         self._domain_id = domain_id
         self._loopback = loopback
         self._stop = threading.Event()
@@ -177,14 +179,14 @@ class DdsTransport:
                 if was_joined:
                     log.warning(pairs("not_joined", node=self.name, reason=error))
 
-    def _topic(self, topic: Topic[M]) -> Any:
+    def _topic(self, topic: Topic[M]) -> DdsTopic:
         name = f"rt/{topic.name}"
         if name not in self._topics:
             kind = sample_type(topic.type)
             self._topics[name] = self._keep(DdsTopic(self._participant, name, kind))
         return self._topics[name]
 
-    def _attach(self, end: "DdsPublisher[Any] | DdsSubscription[Any]") -> None:
+    def _attach(self, end: AnyPublisher | AnySubscription) -> None:
         """Give an end its place in DDS."""
         entity = self._keep(end.create(self._participant, self._topic(end.topic)))
         entity.set_status_mask(end.watched)
@@ -227,7 +229,7 @@ class DdsTransport:
         self._stop.wait(LOOK_EVERY_S)
         self._join_anew()
 
-    def _withdraw(self, publisher: "DdsPublisher[Any]", writer: Any) -> None:
+    def _withdraw(self, publisher: AnyPublisher, writer: DataWriter) -> None:
         """Take one writer off the graph; after close there is none left to take."""
         with self._lock:
             if self._closed or publisher not in self._ends:
@@ -240,7 +242,7 @@ class DdsTransport:
             self._entities = [entity for entity in self._entities if entity is not writer]
             writer.__del__()
 
-    def _keep(self, entity: Any) -> Any:
+    def _keep(self, entity: E) -> E:
         self._entities.append(entity)
         return entity
 
@@ -259,7 +261,7 @@ class DdsTransport:
             raise TransportError(f"{text}: {error}") from error
 
 
-def _shared_domain(domain_id: int, configuration: str) -> Any:
+def _shared_domain(domain_id: int, configuration: str) -> Domain:
     """The domain of this process with this configuration, shared by its participants; there can be
     no second one beside it."""
     key = domain_id, configuration

@@ -2,12 +2,12 @@
 
 import logging
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from bridges.log import pairs
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
+from bridges.rmf.topics import AnyTopic, Topic
 
 log = logging.getLogger(__name__)
 
@@ -19,7 +19,7 @@ NOT_HEARD = "a publisher is not heard"
 NOT_SERVED = "a subscription is not served"
 
 
-def drop(dropped: dict[str, int], topic: Topic[Any], error: CdrError) -> None:
+def drop(dropped: dict[str, int], topic: AnyTopic, error: CdrError) -> None:
     """Count a sample that is no message, and log the first of its topic."""
     dropped[topic.name] = dropped.get(topic.name, 0) + 1
     if dropped[topic.name] == 1:
@@ -40,6 +40,6 @@ def hand_on(
             log.error(text, exc_info=True)
 
 
-def misfit(topic: Topic[Any], text: str, policy: str) -> None:
+def misfit(topic: AnyTopic, text: str, policy: str) -> None:
     """Say which policy keeps a peer apart from our end of a topic."""
     log.warning(pairs("misfit", topic=topic.name, reason=f"{text}: its {policy} does not fit ours"))

@@ -106,7 +106,6 @@ class Devices:
         self._config = config
         self._unsafe = unsafe
         self._kind = kind
-        self._driver = config.driver_type
         self._transport = transport
         self._clock = clock
         self._named = named
@@ -152,8 +151,9 @@ class Devices:
 
     def _node(self, name: str, bus: Bus) -> AnyNode:
         device = self._config.devices[name]
-        limits = self._kind.limits(device, self._driver.debounce(device))
-        driver = self._driver.create(name, device, bus)
+        driver_type = self._config.driver_type(name)
+        limits = self._kind.limits(device, driver_type.debounce(device))
+        driver = driver_type.create(name, device, bus)
         if name in self._unsafe:
             driver = SafeFirst(name, driver)
         return Node(name, self._kind, device, limits, driver, self._outlet.publish, self._clock)

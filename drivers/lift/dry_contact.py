@@ -128,7 +128,7 @@ def decode(
 def _service(inputs: Inputs, shown: Mapping[str, bool]) -> str | None:
     if inputs.service is None:
         return None
-    return inputs.service.codes[_number("service", len(inputs.service.bits), shown)]
+    return inputs.service.means(_number("service", len(inputs.service.bits), shown))
 
 
 def _agv(inputs: Inputs, shown: Mapping[str, bool], service: str | None) -> bool | None:

@@ -24,6 +24,7 @@ from bridges.rmf.stamps import duration
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from hal_fakes.rmf.fleet import Fleet
+from tests.serve.virtual_graph import Disk
 
 STEP_S = 0.25
 GRAPH = {
@@ -133,19 +134,6 @@ class Charger:
 
 
 @dataclass
-class Kept:
-    """The state directory."""
-
-    kept: bytes | None = None
-
-    def read(self) -> bytes | None:
-        return self.kept
-
-    def write(self, kept: bytes) -> None:
-        self.kept = kept
-
-
-@dataclass
 class Yard:
     """All of them. `story`: (s, what) of everything worth telling, in order; `fills`: % per second."""
 
@@ -157,7 +145,7 @@ class Yard:
     story: list[tuple[float, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.network, self.kept = MemoryNetwork(), Kept()
+        self.network, self.kept = MemoryNetwork(), Disk()
         self.rmf = MemoryTransport(self.network, "rmf")
         self.chargers = {name: Charger(name, self.knows) for name in PLACES}
         homes = {f"AMR0{i}": f"wait_{i}" for i in (1, 2, 3)}

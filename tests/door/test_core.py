@@ -2,6 +2,7 @@
 
 import math
 
+import pytest
 from msgspec.structs import replace
 
 from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen
@@ -236,6 +237,29 @@ def test_a_contact_half_seen_before_a_gap_must_be_seen_again() -> None:
         (0.5, "MOVING", False),
         (2.875, "OPEN", False),
     ]
+
+
+@pytest.mark.parametrize(
+    ("contact", "before", "after"),
+    [
+        ("closed", BETWEEN, CLOSED),
+        ("obstruction", replace(OPEN, obstruction=False), replace(OPEN, obstruction=True)),
+        ("fire", replace(OPEN, fire=False), replace(OPEN, fire=True)),
+    ],
+)
+def test_every_contact_half_seen_before_a_gap_must_be_seen_again(
+    contact: str, before: DoorSample, after: DoorSample
+) -> None:
+    core = CoreAlone(DoorLimits(debounce={contact: 0.5}))
+    core.sees(before, until=2.0)
+    core.sees(after, until=2.375)
+    core.hears(IoFailed("no reply"))
+    seen = []
+    for at in (2.5, 2.75, 2.875):
+        core.sees(after, until=at)
+        value = getattr(core.memory.senses, contact).value
+        seen.append(value == getattr(after, contact))
+    assert seen == [False, False, True]
 
 
 def test_a_door_read_once_before_a_gap_is_still_nowhere() -> None:

@@ -5,7 +5,7 @@ that tells the rules in other words. Ages that are beyond every limit are made e
 that cannot behave differently are one. All durations are sums of powers of two: no time is rounded.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -22,6 +22,7 @@ from bridges.door.signals import CloseRequested as CloseDoor
 from bridges.door.signals import DoorSample, Event
 from bridges.door.signals import OpenRequested as OpenDoor
 from tests.door.virtual import Decided
+from tests.walk import Walker
 
 LONG_S = 32.0
 """Without a wake_at, a scan each so many seconds is enough here; below `stale_after_s`."""
@@ -346,14 +347,6 @@ def _settled(seen: Settled[Any] | None, by: float) -> Any:
     )
 
 
-def neighbours(world: World, limits: DoorLimits, seen: Seen) -> Iterator[World]:
-    """Every state one step away."""
-    for move in MOVES.values():
-        yield moved(world, move, limits, seen)
-    for seconds in TIMES:
-        yield waited(world, seconds, limits, seen)
-
-
 def alike(world: World, limits: DoorLimits) -> World:
     """Equal for states that cannot behave differently."""
     return replace(
@@ -363,17 +356,11 @@ def alike(world: World, limits: DoorLimits) -> World:
     )
 
 
-def walk(roots: list[World], depth: int, limits: DoorLimits, seen: Seen) -> list[World]:
-    """Breadth first from the roots; every state within `depth` steps, once."""
-    found = {alike(root, limits) for root in roots}
-    edge = list(found)
-    for _ in range(depth):
-        fresh: list[World] = []
-        for world in edge:
-            for neighbour in neighbours(world, limits, seen):
-                state = alike(neighbour, limits)
-                if state not in found:
-                    found.add(state)
-                    fresh.append(state)
-        edge = fresh
-    return list(found)
+def walker(limits: DoorLimits) -> Walker[World, Move]:
+    """The door's, with these limits."""
+    return Walker(
+        MOVES,
+        TIMES,
+        lambda world, move, seen: alike(moved(world, move, limits, seen), limits),
+        lambda world, seconds, seen: alike(waited(world, seconds, limits, seen), limits),
+    )

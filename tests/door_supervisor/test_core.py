@@ -391,3 +391,11 @@ def test_the_report_names_the_holders_and_the_door_as_it_was_last_seen() -> None
     report = desk.last.report
     assert report == DoorHoldReport(2.0, DoorModeValue.MODE_MOVING, (("b", 1.0), ("a", 2.0)))
     assert report.news() == (DoorModeValue.MODE_MOVING, ("b", "a"))
+
+
+def test_a_holder_that_repeats_itself_takes_no_others_place() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.opens("b")
+    desk.opens("a")
+    assert desk.holders == ["a", "b"]

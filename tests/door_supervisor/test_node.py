@@ -12,24 +12,9 @@ from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import stamp
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
+from tests.serve.virtual_graph import Disk
 
 HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT
-
-
-class Kept:
-    """The state directory; `full`: nothing more can be written."""
-
-    def __init__(self) -> None:
-        self.kept: bytes | None = None
-        self.full = False
-
-    def read(self) -> bytes | None:
-        return self.kept
-
-    def write(self, kept: bytes) -> None:
-        if self.full:
-            raise OSError("no space left on device")
-        self.kept = kept
 
 
 class Graph:
@@ -38,7 +23,7 @@ class Graph:
     def __init__(self) -> None:
         self.now = 0.0
         self.network = MemoryNetwork()
-        self.kept = Kept()
+        self.disk = Disk()
         self.heard: list[tuple[float, str]] = []
         self.rmf = MemoryTransport(self.network, "rmf")
         self.rmf.subscribe(topics.DOOR_REQUESTS, self._request)
@@ -50,7 +35,7 @@ class Graph:
     def starts(self) -> None:
         self.transport = MemoryTransport(self.network, "ours")
         clock = Clock(lambda: self.now, lambda: 1e6 + self.now)
-        self.node = GraphNode(KIND, Settings(), self.transport, clock, kept=self.kept)
+        self.node = GraphNode(KIND, Settings(), self.transport, clock, kept=self.disk)
         self.node.subscribe()
 
     def asks(self, who: str, mode: int, door: str = "ward") -> None:
@@ -120,12 +105,12 @@ def test_a_restart_closes_nothing_and_the_next_heartbeat_lists_who_holds() -> No
 def test_what_cannot_be_kept_is_still_told_and_what_was_spoilt_is_left_out() -> None:
     graph = Graph()
     graph.until(4.0)
-    graph.kept.full = True
+    graph.disk.full = True
     graph.asks("a", 2)
     assert graph.heard[-1] == (4.1, "beat ward:a") or graph.heard[-1][1] == "OPEN ward"
     graph.until(4.2)
     assert graph.heard[-1] == (4.1, "beat ward:a")
-    graph.kept.kept = b"\x00"
+    graph.disk.kept = b"\x00"
     graph.transport.close()
     graph.starts()
     assert graph.node.subjects == {}

@@ -4,7 +4,7 @@ A state is the core's memory, with every time relative to now, and the building 
 are beyond every limit are made equal, so that states that cannot behave differently are one.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -19,6 +19,7 @@ from bridges.lift.settings import Durations as Limits
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Door, Ended, Event, Hazard, LiftSample, Motion
 from bridges.lift.signals import Requested as Asked
+from tests.walk import Walker
 
 LONG_S = 55.0
 """Without a wake_at, a scan each so many seconds is enough here; below `stale_after_s`."""
@@ -272,25 +273,12 @@ def key(world: World) -> tuple[Any, ...]:
     )
 
 
-def neighbours(world: World, limits: LiftLimits, seen: Seen) -> Iterator[World]:
-    """Every state one step away."""
-    for move in MOVES.values():
-        yield moved(world, move, limits, seen)
-    for seconds in TIMES:
-        yield waited(world, seconds, limits, seen)
-
-
-def walk(roots: list[World], depth: int, limits: LiftLimits, seen: Seen) -> list[World]:
-    """Breadth first from the roots; every state within `depth` steps, once."""
-    found = {key(root): root for root in roots}
-    edge = list(found.values())
-    for _ in range(depth):
-        fresh: list[World] = []
-        for world in edge:
-            for state in neighbours(world, limits, seen):
-                name = key(state)
-                if name not in found:
-                    found[name] = state
-                    fresh.append(state)
-        edge = fresh
-    return list(found.values())
+def walker(limits: LiftLimits) -> Walker[World, Move]:
+    """The lift's, with these limits."""
+    return Walker(
+        MOVES,
+        TIMES,
+        lambda world, move, seen: moved(world, move, limits, seen),
+        lambda world, seconds, seen: waited(world, seconds, limits, seen),
+        key,
+    )

@@ -14,13 +14,13 @@ from bridges.rmf.cdr import encode
 from bridges.rmf.definitions import LiftState
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.zenoh import ZenohTransport
-from hal_fakes.domain import free_domain
 from tests.rmf import rmw_zenoh_reader
 from tests.rmf.conftest import ZENOH
+from tests.rmf.domains import domain_of_this_run
 from tests.rmf.zenoh_programs import meeting, reading
 from tests.waiting import wait_until
 
-DOMAIN = free_domain()
+DOMAIN = domain_of_this_run()
 STATE = (
     "rmf_lift_msgs::msg::dds_::LiftState_"
     "/RIHS01_ce0553cd08eeeb321bdae554efdb6d2ebb2be9755df2e34895cbef55b51f4c06"

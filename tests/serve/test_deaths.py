@@ -17,7 +17,7 @@ import pytest
 
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.signals import ENDING, WRITES
-from hal_fakes.domain import free_domain
+from hal_fakes.wire import wire
 from tests.serve.site import (
     YAML,
     Graph,
@@ -34,9 +34,11 @@ SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 
 
 @pytest.fixture(scope="module")
-def wall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Module, Graph]]:
+def wall(
+    module_domain: int, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[Module, Graph]]:
     """A module and an RMF that see many daemons come and go."""
-    standing = Module(tmp_path_factory.mktemp("wall"), free_domain())
+    standing = Module(tmp_path_factory.mktemp("wall"), module_domain)
     joined = Graph(standing.domain)
     yield standing, joined
     joined.transport.close()
@@ -202,11 +204,13 @@ def test_reset_and_outputs_off_as_typed_find_the_daemon_started_by_hand(
     assert (ended.returncode, "no daemon serves" in ended.stderr) == (1, True)
 
 
-def test_a_reset_during_outputs_off_is_not_sent_and_does_not_end_it(tmp_path: Path) -> None:
+def test_a_reset_during_outputs_off_is_not_sent_and_does_not_end_it(
+    domain: int, tmp_path: Path
+) -> None:
     hole = socket.create_server(("127.0.0.1", 0))
     port = hole.getsockname()[1]
     file = tmp_path / "silent.yaml"
-    file.write_text(YAML.format(domain=free_domain(), transport="dds", port=port))
+    file.write_text(YAML.format(domain=domain, transport=wire(), port=port))
     off = subprocess.Popen(
         command("outputs-off", file, "--runtime-dir", tmp_path / "run"), env=environment()
     )
@@ -385,7 +389,7 @@ def test_gpio_without_lgpio_or_permission_is_told_in_a_line(tmp_path: Path) -> N
     assert "Traceback" not in done.stderr
 
 
-def test_a_simulation_needs_no_token(tmp_path: Path) -> None:
+def test_a_simulation_needs_no_token(domain: int, tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "config" / "charger_http.yaml"
     text = file.read_text()
     with_token = tmp_path / "charger.yaml"
@@ -393,7 +397,7 @@ def test_a_simulation_needs_no_token(tmp_path: Path) -> None:
         re.sub(r'(api_base: "[^"]*")', r"\1, token_file: /none/token", text, count=1)
     )
     assert "token_file" in with_token.read_text()
-    options = ("--simulate", "--domain-id", str(free_domain()))
+    options = ("--simulate", "--domain-id", str(domain))
     with daemon(with_token, tmp_path / "run", *options) as running:
         running.wait_for("ready")
         assert "token_file" not in running.log.read_text()

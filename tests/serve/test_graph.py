@@ -19,6 +19,7 @@ from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from bridges.serve.presence import SPREAD_MOST_S
 from bridges.serve.serving import Serving
+from hal_fakes import wire
 from tests.rmf.domains import domain_of_this_run
 from tests.waiting import wait_until
 
@@ -279,7 +280,7 @@ def test_a_lost_wire_is_logged_and_does_not_end_it(caplog: pytest.LogCaptureFixt
 # --- with its thread, and on the wire ----------------------------------------------------------
 
 
-@pytest.fixture(params=["memory", "dds"])
+@pytest.fixture(params=["memory", "wire"])
 def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]:
     network, nodes = MemoryNetwork(), list[Transport]()
 
@@ -287,8 +288,7 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
         if request.param == "memory":
             nodes.append(MemoryTransport(network, name))
         else:
-            dds = pytest.importorskip("bridges.rmf.dds")
-            nodes.append(dds.DdsTransport(name, domain_of_this_run(), loopback=True))
+            nodes.append(wire.join(name, domain_of_this_run()))
         return nodes[-1]
 
     yield join

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from hal_fakes.domain import free_domain
 from tests.serve.site import Daemon, command, daemon, environment
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -30,8 +29,7 @@ class Building:
 
 
 @pytest.fixture
-def building(tmp_path: Path) -> Iterator[Building]:
-    domain = free_domain()
+def building(domain: int, tmp_path: Path) -> Iterator[Building]:
     options = ("--simulate", "--domain-id", str(domain))
     supervisor = daemon(CONFIG / "lift_supervisor.yaml", tmp_path / "supervisor", *options)
     lift = daemon(CONFIG / "lift_dry_contact.yaml", tmp_path / "lift", *options)

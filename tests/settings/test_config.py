@@ -13,6 +13,7 @@ from bridges.core.fields import Rmf
 from bridges.settings import names as named
 from bridges.settings.load import Config, Problem, load
 from drivers.hal.points import Wire
+from tests.depth import examples
 from tests.settings.reading import RIGHT, changed, config_of
 
 GATE = {
@@ -131,7 +132,7 @@ Quoting.add_representer(
 
 @pytest.mark.parametrize("flow", [True, False])
 def test_every_right_file_becomes_what_msgspec_makes_of_its_values(file: Path, flow: bool) -> None:
-    @settings(derandomize=True, max_examples=60, deadline=None, database=None)
+    @settings(derandomize=True, max_examples=examples(60), deadline=None, database=None)
     @given(st.dictionaries(NAMES, gates(), min_size=1, max_size=1))
     def check(devices: dict[str, Any]) -> None:
         raw = {"kind": "gate", "driver": "contact", "buses": {"b": {"type": "pins"}}}

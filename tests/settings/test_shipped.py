@@ -30,6 +30,7 @@ from bridges.commands.check import described
 from bridges.core.fields import Rmf
 from bridges.settings import names as named
 from bridges.settings.load import load
+from tests.depth import DEEP
 from tests.settings.reading import problems_of
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -192,7 +193,7 @@ def test_every_doubled_key_is_found_where_it_stands(config: Path, file: Path) ->
         second = f"{before.count(chr(10)) + 1}:{len(before) - before.rfind(chr(10))}"
         line = place.key.start_mark.line + 1
         assert found == [
-            f"{second}: the key '{place.key.value}' is on line {line} already: "
+            f"{second}: the key '{place.key.value}' is already on line {line}: "
             "delete one of the two"
         ]
 
@@ -219,8 +220,8 @@ def test_every_key_that_is_taken_out_leaves_a_right_file_or_is_missed(
 def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file: Path) -> None:
     text = config.read_text()
     accepted, values = 0, list(scalars(composed(text)))
-    for node in values:
-        for trap in TRAPS:
+    for n, node in enumerate(values):
+        for trap in TRAPS if DEEP else TRAPS[n % 4 :: 4]:  # each kind of trap at a quarter of them
             found = problems_of(
                 file, f"{text[: node.start_mark.index]}{trap}{text[node.end_mark.index :]}"
             )

@@ -15,7 +15,7 @@ from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerOutputs, Cha
 from drivers import Driver, DriverError
 from hal_fakes.plants.plant import Plant
 from tests.drivers.hal.modbus.module import Time
-from tests.waiting import wait_until
+from tests.waiting import at_last, wait_until
 
 ON, OFF, AS_IT_IS = ChargerOutputs(True), ChargerOutputs(False), ChargerOutputs(None)
 PACE = 20.0
@@ -47,9 +47,13 @@ class Bench:
 
     def scan(self, outputs: ChargerOutputs) -> Activity:
         """One scan; what the station does."""
-        activity = self.driver.read().activity
-        self.driver.write(outputs)
+        activity = at_last(lambda: self.driver.read().activity, "a reading", self.a_moment)
+        at_last(lambda: self.driver.write(outputs), "written", self.a_moment)
         return activity
+
+    def a_moment(self) -> None:
+        """All pauses are over."""
+        self.clock.now += 60.0
 
     def until(self, activity: Activity, outputs: ChargerOutputs) -> None:
         """Scans, until the station reads that."""
@@ -57,7 +61,7 @@ class Bench:
 
     def patiently(self) -> Activity | str:
         """What it reads with all pauses over; or why it cannot be read."""
-        self.clock.now += 60.0
+        self.a_moment()
         try:
             return self.driver.read().activity
         except DriverError as error:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from drivers.hal import HalError
 from drivers.hal.http import HttpBus, Settings, open_bus
+from tests.depth import examples
 from tests.drivers.hal.http.far_end import (
     Caller,
     Conversation,
@@ -258,7 +259,7 @@ def test_an_answer_that_is_none_is_an_error_that_says_what_to_look_at(
     assert re.search(text, failure(once(reply)))
 
 
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(derandomize=True, max_examples=examples(150), deadline=None)
 @given(st.binary(max_size=200), st.sampled_from([b"", b"HTTP/1.1 200 OK\r\n", answer(b"")[:-4]]))
 def test_no_bytes_of_a_server_raise_anything_but_a_hal_error(noise: bytes, start: bytes) -> None:
     with FarEnd(once(start + noise)) as far:
