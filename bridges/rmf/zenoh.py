@@ -27,7 +27,7 @@ from zenoh.handlers import Callback
 
 from bridges.core.fields import Zenoh
 from bridges.log import pairs
-from bridges.rmf import addresses, zenoh_config
+from bridges.rmf import addresses, notices, zenoh_config
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
@@ -62,6 +62,7 @@ class ZenohTransport:
         self._loopback = loopback
         self._lock = threading.Lock()
         self._closed = False
+        self._failed = False
         self._ends: Ends = ()
         self._deaf: set[str] = set()
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
@@ -83,7 +84,9 @@ class ZenohTransport:
 
     def publisher(self, topic: Topic[M]) -> ZenohPublisher[M]:
         """Declare a publisher with `topic.publish` QoS."""
-        publisher = ZenohPublisher(topic, self._orders.put, self._withdraw, self._lives, self._deaf)
+        publisher = ZenohPublisher(
+            topic, self._orders.put, self._withdraw, lambda: self.lives, self._deaf
+        )
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             self._attach(publisher)
             self._ends += (publisher,)
@@ -109,6 +112,11 @@ class ZenohTransport:
     def wall(self) -> float:
         """The wall clock (s since the epoch)."""
         return time.time()
+
+    @property
+    def lives(self) -> bool:
+        """Its thread hears; whether a router answers is another matter."""
+        return not self._closed and self._thread.is_alive()
 
     def close(self) -> None:
         """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
@@ -205,17 +213,29 @@ class ZenohTransport:
 
     # --- our thread ----------------------------------------------------------------------------
 
-    def _lives(self) -> bool:
-        return not self._closed and self._thread.is_alive()
-
     def _listen(self) -> None:
-        while not self._closed:
+        failures = 0
+        while not self._closed and failures < notices.FAILURES:
             try:
                 order = self._orders.get(timeout=None if self._loopback else LOOK_EVERY_S)
             except Empty:
                 order = _nothing
-            order()
-            self._follow_network()
+            try:
+                order()
+                self._follow_network()
+                failures = 0
+            except Exception as error:  # noqa: BLE001 - logged by _recover
+                failures += 1
+                self._recover(error)
+
+    def _recover(self, error: Exception) -> None:
+        """Something failed that nobody foresaw: say it once, and have a new session."""
+        if not self._failed:
+            log.exception(pairs("reader_failed", node=self.name, reason=error))
+        self._failed = True
+        if not self._loopback:
+            self._look_at = time.monotonic() + LOOK_EVERY_S
+            self._join_anew()
 
     def _follow_network(self) -> None:
         """Join anew when the addresses are others than those with which we joined."""

@@ -274,7 +274,7 @@ class ZenohSubscription(_End, Generic[M]):
                 notices.drop(self._dropped, self.topic, error)
                 continue
             if message is not None:
-                self._received(message)
+                notices.hand_on(self._dropped, self.topic, self._received, message)
         if self._waiting:
             self._ring()
 
