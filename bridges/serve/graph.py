@@ -5,7 +5,8 @@ virtual time; the daemon has a thread for it (`bridges/serve/serving.py`).
 """
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Generic
 
 from bridges.core.decision import Fault, M, OperatorReset, R, RequestRefused
@@ -66,7 +67,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         kept: Kept | None = None,
     ) -> None:
         self.name = f"graph-{kind.name}"
-        self.inbox: Inbox[tuple[Topic[Message], Message]] = Inbox()
+        self.inbox: Inbox[tuple[Topic[Message], E]] = Inbox()
         self.presence = Presence(kind.name, kind.quiet_s(settings))
         self.subjects: dict[str, Subject[M, GraphEvent[E], None, R]] = {}
         self._kind = kind
@@ -118,9 +119,9 @@ class GraphNode(Generic[S, L, M, E, R]):
     def round(self) -> None:
         """Take what was heard, wake whose time has come, send what they say."""
         self._look_around()
-        for name, messages in self.inbox.take().items():
-            for topic, message in messages:
-                self._receive(name, topic, message)
+        for name, events in self.inbox.take().items():
+            for topic, event in events:
+                self._receive(name, topic, event)
         if self._reset:
             self._reset = False
             self._decide_all(OperatorReset())
@@ -154,12 +155,26 @@ class GraphNode(Generic[S, L, M, E, R]):
         return {subject.name: subject.status() for subject in list(self.subjects.values())}
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
-        """A callback for the transport's thread."""
+        """A callback for the transport's thread. Only what is accepted waits: it is not endless."""
 
         def put(message: Message) -> None:
-            self.inbox.put(self._kind.device_name(message), (topic, message))
+            with self._counting(topic.name):
+                event = self._kind.requests[topic](message, self._settings, self._clock.wall())
+                self.inbox.put(self._kind.device_name(message), (topic, event))
 
         return put
+
+    @contextmanager
+    def _counting(self, about: str) -> Iterator[None]:
+        """What is not obeyed, or fails for a defect of ours: a core that fails has changed nothing."""
+        try:
+            yield
+        except RequestRefused as refusal:
+            self._refusals.add(refusal.kind, refusal.detail)
+        except Exception as error:
+            if not self._refusals.counts().get(DEFECT):
+                log.exception(pairs("defect", kind=self._kind.name, about=about, reason=error))
+            self._refusals.add(DEFECT, f"{type(error).__name__} about {about}")
 
     def _look_around(self) -> None:
         """Whoever may speak is a publisher, and nobody else."""
@@ -180,17 +195,10 @@ class GraphNode(Generic[S, L, M, E, R]):
                 del self.subjects[subject.name]
                 self._shown.discard(subject.name)
 
-    def _receive(self, name: str, topic: Topic[Message], message: Message) -> None:
-        try:
-            event = self._kind.requests[topic](message, self._settings, self._clock.wall())
+    def _receive(self, name: str, topic: Topic[Message], event: E) -> None:
+        with self._counting(name):
             subject = self._subject(name, shows_itself=self._kind.shown_by in (None, topic))
             self._decide(subject, event)
-        except RequestRefused as refusal:
-            self._refusals.add(refusal.kind, refusal.detail)
-        except Exception as error:  # pure cores: what was known before still stands
-            if not self._refusals.counts().get(DEFECT):
-                log.exception(pairs("defect", kind=self._kind.name, subject=name, reason=error))
-            self._refusals.add(DEFECT, f"{type(error).__name__} about {name}")
 
     def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
         """What this message is about; it may be new to us."""
