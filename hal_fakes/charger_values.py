@@ -32,12 +32,11 @@ def values(
     """
     shown: dict[str, Value] = {at: 0 for _, at in errors.places()}
     shown |= {n.at: n.well[0] for n in errors.codes}
-    if wanted[0] is Activity.ERROR and _shows_error(errors, shown, wanted == ROBOT_ERROR):
-        wanted = (Activity.IDLE, "")
-    if not rules:
-        return shown
+    is_shown = wanted[0] is Activity.ERROR and _shows_error(errors, shown, wanted == ROBOT_ERROR)
     at = dict.fromkeys(at for _, at in places(rules))
     tried = [_candidates(place, rules, natural, shown) for place in at]
+    if is_shown or not rules:
+        return {**{place: first for place, (first, *_) in zip(at, tried, strict=True)}, **shown}
     for found in itertools.product(*tried):
         said = {**shown, **dict(zip(at, found, strict=True))}
         rule = judge(rules, said.__getitem__)

@@ -166,14 +166,17 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     bits: list[ErrorBits] = []
 
     def found(self, read: Read) -> Found:
-        """All that is wrong now."""
+        """All that is wrong now; what reads None is not known, and no error."""
         sides: tuple[tuple[FaultSide, Mapping[str, str]], ...] = (
             ("station", self.station),
             ("robot", self.robot),
         )
         flags = [(side, t) for side, texts in sides for at, t in texts.items() if read(at)]
-        numbers = [error for n in self.codes for error in n.errors(read(n.at))]
-        numbers += [error for n in self.bits for error in n.errors(read(n.at))]
+        numbers: Found = []
+        for number in (*self.codes, *self.bits):
+            assert isinstance(number, ErrorNumber | ErrorBits)
+            if (value := read(number.at)) is not None:
+                numbers += number.errors(value)
         order = ("station", "", "robot")
         return sorted([*flags, *numbers], key=lambda error: order.index(error[0]))
 

@@ -12,10 +12,12 @@ from bridges.settings.load import load
 from drivers.charger import dry_contact as charger_contacts
 from drivers.charger import http as charger_http
 from drivers.charger import modbus as charger_modbus
+from drivers.charger import register as charger_register
 from drivers.hal import http, modbus
 from hal_fakes.http import HttpServer
 from hal_fakes.http_charger import HttpCharger as Station
 from hal_fakes.modbus import ModbusServer
+from hal_fakes.modbus.register_charger import PARTS, RegisterCharger
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.contact_charger import ContactCharger
 from hal_fakes.plants.pad import PadPlant
@@ -104,6 +106,30 @@ class TestAReceiverOnModbus(ChargerContract):
 
     def checks(self, bench: Bench) -> list[bool]:
         return bench.switched("check_range")
+
+
+class TestAnyMakeOnRegisters(ChargerContract):
+    link: ClassVar = "unit"
+
+    @contextmanager
+    def benches(self) -> Iterator[Bench]:
+        settings = load(CONFIG / "charger_register.yaml").devices["charger_f"]
+        plant = ChargerPlant("a", commanded=True, asked=True, pace=PACE, parts=PARTS)
+        world, clock = RealTime({"a": plant}), Time()
+        server = ModbusServer([RegisterCharger(world.plants["a"], settings)], slow_s=0.3)
+        plain = {"type": "modbus", "timeout_s": 0.2, **server.replace}
+        bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
+
+        def new(on_death: OnDeath) -> ChargerDriver:
+            changed = msgspec.structs.replace(settings, on_death=on_death)
+            return charger_register.create("a", changed, bus)
+
+        try:
+            yield Bench(new, world.plants["a"], clock)
+        finally:
+            bus.close()
+            server.close()
+            world.close()
 
 
 class ContactBench(Bench):
