@@ -15,7 +15,7 @@ from drivers.charger import modbus as charger_modbus
 from drivers.charger import register as charger_register
 from drivers.hal import http, modbus
 from hal_fakes.http import HttpServer
-from hal_fakes.http_charger import HttpCharger as Station
+from hal_fakes.http_charger import HttpCharger
 from hal_fakes.modbus import ModbusServer
 from hal_fakes.modbus.register_charger import PARTS, RegisterCharger
 from hal_fakes.plants.charger import ChargerPlant
@@ -49,7 +49,7 @@ class TestAnotherMakeOnHttp(ChargerContract):
         asked = settings.range_check is not None
         plant = ChargerPlant("a", settings.receivers, commanded=True, asked=asked, pace=PACE)
         world, clock = RealTime({"a": plant}), Time()
-        server = HttpServer([Station(world.plants["a"], settings)], "", timeout_s=0.5)
+        server = HttpServer([HttpCharger(world.plants["a"], settings)], "", timeout_s=0.5)
         plain = {"type": "http", "api_base": "tpu", "timeout_s": 0.5, **server.replace}
         bus = http.HttpBus(msgspec.convert(plain, http.Settings), clock)
 
