@@ -39,6 +39,10 @@ class Calls(Protocol):
     ) -> None:
         """Once; `safe` where it takes power away. Raises HalError."""
 
+
+class InsistentCalls(Calls, Protocol):
+    """The same, for who must be heard at the end."""
+
     def insist(self) -> None:
         """Try at once what comes next."""
 
