@@ -9,6 +9,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .PHONY: help demo demo-charging test deep test-ros lint format bench flood soak torture mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
+	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
 	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
 	@echo "make deep    all tests, every walk to its full depth: some minutes more"

@@ -27,7 +27,10 @@ def check(step: Step) -> None:
 
 
 def outputs_make_sense(step: Step) -> None:
-    """Calls and door commands exclude each other, need AGV mode, a session, and the right place."""
+    """Calls and door commands exclude each other, need AGV mode, a session, and the right place.
+
+    A call that is to bring AGV mode needs none, and may be for where the car stands.
+    """
     driven, memory, sample = step.decision.outputs, step.decision.memory, step.world.sample
     session, grace = memory.session, memory.grace
     assert driven == memory.relays.outputs()
@@ -39,12 +42,14 @@ def outputs_make_sense(step: Step) -> None:
     standing = sample.motion in (None, Motion.STOPPED)
     if not _sampled(step):
         return
-    if driven.call:
+    to_bring_agv = step.limits.by_call and sample.agv is False
+    if driven.call and not to_bring_agv:
         assert sample.agv is not False
-        assert Hazard.OVERLOAD not in sample.hazards
-        assert driven.call == session.destination
         trusted = memory.senses.position.trusted
         assert not (standing and driven.call == sample.level == trusted)
+    if driven.call:
+        assert Hazard.OVERLOAD not in sample.hazards
+        assert driven.call == session.destination
     if driven.hold_door:
         assert standing
         assert sample.agv is not False

@@ -195,12 +195,17 @@ class Story:
         debounce: dict[str, float] | None = None,
         fire_reset: Any = "auto",
         alarm: Any = "none",
+        agv_mode: Any = "requested",
         kind: AnyDeviceKind = KIND,
         **limits: Any,
     ) -> None:
         self.building = building or Building()
         self.settings = LiftSettings(
-            floors=floors or FLOORS, limits=Durations(**limits), fire_reset=fire_reset, alarm=alarm
+            floors=floors or FLOORS,
+            limits=Durations(**limits),
+            fire_reset=fire_reset,
+            alarm=alarm,
+            agv_mode=agv_mode,
         )
         self.limits = LiftLimits.of(self.settings, DEBOUNCE if debounce is None else debounce)
         self.now = 0.0

@@ -20,6 +20,7 @@ from bridges.lift.signals import (
     Requested,
     Side,
 )
+from bridges.rmf.definitions import LiftMode
 
 DEBOUNCE = {"floor": 0.08, "door": 0.03, "rear_door": 0.04, "agv_mode": 0.05, Hazard.FIRE: 0.06}
 AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
@@ -272,4 +273,7 @@ def test_a_floor_that_was_not_believed_is_believed_when_the_car_really_goes_ther
 
 def test_a_reading_in_the_instant_in_which_the_last_one_expires_starts_afresh() -> None:
     told = Told(DEBOUNCE)(0.0, AT_L1)(0.5, AT_L1)(1.5, AT_L1)
-    assert [fault.code for fault in told.faults] == ["INPUTS_NOT_FRESH"]
+    shown = told.decision.report
+    assert (shown.mode, shown.floor, told.faults) == (LiftMode.MODE_OFFLINE, "", ())
+    told(1.6, AT_L1)
+    assert told.decision.report.floor == "L1"

@@ -23,13 +23,16 @@ LONG_S = 55.0
 """Without a wake_at, a scan each so many seconds is enough here; below `stale_after_s`."""
 
 
-def limits_of(debounce: dict[str, float] | None = None, **changes: Any) -> LiftLimits:
+def limits_of(
+    debounce: dict[str, float] | None = None, agv_mode: Any = "requested", **changes: Any
+) -> LiftLimits:
     """The default durations, but for the age of readings, which costs scans."""
     settings = LiftSettings(
         floors=["L1", "L2", "L3"],
         limits=Durations(**{"stale_after_s": 60.0, **changes}),
         fire_reset="manual",
         alarm="fire_alarm_trigger",
+        agv_mode=agv_mode,
     )
     return LiftLimits.of(settings, debounce or {})
 

@@ -17,6 +17,7 @@ import pytest
 
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.signals import ENDING, WRITES
+from hal_fakes.wire import wire
 from tests.depth import depth
 from tests.serve.site import (
     YAML,
@@ -221,7 +222,7 @@ def test_a_reset_during_outputs_off_is_not_sent_and_does_not_end_it(
     hole = socket.create_server(("127.0.0.1", 0))
     port = hole.getsockname()[1]
     file = tmp_path / "silent.yaml"
-    file.write_text(YAML.format(domain=domain, transport="dds", port=port))
+    file.write_text(YAML.format(domain=domain, transport=wire(), port=port))
     off = subprocess.Popen(
         command("outputs-off", file, "--runtime-dir", tmp_path / "run"), env=environment()
     )

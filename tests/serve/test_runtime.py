@@ -268,3 +268,34 @@ def test_what_must_outlive_the_daemon_is_replaced_whole(
     monkeypatch.delenv("STATE_DIRECTORY")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "home"))
     assert state_file(Path("doors.yaml")) == tmp_path / "home/rmf-bridge/doors/kept.json"
+
+
+def test_what_cannot_be_kept_in_the_state_directory_is_kept_in_the_runtime_directory(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
+    kept = KeptFile(state, runtime)
+    kept.write(b"one")
+    state.unlink()
+    state.mkdir()  # nothing can be put in its place
+    kept.write(b"two")
+    kept.write(b"three")
+    assert (kept.read(), runtime.read_bytes()) == (b"three", b"three")
+    assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_written"]
+    state.rmdir()
+    state.write_bytes(b"one")  # as a disk that has come back has it
+    assert KeptFile(state, runtime).read() == b"three"
+    kept.write(b"four")
+    assert (KeptFile(state, runtime).read(), runtime.exists()) == (b"four", False)
+
+
+def test_where_neither_can_be_written_the_old_one_stands(tmp_path: Path) -> None:
+    state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
+    kept = KeptFile(state, runtime)
+    kept.write(b"one")
+    for folder in (state.parent, runtime.parent):
+        folder.mkdir(exist_ok=True)
+        (folder / ".kept.json.new").mkdir()
+    with pytest.raises(OSError, match=r"kept\.json\.new"):
+        kept.write(b"two")
+    assert kept.read() == b"one"

@@ -193,7 +193,7 @@ def test_every_doubled_key_is_found_where_it_stands(config: Path, file: Path) ->
         second = f"{before.count(chr(10)) + 1}:{len(before) - before.rfind(chr(10))}"
         line = place.key.start_mark.line + 1
         assert found == [
-            f"{second}: the key '{place.key.value}' is on line {line} already: "
+            f"{second}: the key '{place.key.value}' is already on line {line}: "
             "delete one of the two"
         ]
 

@@ -367,7 +367,7 @@ def test_two_chargers_that_send_the_same_frames_need_two_buses(tmp_path: Path) -
     with pytest.raises(SettingsError) as caught:
         load(file)
     taken = [
-        f"frame {frame} is taken by charger_c profile" for frame in ("0x18FF50E5", "0x1806E5F4")
+        f"frame {frame} is used by charger_c profile" for frame in ("0x18FF50E5", "0x1806E5F4")
     ]
     assert all(text in str(caught.value) for text in taken)
 

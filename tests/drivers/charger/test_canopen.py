@@ -209,7 +209,7 @@ def test_one_node_is_one_charger(tmp_path: Path) -> None:
     with pytest.raises(SettingsError) as caught:
         load(file)
     [problem] = caught.value.problems
-    assert "node 10 is taken by charger_b node" in str(problem)
+    assert "node 10 is used by charger_b node" in str(problem)
 
 
 @pytest.mark.parametrize("node", [0, 128])

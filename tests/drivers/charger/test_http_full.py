@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from bridges.charger.settings import robot
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings.load import SettingsError, load
-from drivers import DriverError
-from drivers.charger import json_fields
+from drivers import DriverError, json_fields
 from drivers.charger.http import Call, InRange, Settings, create, describe, warnings
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError

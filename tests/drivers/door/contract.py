@@ -19,7 +19,7 @@ from tests.drivers.hal.modbus.module import Time
 from tests.waiting import at_last, wait_until
 
 HOLD, RELEASE = DoorOutputs(hold_open=True), DoorOutputs(hold_open=False)
-QUICK = {"open_s": 0.05, "close_s": 0.05, "auto_close_s": 0.05}
+QUICK: dict[str, Any] = {"open_s": 0.05, "close_s": 0.05, "auto_close_s": 0.05}
 """A door that is not worth waiting for."""
 
 DoorDriver = Driver[DoorSample, DoorOutputs]

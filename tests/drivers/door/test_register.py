@@ -207,7 +207,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
     assert [(w.line, w.column) for w in load(path).warnings] == [(9, 69)]
     second = PROFILED[PROFILED.index("  front:") :].replace("front", "back") + changes
     path.write_text(PROFILED + changes + second)
-    text = r"unit 1 coil 4 is taken by front changes\.command\.at on line 9"
+    text = r"unit 1 coil 4 is used by front changes\.command\.at on line 9"
     with pytest.raises(SettingsError, match=text):
         load(path)
 
@@ -219,7 +219,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
         ("moving: [1]", "moving: [1, 2]", ["9:63: 2 is listed under open already"]),
         ("{4: blocked}", "{0: blocked}", ["9:87: 0 is listed under closed already"]),
         ("open: [2], ", "", ["9:7: 'status' needs 'open': a list ([...])"]),
-        ("open: [2]", "open: []", ["9:64: 'open' has 0 entries: at least 1 are wanted"]),
+        ("open: [2]", "open: []", ["9:64: 'open' has 0 entries: at least 1 are needed"]),
         (
             "at: input register 0",
             "at: coil 3",
@@ -230,7 +230,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
             "at: input register 30001",
             [
                 "9:20: 30001 looks like a number of the data model, which begins at 1: write input"
-                " register 0; or 0x7531 if 30001 really is the address"
+                " register 0; or 0x7531 if 30001 really is the address on the wire"
             ],
         ),
         ("hold: 1, release: 0", "hold: 1, release: 1", ["10:47: is the value of hold"]),
@@ -282,7 +282,7 @@ def test_two_doors_never_share_a_command(tmp_path: Path) -> None:
     path = tmp_path / "door.yaml"
     second = YAML[YAML.index("  front:") :].replace("front", "back")
     path.write_text(YAML + second)
-    with pytest.raises(SettingsError, match=r"unit 1 coil 0 is taken by front map\.command\.at"):
+    with pytest.raises(SettingsError, match=r"unit 1 coil 0 is used by front map\.command\.at"):
         load(path)
 
 
