@@ -152,6 +152,11 @@ class WorldTransport:
             self.received[topic.name].append(received)
         return _End(self, topic)
 
+    @property
+    def lives(self) -> bool:
+        """Always: no thread reads for it."""
+        return True
+
     def wall(self) -> float:
         return EPOCH + self.world.now
 

@@ -83,6 +83,11 @@ class DdsPlace:
 
         return self._inner.subscribe(topic, post, others_only=others_only)
 
+    @property
+    def lives(self) -> bool:
+        """Always: no thread reads for it."""
+        return True
+
     def wall(self) -> float:
         return self._inner.wall()
 
