@@ -79,9 +79,9 @@ def test_every_text_that_pyyaml_takes_for_something_else_is_known(text: str) -> 
 OTHER_NAMES = {
     '""': "has 0 characters: 1 to 128 are allowed",
     "x" * 129: "has 129 characters: 1 to 128 are allowed",
-    '" a"': "is ' a': write text without control characters, or spaces at its ends,",
-    '"a\\n"': "is 'a\\n': write text without control characters, or spaces at its ends,",
-    '"a\\0b"': "is 'a\\x00b': write text without control characters, or spaces at its ends,",
+    '" a"': "is ' a': write text without control characters, or spaces at its ends",
+    '"a\\n"': "is 'a\\n': write text without control characters, or spaces at its ends",
+    '"a\\0b"': "is 'a\\x00b': write text without control characters, or spaces at its ends",
     '"\\ud800"': "holds half a character (\\ud800 to \\udfff): write the whole character",
     "[a]": "is a list: write text",
     "{a: b}": "is a mapping: write text",
@@ -220,5 +220,5 @@ def test_a_choice_is_compared_as_it_is_written(file: Path) -> None:
 
 def test_a_long_value_is_shown_in_part(file: Path) -> None:
     assert problems_of(file, changed("dds", "x" * 1000)) == [
-        f"3:18: 'transport' is '{'x' * 37}...': write auto, dds or ros2"
+        f"3:18: 'transport' is '{'x' * 37}...': write auto, dds, ros2 or zenoh"
     ]
