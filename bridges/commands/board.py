@@ -1,6 +1,7 @@
 """What `watch` shows: rows made from messages and a time. Pure.
 
-RMF's states have no field for faults, queues and simulations: our daemons publish those on `/diagnostics`.
+RMF's states have no field for faults, queues and simulations: our daemons publish those on
+`/diagnostics`.
 """
 
 import re

@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _places(file: Path, given: str | None) -> Places | None:
-    """The daemon's directories. None if they cannot be trusted, but systemd says that the daemon is dead.
+    """The daemon's directories. None if they cannot be trusted and systemd says that it is dead.
 
     Raises Unknown or PermissionError if it cannot be known whether a daemon runs there.
     """
@@ -74,7 +74,7 @@ def _places(file: Path, given: str | None) -> Places | None:
 
 
 def _asked_by_our_daemon(places: Places) -> bool:
-    """Whether our parent holds the lock (`bridges/serve/predecessor.py`), or its pid is not readable."""
+    """Whether our parent holds the lock (`bridges/serve/predecessor.py`), or it names no process."""
     found = runtime.holder(places)
     return found is None or found.pid in (0, os.getppid())
 

@@ -1,8 +1,8 @@
 """`rmf-bridge release LIFT`: an operator ends the session of whoever holds a lift.
 
-It is `send lift LIFT --end` under the name that an operator looks for: it sends the holder's END_SESSION
-to the lift supervisor until the lift shows that the session is over. A robot that keeps requesting the
-lift goes to the end of the queue.
+It is `send lift LIFT --end` under the name that an operator looks for: it sends the holder's
+END_SESSION to the lift supervisor until the lift shows that the session is over. A robot that keeps
+requesting the lift goes to the end of the queue.
 """
 
 import argparse

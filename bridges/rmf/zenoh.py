@@ -154,9 +154,7 @@ class ZenohTransport:
             self._deaf.add(self._keys.token("MS", end.topic, number))
         end.create(self._session, self._keys, number)
 
-    def _neighbour(
-        self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent
-    ) -> None:
+    def _neighbour(self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent) -> None:
         """A router or peer is there, or has gone. On zenoh's thread, which holds what asking the
         session about its neighbours would wait for: so we keep count of them."""
         if event.kind == zenoh.SampleKind.PUT:
@@ -244,7 +242,11 @@ class ZenohTransport:
         if linked:
             log.info(pairs("linked", node=self.name, connect=where))
         else:
-            log.warning(pairs("not_linked", node=self.name, connect=where, reason=NOBODY, last=self._trouble))
+            log.warning(
+                pairs(
+                    "not_linked", node=self.name, connect=where, reason=NOBODY, last=self._trouble
+                )
+            )
 
     @contextmanager
     def _reporting(self, text: str) -> Iterator[None]:

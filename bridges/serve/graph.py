@@ -1,7 +1,7 @@
-"""A kind without hardware in service: a core memory for each subject, and their place on RMF's graph.
+"""Serves a kind without hardware: a core memory for each subject, and its publishers on RMF's graph.
 
-A round takes what was heard, wakes whose time has come and sends what they say. A test calls it in
-virtual time; the daemon has a thread for it (`bridges/serve/serving.py`).
+A round takes the messages that arrived, wakes the subjects that are due and publishes their messages.
+A test calls it in virtual time; the daemon has a thread for it (`bridges/serve/serving.py`).
 """
 
 from collections.abc import Callable, Mapping
@@ -23,11 +23,11 @@ from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Status, Subject
 
 MAX_SUBJECTS = 1000
-"""More lifts or doors than any site has: somebody makes names up."""
+"""More lifts or doors than any site has; more names must be invented ones."""
 
 
 def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> Core[M, GraphEvent[E], None, R]:
-    """A fault's detail says whose it is: another detail is another fault."""
+    """A fault is identified by code and detail: the detail says whose it is."""
 
     def itself(fault: Fault) -> Fault:
         return fault
@@ -45,7 +45,7 @@ def _same(topic: Topic[Message]) -> Topic[Message]:
 
 
 class GraphNode(Generic[S, L, M, E, R]):
-    """Serves one GraphKind. `named`: a topic under the site's own name for it."""
+    """Serves one GraphKind. `named`: renames topics as the site's YAML says."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._add(name, memory)
 
     def subscribe(self) -> None:
-        """Begin to hear. What is retained for us comes at once."""
+        """Subscribe to every topic. Retained messages arrive at once."""
         self.presence.listen(self._transport, map(self._named, self._kind.sole))
         for topic in self._kind.requests:
             others_only = topic in self._kind.publishes
@@ -89,17 +89,17 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     @property
     def ready(self) -> bool:
-        """It listens. (A passive node is in order: the other one speaks.)"""
+        """Always: a passive node is ready too, as another one does its work."""
         return True
 
     @property
     def wake_at(self) -> float:
-        """When the next round is due if nothing is heard."""
+        """When the next round is due if no message arrives (monotonic s)."""
         due = (subject.wake_at for subject in self.subjects.values())
         return min(self.presence.look_at, self._keeper.tell_at, *due)
 
     def round(self) -> None:
-        """Take what was heard, wake whose time has come, send what they say."""
+        """Take the messages that arrived, wake the subjects that are due, publish."""
         self._look_around()
         for name, messages in self.inbox.take().items():
             for topic, message in messages:
@@ -113,16 +113,16 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._keeper.tell(memories, self._clock.monotonic(), self.presence.may_speak)
 
     def end(self) -> bool:
-        """It has no outputs."""
+        """Nothing to switch off."""
         return True
 
     @property
     def refused(self) -> dict[str, int]:
-        """What was not obeyed, by kind."""
+        """The number of refused requests, by reason."""
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """For the status file: how it stands on the graph."""
+        """For the status file: whether it is passive, and how many other nodes publish the same."""
         return {
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
@@ -142,7 +142,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return put
 
     def _look_around(self) -> None:
-        """Whoever may speak is a publisher, and nobody else."""
+        """Declare our publishers when we may speak, and withdraw them when not."""
         if not self.presence.look(self._clock.monotonic()):
             return
         if self.presence.may_speak:
@@ -169,7 +169,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._decide(subject, event)
 
     def _subject(self, name: str) -> Subject[M, GraphEvent[E], None, R]:
-        """What this message is about; it may be new to us."""
+        """The subject of this name; made if it is new."""
         if name in self.subjects:
             return self.subjects[name]
         if len(self.subjects) == MAX_SUBJECTS:
@@ -191,9 +191,9 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _publish(self, topic: Topic[Message], message: Message) -> None:
-        """With the stamp of its sending."""
+        """Publish a message, stamped now."""
         self._outlet.publish(topic, self._kind.stamped(message, stamp(self._clock.wall())))
 
 
 AnyGraphNode = GraphNode[Any, Any, Any, Any, Any]
-"""One of a kind that is found by its name."""
+"""A node of a kind that was found by its name."""

@@ -1,6 +1,6 @@
-"""What a kind without hardware keeps for its next start, and what it tells of all its subjects at once.
+"""What a kind without hardware keeps on disk, and the message that it publishes about all subjects.
 
-What is kept is kept before it is told: others act on what they are told.
+It writes to disk before it publishes, because others act on what is published.
 """
 
 import logging
@@ -19,8 +19,8 @@ log = logging.getLogger(__name__)
 
 
 class Kept(Protocol):
-    """What outlives the daemon: one file, or nothing yet. `write` replaces it whole; both may raise
-    OSError."""
+    """The file that outlives the daemon; None before the first `write`, which replaces it as a whole.
+    Both may raise OSError."""
 
     def read(self) -> bytes | None: ...
 
@@ -28,7 +28,7 @@ class Kept(Protocol):
 
 
 class Keeper(Generic[S, L, M, E, R]):
-    """Of one node. `kept`: None to forget. `tell_at`: when all subjects are to be told of next."""
+    """The keeper of one node. `kept`: None to keep nothing. `tell_at`: when to publish next."""
 
     def __init__(self, kind: GraphKind[S, L, M, E, R], kept: Kept | None, publish: Publish) -> None:
         self.tell_at = NEVER
@@ -39,7 +39,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._pace = Pace()
 
     def restore(self, settings: S, now: float) -> Mapping[str, M]:
-        """What was kept; a file that cannot be right is as good as none, and says so."""
+        """The memories that were kept; an invalid file is logged and ignored."""
         if self._kept is None or self._kind.restore is None:
             return {}
         try:
@@ -52,7 +52,7 @@ class Keeper(Generic[S, L, M, E, R]):
         return found
 
     def keep(self, memories: Mapping[str, M]) -> None:
-        """Write down what must outlive us, if it has changed."""
+        """Write what must survive a restart, if it has changed."""
         if self._kept is None or self._kind.persist is None:
             return
         kept = self._kind.persist(memories)
@@ -65,7 +65,7 @@ class Keeper(Generic[S, L, M, E, R]):
             log.error(pairs("not_kept", kind=self._kind.name, reason=error))
 
     def tell(self, memories: Mapping[str, M], now: float, may_speak: bool) -> None:
-        """Tell of all subjects together, when that is due."""
+        """Publish the message about all subjects, if it is due."""
         if self._kind.together is None or not may_speak:
             self.tell_at = NEVER
             return

@@ -166,9 +166,7 @@ def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> Wrong:
     text, asked = shown(node.value), wanted_text(wanted, extra)
     if not is_plain(node):
         meant = _READINGS[type(wanted)](node.value) is not None
-        return Wrong(
-            f'is the text "{text}": write {asked}{", without quotes" if meant else ""}'
-        )
+        return Wrong(f'is the text "{text}": write {asked}{", without quotes" if meant else ""}')
     reading = reads_as(node.value) or ""
     if isinstance(wanted, BoolType) and reading in ("true", "false"):
         return Wrong(f"is written {text}, which YAML versions read differently: write {reading}")

@@ -63,7 +63,9 @@ def _missing(building: BuildingMap, what: str, name: str, lift: str) -> str:
             return f"{has}, though the level is there (line {building.named[FLOOR][name]})"
     elif what == CHARGER and name in building.named[WAYPOINT]:
         line = building.named[WAYPOINT][name]
-        return f"{where}:{line}: the waypoint '{shown(name)}' is not a charger: set is_charger: true"
+        return (
+            f"{where}:{line}: the waypoint '{shown(name)}' is not a charger: set is_charger: true"
+        )
     else:
         has = f"{where} has no {what} '{shown(name)}'"
     near = nearest(name, known)

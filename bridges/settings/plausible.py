@@ -45,7 +45,10 @@ def out_of_step(device: DeviceSettings, bus: object) -> Iterator[Remark]:
         lost_s = RENEWED * scan_s + getattr(bus, "timeout_s", 0.0)
         if off_s < lost_s:
             text = f"{path[-1]} is {off_s:g}, but it is renewed every {scan_s:g} s (scan_s)"
-            yield path, f"{text}: write at least {lost_s:g}, so that one lost reply does not drop the output"
+            yield (
+                path,
+                f"{text}: write at least {lost_s:g}, so that one lost reply does not drop the output",
+            )
 
 
 def _stale_readings(device: DeviceSettings, scan_s: float) -> Iterator[Remark]:

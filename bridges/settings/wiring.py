@@ -27,7 +27,7 @@ class Use:
 
 
 class Wiring:
-    """Collects and checks the points of one device: first while its settings are read, then as wires."""
+    """Collects and checks the points of one device: while its settings are read, then as wires."""
 
     def __init__(self, page: Page, device: str, bus: str, hal: AnyBus | None) -> None:
         self._page = page

@@ -49,7 +49,9 @@ def tell(**line: object) -> None:
 def tokens(session: zenoh.Session, pattern: str) -> Any:
     return session.liveliness().declare_subscriber(
         pattern,
-        lambda sample: tell(token=str(sample.key_expr), is_there=sample.kind == zenoh.SampleKind.PUT),
+        lambda sample: tell(
+            token=str(sample.key_expr), is_there=sample.kind == zenoh.SampleKind.PUT
+        ),
         history=True,
     )
 

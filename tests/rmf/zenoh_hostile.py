@@ -23,9 +23,7 @@ def main(endpoint: str, key: str, text: str, token: str) -> None:
     with zenoh.open(config) as session:
         alive = session.liveliness().declare_token(token)
         attached = (1).to_bytes(8, "little") + bytes(8) + b"\x10" + gid(token)
-        publisher = session.declare_publisher(
-            key, congestion_control=zenoh.CongestionControl.BLOCK
-        )
+        publisher = session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
         while not publisher.matching_status:
             time.sleep(0.01)
         publisher.put(good)  # without attachment

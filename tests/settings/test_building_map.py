@@ -264,7 +264,10 @@ def test_every_odd_form_is_named_with_its_place() -> None:
         ("levels: " + "[" * 40, "map.yaml:1:40: nested more than 32 deep"),
         ("levels: &a [*a]", "map.yaml:1:13: an alias ('*name') inside the value that it"),
         ("levels: !!python/name:os.system x", "map.yaml:1:9: a tag ('!...') is not acce"),
-        (b" " * (MAP.max_bytes + 1), "map.yaml:1:1: longer than 4096 KiB: this is not a building map"),
+        (
+            b" " * (MAP.max_bytes + 1),
+            "map.yaml:1:1: longer than 4096 KiB: this is not a building map",
+        ),
     ],
 )
 def test_a_hostile_file_ends_in_a_clear_text(text: str | bytes, problem: str) -> None:

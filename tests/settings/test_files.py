@@ -27,7 +27,9 @@ def test_a_name_that_no_file_can_have_is_one_problem() -> None:
 
 
 def test_a_file_longer_than_any_device_yaml_is_not_read(file: Path) -> None:
-    assert problems_of(file, "#" * 300_000) == ["1:1: longer than 256 KiB: this is not a device YAML"]
+    assert problems_of(file, "#" * 300_000) == [
+        "1:1: longer than 256 KiB: this is not a device YAML"
+    ]
 
 
 @pytest.mark.parametrize("text", ["", "# nothing yet\n", "\n\n", "\ufeff"])

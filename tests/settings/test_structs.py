@@ -66,7 +66,9 @@ def test_keys_are_judged_as_values_are(file: Path) -> None:
 def test_merge_keys_are_refused_with_what_to_do(file: Path) -> None:
     text = changed("opened: {", "opened: &o {")
     text = changed("closed: {point: 1A,", "closed: {<<: *o, point: 1A,", text)
-    assert problems_of(file, text) == ["11:16: merge keys ('<<') are not accepted: write the keys out"]
+    assert problems_of(file, text) == [
+        "11:16: merge keys ('<<') are not accepted: write the keys out"
+    ]
 
 
 def test_a_quoted_merge_mark_is_an_ordinary_key(file: Path) -> None:

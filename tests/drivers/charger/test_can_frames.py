@@ -276,7 +276,7 @@ def test_setpoints_are_those_that_the_map_takes() -> None:
     [(path, text)] = problems(setpoints={"max_volts": 29.4, "volts": 29.2})
     assert (path, text) == (
         ("setpoints",),
-        "needs 'amps', which the charger is told while it charges",
+        "needs 'amps', which is sent to the charger while it charges",
     )
     [(path, text)] = problems(setpoints=SETPOINTS | {"ampere": 1.0})
     assert (path, text) == (
@@ -315,7 +315,7 @@ def map_problems(**changed: Any) -> list[tuple[tuple[str, ...], str]]:
     ("changed", "path", "text"),
     [
         ({"dbc": "other.dbc"}, ("dbc",), "No such file or directory"),
-        ({"dbc": "wiferion.yaml"}, ("dbc",), "is no DBC file"),
+        ({"dbc": "wiferion.yaml"}, ("dbc",), "is not a DBC file"),
         ({"volts": "ChargerStatus.Voltage"}, ("volts",), "'OutputVoltage'"),
         ({"amps": "ChargeStatus.Amps"}, ("amps",), "'ChargerStatus'"),
         ({"masks": {"Mobile": 1}}, ("masks", "Mobile"), "unknown frame 'Mobile'"),
@@ -398,6 +398,6 @@ def test_a_map_without_a_receiver_verifies_nobody() -> None:
     "text", ["", "hello", 'VERSION ""\nBO_ 1 A: 8 X\n SG_ B : 0|99@1+ (1,0) [0|1] "" X\n']
 )
 def test_what_is_no_dbc_file_is_a_value_error_on_one_line(text: str) -> None:
-    with pytest.raises(ValueError, match="is no DBC file") as caught:
+    with pytest.raises(ValueError, match="is not a DBC file") as caught:
         dbc.Dbc(text)
     assert "\n" not in str(caught.value)
