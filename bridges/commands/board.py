@@ -1,6 +1,6 @@
 """What `watch` shows: rows made from messages and a time. Pure.
 
-RMF's states have no field for faults, queues and simulations: our daemons publish those on
+RMF's states have no field for faults, queues and simulations. Our daemons publish those on
 `/diagnostics`.
 """
 

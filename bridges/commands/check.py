@@ -70,6 +70,7 @@ def _check(file: str, quiet: bool, building: BuildingMap | None) -> bool:
         lines = described(config)
         if building and not problems:
             lines += [_agreement(config, building), ""]
+        lines += map(str, config.notes)
         sys.stdout.write("\n".join(lines) + "\n")
     if problems:
         _print_problems(file, problems)

@@ -8,28 +8,37 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
+
+import msgspec
 
 from bridges.core.fields import Rmf
 from bridges.rmf import words
 from bridges.rmf.topics import AnyTopic
-from bridges.rmf.transport import Transport
+from bridges.rmf.transport import Transport, TransportError
 
 SILENT_AFTER_S = 3.0
 """States come at 1 Hz: three missed ones, or a reading three seconds old, get a mark."""
+TRANSPORTS = ("auto", "ros2", "dds", "zenoh")
 
 
 def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options that say which graph: `--domain-id`, `--transport`, `--localhost`."""
+    """The options that say which graph: `--config`, `--domain-id`, `--transport`, `--localhost`."""
     parser.add_argument(
-        "--domain-id", type=_domain, metavar="N", help="DDS domain (default: ROS_DOMAIN_ID, else 0)"
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="a device YAML, for its `rmf:` section: routers, certificates, domain",
+    )
+    parser.add_argument(
+        "--domain-id", type=_domain, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID, else 0)"
     )
     parser.add_argument(
         "--transport",
-        choices=("auto", "ros2", "dds"),
-        default="auto",
-        help="ros2: rclpy; dds: without ROS; auto (default): ros2 where rclpy is installed, else dds",
+        choices=TRANSPORTS,
+        help="ros2 is rclpy, dds and zenoh need no ROS; auto takes the first that is here (default)",
     )
     parser.add_argument(
         "--localhost",
@@ -48,12 +57,28 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
     """Join the graph that the options name. Raises TransportError."""
     from bridges.rmf.choose import open_transport
 
-    rmf = Rmf(
-        transport=args.transport,
-        domain_id=args.domain_id,
-        network="localhost" if args.localhost else "subnet",
-    )
+    rmf = overridden(_configured(args.config), args)
     return open_transport(rmf, node_name, localhost=args.localhost, ros_args=args.ros_args)
+
+
+def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
+    """A YAML's `rmf:` section, with what the command line says instead."""
+    if args.domain_id is not None:
+        rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
+    if args.transport is not None:
+        rmf = msgspec.structs.replace(rmf, transport=args.transport)
+    return rmf
+
+
+def _configured(file: Path | None) -> Rmf:
+    if file is None:
+        return Rmf()
+    from bridges.settings.load import SettingsError, load
+
+    try:
+        return load(file).rmf
+    except SettingsError as error:
+        raise TransportError("\n".join(map(str, error.problems))) from None
 
 
 @contextmanager

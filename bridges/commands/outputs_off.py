@@ -74,7 +74,7 @@ def _places(file: Path, given: str | None) -> Places | None:
 
 
 def _asked_by_our_daemon(places: Places) -> bool:
-    """Whether our parent holds the lock (`bridges/serve/predecessor.py`), or it names no process."""
+    """Whether our parent holds the lock (`serve/predecessor.py`), or its pid is not readable."""
     found = runtime.holder(places)
     return found is None or found.pid in (0, os.getppid())
 

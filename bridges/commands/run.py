@@ -7,9 +7,8 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import msgspec
-
 from bridges import log
+from bridges.commands.graph import TRANSPORTS, overridden
 from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
@@ -32,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--expose", action="store_true", help="with --simulate: let the network see the fake device"
     )
     parser.add_argument("--domain-id", type=int, metavar="N", help="overrides the YAML's domain_id")
+    parser.add_argument("--transport", choices=TRANSPORTS, help="overrides the YAML's transport")
     parser.add_argument(
         "--runtime-dir", metavar="DIR", help="default: systemd's, else one of the user's"
     )
@@ -47,7 +47,8 @@ def run(args: argparse.Namespace) -> int:
         logging.error("--expose needs --simulate: a real device is on the network anyway")
         return EX_USAGE
     try:
-        config = _overridden(load(args.file), args)
+        config = load(args.file)
+        config = replace(config, rmf=overridden(config.rmf, args))
     except SettingsError as error:
         for problem in error.problems:
             logging.error(str(problem))
@@ -66,13 +67,6 @@ def run(args: argparse.Namespace) -> int:
         return EX_UNAVAILABLE
     finally:
         held.close()
-
-
-def _overridden(config: Config, args: argparse.Namespace) -> Config:
-    rmf = config.rmf
-    if args.domain_id is not None:
-        rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
-    return replace(config, rmf=rmf)
 
 
 def _held(args: argparse.Namespace) -> runtime.RuntimeDirectory:

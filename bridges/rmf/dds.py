@@ -5,8 +5,7 @@ Names, types and QoS are those that rmw_cyclonedds and rmw_fastrtps use: topic `
 
 One thread reads for all subscriptions. Whatever arrives, it goes on: a sample that is not a message
 is dropped, counted, and logged once for its topic. (Cyclone's C library refuses samples that do not
-fit the type before they come here, and says so on stderr.) A thread that has died all the same
-shows at the next publish.
+fit the type before they come here, and says so on stderr.) When reading itself fails, it joins anew.
 
 cyclonedds is imported here, in dds_ends.py, idl.py and graph.py, and these only by choose.py.
 """
@@ -31,7 +30,7 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.log import pairs
-from bridges.rmf import network
+from bridges.rmf import network, notices
 from bridges.rmf.dds_ends import AnyPublisher, AnySubscription, DdsPublisher, DdsSubscription
 from bridges.rmf.definitions import Message
 from bridges.rmf.graph import NodeOnGraph
@@ -74,6 +73,7 @@ class DdsTransport:
         self.dropped: dict[str, int] = {}
         self._lock = threading.Lock()
         self._closed = False
+        self._failed = False
         self._entities: list[core.Entity] = []
         self._topics: dict[str, DdsTopic] = {}
         self._ends: tuple[AnyPublisher | AnySubscription, ...] = ()
@@ -114,6 +114,11 @@ class DdsTransport:
             self._subscriptions += (subscription,)
         return subscription
 
+    @property
+    def lives(self) -> bool:
+        """Its thread reads; a network that is gone is another matter."""
+        return not self._closed and self._thread.is_alive()
+
     def wall(self) -> float:
         """The wall clock (s since the epoch)."""
         return time.time()
@@ -147,7 +152,7 @@ class DdsTransport:
     def _follow_network(self) -> None:
         """Join anew when the addresses are others than those with which we joined."""
         now = time.monotonic()
-        if self._loopback or now < self._look_at:
+        if now < self._look_at or (self._loopback and self._joined):
             return
         self._look_at = now + LOOK_EVERY_S
         found = network.addresses()
@@ -194,19 +199,35 @@ class DdsTransport:
             self._node.add_reader(entity)
 
     def _read(self) -> None:
-        try:
-            while not self._closed:
-                self._follow_network()
-                if not self._joined:
-                    self._stop.wait(LOOK_EVERY_S)
-                    continue
-                self._waitset.wait(dds_infinity if self._loopback else LOOK_EVERY_NS)
-                taken = [subscription.take() for subscription in self._subscriptions]
-                if not any(taken):
-                    for end in self._ends:
-                        end.log_misfits()
-        except DDSException as error:
-            log.error(pairs("reader_lost", node=self.name, reason=error))
+        failures = 0
+        while not self._closed and failures < notices.FAILURES:
+            try:
+                self._read_once()
+                failures = 0
+            except Exception as error:  # noqa: BLE001 - logged by _recover
+                failures += 1
+                self._recover(error)
+
+    def _read_once(self) -> None:
+        self._follow_network()
+        if not self._joined:
+            self._stop.wait(LOOK_EVERY_S)
+            return
+        self._waitset.wait(dds_infinity if self._loopback else LOOK_EVERY_NS)
+        taken = [subscription.take() for subscription in self._subscriptions]
+        if not any(taken):
+            for end in self._ends:
+                end.log_misfits()
+
+    def _recover(self, error: Exception) -> None:
+        """Reading failed, which nobody foresaw: say it once, and join anew after a while."""
+        if self._closed:
+            return
+        if not self._failed:
+            log.error(pairs("reader_failed", node=self.name, reason=error), exc_info=error)
+        self._failed = True
+        self._stop.wait(LOOK_EVERY_S)
+        self._join_anew()
 
     def _withdraw(self, publisher: AnyPublisher, writer: DataWriter) -> None:
         """Take one writer off the graph; after close there is none left to take."""

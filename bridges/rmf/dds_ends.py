@@ -136,7 +136,7 @@ class DdsSubscription(Generic[M]):
             if not samples:
                 return taken > 0
             if samples[0].sample_info.valid_data:
-                self._received(samples[0].message)
+                notices.hand_on(self._dropped, self.topic, self._received, samples[0].message)
         return True
 
     def log_misfits(self) -> None:

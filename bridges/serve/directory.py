@@ -26,6 +26,7 @@ from bridges.serve.record import Record, Records, paths, read
 log = logging.getLogger(__name__)
 
 STATUS = "status.json"
+KEPT = "kept.json"
 LOCK = "lock"
 WAIT_S = 7.0
 """How long a daemon that starts waits for `outputs-off`, which takes less."""
@@ -122,25 +123,40 @@ def _what_to_do(folder: Path, error: OSError) -> str:
 def state_file(file: Path) -> Path:
     """The file that outlives a daemon and a reboot: in systemd's state directory, else the user's."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
-    return Path(given or state_base() / file.stem).absolute() / "kept.json"
+    return Path(given or state_base() / file.stem).absolute() / KEPT
 
 
 class KeptFile:
-    """A file that is replaced as a whole and is on disk when `write` returns."""
+    """A file that is replaced as a whole and is on disk when `write` returns.
 
-    def __init__(self, path: Path) -> None:
+    `instead`: the path to use while the first cannot be written; a file there is the newer one.
+    """
+
+    def __init__(self, path: Path, instead: Path | None = None) -> None:
         self._path = path
+        self._instead = instead
+        self._once = Once()
 
     def read(self) -> bytes | None:
         """The file's bytes; None if there is no file. Raises OSError."""
-        try:
-            return self._path.read_bytes()
-        except (FileNotFoundError, NotADirectoryError):
-            return None
+        for path in filter(None, (self._instead, self._path)):
+            with suppress(FileNotFoundError, NotADirectoryError):
+                return path.read_bytes()
+        return None
 
     def write(self, kept: bytes) -> None:
-        """Replace the file. Raises OSError, and then the old one remains."""
-        replace(self._path, kept)
+        """Replace the file. Raises OSError if neither path can be written; the old one then remains."""
+        try:
+            replace(self._path, kept)
+            if self._instead is not None:
+                self._instead.unlink(missing_ok=True)
+        except OSError as error:
+            self._once.failed(str(self._path), error)
+            if self._instead is None:
+                raise
+            replace(self._instead, kept)
+        else:
+            self._once.works(str(self._path))
 
 
 class Once:
@@ -149,7 +165,7 @@ class Once:
     def __init__(self) -> None:
         self._wrong: dict[str, str] = {}
 
-    def failed(self, what: str, error: OSError) -> None:
+    def failed(self, what: str, error: Exception) -> None:
         """Note a failed attempt; the caller will try again."""
         if what not in self._wrong:
             log.warning(pairs("not_written", what=what, reason=error))

@@ -54,6 +54,7 @@ class Config:
 
     `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's
     or driver's record. `bus_types`: name -> `type:`. `warnings`: legal but doubtful settings.
+    `notes`: settings that a site may want, and should know about.
     `section`: the settings of a kind without devices (`bridges/core/graph_kind.py`), which has no
     driver and no buses.
     """
@@ -67,6 +68,7 @@ class Config:
     devices: Mapping[str, Any]
     bus_types: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
+    notes: tuple[Problem, ...] = ()
     section: Any = None
 
     def bus_of(self, device_name: str) -> str:
@@ -139,6 +141,7 @@ class _Reading:
         self._devices: dict[str, Any] = {}
         self._uses: list[Use] = []
         self._warnings: list[Problem] = []
+        self._notes: list[Problem] = []
 
     def config(self, path: Path, text: bytes) -> Config:
         """What was read, if no problem was noted."""
@@ -152,6 +155,7 @@ class _Reading:
             devices=self._devices,
             bus_types={name: bus.type or "" for name, bus in self._buses.items()},
             warnings=tuple(sorted(self._warnings)),
+            notes=tuple(sorted(self._notes)),
             section=self._section,
         )
 
@@ -346,6 +350,8 @@ class _Reading:
             self._check_pace(settings, spot, bus)
         if len(self._page.problems) == before:
             self._collect_warnings(settings, spot, driver)
+            for node, text in wiring.warnings(driver.wires(settings), spot):
+                self._warn(node, f"{spot.label}: {text}")
             for path, text in milliseconds(values.structs):
                 self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
         self._uses += wiring.uses
@@ -371,6 +377,9 @@ class _Reading:
             self._warn(key, f"{spot.label}: unsafe wiring of '{signal}' is accepted: {reason}")
         for path, text in driver.warnings(settings):
             self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
+        for path, text in driver.notes(settings):
+            node = locate(spot, path).where()
+            self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
     def _warn(self, node: Node, text: str) -> None:
         self._warnings.append(self._page.problem(node, f"warning: {text}"))

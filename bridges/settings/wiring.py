@@ -27,7 +27,7 @@ class Use:
 
 
 class Wiring:
-    """Collects and checks the points of one device: while its settings are read, then as wires."""
+    """Collects and checks a device's points: first while its settings are read, then as wires."""
 
     def __init__(self, page: Page, device: str, bus: str, hal: AnyBus | None) -> None:
         self._page = page
@@ -70,6 +70,12 @@ class Wiring:
         if reason:
             self._page.note(node, reason)
         return reason is None
+
+    def warnings(self, wires: Iterable[Wire], spot: Spot) -> Iterable[tuple[Node, str]]:
+        """What is legal about these wires but worth a look, and where it stands."""
+        for wire in wires:
+            for text in self._hal.wire_warnings(wire) if self._hal else ():
+                yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
 
     def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
         """Record what a device without wires claims for itself: (place, path in its YAML)."""

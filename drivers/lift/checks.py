@@ -33,7 +33,7 @@ def warnings(wiring: LiftWiring) -> Iterator[Problem]:
     """What works and deserves a second look."""
     table = {w.signal: w for w in wires(wiring)}
     told = wiring.inputs.agv_mode is not None or _in_service(wiring, "agv_mode")
-    fire = Hazard.FIRE in table or _in_service(wiring, Hazard.FIRE)
+    fire = sees_fire(wiring)
     asks, holds = bool(wiring.outputs.agv_mode_request), bool(wiring.outputs.door_open)
     yield from missing(wiring, ("inputs",), told, asks, fire, holds)
     yield from slow_alarms(table[hazard] for hazard in Hazard if hazard in table)
@@ -72,6 +72,15 @@ def missing(
         yield path, text
     if not fire:
         yield path, "no fire_alarm: a fire recall would not be seen"
+
+
+def notes(settings: LiftSettings, fire: bool) -> Iterator[Problem]:
+    """What the site decides. `fire`: a fire is told by the lift."""
+    if fire and settings.alarm == "none":
+        text = (
+            "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)"
+        )
+        yield ("alarm",), text
 
 
 def by_call(
@@ -240,6 +249,11 @@ def _service(wiring: LiftWiring) -> Iterator[Problem]:
         yield ("inputs", "service", "codes"), f"{number} is missing: say what it means"
     for number in sorted(service.codes.keys() - every):
         yield ("inputs", "service", "codes", str(number)), f"{number} does not fit on the bits"
+
+
+def sees_fire(wiring: LiftWiring) -> bool:
+    """Is a fire told, by a line or by the service code?"""
+    return wiring.inputs.fire_alarm is not None or _in_service(wiring, Hazard.FIRE)
 
 
 def _in_service(wiring: LiftWiring, state: str) -> bool:

@@ -76,6 +76,11 @@ def warnings(settings: Settings) -> Problems:
         yield ("map", "commands", "read_back"), text
 
 
+def notes(settings: Settings) -> Problems:
+    """What the site decides: (path below the device, text)."""
+    return checks.notes(settings, settings.map.shows(Hazard.FIRE))
+
+
 def debounce(settings: Settings) -> Mapping[str, float]:
     """How long a change must last (s), as for contacts: a gateway may show a number half changed."""
     return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
@@ -227,5 +232,6 @@ DRIVER = DriverType(
     describe=describe,
     claims=claims,
     warnings=warnings,
+    notes=notes,
     fake="hal_fakes.modbus.register_lift",
 )

@@ -145,7 +145,7 @@ def test_requests_go_to_the_supervisors_unless_direct(
 # --- lifts -------------------------------------------------------------------------------------
 
 
-def test_an_arrival_seen_before_the_request_is_not_our_effect() -> None:
+def test_an_arrival_seen_before_the_request_does_not_count() -> None:
     told = tell(RIDE, [(0.5, ARRIVED)], listen_from=1.0, timeout_s=3.0)
     assert isinstance(told.outcome, Failed)
 
@@ -160,7 +160,7 @@ def test_an_arrival_seen_before_the_request_is_not_our_effect() -> None:
         replace(ARRIVED, door_state=1),
     ],
 )
-def test_three_of_the_four_fields_are_not_an_arrival(nearly: d.LiftState) -> None:
+def test_a_state_that_fits_in_three_of_four_fields_is_not_an_arrival(nearly: d.LiftState) -> None:
     assert isinstance(tell(RIDE, every_second(nearly)).outcome, Failed)
 
 
@@ -248,13 +248,13 @@ def test_a_name_that_nobody_has_is_compared_with_those_heard() -> None:
     assert (told.hints, told.outcome) == ([text], Failed(text))
 
 
-def test_a_graph_without_any_state_is_called_that() -> None:
+def test_a_graph_without_any_state_is_said_to_be_empty() -> None:
     text = "nothing is heard on lift_states: no lift daemon runs in this domain and network"
     told = tell(RIDE)
     assert (told.hints, told.outcome) == ([text], Failed(text))
 
 
-def test_a_daemon_that_falls_silent_is_the_reason() -> None:
+def test_a_daemon_that_falls_silent_is_named_as_the_reason() -> None:
     told = tell(RIDE, every_second(GRANTED, until=3.0))
     assert told.outcome == Failed("Lift1 fell silent 8 s ago: is its daemon still running?")
 

@@ -158,19 +158,21 @@ def test_names_that_agree_are_no_problem(
     assert complaints(capsys, text, building) == []
 
 
-def test_agreement_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_says_that_all_names_agree(capsys: pytest.CaptureFixture[str]) -> None:
     Path("device.yaml").write_text(LIFT)
     assert main(["check", "device.yaml", "--building-map", "graph.yaml"]) == 0
     assert "\nsame names as in graph.yaml: Lift1, L1, L2\n" in capsys.readouterr().out
 
 
-def test_a_lift_that_the_map_spells_otherwise(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_lift_that_the_map_spells_differently_is_named(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert complaints(capsys, LIFT.replace("Lift1", "lift_1")) == [
         "device.yaml:5:3: building.yaml has no lift 'lift_1': did you mean 'Lift1' (line 17)?"
     ]
 
 
-def test_a_floor_that_no_level_is_called(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_floor_without_a_level_of_that_name_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert complaints(capsys, LIFT.replace("L2", "Level2")) == [
         "device.yaml:6:5: on building.yaml (line 18) 'Lift1' also stops at 'L2': a robot sent there"
         " would always be refused. Add the floor, or remove the stop from the map",
@@ -179,7 +181,7 @@ def test_a_floor_that_no_level_is_called(capsys: pytest.CaptureFixture[str]) -> 
     ]
 
 
-def test_a_level_where_the_lift_does_not_stop(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_level_where_the_lift_does_not_stop_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     said = complaints(capsys, LIFT.replace("L2", "L10"), "graph.yaml")
     assert said[1:] == [
         "device.yaml:6:18: the lift 'Lift1' does not stop at 'L10' on graph.yaml, though the level"
@@ -225,13 +227,15 @@ def test_a_map_without_any_lift_says_so(capsys: pytest.CaptureFixture[str]) -> N
     ]
 
 
-def test_a_kind_that_names_nothing_on_a_map(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_kind_without_names_on_a_map_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     Path("device.yaml").write_text("kind: lift_supervisor\n")
     assert main(["check", "device.yaml", "--building-map", "building.yaml"]) == 0
     assert "\nthis file uses no names that building.yaml could confirm\n" in capsys.readouterr().out
 
 
-def test_what_is_no_map_is_refused_where_it_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_is_not_a_map_is_refused_at_the_place_that_is_wrong(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     Path("device.yaml").write_text(LIFT)
     assert main(["check", "device.yaml", "--building-map", "device.yaml"]) == 78
     assert capsys.readouterr() == (

@@ -62,7 +62,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_it_is_refused(file: Path, what: str) -> None:
+def test_an_implausible_setting_is_refused(file: Path, what: str) -> None:
     text, problem = REFUSED[what]
     found = problems_of(file, text)
     assert len(found) == 1
@@ -84,7 +84,7 @@ WARNED = {
 
 
 @pytest.mark.parametrize("what", WARNED)
-def test_it_is_warned_of(file: Path, what: str) -> None:
+def test_an_unlikely_setting_is_warned_of(file: Path, what: str) -> None:
     text, warning = WARNED[what]
     assert warnings_of(file, text) == [warning]
 

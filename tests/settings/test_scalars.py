@@ -89,7 +89,7 @@ OTHER_NAMES = {
 
 
 @pytest.mark.parametrize("text", OTHER_NAMES)
-def test_a_name_has_letters_and_an_end(file: Path, text: str) -> None:
+def test_a_name_is_neither_empty_nor_too_long(file: Path, text: str) -> None:
     assert problems_of(file, changed("[in, out]", f"[in, out, {text}]")) == [
         f"8:22: item 3 of 'lanes' {OTHER_NAMES[text]}"
     ]

@@ -135,13 +135,13 @@ def test_a_section_that_was_left_empty_is_named(file: Path) -> None:
     ]
 
 
-def test_a_value_that_was_forgotten_is_named_even_where_none_is_needed(file: Path) -> None:
+def test_an_empty_value_is_named_even_if_the_key_is_optional(file: Path) -> None:
     assert problems_of(file, changed("tries: 2", "close_s:")) == [
         "15:25: 'close_s' has no value: write a number from 0 to 86400 s"
     ]
 
 
-def test_what_a_struct_says_of_itself_stands_at_the_place_that_it_names(file: Path) -> None:
+def test_a_structs_own_problem_is_told_at_the_place_that_it_names(file: Path) -> None:
     text = changed("{1: in, 2: out}", "{1: in, 2: yard, 0x3: roof}")
     text = changed("tries: 2", "close_s: 9", text)
     assert problems_of(file, text) == [

@@ -135,9 +135,8 @@ class Request:
         """The device has not been heard; perhaps another has a similar name."""
         topic = self.states.name
         if not names:
-            where = "in this domain and network"
-            silence = f"nothing is heard on {topic}: no {self.kind} daemon runs {where}"
-            return Obstacle(True, silence, self._loopback())
+            here = f"no {self.kind} daemon runs in this domain and network"
+            return Obstacle(True, f"nothing is heard on {topic}: {here}", self._loopback())
         there = ", ".join(sorted(names))
         near = nearest(self.name, names)
         return Obstacle(True, f"no '{self.name}' on {topic}; there: {there}{near}")

@@ -41,7 +41,7 @@ class LiftRide(_Lift):
         )
 
     def outcome(self, seen: Seen) -> Done | Failed | None:
-        """Done when the fields that RequestLift waits for match; an unserved floor fails at once."""
+        """Done when RequestLift's four fields match; an unserved floor fails at once."""
         latest = seen.latest()
         if latest and latest.available_floors and self.floor not in latest.available_floors:
             floors = ", ".join(latest.available_floors)
