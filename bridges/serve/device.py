@@ -194,7 +194,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._io_fault
 
     def _identity(self, fault: Fault) -> object:
-        """A fault is identified by code and detail; one with a bus's error text, which varies, by code."""
+        """Code and detail; the code alone if the detail is a bus's error text, which varies."""
         return fault.code if fault.detail in ("", *self._bus_words) else fault
 
 
