@@ -21,11 +21,11 @@ class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     body: Annotated[str, msgspec.Meta(max_length=1024)] | None = None
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """A body that is no JSON."""
+        """A body that is not JSON."""
         try:
             msgspec.json.decode(self.body or "{}")
         except msgspec.DecodeError as error:
-            yield ("body",), f"is no JSON: {error}"
+            yield ("body",), f"is not JSON: {error}"
 
 
 class Calls(Protocol):

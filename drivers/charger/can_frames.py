@@ -44,7 +44,10 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
         """What the fields cannot say one by one."""
         yield from super().problems()
         if self.on_death == "keep":
-            yield ("on_death",), "it stops when it is not fed any more: leave this out"
+            yield (
+                ("on_death",),
+                "it stops when our frames cease, so it cannot be kept: leave this out",
+            )
         before = list(profile_problems(PROFILE, self.profile, self.map))
         yield from before
         if not before and not any(self.map.problems() if self.map else ()):
@@ -65,7 +68,7 @@ def _setpoint_problems(settings: Settings) -> Problems:
     found = frame_map(settings)
     wanted, given = found.wanted_setpoints(), set(settings.setpoints)
     for name in sorted(wanted - given):
-        yield ("setpoints",), f"needs '{name}', which the charger is told while it charges"
+        yield ("setpoints",), f"needs '{name}', which is sent to the charger while it charges"
     for name in sorted(given - wanted):
         yield ("setpoints", name), unknown("setpoint", name, sorted(wanted))
     if wanted == given:
@@ -99,7 +102,7 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
     """What `check` prints in place of a wiring table: (what, meaning)."""
     found = frame_map(settings)
     stops_s = settings.limits.peer_internal_timeout_s
-    after = "a time that the maker knows" if stops_s is None else f"{stops_s:g} s"
+    after = "a time to be asked of the maker" if stops_s is None else f"{stops_s:g} s"
     return [
         ("bus", can.describe(bus_settings)),
         *rows(found, settings.setpoints),

@@ -125,7 +125,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
             text = "receivers needs it: where does the station say whose receiver it sees?"
             yield ("fields", "receiver_id"), text
         if self.start and not self.stop:
-            yield ("start",), "needs stop as well: nobody starts what cannot be stopped"
+            yield ("start",), "needs stop as well: a charge that cannot be stopped is not started"
         if self.range_check and self.fields.in_range is None:
             yield ("fields", "in_range"), "range_check needs it: where is its result?"
         if self.on_death == "keep" and self.stop is None:

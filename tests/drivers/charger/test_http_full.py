@@ -288,7 +288,7 @@ def problems(tmp_path: Path, old: str, new: str) -> list[str]:
         ("      receiver_id: pad.receiver", "      #", "receivers needs it"),
         ("    stop: {path: /output/off}", "", "needs stop as well"),
         ("      in_range:", "      #", "range_check needs it"),
-        ("""'{"enabled": true}'""", """'{"enabled": yes}'""", "is no JSON"),
+        ("""'{"enabled": true}'""", """'{"enabled": yes}'""", "is not JSON"),
         ("pad.receiver ", "pad..receiver ", "names with dots between them"),
         ("PUT", "DELETE", "PUT"),
     ],
