@@ -1,4 +1,4 @@
-"""Chargers: RMF's ChargerRequest to a station, and the truth about it as ChargerState."""
+"""Chargers: ChargerRequest becomes commands to a station, and its readings become ChargerState."""
 
 from bridges.charger import core, messages
 from bridges.charger.memory import ChargerLimits, Memory

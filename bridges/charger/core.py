@@ -1,26 +1,28 @@
-"""The charger's decision core: whose the station is, what it does, and what RMF is told.
+"""The charger's decision core: who has the station, whether it may energise, and what RMF is told.
 
-1. IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from anywhere. A request only assigns; every
-   other state is what the station's readings say. CHARGING lasts as long as current flows, also while
-   it ramps down. RELEASED is a station disconnected from its robot, until the pad is clear.
+1. The states are IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from any of them. A request
+   leads to ASSIGNED only; every other state comes from the station's readings. CHARGING lasts as long
+   as current flows, also while it ramps down. In RELEASED the station is disconnected from its robot,
+   and the pad is not clear yet.
 2. A request is granted while the state is IDLE. Its repeats change nothing, and do not start it again
-   once it is over. Other requests are refused until the station is IDLE. The robot that stands on the
-   pad is an exception where the station knows it (`pad.py`).
-3. `start_timeout` counts from acceptance. A request that has not charged by then ends in RELEASED and
-   IDLE. The reason is a fault; RMF's error message is blank unless the state is ERROR.
-4. A cancel ends the request that it names and no other. While current flows it takes the power away,
+   once it is over. Other requests are refused until the station is IDLE. There is one exception: the
+   robot on the pad, if the station can tell which robot that is (`pad.py`).
+3. `start_timeout` counts from the grant. A request that has not charged by then ends, through RELEASED
+   to IDLE. The reason is shown as a fault, as RMF's error message is blank unless the state is ERROR.
+4. A cancel ends the request that it names and no other. If current flows, the power is switched off,
    and the state stays CHARGING until the station has stopped. A full battery ends a request likewise.
-5. Power is given to the robot that the station is assigned to, when it is seen on the pad and in range.
-   Another robot gets no power; the state is ERROR with its name, and the request goes on waiting.
-6. A fault takes the power away before it is reported. Power comes back only with a new request. A
-   station at fault, or one that goes on charging when it is told to stop, is out of service
-   (protection): ERROR until its errors have been cleared and a good reading says so. A fault of the
-   robot's side takes no station out of service.
-7. Failed polls prove nothing. After `misses` of them the state is ERROR, and robot and request stay as
-   they were. Only a good reading ends a request or frees a station, or an operator, once the station
-   has certainly switched off by itself.
-8. A charge under way when this daemon starts, or reaches the station again, is shown as it is. It is
-   not stopped, and the next request does not get it unless its robot is seen there.
+5. The station is energised only for the robot that it is assigned to, once that robot is seen on the
+   pad and in range. Another robot gets no power: the state is ERROR with its name, and the request
+   goes on waiting.
+6. At a fault the power is switched off before the fault is reported. It comes back only with a new
+   request. A station that is at fault, or that goes on charging when told to stop, is out of service
+   (PROTECTION): the state is ERROR until its errors have been cleared and a good reading follows. A
+   fault of the robot does not take the station out of service.
+7. Failed polls say nothing about the charge. After `misses` of them the state is ERROR, and robot and
+   request stay. Only a good reading ends a request or frees a station. An operator can do so too, once
+   the station must have switched off by itself (`peer_internal_timeout_s`).
+8. If a charge is under way when the daemon starts, or when it reaches the station again, it is shown
+   and not stopped. The next request gets that charge only if its robot is seen on the pad.
 9. Errors are cleared when an operator says so, or at most `clear_errors_per_h` times an hour.
 """
 
@@ -43,13 +45,13 @@ from bridges.core.decision import Decision, IoFailed, OperatorReset, RivalSeen, 
 from bridges.core.durations import AGES_AGO, NEVER, RIVAL_QUIET_S
 
 REMEMBERED = 8
-"""Requests that are over and whose late repeats are still known."""
+"""How many ended requests are remembered, so that their late repeats are refused."""
 CLEARED_WITHIN_S = 30.0
-"""A good reading later than this after a clearing does not show that the clearing has helped."""
+"""How long after a clearing a good reading still proves that it has helped."""
 
 
 def initial(limits: ChargerLimits, now: float) -> Memory:
-    """Nothing read, nobody assigned."""
+    """Nothing has been read, and no request holds the station."""
     return Memory()
 
 
@@ -109,7 +111,7 @@ def _sampled(memory: Memory, sample: ChargerSample, now: float, limits: ChargerL
 
 
 def _held(memory: Memory, holder: Session | None) -> Memory:
-    """The memory with this session; without one, the last request's late repeats are remembered."""
+    """The memory with this session. If it is None, the ended request is remembered in `over`."""
     if holder or not memory.holder:
         return replace(memory, holder=holder)
     ended = memory.holder.request.request_id
@@ -127,7 +129,8 @@ def _watched(memory: Memory, now: float) -> Memory:
 
 
 def _protected(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
-    """Out of service from a fault of the station until a good reading follows a clearing."""
+    """The memory in or out of service: a station's fault starts it, a good reading after a clearing
+    ends it."""
     sample, since = memory.sample, memory.disobeyed_since
     assert sample
     if not limits.can_stop:
@@ -143,7 +146,7 @@ def _protected(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
 
 
 def _served(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
-    """Where the policy says so, a known robot on a free pad is served as if it had request."""
+    """With `unrequested: serve_known`, serve a known robot on a free pad as if it had a request."""
     who = pad.seen(memory.sample, limits).robot
     if limits.unrequested != "serve_known" or who is None or memory.holder:
         return memory
@@ -194,7 +197,7 @@ def _granted(
 
 
 def _in_the_way(memory: Memory, on_pad: bool, now: float, limits: ChargerLimits) -> bool:
-    """Is there an error that a request of the robot on the pad would not put right?"""
+    """Is there an error that granting this request would not clear?"""
     found = report.errors(memory, now, limits)
     return any(not (on_pad and fault.code == pad.WRONG_DOCKING) for fault in found)
 
@@ -222,7 +225,7 @@ def _reset(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, s
 
 
 def _freed(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, str]:
-    """An operator frees a station that does not answer, once it must have switched off by itself."""
+    """An operator frees a silent station, once it must have switched off by itself."""
     after_s = limits.t.peer_internal_timeout_s
     silent_s = NEVER if memory.read_at is None else now - memory.read_at
     if memory.holder is None or after_s is None or silent_s < after_s:

@@ -11,9 +11,10 @@ from bridges.core.durations import AGES_AGO, RIVAL_QUIET_S
 
 
 class ChargerLimits(msgspec.Struct, frozen=True):
-    """A charger's fixed facts as its core needs them. `t`: durations and counts.
+    """What the core needs of a charger's settings. `t`: durations and counts.
 
-    `receivers`: empty where nobody is verified. `can_stop`: `power` is obeyed.
+    `receivers`: receiver id -> robot; empty if robots are not verified. `can_stop`: the station obeys
+    `power`.
     """
 
     t: Durations = Durations()
@@ -31,12 +32,12 @@ class ChargerLimits(msgspec.Struct, frozen=True):
 
 
 class Session(msgspec.Struct, frozen=True):
-    """A request that occupies the station, and how far its charging is.
+    """A request that holds the station, and how far its charge has come.
 
-    `start_by`: charging must have started (monotonic s). `paused_at`: since when another robot on the
-    pad keeps it from starting. `checked_at`: when its position was asked for. `started`: current has
-    flowed for it. `failed`: the station was at fault since, so there is no power for this request any
-    more. `ended`: why it is over; `released_at`: since when it is disconnected.
+    `start_by`: when charging must have started (monotonic s). `paused_at`: since when another robot on
+    the pad has kept it from starting. `checked_at`: when its robot's position was last asked for.
+    `started`: current has flowed for it. `failed`: the station was at fault, so this request gets no
+    more power. `ended`: why it is over. `released_at`: since when its robot is disconnected.
     """
 
     request: Requested
@@ -50,18 +51,19 @@ class Session(msgspec.Struct, frozen=True):
 
     @property
     def over(self) -> bool:
-        """There is no power for it any more, whatever comes."""
+        """This request gets no more power."""
         return self.failed or bool(self.ended) or self.released_at is not None
 
 
 class Memory(msgspec.Struct, frozen=True):
-    """Everything that outlives a scan. `sample`: the last good reading, of `read_at`.
+    """Everything that outlives a scan. `sample`: the last good reading, taken at `read_at`.
 
-    `write_misses`: scans in a row whose commands failed, `write_failed` among them this one.
-    `power`: as last decided; `disobeyed_since`: since when the station charges against it.
-    `adopted`: it was charging when we came, so whatever is on the pad stays as it is.
-    `protection`: why the station is out of service, "" while it is not; `clear_by`: until when a good
-    reading shows that a clearing has helped. `over`: the last requests that have ended.
+    `misses`: polls that failed in a row. `write_misses`: scans in a row whose commands failed;
+    `write_failed`: this scan's did. `power`: as last decided; `disobeyed_since`: since when the station
+    charges although `power` is off. `adopted`: the station was charging when we reached it, and that
+    charge is left alone. `protection`: why the station is out of service, "" while it is in service;
+    `clear_by`: until when a good reading proves that a clearing has helped. `over`: the last requests
+    that have ended.
     """
 
     sample: ChargerSample | None = None
@@ -90,5 +92,5 @@ def rivalled(memory: Memory, now: float) -> bool:
 
 
 def unreachable(memory: Memory, limits: ChargerLimits) -> bool:
-    """Have `misses` polls failed since the last good reading, or was there none?"""
+    """Have `misses` polls failed since the last good reading, or has there been no reading yet?"""
     return memory.sample is None or memory.misses >= limits.t.misses

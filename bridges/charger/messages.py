@@ -1,4 +1,4 @@
-"""ChargerRequest and ChargerCancel in, ChargerState out: is it well formed?"""
+"""ChargerRequest and ChargerCancel in, ChargerState out. Is a message well formed?"""
 
 from collections.abc import Mapping
 
@@ -18,11 +18,11 @@ from bridges.rmf.definitions import (
 from bridges.rmf.stamps import duration, in_seconds
 
 LONGEST_TIMEOUT_S = 86400.0
-"""A day: whoever asks for more has mistaken the unit."""
+"""A day. A longer timeout must be a mistaken unit."""
 
 
 def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Requested:
-    """The event that a ChargerRequest is. Raises RequestRefused for what is not one.
+    """The ChargerRequest as an event. Raises RequestRefused if it is malformed.
 
     A start_timeout of zero means the configured default.
     """
@@ -40,9 +40,9 @@ def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Reques
 
 
 def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled:
-    """The event that a ChargerCancel is. Raises RequestRefused for what is not one.
+    """The ChargerCancel as an event. Raises RequestRefused if it is malformed.
 
-    What nobody asked for is cancelled by the request id under which its state is published.
+    A charge without a request is cancelled by the request id under which its state is published.
     """
     _check("request_id", cancel.request_id)
     if cancel.request_id == UNREQUESTED + cancel.charger_name:
@@ -92,8 +92,8 @@ def state_message(
 
 
 def summary(report: ChargerReport) -> Mapping[str, str]:
-    """What a person wants to read of it, in a line. A robot is only the one that asked, unless the
-    station has seen its receiver.
+    """The report in one line, for a person. A robot is marked unverified unless the station has seen
+    its receiver.
     """
     measured = report.measured
     seen = "" if report.verified else " (unverified)"

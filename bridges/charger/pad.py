@@ -1,11 +1,11 @@
-"""Who stands on the pad: the handshake between the receiver that the station sees and the request.
+"""Who stands on the pad: does the receiver that the station sees belong to the request's robot?
 
-Where the YAML has no `receivers`, nobody is verified and every robot counts as the one that asked.
-Where it has some, a station that does not say whom it sees charges nobody.
+Without `receivers` in the YAML no robot is verified: any robot counts as the one of the request. With
+`receivers`, a station that does not say which receiver it sees charges nobody.
 
-What stands there and should not is told to RMF in ChargerState's error_message. `Misplaced.text`
-writes it and `misplaced_in` reads it: an id that would be ambiguous in the sentence is quoted as in
-JSON, so that no id is lost.
+If something stands on the pad that should not, ChargerState's error_message says so.
+`Misplaced.text` writes that text and `misplaced_in` reads it. An id that would make the text
+ambiguous is quoted as in JSON, so every id can be read back.
 """
 
 import json
@@ -35,9 +35,10 @@ _TEXT = re.compile(
 
 
 class Pad(msgspec.Struct, frozen=True):
-    """`unverified`: the YAML knows no receivers. `mute`: the station does not say whom it sees.
+    """What stands on the pad. `unverified`: the YAML has no receivers. `mute`: the station does not say
+    which receiver it sees. `stranger`: a receiver that the YAML does not list.
 
-    `receiver`: the id that it sees; `robot`: whose that is, None for a stranger's.
+    `receiver`: the id that it sees. `robot`: whose receiver that is, None if it is not listed.
     """
 
     sort: Literal["unverified", "mute", "empty", "robot", "stranger"]
@@ -45,11 +46,11 @@ class Pad(msgspec.Struct, frozen=True):
     robot: Robot | None = None
 
     def may_be(self, who: Robot) -> bool:
-        """Nothing says that this robot is not there."""
+        """Can this robot be the one on the pad, as far as the station can tell?"""
         return self.sort == "unverified" or self.robot == who
 
     def is_another(self, who: Robot) -> bool:
-        """Somebody else stands there."""
+        """Is another robot on the pad?"""
         return self.sort in ("robot", "stranger") and self.robot != who
 
 
@@ -67,9 +68,9 @@ def seen(sample: ChargerSample | None, limits: ChargerLimits) -> Pad:
 
 
 class Misplaced(msgspec.Struct, frozen=True):
-    """What stands on the pad and should not: a `robot`, or None and the `receiver` of a stranger.
+    """What stands on the pad and should not: a known `robot`, else an unknown `receiver`.
 
-    `expected`: the robot that the station waits for; None for nobody.
+    `expected`: the robot that the station waits for, None if it waits for none.
     """
 
     robot: Robot | None
@@ -78,7 +79,7 @@ class Misplaced(msgspec.Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """As ChargerState's error_message has it."""
+        """The text for ChargerState's error_message."""
         expected = f", {_robot(self.expected)} is expected" if self.expected else ""
         if self.robot is None:
             return f"{UNKNOWN_RECEIVER_TEXT}{_id(self.receiver)}{expected}"
@@ -87,7 +88,7 @@ class Misplaced(msgspec.Struct, frozen=True):
 
 
 def misplaced_in(text: str) -> Misplaced | None:
-    """What such a text says; None for any other text."""
+    """The Misplaced that `Misplaced.text` wrote; None for any other text."""
     found = _TEXT.fullmatch(text)
     if found is None:
         return None
@@ -109,7 +110,7 @@ def _read(part: str) -> str:
 
 
 def misplaced(memory: Memory, limits: ChargerLimits) -> Fault | None:
-    """Why the station must not energise for what stands there; None where nothing forbids it."""
+    """Why the station must not energise for what is on the pad; None if it may."""
     pad, holder = seen(memory.sample, limits), memory.holder
     expected = holder.request.who if holder and not holder.over else None
     if pad.sort == "mute":
@@ -124,7 +125,7 @@ def misplaced(memory: Memory, limits: ChargerLimits) -> Fault | None:
 
 
 def left_alone(memory: Memory, limits: ChargerLimits) -> bool:
-    """Current flows that nobody asked for, and it is not for us to stop it."""
+    """Does current flow without a request, in a case where we do not stop it?"""
     if memory.sample is None or memory.sample.activity not in CURRENT_FLOWS:
         return False
     return memory.adopted or not limits.can_stop or limits.unrequested == "serve_known"

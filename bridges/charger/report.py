@@ -1,7 +1,8 @@
-"""What RMF, the log and the status file are told of a charger, and how its error is read again.
+"""What RMF, the log and the status file are told of a charger, and how an error's text is read.
 
-RMF's ChargerState has one text for what is wrong. The coordinator (`bridges/charger_coordinator/`)
-must know from it whose fault that is: `diagnosis` reads what `error_message` has written.
+RMF's ChargerState has one text for everything that is wrong. From that text the coordinator
+(`bridges/charger_coordinator/`) must find out which side is at fault: `error_message` writes it and
+`diagnosis` reads it.
 """
 
 from enum import StrEnum
@@ -24,24 +25,24 @@ RELEASED = ChargerStateValue.CHARGER_RELEASED
 ERROR = ChargerStateValue.CHARGER_ERROR
 
 UNREQUESTED = "unrequested/"
-"""ChargerState wants a request id in every state but IDLE. What nobody asked for (an error of a free
-station, a robot that charges by itself) gets this, followed by the charger's name."""
+"""ChargerState has a request id in every state but IDLE. Without a request (an error of a free
+station, a charge that nobody requested) the id is this, followed by the charger's name."""
 
 LOST = {
     "TWO_NODES_FOR_ONE_DEVICE": "two nodes for one device",
     "CHARGER_UNREACHABLE": "Charger unreachable",
     "CHARGER_NOT_COMMANDED": "Charger takes no commands",
 }
-"""RMF's error message of a station that is not reached: a fixed text, the reason is in the fault."""
+"""The error message of a station that is not reached. It is a fixed text; the fault has the reason."""
 OUT_OF_SERVICE = "out of service after: "
 
 
 class Diagnosis(StrEnum):
-    """Whose fault an error is.
+    """Which side is at fault.
 
-    PAD: what stands on the pad should not be there. LOST: the station is not reached or not
-    commanded, which says nothing of station or robot. UNCLEAR: nothing tells; then a second station
-    does, as a robot that fails there too is the one at fault.
+    PAD: what stands on the pad should not be there. LOST: the station cannot be reached or commanded,
+    which says nothing about station or robot. UNCLEAR: the text does not tell. Then a second station
+    shows it: a robot that fails there too is the one at fault.
     """
 
     NONE = ""
@@ -69,7 +70,7 @@ def error_message(fault: Fault) -> str:
 
 
 def diagnosis(message: str) -> Diagnosis:
-    """Whose fault it is, by a ChargerState's error_message; another node's text is UNCLEAR."""
+    """Which side is at fault, by a ChargerState's error_message; a text of another node is UNCLEAR."""
     found = (whose for start, whose in _BEGINNINGS.items() if message.startswith(start))
     return next(found, Diagnosis.UNCLEAR)
 
@@ -79,8 +80,8 @@ class ChargerReport(msgspec.Struct, frozen=True):
 
     `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:
     blank unless `state` is CHARGER_ERROR. `request_id`: blank while no request holds the station.
-    `fleet`, `robot`: whom it is for, else who is seen on the pad of a station that is not idle.
-    `verified`: the station sees that robot's receiver; otherwise it is only the one that asked.
+    `fleet`, `robot`: the request's robot; without a request, the one on the pad of a station that is
+    not idle. `verified`: the station sees that robot's receiver.
     """
 
     read_at: float | None
@@ -94,13 +95,13 @@ class ChargerReport(msgspec.Struct, frozen=True):
     measured: Measured = Measured()
 
     def news(self) -> Any:
-        """All but the age and the measurements, which differ at each reading."""
+        """All but the age and the measurements, which change with each reading."""
         measured = Measured(receiver_id=self.measured.receiver_id)
         return replace(self, read_at=None, measured=measured)
 
 
 def report(memory: Memory, now: float, limits: ChargerLimits) -> ChargerReport:
-    """Everything, afresh."""
+    """The report as it is now."""
     found = errors(memory, now, limits)
     shown = ERROR if found else state(memory)
     lost = unreachable(memory, limits)
@@ -120,7 +121,7 @@ def report(memory: Memory, now: float, limits: ChargerLimits) -> ChargerReport:
 
 
 def state(memory: Memory) -> ChargerStateValue:
-    """RMF's state of a station that is in no error."""
+    """RMF's state of a station without an error."""
     sample, holder = memory.sample, memory.holder
     if sample is not None and sample.activity in CURRENT_FLOWS:
         return CHARGING
@@ -154,7 +155,7 @@ def errors(memory: Memory, now: float, limits: ChargerLimits) -> list[Fault]:
 
 
 def error_text(sample: ChargerSample) -> str:
-    """A station's error in its own words, with the side that is at fault before them."""
+    """A station's error in its own words, after the side that is at fault."""
     text = sample.error_text or f"the charger reports an error (vendor state {sample.code})"
     if diagnosis(text) in (Diagnosis.PAD, Diagnosis.LOST):
         text = f"the charger says: {text}"
@@ -163,7 +164,7 @@ def error_text(sample: ChargerSample) -> str:
 
 
 def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> list[Fault]:
-    """What is wrong though the state is no ERROR."""
+    """What is wrong although the state is not ERROR."""
     holder = memory.holder
     if holder is None:
         who = pad.seen(memory.sample, limits).robot or "the robot is not known"
@@ -179,7 +180,7 @@ def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) 
 
 
 def _who(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> Robot | None:
-    """Whom it is for; where it is for nobody, who stands there, or was charged when last seen."""
+    """The request's robot. Without a request: the robot on the pad, or the last one seen charging."""
     if memory.holder:
         return memory.holder.request.who
     if shown is IDLE or (unreachable(memory, limits) and not memory.adopted):

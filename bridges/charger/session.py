@@ -7,16 +7,16 @@ from bridges.charger.memory import ChargerLimits, Memory, Session
 from bridges.charger.signals import AT_FAULT, CURRENT_FLOWS, Activity, ChargerSample, Requested
 
 RANGE_EVERY_S = 5.0
-"""A receiver is not asked for its position more often (Xnergy RCU: wait 5 s between two checks)."""
+"""The least time between two range checks (Xnergy RCU: wait 5 s between two checks)."""
 
 
 def granted(request: Requested, now: float, limits: ChargerLimits) -> Session:
-    """It has the station; `start_timeout` counts from now."""
+    """A request that has just got the station; its `start_timeout` counts from now."""
     return Session(request, now + _patience_s(request, limits))
 
 
 def taken_over(holder: Session, request: Requested, now: float, limits: ChargerLimits) -> Session:
-    """The same robot, served without a request until now, has one."""
+    """The session of a robot that was served without a request, and now has one."""
     return replace(holder, request=request, start_by=now + _patience_s(request, limits))
 
 
@@ -27,7 +27,7 @@ def _patience_s(request: Requested, limits: ChargerLimits) -> float:
 def follow(
     holder: Session, sample: ChargerSample, now: float, limits: ChargerLimits
 ) -> Session | None:
-    """The request after one reading; None when it is over and the station free."""
+    """The session after one reading; None when it is over and the station is free."""
     on_pad = pad.seen(sample, limits)
     another = on_pad.is_another(holder.request.who)
     if sample.activity in AT_FAULT and not (another and sample.side == "robot"):
@@ -47,12 +47,12 @@ def follow(
 
 
 def shown_released(holder: Session, now: float, limits: ChargerLimits) -> bool:
-    """Has RELEASED been shown for its time?"""
+    """Has RELEASED been shown for `released_s`?"""
     return holder.released_at is not None and now - holder.released_at >= limits.t.released_s
 
 
 def _beside_another(holder: Session, now: float, limits: ChargerLimits) -> Session | None:
-    """Another robot stands on the pad: who waits goes on waiting; who was charged has left."""
+    """Another robot is on the pad. A robot that waits keeps waiting; one that was charged has left."""
     if shown_released(holder, now, limits):
         return None
     if holder.released_at is not None:
@@ -75,7 +75,7 @@ def _flowing(holder: Session, sample: ChargerSample, limits: ChargerLimits) -> S
 
 
 def _sought_again(holder: Session, now: float, limits: ChargerLimits) -> Session:
-    """The coupling was lost and is sought again: the same request waits for its start."""
+    """The station has lost the receiver and looks for it: the request waits for its start again."""
     by = now + _patience_s(holder.request, limits)
     return replace(holder, started=False, start_by=by, checked_at=None)
 
@@ -107,7 +107,7 @@ def cleared_to_start(memory: Memory, limits: ChargerLimits) -> bool:
 
 
 def range_checked(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
-    """Ask for the robot's position where only that is missing. An answer from before does not count."""
+    """Ask for a range check if only that is missing. A result from before the check does not count."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or holder.started or holder.over:
         return memory

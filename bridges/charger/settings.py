@@ -1,4 +1,4 @@
-"""The part of a charger's YAML that does not depend on how it is reached."""
+"""The part of a charger's YAML that does not depend on its driver."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal, NamedTuple
@@ -44,16 +44,16 @@ def robot(text: str) -> Robot:
 class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations and counts of a charger.
 
-    `misses`: failed polls in a row after which the charger is shown as unreachable; failed commands
-    too.
-    `start_timeout_s`: how long a request waits for charging to start where it does not say.
-    `stop_timeout_s`: how long a station may go on charging that was told to stop, before it is taken
+    `misses`: after so many failed polls in a row the charger is shown as unreachable; after so many
+    failed commands in a row, as one that takes no commands.
+    `start_timeout_s`: how long charging may take to start, if the request does not say.
+    `stop_timeout_s`: how long a station may go on charging after it was told to stop. Then it is taken
     out of service.
-    `released_s`: how long RELEASED is shown at the least; states go out at 1 Hz, so not below 1 s.
-    `full_percent`: a battery as full as this is released, where the station knows how full it is.
+    `released_s`: the least time for which RELEASED is shown. States go out at 1 Hz, so at least 1 s.
+    `full_percent`: the charge at which a robot is released, if the station knows the battery's charge.
     `clear_errors_per_h`: how often the daemon may clear the station's errors by itself; 0 is never.
-    `peer_internal_timeout_s`: after how long without us the station is certain to have switched off
-    by itself; only with it can an operator free a station that does not answer.
+    `peer_internal_timeout_s`: after how long without the daemon the station has certainly switched
+    off by itself. Without it an operator cannot free a station that does not answer.
     """
 
     misses: Misses = 3
@@ -68,12 +68,12 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What every charger has, whatever its driver.
 
-    `limits`: durations and counts, where the defaults do not suit.
-    `receivers`: receiver id -> FLEET/ROBOT: whose receiver the station sees. With it, only the robot
+    `limits`: durations and counts that differ from the defaults.
+    `receivers`: receiver id -> FLEET/ROBOT, the robot that carries it. With this table only the robot
     that the station is assigned to is charged.
-    `unrequested`: a robot of `receivers` that turns up without a request: `serve_known` charges it,
-    `refuse` does not, and says who it is.
-    `on_death`: what the daemon's end means for a charge under way: `stop` it, or `keep` it.
+    `unrequested`: what happens to a robot of `receivers` on the pad without a request. `serve_known`
+    charges it; `refuse` does not, and says which robot it is.
+    `on_death`: `stop` or `keep` a charge under way when the daemon ends.
     """
 
     limits: Durations = Durations()
@@ -82,11 +82,11 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
     on_death: Literal["stop", "keep"] = "stop"
 
     def can_stop(self) -> bool:
-        """Can this station be told to stop? A driver whose station cannot says so."""
+        """Can this station be told to stop? Drivers of stations that cannot override this."""
         return True
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """Names that are no FLEET/ROBOT. A robot may have two receivers: one may be a spare."""
+        """Names that are not FLEET/ROBOT. A robot may have two receivers: one may be a spare."""
         for receiver, text in self.receivers.items():
             try:
                 robot(text)

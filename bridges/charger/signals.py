@@ -1,7 +1,7 @@
-"""What a charger's driver and its core say to each other in one scan, and the core's events.
+"""What passes between a charger's driver and its core in one scan, and the core's events.
 
-A station that answers HTTP as the first contract does fills in the activity and the error's text only.
-Richer controllers (CANopen, Modbus, another make's JSON) fill in `measured` and obey `power`.
+A station with the first HTTP contract gives its activity and its error's text only. Richer
+controllers (CANopen, Modbus, another make's JSON) fill in `measured` and obey `power`.
 """
 
 from enum import StrEnum
@@ -14,10 +14,10 @@ from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 
 class Activity(StrEnum):
-    """What a station says that it is doing. The names are the YAML's, but for UNKNOWN.
+    """What a station says it is doing. The names are those of the YAML, except UNKNOWN.
 
-    STOPPING: asked to end or ramping down while current still flows. RELEASED: disconnected from
-    the robot, and not ready for another yet. UNKNOWN: a code that no list of the YAML names.
+    STOPPING: told to stop or ramping down, and current still flows. RELEASED: disconnected from the
+    robot, and not yet ready for another. UNKNOWN: a code that the YAML does not list.
     """
 
     IDLE = "idle"
@@ -33,15 +33,15 @@ CURRENT_FLOWS = frozenset({Activity.CHARGING, Activity.STOPPING})
 AT_FAULT = frozenset({Activity.ERROR, Activity.UNKNOWN})
 
 FaultSide = Literal["", "station", "robot"]
-"""Whose fault an error is, by the controller's own diagnosis; "" where it does not say."""
+"""Which side is at fault, by the controller's own diagnosis; "" if it does not say."""
 
 
 class Measured(msgspec.Struct, frozen=True):
     """What a richer controller knows beside its state; None where it does not say.
 
-    `receiver_id`: who is on the pad, "" for nobody. `in_range`: is the robot's coil where it can be
-    charged; False too while that is being found out. `volts`, `amps`: at the battery.
-    `battery_percent`: how full it is.
+    `receiver_id`: the receiver on the pad, "" if there is none. `in_range`: the robot's coil is where
+    it can be charged; False too until a range check has shown that. `volts`, `amps`: at the battery.
+    `battery_percent`: its charge.
     """
 
     receiver_id: str | None = None
@@ -56,7 +56,7 @@ class ChargerSample(msgspec.Struct, frozen=True):
     """One reading of one station.
 
     `code`: the vendor's number or word, for texts only. `error_text`: the station's own words,
-    printable and bounded. `side`: whose fault the error is.
+    printable and of bounded length. `side`: which side is at fault.
     """
 
     activity: Activity
@@ -67,14 +67,14 @@ class ChargerSample(msgspec.Struct, frozen=True):
 
 
 class ChargerOutputs(msgspec.Struct, frozen=True):
-    """Everything that a station is told.
+    """Every command to a station.
 
-    `power`: whether it may energise; None leaves it as it is (a charge that we have not started, and
-    a station that does not answer, are neither started nor stopped blindly).
-    `clear_errors`, `range_checks`: how many clearings of its errors, and checks of the robot's
-    position, were asked for since the daemon started. A driver sends one for a rise and never sends
-    it again, whatever became of it: they are not idempotent, and as counts they may be written any
-    number of times. A station that always knows the position has no use for `range_checks`.
+    `power`: may it energise? None changes nothing: a charge that we did not start, or a station that
+    does not answer, is neither started nor stopped blindly.
+    `clear_errors`, `range_checks`: how many clearings of errors and checks of the robot's position
+    have been ordered since the daemon started. The commands are not idempotent, so they are counts: a
+    driver sends one command when a count rises, and never repeats it, even if it failed. A station
+    that always knows the position ignores `range_checks`.
     """
 
     power: bool | None = None
@@ -83,9 +83,9 @@ class ChargerOutputs(msgspec.Struct, frozen=True):
 
 
 class Requested(msgspec.Struct, frozen=True):
-    """A ChargerRequest that is ours and well formed; `start_timeout_s` 0 is the configured default.
+    """A well-formed ChargerRequest for this charger; `start_timeout_s` 0 is the configured default.
 
-    A robot that is served though nobody asked has one without a `request_id`.
+    The session of a robot that is served without a request has one with an empty `request_id`.
     """
 
     request_id: str
@@ -100,7 +100,7 @@ class Requested(msgspec.Struct, frozen=True):
 
 
 class Cancelled(msgspec.Struct, frozen=True):
-    """A ChargerCancel; without a `request_id`, of what nobody asked for."""
+    """A ChargerCancel; an empty `request_id` cancels a charge without a request."""
 
     request_id: str
 

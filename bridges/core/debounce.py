@@ -1,7 +1,7 @@
 """Debounce: a reading is believed when it has been seen unchanged for long enough.
 
-Pure and in samples: no vendor option does this for us (gpiozero's own drops edges and its mock has
-none), and the same rule serves GPIO pins and polled Modbus inputs.
+Pure: it works on samples, so one rule serves GPIO pins and polled Modbus inputs. gpiozero's own
+debounce drops edges, and its mock pins have none.
 """
 
 from typing import Generic, TypeVar, cast
@@ -18,8 +18,8 @@ T_co = TypeVar("T_co", covariant=True)
 class Settled(msgspec.Struct, Generic[T_co], frozen=True):
     """`value` is believed, and `candidate` has been seen since `since` (s).
 
-    `steady_at`: when `value` last came to be believed; None: nothing is yet. `torn_since`: since
-    when what is seen has not lasted for long enough; None while it has.
+    `steady_at`: when `value` was last confirmed; None before the first time. `torn_since`: since when
+    the readings have not been steady; None while they are.
     """
 
     value: T_co | None
@@ -29,7 +29,7 @@ class Settled(msgspec.Struct, Generic[T_co], frozen=True):
     torn_since: float | None = None
 
     def due_at(self, hold_s: float) -> float:
-        """When what is seen will count, if it stays; inf when it does."""
+        """When the candidate will count if it lasts; inf when it counts already."""
         return NEVER if self.torn_since is None else self.since + hold_s
 
 
@@ -46,7 +46,7 @@ def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "
 
 
 def forget(before: "Settled[T] | None") -> "Settled[T] | None":
-    """After a gap in the readings the value stands, but a half-seen candidate starts again."""
+    """After a gap in the readings: the value stays, and the debounce of a candidate starts again."""
     if before is None or before.steady_at is None:
         return None
     return replace(before, candidate=cast(T, before.value), torn_since=None)

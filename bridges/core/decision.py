@@ -1,4 +1,4 @@
-"""What every decision core takes and gives: events in, a Decision out.
+"""The interface of every decision core: events in, a Decision out.
 
 A core is one pure function, `decide(memory, event, now, limits) -> Decision`. It has no I/O, no
 clock and no log. `now` is monotonic seconds. Each call derives the whole set of outputs and the
@@ -28,7 +28,7 @@ Said = tuple[Topic[Message], Message]
 
 
 class Fault(msgspec.Struct, frozen=True):
-    """One thing that is wrong, by a name that an engineer knows; `detail` says which and why."""
+    """One thing that is wrong. `code`: a name that an engineer knows. `detail`: which one, and why."""
 
     code: str
     detail: str = ""
@@ -38,20 +38,19 @@ class Fault(msgspec.Struct, frozen=True):
 
 
 class Sampled(msgspec.Struct, Generic[X], frozen=True):
-    """The driver has read every input once; the reading is as old as `now` when it is decided."""
+    """The driver has just read every input once."""
 
     sample: X
 
 
 class IoFailed(msgspec.Struct, frozen=True):
-    """A read or a write did not succeed: the outputs are unknown and the inputs not fresh."""
+    """A read or a write failed: the state of the outputs is unknown, and the inputs were not read."""
 
     reason: str
 
 
 class Suspended(IoFailed, frozen=True):
-    """Nobody has read anything for a while: the process was stopped, or the machine slept. What was
-    believed is as stale as after a long time without a reading."""
+    """The process was stopped, or the machine slept. All that was believed of the inputs is stale."""
 
 
 class WriteFailed(IoFailed, frozen=True):
@@ -59,7 +58,7 @@ class WriteFailed(IoFailed, frozen=True):
 
 
 class RivalSeen(msgspec.Struct, frozen=True):
-    """Somebody else publishes states under this device's name."""
+    """Another node publishes states under this device's name."""
 
 
 class OperatorReset(msgspec.Struct, frozen=True):
@@ -67,7 +66,7 @@ class OperatorReset(msgspec.Struct, frozen=True):
 
 
 class Report(Protocol):
-    """What RMF and the status file are told. Equal reports are the same news."""
+    """What RMF and the status file are told."""
 
     @property
     def read_at(self) -> float | None:
@@ -78,16 +77,16 @@ class Report(Protocol):
         """Everything that is wrong now, most serious first."""
 
     def news(self) -> object:
-        """The part whose change is worth publishing at once: the report without its age."""
+        """The part of the report whose change is published at once: all but its age."""
 
 
 class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     """The result of one scan.
 
-    `outputs`: the whole set, to be written as it is. `wake_at`: decide again by then at the latest
-    (monotonic seconds; `inf` when only an event can change anything). `refused`: why the event was
-    not obeyed, as a short fixed kind to count by or as `kind: detail`; "" when it was. `publish`:
-    messages beside the state, each to go out once.
+    `outputs`: the whole set, to be written as it is. `wake_at`: decide again at this time at the
+    latest (monotonic seconds; `inf` when only an event can change anything). `refused`: why the event
+    was not obeyed, as `kind` or `kind: detail`, where `kind` is a short fixed name to count by; ""
+    when it was obeyed. `publish`: messages beside the state, each sent once.
     """
 
     memory: M
@@ -102,7 +101,8 @@ LONGEST_DETAIL = 300
 
 
 class RequestRefused(Exception):
-    """A message that is not obeyed. `kind` is a short fixed name to count and to log once by.
+    """A message that is not obeyed. `kind`: a short fixed name. Refusals are counted by it, and
+    each kind is logged once.
 
     `detail` may quote the message, which anybody can send: it is cut to LONGEST_DETAIL characters.
     """

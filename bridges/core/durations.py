@@ -7,19 +7,20 @@ NEVER: Final = math.inf
 AGES_AGO: Final = -math.inf
 
 RIVAL_QUIET_S: Final = 5.0
-"""A device is ours again when no other node has published its states for so long; they come at 1 Hz."""
+"""When no other node has published a device's states for so long, it is ours again. States come at
+1 Hz."""
 SILENT_S: Final = 3.0
-"""States of lifts and doors come at 1 Hz. After a gap as long as this the device was silent."""
+"""After so long without a state a lift or door is silent. States come at 1 Hz."""
 FORGOTTEN_S: Final = 60.0
-"""What nobody holds and nobody mentions is forgotten after so long."""
+"""A device or requester that holds nothing, and that no message names, is forgotten after so long."""
 GAP_S: Final = 0.1
-"""A supervisor never sends two requests for one device closer together."""
+"""The least time between two requests that a supervisor sends for one device."""
 REPEAT_S: Final = 1.0
-"""A request that is still to be obeyed is repeated this often."""
+"""A request that is not obeyed yet is repeated this often."""
 
 
 def due_at(sent_at: float, *, new: bool, again: bool) -> float:
-    """When a request is to be sent: a new one after GAP_S, the last one `again` after REPEAT_S.
+    """When a request is due: GAP_S after the last one if it is `new`, REPEAT_S if sent `again`.
 
     `sent_at`: when the last one was sent (s; AGES_AGO: never).
     """

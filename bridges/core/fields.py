@@ -1,9 +1,9 @@
-"""What the sections of every device YAML are made of: numbers with units, names, common structs.
+"""The building blocks of every device YAML: numbers with units, names, common structs.
 
 `bridges/settings/load.py` reads a file into these; the kinds and drivers derive their own from them.
-A struct may have `problems() -> Iterable[tuple[tuple[str, ...], str]]`: what its fields cannot say
-one by one, as (path below the struct, text with the fix). It is asked when each field is there and
-of the right sort, even if a struct below has problems of its own.
+A struct may have `problems() -> Iterable[tuple[tuple[str, ...], str]]`. It checks what no field can
+check alone, and gives (path below the struct, text with the fix). It is called once every field is
+present and of the right type, even if a struct below has problems of its own.
 """
 
 from collections.abc import Iterable
@@ -15,13 +15,13 @@ from msgspec import Meta
 Seconds = Annotated[float, Meta(ge=0, le=86400, extra={"unit": "s"})]
 """A duration that may be zero."""
 Timeout = Annotated[float, Meta(ge=1, le=86400, extra={"unit": "s"})]
-"""After how long something is given up: with zero it would never be tried."""
+"""After how long something is given up. Zero is not allowed: nothing would ever be tried."""
 Period = Annotated[float, Meta(ge=0.01, le=60, extra={"unit": "s"})]
 """A repetition period."""
 QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
 """How long a node without hardware only listens at first."""
 Patience = Annotated[float, Meta(ge=3, le=86400, extra={"unit": "s"})]
-"""How long somebody may be silent, or something may last, before it matters."""
+"""How long a silence or a state may last before the daemon acts on it."""
 Name = Annotated[
     str,
     Meta(
@@ -55,9 +55,9 @@ Endpoint = Annotated[
 class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Encryption of `tls/…` and `quic/…` endpoints, from PEM files.
 
-    `ca`: who has signed the router's certificate; the public authorities when absent.
-    `certificate`, `private_key`: our own, where the router asks for one (mutual TLS). The key's file
-    is readable by the daemon's user alone.
+    `ca`: the authority that has signed the router's certificate; the public ones when absent.
+    `certificate`, `private_key`: the daemon's own, if the router asks for one (mutual TLS). Only the
+    daemon's user may read the key's file.
     """
 
     ca: AbsolutePath | None = None
@@ -71,17 +71,17 @@ class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How transport `zenoh` reaches the others.
+    """How transport `zenoh` reaches the other nodes.
 
     `keys`: `rmw_zenoh` for sites whose RMF runs on rmw_zenoh, `ros2dds` for sites with a
     zenoh-bridge-ros2dds beside RMF; the two do not understand each other.
-    `connect`: the router (or the bridge); of several, one is used and the others stand by.
+    `connect`: the router (or the bridge). If there are several, one is used and the others stand by.
     `mode`: `peer` also speaks to other nodes directly, `client` to a router alone. `auto` is `peer`
     with one router, if it is on this machine or `listen` is open to others; else `client`.
-    `listen`: where other nodes reach a peer; this machine alone when absent.
+    `listen`: where other nodes reach this one as a peer; only from this machine when absent.
     `tls`: certificates, for `tls/…` and `quic/…`.
-    `user`: the name that the routers know us by.
-    `password_file`: a file that holds its password, readable by the daemon's user alone.
+    `user`: the daemon's user name at the routers.
+    `password_file`: a file with its password. Only the daemon's user may read it.
     """
 
     keys: Literal["rmw_zenoh", "ros2dds"] = "rmw_zenoh"
@@ -109,13 +109,13 @@ def _is_encrypted(endpoint: str) -> bool:
 class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How the daemon reaches Open-RMF.
 
-    `transport`: `ros2` (rclpy), `dds` or `zenoh` (both without ROS), or `auto`: rclpy where it
-    imports, else dds where cyclonedds imports, else zenoh.
+    `transport`: `ros2` (rclpy), `dds` or `zenoh` (both without ROS). `auto` takes ros2 if rclpy can be
+    imported, else dds if cyclonedds can be, else zenoh.
     `domain_id`: the ROS domain; ROS_DOMAIN_ID, or 0, when absent.
     `network`: `localhost` keeps all traffic on the loopback interface.
-    `ros_setup`: ROS's setup file, sourced before the daemon starts (not for `dds`, `zenoh`): a
-    service has no shell that has done so. Where `auto` does not find it, that is logged.
-    `diagnostics`: each second, say on ROS's `/diagnostics` how the daemon and its devices are.
+    `ros_setup`: ROS's setup file, sourced before the daemon starts, as a service has no shell that
+    has done so. Not for `dds` and `zenoh`. If `auto` does not find the file, it logs that.
+    `diagnostics`: publish the health of the daemon and its devices each second on `/diagnostics`.
     `topics`: RMF's topic name -> the name that the site uses.
     `zenoh`: routers, keys and credentials of transport `zenoh`.
     """
@@ -137,9 +137,9 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What every lift, door and charger has, whatever its driver.
 
-    `bus`: the name of the bus that it stands on; not needed where the file has one.
-    `driver`: where it is reached otherwise than the file's others; the file's `driver` when absent.
-    `accept_unsafe`: signal -> why its unsafe wiring is accepted; `check` prints it.
+    `bus`: the name of its bus; not needed if the file has only one.
+    `driver`: this device's own driver; the file's `driver` when absent.
+    `accept_unsafe`: signal -> why its unsafe wiring is accepted; `check` prints the reason.
     """
 
     bus: Name | None = None
@@ -147,23 +147,24 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     accept_unsafe: dict[Name, Name] = msgspec.field(default_factory=dict)
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """After how long (s) without a command what it drives is off by itself, and the setting."""
+        """How long (s) without a command until its outputs go off by themselves, and the path of the
+        setting that says so; None where they do not."""
         return None
 
     def stale_after(self) -> float | None:
-        """After how long (s) without a reading it is out of service; None where that is not a time."""
+        """After how long (s) without a reading it is out of service; None if no time decides that."""
         return None
 
 
 class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What every kind without hardware has.
 
-    `quiet_start_s`: how long it only listens at first.
+    `quiet_start_s`: how long it only listens after its start.
     """
 
     quiet_start_s: QuietStart = 3.0
 
 
 def quiet_s(settings: GraphSettings) -> float:
-    """How long it only listens before it sends its first message (s)."""
+    """How long the node only listens before it sends its first message (s)."""
     return settings.quiet_start_s

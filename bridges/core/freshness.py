@@ -1,22 +1,23 @@
-"""Does a request of an adapter count, or is it an echo from the past?
+"""Does an adapter's request count, or is it a replay of an old one?
 
-A request's stamp is by its requester's clock, which need not agree with ours. So stamps of one
-requester are compared with each other first. Rules:
-1. A request counts if it is newer than all that has counted of its requester. An END is compared
-   with earlier ENDs only: an operator ends a robot's session by another clock than the robot's.
-2. On a retained topic (`adapter_lift_requests`) whoever subscribes gets up to 100 old requests of
-   every adapter at once, and again when an adapter's network comes back. There an equal stamp is a
-   replay, and the first request of a requester must have been sent after our own start. One that has
-   counted has a clock that we know. With `clock_synchronised` every request is judged by its age.
+A stamp is by the requester's clock, which need not agree with ours. So a stamp is first compared with
+the earlier stamps of the same requester. Rules:
+1. A request counts if it is newer than every earlier request of its requester that counted. An END is
+   compared with earlier ENDs only: an operator may end a robot's session, by another clock.
+2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every adapter to each
+   new subscriber, and again when an adapter's network comes back. There an equal stamp is a replay,
+   and a requester's first request counts only if it was sent after our own start. Once a requester
+   has counted, only its own stamps are compared. With `clock_synchronised` every request's age is
+   judged too.
 3. On a topic that is not retained (`adapter_door_requests`) an old request was late or came twice.
-   There an equal stamp counts (who has no clock always sends 0), and so does a requester's first
-   request. A requester that has been silent for FORGOTTEN_S and holds nothing is new again.
-4. During the quiet start of a retained topic a stamp from the future does not count: our clock has
-   not been set yet, and everything replayed looks new.
+   There an equal stamp counts, as a requester without a clock always sends 0. A requester's first
+   request counts. A requester that has been silent for FORGOTTEN_S and holds nothing is new again.
+4. During the quiet start on a retained topic a stamp from the future does not count: our clock may
+   not be set yet, and then every replayed request looks new.
 5. A request that does not count may come from a live requester whose clock is wrong or was set back.
-   It counts once it is repeated, with stamps that rise or are all 0, for longer than a replay takes
-   (retained: REPLAY_S) or a message can be late (LATE_S). After a break of BROKEN_OFF_S, or when a
-   stamp does not rise, that time starts again.
+   It counts once it has been repeated for long enough, with stamps that rise or are all 0. Long
+   enough is longer than a replay lasts (REPLAY_S, retained), or than a message can be late (LATE_S).
+   After a pause of BROKEN_OFF_S, or when a stamp does not rise, that time starts again.
 """
 
 from collections.abc import Collection, Mapping
@@ -32,7 +33,7 @@ from bridges.rmf.definitions import Time
 REPLAY_S: Final = 1.0
 """A replay comes in a burst; a live requester repeats itself at 1 Hz."""
 LATE_S: Final = 10.0
-"""No message is late for so long."""
+"""No message arrives later than this."""
 BROKEN_OFF_S: Final = 3.0
 FUTURE_S: Final = 2.0
 MAX_REQUESTERS: Final = 200
@@ -43,7 +44,7 @@ class Rules(msgspec.Struct, frozen=True):
     """How a topic's requests are judged.
 
     `most_s`: how old a request may be by its stamp. `known_clocks`: a requester that has counted
-    before is judged by its own clock only. `future_s`: how far ahead of us a stamp may be.
+    before is judged by its own stamps only. `future_s`: how far ahead of our clock a stamp may be.
     `retained`: old requests are replayed on this topic.
     """
 
@@ -59,10 +60,12 @@ class Rules(msgspec.Struct, frozen=True):
 
 
 class Requester(msgspec.Struct, frozen=True):
-    """What has been heard of one requester. Stamps are in one unit, by its clock.
+    """What has been heard of one requester. Its stamps are all in one unit, by its clock.
 
-    `newest`, `newest_end`: of what counted. `heard_at`: when that came (s, ours). `doubted`: of what
-    has not counted since `doubted_since`, without a break until `doubted_at` (s, ours).
+    `newest`, `newest_end`: the newest stamp that counted, of all requests and of ENDs. `heard_at`:
+    when a request last counted. `doubted`: the stamp of the last request that did not count;
+    `doubted_since`, `doubted_at`: when its row of repeats began, and when the last of them came.
+    Times ending in `_at` or `_since` are in s by our clock.
     """
 
     newest: float = AGES_AGO
@@ -114,10 +117,11 @@ def hear(
     ends: bool = False,
     holders: Collection[str] = (),
 ) -> tuple[Requesters, str]:
-    """Take one request into the table. Returns it, and why the request does not count ("": it does).
+    """Take one request into the table. Returns the table, and why the request does not count ("" if
+    it does).
 
-    The table has a bound, as anybody can make names up: who was heard least lately makes room, but a
-    holder never does.
+    Anybody can make names up, so the table has a bound: the requester heard longest ago makes room,
+    but never a holder.
     """
     known = {
         name: requester

@@ -1,8 +1,8 @@
-"""What a kind without hardware is to the daemon: topics in, topics out, and the core between them.
+"""How the daemon sees a kind without hardware: topics in, topics out, and the core between them.
 
-A supervisor or coordinator has no driver and no bus. It serves any number of subjects (lifts, doors)
-that it learns of from messages, with one core memory for each. `bridges/<kind>/__init__.py` holds the
-`KIND`; `bridges/serve/graph.py` serves it.
+A supervisor or coordinator has no driver and no bus. It learns from messages which subjects (lifts,
+doors) there are, and keeps one core memory for each. `bridges/<kind>/__init__.py` holds the `KIND`;
+`bridges/serve/graph.py` serves it.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -17,18 +17,18 @@ from bridges.rmf.topics import Topic
 
 @dataclass(frozen=True, slots=True)
 class MaySpeak:
-    """Whether the core may publish: not in the quiet time at start, nor beside a rival."""
+    """Whether the core may publish. It may not during the quiet start or while a rival publishes."""
 
     yes: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Woken:
-    """Nothing but time has passed: it is the core's `wake_at`."""
+    """The core's `wake_at` has come, and nothing was heard."""
 
 
 GraphEvent = Union[MaySpeak, Woken, OperatorReset, E]  # noqa: UP007
-"""Everything that such a core may be told."""
+"""Every event that such a core takes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,26 +38,26 @@ class GraphKind(Generic[S, L, M, E, R]):
     `devices_key`: the YAML's section of its settings. `settings`: the struct that reads it.
     `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
     RequestRefused; `wall` is our clock (s since the epoch).
-    `publishes`: what it sends. `sole`: those of them that one node alone may send; while another
-    does, ours is passive.
-    `device_name`: which subject a message is about. `shown_by`: the topic by which a subject shows
-    itself, None where all is about one; only requests speak of what is made up. `reserved(settings)`:
-    the subjects that the YAML names.
-    `quiet_s(settings)`: how long it listens, alone, before it speaks.
-    `limits(settings)`: what the core is to know of them.
+    `publishes`: the topics that it sends on. `sole`: those on which only one node may send; while
+    another node does, ours only listens.
+    `device_name`: which subject a message is about. `shown_by`: the topic on which a subject publishes
+    its own states, which proves that it exists (a request may name anything); None if there is only
+    one subject. `reserved(settings)`: the subjects that the YAML names.
+    `quiet_s(settings)`: how long it only listens after its start.
+    `limits(settings)`: what the core needs of the settings.
     `initial(subject, started_at)`: a subject's memory; `started_at` is the daemon's start.
-    `decide`: the core; its `publish` leaves stamps to `stamped(message, time)`, at the time of sending.
-    `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`: nothing
-    worth remembering is left of this subject.
+    `decide`: the core. Its messages have no stamps: `stamped(message, time)` adds them when they are
+    sent. `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`:
+    may this subject be forgotten?
     `on_map(settings)`: which settings name a place on RMF's map (`bridges/core/kind.py`).
 
-    For a kind that speaks of all its subjects in one message: `together(memories)`, sent when it has
-    changed and each second. For one whose memory must outlive the daemon: `persist(memories)`, the
-    same bytes while nothing worth keeping has changed, and `restore(kept, settings, now)`, which
-    raises ValueError for bytes that are not that. What is kept is kept before it is told together.
+    For a kind with one message about all its subjects: `together(memories)`, sent each second and
+    whenever it has changed. For a kind whose memory must survive a restart: `persist(memories)`, which
+    gives the same bytes until something worth keeping changes, and `restore(kept, settings, now)`,
+    which raises ValueError for any other bytes. The memory is saved before `together` is sent.
 
-    For one whose settings are more than a few numbers: `described(settings)`, as rows for `check`, and
-    `warnings(settings)`, as (path, text) of what is legal but worth a look.
+    For a kind with more settings than a few numbers: `described(settings)`, rows for `check`, and
+    `warnings(settings)`, (path, text) of what is legal but may be a mistake.
     """
 
     name: str
@@ -86,4 +86,4 @@ class GraphKind(Generic[S, L, M, E, R]):
 
 AnyGraphKind = GraphKind[Any, Any, Any, Any, Any]
 AnyKind = AnyDeviceKind | AnyGraphKind
-"""One that is found by its name."""
+"""A kind that is looked up by its name."""

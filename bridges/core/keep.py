@@ -1,4 +1,4 @@
-"""What a kind keeps across a restart: JSON with a version, read whole or not at all."""
+"""What a kind keeps across a restart: JSON with a version. It is read whole, or refused."""
 
 from typing import Annotated, TypeVar
 
@@ -9,7 +9,7 @@ Text = Annotated[str, Meta(min_length=1)]
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a kind's file holds. `version`: of its fields."""
+    """The content of a kind's file. `version`: the version of its layout."""
 
     version: int
 
@@ -18,7 +18,7 @@ R = TypeVar("R", bound=Record)
 
 
 def read(kept: bytes, record: type[R], version: int, what: str) -> R:
-    """The record in these bytes. ValueError if they are not `what`, of this version."""
+    """The record in these bytes. ValueError if they are not `what` in this version."""
     try:
         found = msgspec.json.decode(kept, type=record)
     except msgspec.MsgspecError as error:

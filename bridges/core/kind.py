@@ -1,8 +1,7 @@
-"""What a kind of device is to the daemon: its topics, and the pure functions of its folder.
+"""How the daemon sees a kind of device: its topics, and the pure functions of its folder.
 
-`bridges/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or doors. A
-`KIND` is written down with its types, so that mypy proves that what the runtime hands from one
-function to the next is what that one takes.
+`bridges/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or doors. Each
+`KIND` states its types, so mypy proves that its functions fit together.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -24,14 +23,14 @@ from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
 
 S = TypeVar("S")
-"""A device's settings; a kind's own, for one without hardware."""
+"""The settings of one device, or of a kind without hardware."""
 L = TypeVar("L")
-"""What the core is to know of them."""
+"""The limits: what the core needs of the settings."""
 E = TypeVar("E")
-"""What requests are to the core, as `accept` gives them."""
+"""The events that `accept` makes of requests."""
 
 DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: UP007
-"""Everything that the core of a device may be told."""
+"""Every event that the core of a device takes."""
 
 Place = tuple[tuple[str, ...], str, str]
 """A setting that names something on RMF's map: its path, what it is (`building_map`), the name."""
@@ -41,19 +40,19 @@ Place = tuple[tuple[str, ...], str, str]
 class Kind(Generic[S, L, M, X, E, O, R]):
     """One kind of device: its settings, limits, memory, sample, requests, outputs and report.
 
-    `devices_key`: the YAML's section of them. `states`: the topic of its state messages.
+    `devices_key`: the YAML's section of the devices. `states`: the topic of their state messages.
     `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
     RequestRefused for a message that is malformed or cannot be asked of this device.
-    `device_name`: which device a message (request or state) is about. `sender`: on whose behalf a
-    request was sent; of several that wait for a scan, only the last of each sender counts.
+    `device_name`: which device a message (request or state) is about. `sender`: for whom a request
+    was sent; if several wait for the next scan, only the last of each sender counts.
     `limits(settings, debounce_s)`: the core's durations, from the device's settings and the wiring
     table's per-signal debounce. `initial(limits, now)`: the core's memory at start.
     `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
     `summary(report)`: key -> value for the log line, the status file and `watch`.
     `published(memory, report)`: the memory after this report has gone out to RMF.
     `alarm_topics(settings)`: what a device publishes beside its states.
-    `on_map(settings)`: which of its settings name a place on RMF's map, as (path, what it is, name);
-    that the device's own name stands there goes without saying.
+    `on_map(settings)`: which of its settings name a place on RMF's map, as (path, what it is, name).
+    The device's own name is checked for every kind.
     """
 
     name: str
@@ -73,4 +72,4 @@ class Kind(Generic[S, L, M, X, E, O, R]):
 
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]
-"""One that is found by its name."""
+"""A kind that is looked up by its name."""

@@ -1,4 +1,4 @@
-"""Texts from the graph have a longest length: anybody can send them, and they are kept."""
+"""The longest texts that are taken from the graph: anybody can send them, and they are stored."""
 
 from typing import Final
 
@@ -6,7 +6,7 @@ from bridges.core.decision import RequestRefused
 
 LONGEST_NAME: Final = 256
 LONGEST_TEXT: Final = 10_000
-"""Of a ChargerState's error_message."""
+"""The longest error_message of a ChargerState."""
 
 
 def check_length(longest: int = LONGEST_NAME, /, **fields: str) -> None:

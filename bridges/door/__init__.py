@@ -1,4 +1,4 @@
-"""Doors: RMF's DoorRequest to a relay or register, and the truth about the door as DoorState."""
+"""Doors: RMF's DoorRequest becomes a relay or register, and the door's inputs become DoorState."""
 
 from bridges.core.kind import Kind
 from bridges.door import core, messages

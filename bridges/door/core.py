@@ -1,22 +1,24 @@
-"""What a door does and says: one pure decision for each event.
+"""The door's decision core: one pure decision for each event.
 
 Rules:
-- OPEN latches the hold, whoever asks and however often. CLOSE releases it after `close_grace_s`. An
-  OPEN cancels that; a repeated CLOSE does not prolong it. (RMF's supervisor, restarted while a robot
-  stands in the doorway, first sends a CLOSE.) Nothing ever drives the door shut. Silence never
-  releases the hold: RMF is silent while a robot passes.
-- From the end of our hold until the door is seen closed, an obstruction switches the hold on again.
-- On a fire alarm the site's `on_fire` counts. `open` holds the door against every CLOSE. `release`
-  switches the hold off, forgets the latch and refuses OPEN. The state is then UNKNOWN: no robot
-  enters a door that is about to close, and RMF's supervisor stops repeating itself.
-- Without a fresh reading the state is OFFLINE and the hold off. The latch is kept, and the hold comes
-  on again with the first good reading.
-- The state is OPEN when the contact of the fully open door says so, and only then. Both contacts:
-  UNKNOWN. Neither: MOVING, and after `travel_s` UNKNOWN. A controller that does not say: UNKNOWN.
-- While another node publishes states under this door's name: OFFLINE and the hold off.
+- OPEN latches the hold, from any requester and any number of times. CLOSE releases it after
+  `close_grace_s`. An OPEN in that time cancels the CLOSE; a repeated CLOSE does not prolong it. (The
+  reason: RMF's supervisor, restarted while a robot stands in the doorway, first sends a CLOSE.)
+- Nothing ever drives the door shut. Silence never releases the hold: RMF is silent while a robot
+  passes.
+- After the hold has ended, and until the door is seen closed, an obstruction switches it on again.
+- In a fire alarm the site's `on_fire` decides. `open` holds the door open, and no CLOSE releases it.
+  `release` switches the hold off, clears the latch and refuses OPEN. The state is then UNKNOWN: no
+  robot enters a door that is about to close, and RMF's supervisor stops repeating its request.
+- Without a fresh reading the state is OFFLINE and the hold is off. The latch is kept, and the hold
+  comes on again with the first good reading.
+- The state is OPEN only if the contact of the fully open door says so. If both contacts are closed it
+  is UNKNOWN. If neither is, it is MOVING, and UNKNOWN after `travel_s`. If the controller does not say
+  where the door is, it is UNKNOWN.
+- While another node publishes states under this door's name, the state is OFFLINE and the hold is off.
 
-Faults only describe; they change no output. Each lasts as long as its cause, so an operator has
-nothing to reset.
+A fault only describes; it changes no output. It lasts as long as its cause, so an operator has nothing
+to reset.
 """
 
 from collections.abc import Iterator
@@ -48,7 +50,7 @@ from bridges.door.signals import CloseRequested, DoorOutputs, Event, OpenRequest
 
 
 def initial(limits: DoorLimits, now: float) -> Memory:
-    """At start: nothing is known, nothing is held."""
+    """At start nothing is known, and the hold is off."""
     return Memory(held_since=now)
 
 
@@ -152,7 +154,7 @@ def _pulse_is_on(memory: Memory, now: float, pulse: Pulse | None) -> bool:
 
 
 def _wakes(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterator[float]:
-    """Each time at which the decision may change though nothing happens."""
+    """Each time at which the decision may change without an event."""
     yield view.changes_at
     yield NEVER if memory.close_at is None else memory.close_at
     yield NEVER if memory.rival_at is None else memory.rival_at + RIVAL_QUIET_S

@@ -11,7 +11,10 @@ from bridges.door.settings import DoorSettings, Durations, Pulse
 
 
 class DoorLimits(msgspec.Struct, frozen=True):
-    """A door's fixed facts as its core needs them. `t`: the durations; `debounce`: s by signal."""
+    """What the core needs of a door's settings. `t`: the durations. `debounce`: signal -> s.
+
+    `estimated`: a missing limit contact is estimated by time.
+    """
 
     t: Durations = Durations()
     debounce: Mapping[str, float] = {}
@@ -21,7 +24,7 @@ class DoorLimits(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, settings: DoorSettings, debounce: Mapping[str, float]) -> "DoorLimits":
-        """From the YAML and the wiring's debounce by signal."""
+        """From the YAML, and from the wiring table's debounce (signal -> s)."""
         return cls(
             settings.limits,
             debounce,
@@ -32,13 +35,14 @@ class DoorLimits(msgspec.Struct, frozen=True):
 
 
 Contact = Settled[bool | None]
-"""One input with its debounce. Where it is not wired, both value and candidate are None."""
+"""One debounced input. If it is not wired, its value and its candidate are None."""
 
 
 class Senses(msgspec.Struct, frozen=True):
-    """Each contact (None: not read yet); when all were last read, and since when without a miss.
+    """Each contact; None before it was first read.
 
-    `lost`, `errors`: the last reading's (`DoorSample`).
+    `read_at`: when all were last read. `linked_since`: since when no read or write has failed; None
+    while one has. `lost`, `errors`: those of the last `DoorSample`.
     """
 
     opened: Contact | None = None
@@ -55,9 +59,9 @@ class Memory(msgspec.Struct, frozen=True):
     """Everything that the next decision needs to know of the past. Times are monotonic seconds.
 
     `latched_at`: since when RMF wants the door open. `close_at`: when a CLOSE releases the hold.
-    `held_since`: since when the hold has been as `held` says. `closing`: our hold has ended and the
-    door has not been seen closed since. `between_since`: since when the door is at neither limit;
-    `shut_since`: since when it is not fully open.
+    `held`: the hold is on; `held_since`: when it was last switched on or off. `closing`: the hold has
+    ended, and the door has not been seen closed since. `between_since`: since when the door is at
+    neither limit. `shut_since`: since when it is not fully open.
     """
 
     latched_at: float | None = None
@@ -78,21 +82,21 @@ def rivalled(memory: Memory, now: float) -> bool:
 
 
 def travel_ends_at(memory: Memory, limits: DoorLimits) -> float:
-    """When a door at neither limit is overdue; a change of the hold starts the time again."""
+    """When a door at neither limit has taken too long; a change of the hold starts the time again."""
     if memory.between_since is None:
         return NEVER
     return max(memory.between_since, memory.held_since) + limits.t.travel_s
 
 
 def opening_ends_at(memory: Memory, limits: DoorLimits) -> float:
-    """When a door that is held should have opened; NEVER for one that is open or not held."""
+    """When a held door should have opened; NEVER if it is open or not held."""
     if memory.shut_since is None or not memory.held:
         return NEVER
     return max(memory.shut_since, memory.held_since) + limits.t.open_timeout_s
 
 
 def too_long_at(memory: Memory, limits: DoorLimits) -> float:
-    """When RMF will have held the door for too long."""
+    """When RMF will have held the door for `max_hold_s`; NEVER if there is no such limit."""
     if memory.latched_at is None or limits.t.max_hold_s is None:
         return NEVER
     return memory.latched_at + limits.t.max_hold_s

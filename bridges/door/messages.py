@@ -1,4 +1,4 @@
-"""RMF's door messages at the edge: which requests can be asked, and the report as a DoorState."""
+"""DoorRequest in, DoorState out. Is a request well formed?"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,10 +12,10 @@ from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorSt
 
 
 def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | CloseRequested:
-    """The event that this request is.
+    """The request as an event. Raises RequestRefused if it is malformed.
 
-    Who asks does not matter to a door, but somebody always does: a request without a requester_id is
-    a half-filled one, and its mode, 0 by default, would mean CLOSE.
+    A door obeys every requester, but a request without a requester_id is refused: its fields were not
+    filled in, and its default mode, 0, would mean CLOSE.
     """
     if not message.requester_id:
         raise RequestRefused("no requester", "requester_id is empty")
@@ -31,11 +31,11 @@ def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | Clos
 
 
 def state_message(name: str, settings: Any, report: DoorReport, stamp: Time) -> DoorState:
-    """What RMF is told. `stamp`: when the door was last read."""
+    """The report as RMF reads it; `stamp` is when the door was last read."""
     return DoorState(door_time=stamp, door_name=name, current_mode=DoorMode(int(report.mode)))
 
 
 def summary(report: DoorReport) -> Mapping[str, str]:
-    """For the log line, the status file and `watch`: RMF's words, without their prefix."""
+    """The report in one line, for the log, the status file and `watch`."""
     words = {"mode": report.mode.name.removeprefix("MODE_"), "hold": "on" if report.hold else "off"}
     return {**words, "feedback": "estimated"} if report.estimated else words

@@ -19,7 +19,7 @@ from bridges.rmf.definitions import DoorModeValue
 
 
 class DoorReport(msgspec.Struct, frozen=True):
-    """What RMF and the status file are told. `hold`: we hold the door open (pulses included).
+    """What RMF and the status file are told. `hold`: we hold the door open, also between pulses.
 
     `estimated`: no contact proves `mode`.
     """
@@ -52,7 +52,7 @@ _PROOFS = {
     DoorModeValue.MODE_CLOSED: frozenset({"closed"}),
     DoorModeValue.MODE_MOVING: frozenset({"opened", "closed"}),
 }
-"""The contacts that a mode rests on."""
+"""The contacts that prove each mode."""
 
 
 def _mode(memory: Memory, view: View, now: float, limits: DoorLimits) -> DoorModeValue:
@@ -72,7 +72,7 @@ def _mode(memory: Memory, view: View, now: float, limits: DoorLimits) -> DoorMod
 
 
 def _faults(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterator[Fault]:
-    """Everything that is wrong now, most serious first. No text has a number that runs."""
+    """Everything that is wrong now, most serious first. No text counts up: a changed text is news."""
     if rivalled(memory, now):
         yield Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes states of this door")
     if not view.fresh:

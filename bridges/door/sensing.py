@@ -1,13 +1,13 @@
 """What to believe of a door's inputs: debounce, age, and estimates where no contact is wired.
 
 Rules:
-- A change counts when it has lasted for its signal's debounce. The end of a fire alarm or an
-  obstruction counts when it has lasted for `hazard_clear_s`. Until such an input has settled for the
+- A change counts once it has lasted for its signal's debounce. The end of a fire alarm or an
+  obstruction counts once it has lasted for `hazard_clear_s`. Until such an input has settled for the
   first time, a single reading of the hazard counts.
 - After `stale_after_s` without a reading, what was believed is forgotten: the door may have moved.
-- A missing limit contact is estimated only when the YAML says so, from the time for which the relay
-  has been on or off. A failed reading or write starts that time again.
-- A controller that does not say where the door is (`lost`) is believed at once.
+- A missing limit contact is estimated only if the YAML says so, from how long the relay has been on
+  or off. A failed read or write starts that time again.
+- If a controller does not say where the door is (`lost`), that counts at once, without debounce.
 """
 
 from collections.abc import Iterator
@@ -27,9 +27,9 @@ HAZARDS = ("obstruction", "fire")
 class View(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
-    `fresh`: they were read lately. `seen`: and each has lasted for its debounce, so that something
-    can be said about where the door is. `estimated`: the ends that no contact proves.
-    `changes_at`: when this may differ though nothing happens (s). `lost`, `errors`: see DoorSample.
+    `fresh`: they were read within `stale_after_s`. `seen`: and each has settled, so the door's position
+    can be told. `estimated`: the limits that no contact proves. `changes_at`: when the view may change
+    without a new reading (s). `lost`, `errors`: see DoorSample.
     """
 
     fresh: bool
@@ -64,7 +64,7 @@ def take(senses: Senses, sample: DoorSample, now: float, limits: DoorLimits) -> 
 
 
 def miss(senses: Senses) -> Senses:
-    """A reading has failed: debounce and the time of the relay start again."""
+    """A read has failed: the debounce and the estimates' time start again."""
     return replace(
         senses,
         opened=forget(senses.opened),
@@ -81,7 +81,7 @@ def is_fresh(senses: Senses, now: float, limits: DoorLimits) -> bool:
 
 
 def look(senses: Senses, held: bool, held_since: float, now: float, limits: DoorLimits) -> View:
-    """What is believed now, the relay having been on (`held`) or off since `held_since`."""
+    """What is believed now. The relay has been on (`held`) or off since `held_since`."""
     opened, closed = _believed(senses.opened), _believed(senses.closed)
     opened_at, closed_at = _estimates(senses, held, held_since, limits)
     guessed = frozenset(s for s in ("opened", "closed") if _unwired(getattr(senses, s)))
@@ -101,12 +101,12 @@ def look(senses: Senses, held: bool, held_since: float, now: float, limits: Door
 
 
 def released_by_fire(view: View, limits: DoorLimits) -> bool:
-    """Has the fire alarm taken the hold away?"""
+    """Has a fire alarm released the hold?"""
     return view.fresh and view.fire and limits.on_fire == "release"
 
 
 def _hold_s(before: Contact | None, seen: bool | None, signal: str, limits: DoorLimits) -> float:
-    """How long `seen` must last: the end of a hazard longer than its beginning."""
+    """How long `seen` must last: longer for the end of a hazard than for its start."""
     hold_s = limits.debounce.get(signal, 0.0)
     clearing = signal in HAZARDS and seen is False and before is not None and before.value
     return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
@@ -125,7 +125,7 @@ def _believed(contact: Contact | None) -> bool:
 
 
 def _feared(contact: Contact | None) -> bool:
-    """Is the hazard there? Before its input has settled, a single reading counts."""
+    """Is the hazard present? Before its input has settled, a single reading counts."""
     if contact is None:
         return False
     return bool(contact.value if _settled(contact) else contact.candidate)
@@ -134,7 +134,7 @@ def _feared(contact: Contact | None) -> bool:
 def _estimates(
     senses: Senses, held: bool, held_since: float, limits: DoorLimits
 ) -> tuple[float, float]:
-    """When a door without contacts is taken to be open, and closed; NEVER where it is not."""
+    """When a door without contacts counts as open, and when as closed; NEVER for "not at all"."""
     if not limits.estimated or senses.linked_since is None:
         return NEVER, NEVER
     since = max(held_since, senses.linked_since)
@@ -143,7 +143,7 @@ def _estimates(
 
 
 def _changes(senses: Senses, limits: DoorLimits, now: float, *estimates: float) -> Iterator[float]:
-    """When the view may change by staleness, an estimate or a contact that settles (s)."""
+    """When a reading goes stale, an estimate becomes due or a contact settles (s)."""
     stale_at = NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
     due = [stale_at, *estimates]
     for signal in SIGNALS:

@@ -1,4 +1,4 @@
-"""The part of a door's YAML that does not depend on how it is wired."""
+"""The part of a door's YAML that does not depend on its wiring."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -15,13 +15,13 @@ PulseSeconds = Annotated[float, Meta(ge=0.05, le=600, extra={"unit": "s"})]
 class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations of a door.
 
-    `stale_after_s`: without a good reading for this long the door is OFFLINE and its hold off.
-    `close_grace_s`: how long a CLOSE waits before the hold is released; an OPEN meanwhile cancels it.
-    `travel_s`: between its limits for longer, the door's position is UNKNOWN.
-    `open_timeout_s`: held for so long and still not open is a fault.
-    `hazard_clear_s`: how long a fire alarm or an obstruction must be away before it counts as over.
+    `stale_after_s`: after so long without a good reading the door is OFFLINE and its hold is off.
+    `close_grace_s`: how long after a CLOSE the hold is released; an OPEN before then cancels the CLOSE.
+    `travel_s`: how long the door may be between its limits; after that its state is UNKNOWN.
+    `open_timeout_s`: how long a held door may take to open; after that a fault is shown.
+    `hazard_clear_s`: how long a fire alarm or an obstruction must be clear before it counts as over.
     `open_delay_s`: with estimated feedback, how long the door takes to open.
-    `max_hold_s`: held by RMF for longer is a fault that is shown; the hold stays.
+    `max_hold_s`: how long RMF may hold the door; after that a fault is shown, and the hold stays.
     """
 
     stale_after_s: StaleAfter = 1.0
@@ -34,10 +34,10 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """For an operator that closes by itself: the relay is triggered again while RMF holds the door.
+    """For a door operator that closes by itself: pulses on the relay while RMF holds the door.
 
-    `on_s`: how long the relay is on.
-    `every_s`: from one trigger to the next.
+    `on_s`: how long each pulse lasts.
+    `every_s`: the time from the start of one pulse to the start of the next.
     """
 
     on_s: PulseSeconds
@@ -45,13 +45,13 @@ class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What RMF and the building agree on about one door.
+    """One door, apart from its wiring.
 
-    `limits`: durations, where the defaults do not suit.
-    `feedback`: `estimated` where a limit contact is missing and the door's times must do; such a
-    state is marked in logs and status, and RMF cannot see the difference.
-    `on_fire`: whether a fire alarm holds the door `open`, or takes the hold away (`release`).
-    `pulse`: re-trigger an operator that closes by itself; absent, the relay stays on.
+    `limits`: durations that differ from the defaults.
+    `feedback`: `estimated` if a limit contact is missing; the door's state is then estimated by time.
+    Logs and status mark an estimate; RMF cannot see the difference.
+    `on_fire`: a fire alarm holds the door open (`open`) or releases the hold (`release`).
+    `pulse`: pulses for a door operator that closes by itself. When absent, the relay stays on.
     """
 
     limits: Durations = Durations()
@@ -60,11 +60,11 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     pulse: Pulse | None = None
 
     def stale_after(self) -> float:
-        """As its limits say."""
+        """Its limits' `stale_after_s`."""
         return self.limits.stale_after_s
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """What the fields cannot say one by one."""
+        """Fields that contradict each other."""
         if self.pulse and self.pulse.on_s >= self.pulse.every_s:
             yield (
                 ("pulse", "on_s"),

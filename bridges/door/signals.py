@@ -1,4 +1,4 @@
-"""What a door's driver and its core say to each other in one scan, and the core's events."""
+"""What passes between a door's driver and its core in one scan, and the core's events."""
 
 import msgspec
 
@@ -9,9 +9,9 @@ class DoorSample(msgspec.Struct, frozen=True):
     """Every input of one door, polarity resolved but not debounced; None where not wired.
 
     `opened`, `closed`: the limit contacts of the fully open and the fully closed door.
-    `obstruction`: somebody or something stands in the doorway. `fire`: the fire alarm's contact.
-    `lost`: why a controller that was asked has not said where the door is; "" when it has.
-    `errors`: what the controller itself says is wrong.
+    `obstruction`: somebody or something is in the doorway. `fire`: the fire alarm's contact.
+    `lost`: why the controller did not say where the door is; "" if it did.
+    `errors`: the faults that the controller itself reports.
     """
 
     opened: bool | None = None
@@ -23,10 +23,10 @@ class DoorSample(msgspec.Struct, frozen=True):
 
 
 class DoorOutputs(msgspec.Struct, frozen=True):
-    """Every output of one door. There is no command to close: that is the operator's own doing.
+    """Every output of one door. There is no command to close: the door operator closes by itself.
 
-    `hold_open`: the relay is on. `between_pulses`: the relay is off because a pulse has had its time,
-    and the door is still held: the next pulse follows.
+    `hold_open`: the relay is on. `between_pulses`: the relay is off until the next pulse, and the door
+    is still held.
     """
 
     hold_open: bool = False

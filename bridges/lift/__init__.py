@@ -1,4 +1,4 @@
-"""Lifts: RMF's LiftRequest to relays, and the truth about the car as LiftState."""
+"""Lifts: RMF's LiftRequest becomes outputs, and the lift's inputs become LiftState."""
 
 from bridges.core.kind import Kind
 from bridges.lift import core, messages

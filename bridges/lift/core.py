@@ -1,23 +1,23 @@
 """The lift's decision core: who holds the lift, what its relays do, and what RMF is told.
 
 Rules, in the order in which they are applied:
-1. While the lift is free, the first request is granted a session, unless an obstacle forbids every
-   output. The session's own requests refresh it; requests of others are refused. A session ends by
-   its own END only, never by a hazard, a fault or a timeout. A session in HUMAN mode has no outputs.
-2. END ends the session at once. AGV mode and the door's hold may stay on for `release_grace_s`. In
-   that time only the same session is granted, even in a fire: a supervisor that restarts sends END
-   for a robot that is still inside, and that robot must get out.
-3. A request sets what is wanted. `bridges/lift/drive.py` says what may be energised.
-4. Obstacles switch every output off and never change the session. They are: fire (and its latch,
-   where an operator must reset it), code blue, earthquake, emergency, out of service, manual mode, a
-   second node for this lift, inputs that cannot be believed, outputs that cannot be written. A gap
-   in reading or writing that is shorter than `stale_after_s` is no obstacle. Overload only delays.
-5. RMF is told OPEN when fresh inputs show the door open, a floor, and the car standing there.
-   - Before OPEN has been published for a session at its destination, its robot is outside. Then
-     OPEN also needs AGV mode and no fault: a robot looks at session, floor and door only, and must
-     not board a lift in a fire.
-   - After that a robot may be inside. The true door is shown in any mode, so that it gets out.
-   - A door whose hold is wanted but not on yet (the relay must rest) is not shown OPEN: it may
+1. While the lift is free, the first request gets a session, unless an obstacle (rule 4) is present.
+   Requests of the same session refresh it; those of other sessions are refused. Only its own END ends
+   a session: no hazard, fault or timeout does. A session in HUMAN mode has no outputs.
+2. END ends the session at once. AGV mode and the door's hold may stay on for `release_grace_s`. During
+   that time only the same session is granted, even in a fire. The reason: a supervisor that restarts
+   sends END for a robot that is still inside, and that robot must get out.
+3. A request sets the destination and the mode. `bridges/lift/drive.py` says what may be energised.
+4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and its
+   latch, if an operator must reset it), code blue, earthquake, emergency, out of service, manual mode,
+   a second node for this lift, inputs that cannot be believed, outputs that cannot be written. A gap
+   in reading or writing shorter than `stale_after_s` is no obstacle. Overload only delays.
+5. RMF is told OPEN when fresh inputs show that the car stands at a known floor with its door open.
+   - Until OPEN has been published at a session's destination, its robot is outside. Then OPEN also
+     needs AGV mode and no fault: a robot looks only at session, floor and door, and must not board a
+     lift in a fire.
+   - After that a robot may be inside. The true door is shown in any mode, so that it can get out.
+   - A door is not shown OPEN while its hold is wanted but the relay must rest first: such a door may
      close by itself while a robot drives through.
 """
 
@@ -58,7 +58,7 @@ NOT_RMFS = frozenset(
 
 
 def initial(limits: LiftLimits, now: float) -> Memory:
-    """Nothing read, nobody in session, everything off."""
+    """Nothing has been read, there is no session, every output is off."""
     return Memory()
 
 
@@ -83,7 +83,7 @@ def decide(
 
 
 def published(memory: Memory, shown: LiftReport) -> Memory:
-    """The memory once this report is out. After OPEN at the destination a robot may be inside."""
+    """The memory once this report is published. After OPEN at the destination a robot may be inside."""
     session = memory.session
     if session is None or shown.open_at != session.destination:
         return memory
@@ -106,7 +106,7 @@ def obstacles(memory: Memory, view: View, now: float, limits: LiftLimits) -> tup
 
 
 def _unwritten_at(memory: Memory, limits: LiftLimits) -> float:
-    """When outputs have not been written for so long that it matters."""
+    """When failed writes become an obstacle; NEVER if the last write succeeded."""
     since = memory.unwritten_since
     return NEVER if since is None else since + limits.t.stale_after_s
 
@@ -114,7 +114,7 @@ def _unwritten_at(memory: Memory, limits: LiftLimits) -> float:
 def _drive(
     memory: Memory, view: View, allowed: bool, now: float, limits: LiftLimits
 ) -> tuple[Memory, LiftOutputs]:
-    """The memory with the next state of the relays; and the outputs that are wanted."""
+    """The memory with the next state of the relays, and the outputs that are wanted."""
     session, grace, relays = memory.session, memory.grace, memory.relays
     outputs = LiftOutputs()
     if session and drive.serves(session, allowed, now, limits):
@@ -184,7 +184,7 @@ def _grant(request: Requested, now: float, boarded: bool) -> Session:
 
 
 def _refresh(session: Session, request: Requested, now: float) -> Session:
-    """A repeat only says that RMF is still there; another destination or mode is a new request."""
+    """A repeat only shows that RMF is alive; another destination or mode is a new request."""
     if (request.agv, request.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
     return _grant(request, now, session.boarded)
@@ -203,11 +203,11 @@ def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tup
 
 
 def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
-    """An operator says that it is safe: latches go, unless their cause may still be there."""
+    """An operator says that it is safe: clear the latches, unless their cause may still be present."""
     session = memory.session
     if session and session.fault:
         session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
-    # A fire that is seen latches again in this decision. Where inputs are stale there may be a fire.
+    # A fire that the inputs show latches again in this decision. Stale inputs may hide a fire.
     unseen = not look(memory.senses, now, limits).fresh
     return replace(
         memory,
@@ -219,7 +219,7 @@ def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
 
 
 def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory:
-    """A fire stays as `fire_reset` says; a rival until it has been silent for RIVAL_QUIET_S."""
+    """Latch a fire as `fire_reset` says. Forget a rival once it has been silent for RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
     manual = limits.fire_reset == "manual"
     rival_at = memory.rival_at

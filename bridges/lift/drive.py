@@ -1,24 +1,25 @@
-"""What the lift's outputs should be: from who holds the lift, what is seen, and what was asked.
+"""Which outputs a session needs, from its request and from what the inputs show.
 
 Rules:
-- Without a session no output is switched on. All are off under an obstacle (`core.py`), for a session
-  in HUMAN mode, while RMF is silent with the robot outside, and while a fault waits for its next try.
-  In the grace after END, AGV mode and the door's hold stay on if they were on; the hold ends
-  `dead_time_s` before AGV mode.
-- AGV mode comes first, then the call to the destination, then, once the car stands there, the door.
-  Where AGV mode is the result of a call (`by_call`), the call comes first, also where the car stands.
-- A call is given only in AGV mode (but for `by_call`), away from the destination, and without
+- Without a session no output is switched on. All outputs are off under an obstacle (`core.py`), for a
+  session in HUMAN mode, while RMF is silent and the robot is outside, and while a fault waits for its
+  next try. In the grace after END, AGV mode and the door's hold stay on if they were on; the hold
+  ends `dead_time_s` before AGV mode.
+- The order is: AGV mode, then the call to the destination, then, once the car stands there, the door's
+  hold. With `by_call` a call brings AGV mode, so the call comes first, even if the car stands there.
+- A call is given only in AGV mode (except with `by_call`), away from the destination, and without
   overload. A door command is given only in AGV mode, while the car stands at the destination's
-  landing. The two are never on together, and neither comes on within `dead_time_s` of the last one.
+  landing. The two are never on together, and neither comes on before both have been off for
+  `dead_time_s`.
 - A call is held until the car stands at its destination, or pulsed. It is given again after every
-  interruption, and when the car had arrived and is seen at another floor. While the floor code is
-  just changing no new call is given: the car may be there.
-- AGV mode, the floor and the open door are each waited for with a timeout. After it the outputs go
-  off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches.
-  AGV mode that ends during the ride is such a fault too; with `by_call` it may end between two
-  destinations, when neither a call nor the hold is on. An overload stops the waiting time.
-- Switching off is immediate. Switching on waits for `min_off_s` and for the relay's cycles of the
-  last minute (`Channel` in `memory.py`).
+  interruption, and when the car had arrived but is then seen at another floor. While the floor code
+  is changing no new call is given: the car may just be arriving.
+- AGV mode, the floor and the open door each have a timeout. When it ends, the outputs go off and a
+  fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches. Losing AGV
+  mode during the ride is such a fault too. With `by_call` AGV mode may end between two destinations,
+  while neither a call nor the hold is on. During an overload no timeout runs.
+- Switching off is immediate. Switching on waits until the relay has been off for `min_off_s`, and is
+  limited to `max_cycles_per_min` (`Channel` in `memory.py`).
 """
 
 from msgspec.structs import replace
@@ -38,7 +39,7 @@ def at_destination(session: Session, view: View, limits: LiftLimits) -> bool:
 
 
 def agv_ok(view: View) -> bool:
-    """AGV mode is on as far as the wiring can tell (True where no status line is wired)."""
+    """Is AGV mode on, as far as the wiring can tell? True if no status line is wired."""
     return view.agv is not False
 
 
@@ -48,22 +49,22 @@ def silent(session: Session, now: float, limits: LiftLimits) -> bool:
 
 
 def serves(session: Session, allowed: bool, now: float, limits: LiftLimits) -> bool:
-    """May anything be energised for this session? `allowed`: nothing forbids it to everybody."""
+    """May anything be energised for this session? `allowed`: there is no obstacle."""
     outside_and_gone = silent(session, now, limits) and not session.boarded
     return allowed and session.agv and not outside_and_gone
 
 
 def paused(session: Session) -> Session:
-    """The session while its outputs are off, but not by a timeout; later its ride starts anew."""
+    """The session with its ride interrupted: it starts anew when outputs are allowed again."""
     return replace(session, agv_seen=False, arrived=False, call_at=None, waiting=None)
 
 
 def advance(
     session: Session, view: View, relays: Relays, now: float, limits: LiftLimits
 ) -> Session:
-    """The session's progress after what is seen: arrivals, waits and retries.
+    """The session after this scan's inputs: arrivals, timeouts and retries.
 
-    `relays`: as they were until now.
+    `relays`: their state before this scan.
     """
     if session.retry_at is not None:
         if now < session.retry_at:
@@ -117,7 +118,7 @@ def let_go_at(grace: Grace, limits: LiftLimits) -> float:
 
 
 def next_at(session: Session, limits: LiftLimits) -> tuple[float, ...]:
-    """When time alone may change what this session wants or shows."""
+    """When time alone may change this session's outputs or report."""
     waits = NEVER if session.waiting is None else session.since + _time_for(session.waiting, limits)
     return (
         session.asked_at + limits.t.request_timeout_s,
@@ -128,16 +129,17 @@ def next_at(session: Session, limits: LiftLimits) -> tuple[float, ...]:
 
 
 def _requested(session: Session, relays: Relays, limits: LiftLimits) -> bool:
-    """Has anything of ours asked for AGV mode until now?"""
+    """Has one of our outputs requested AGV mode until now?"""
     if limits.by_call:
         return session.call_at is not None or relays.hold.on is not None
     return bool(relays.agv.on)
 
 
 def _arrive(session: Session, view: View, limits: LiftLimits) -> Session:
-    """Standing at the destination ends the call. A car that then is seen elsewhere is called again.
+    """A car that stands at the destination ends the call. If it is then seen elsewhere, it is called
+    again.
 
-    A call that has yet to bring AGV mode is not ended by a car that stands there already.
+    With `by_call`, a car that stands there already does not end the call before AGV mode is on.
     """
     if limits.by_call and not agv_ok(view):
         return replace(session, arrived=False)
@@ -172,7 +174,7 @@ def _timeout_fault(session: Session, waiting: Waiting, limits: LiftLimits) -> Fa
 
 
 def _trip(session: Session, fault: Fault, now: float) -> Session:
-    """Outputs off until the next try; after the third retry the fault latches."""
+    """Switch the outputs off until the next try. After the third retry the fault latches."""
     latched = session.tries >= len(RETRY_AFTER_S)
     retry_at = NEVER if latched else now + RETRY_AFTER_S[session.tries]
     return replace(paused(session), tries=session.tries + 1, retry_at=retry_at, fault=fault)

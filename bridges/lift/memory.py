@@ -19,10 +19,10 @@ Waiting = Literal["agv", "floor", "door"]
 
 
 class LiftLimits(msgspec.Struct, frozen=True, dict=True):
-    """A lift's fixed facts as its core needs them.
+    """What the core needs of a lift's settings.
 
     `stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations.
-    `debounce`: s by signal. `by_call`: AGV mode is the result of a call.
+    `debounce`: signal -> s. `by_call`: a call brings AGV mode.
     """
 
     stops: Mapping[str, Stop]
@@ -34,7 +34,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 
     @classmethod
     def of(cls, settings: LiftSettings, debounce: Mapping[str, float]) -> "LiftLimits":
-        """From the YAML and the wiring's debounce (s) by signal."""
+        """From the YAML, and from the wiring table's debounce (signal -> s)."""
         return cls(
             settings.stops(),
             settings.limits,
@@ -55,11 +55,11 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
         return {level: place for place, level in enumerate(landings)}
 
     def floors_between(self, level: str, other: str) -> int:
-        """How many floors a car skips that is seen at one landing and then at the other."""
+        """How many landings lie between these two."""
         return abs(self.levels[level] - self.levels[other]) - 1
 
     def floor_name(self, level: str, preferred: str) -> str:
-        """RMF's name for a landing: `preferred` where that is one, else the first."""
+        """RMF's name for a landing: `preferred` if that is one of its names, else the first."""
         if preferred in self.stops and self.stops[preferred].level == level:
             return preferred
         return next(name for name, stop in self.stops.items() if stop.level == level)
@@ -70,9 +70,10 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 
 
 class Position(msgspec.Struct, frozen=True):
-    """`trusted`: the floor last believed, last seen at `seen_at`; `suspect`: one that cannot be.
+    """Where the car is. `trusted`: the landing last believed, last seen at `seen_at`. `suspect`: one
+    that the floor code shows, but that the car cannot have reached.
 
-    `moved_at`: when the car was last not seen standing.
+    `moved_at`: when a reading last did not show the car standing.
     """
 
     trusted: str | None = None
@@ -82,7 +83,7 @@ class Position(msgspec.Struct, frozen=True):
 
 
 class Senses(msgspec.Struct, frozen=True):
-    """Every input with its debounce, and when all were last read."""
+    """Every input, debounced, and when all were last read."""
 
     read_at: float | None = None
     code: Settled[tuple[str | None, str]] | None = None
@@ -94,12 +95,12 @@ class Senses(msgspec.Struct, frozen=True):
 
 
 class Session(msgspec.Struct, frozen=True):
-    """Who holds the lift, what they asked, and how far we are with it.
+    """Who holds the lift, what was requested, and how far the ride has come.
 
-    `boarded`: an open door at the destination has been published for this session: a robot may be
-    inside. `agv_seen`: AGV mode is on for our request. `arrived`: the car stood at the destination.
-    `call_at`: when the present call began. `waiting`, `since`: what we wait for. `tries`: how often
-    that has failed; `retry_at`: outputs stay off until then (inf: latched).
+    `boarded`: OPEN at the destination has been published for this session, so a robot may be inside.
+    `agv_seen`: AGV mode has come on for our request. `arrived`: the car has stood at the destination.
+    `call_at`: when the present call began. `waiting`, `since`: what we wait for, and since when.
+    `tries`: how often that has failed. `retry_at`: outputs stay off until then (inf: latched).
     """
 
     id: str
@@ -118,14 +119,17 @@ class Session(msgspec.Struct, frozen=True):
 
 
 class Grace(msgspec.Struct, frozen=True):
-    """After END: the session that may come back, until when."""
+    """After END: this session, and only this one, is granted again until `until`."""
 
     session: Session
     until: float
 
 
 class Channel(msgspec.Struct, Generic[T], frozen=True):
-    """One output or one group of exclusive ones: what is on, since when off, recent switchings on."""
+    """One output, or a group of which one at a time may be on.
+
+    `on`: what is on now. `off_at`: when it last went off. `ons`: when it was lately switched on.
+    """
 
     on: T | None = None
     off_at: float = AGES_AGO
@@ -134,7 +138,8 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
     def step(
         self, wanted: T | None, now: float, ready_at: float, limits: LiftLimits
     ) -> "Channel[T]":
-        """The next state: off at once, and on, or changed, only after its rest and `ready_at`."""
+        """The next state. It goes off at once. It comes on, or changes, only after its rest and after
+        `ready_at`."""
         if self.on is not None:
             return self if wanted == self.on else replace(self, on=None, off_at=now)
         if wanted is None or now < self.may_switch_on_at(now, ready_at, limits):
@@ -154,7 +159,7 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
 
 
 class Relays(msgspec.Struct, frozen=True):
-    """Every output with its history. A call and a door command exclude each other in time."""
+    """Every output with its history. A call and a door command are never on together."""
 
     agv: Channel[bool] = Channel()
     call: Channel[str] = Channel()
@@ -188,15 +193,15 @@ class Relays(msgspec.Struct, frozen=True):
         return max(min(due, default=NEVER), math.nextafter(now, NEVER))
 
     def _rested_at(self, limits: LiftLimits) -> float:
-        """When neither call nor door command has been on for `dead_time_s`."""
+        """When call and door command will both have been off for `dead_time_s`."""
         return max(self.call.off_at, self.hold.off_at) + limits.t.dead_time_s
 
 
 class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives a scan.
 
-    `io_fault`: what reading or writing said that has just failed. `unwritten_since`: since when
-    each scan's outputs could not be written; `write_failed`: those of the last scan.
+    `io_fault`: why the last read or write failed; "" if both succeeded. `unwritten_since`: since when
+    writes have failed in every scan. `write_failed`: the last scan's write failed.
     """
 
     senses: Senses = Senses()

@@ -1,4 +1,4 @@
-"""LiftRequest in, LiftState out: is it well formed, and can it be asked of this lift?"""
+"""LiftRequest in, LiftState out. Is a request well formed, and does this lift serve its floor?"""
 
 from collections.abc import Mapping
 
@@ -22,9 +22,9 @@ AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
 
 
 def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
-    """The event that a request is. Raises RequestRefused for what cannot be asked.
+    """The request as an event. Raises RequestRefused if it is malformed or asks for the impossible.
 
-    An END_SESSION is taken whatever its floor and door say: fleet adapters send "" and 0
+    An END_SESSION counts whatever its floor and door are: fleet adapters send "" and 0
     (rmf_fleet_adapter RobotContext.cpp).
     """
     if not request.session_id:
@@ -46,7 +46,7 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
 
 
 def alarm_topics(settings: LiftSettings) -> tuple[Topic[Message], ...]:
-    """Where this lift tells the fleets of a fire, if it does."""
+    """The topic on which this lift tells the fleets of a fire; empty if it does not."""
     return tuple(t for t in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL) if t.name == settings.alarm)
 
 
@@ -72,7 +72,7 @@ def state_message(name: str, settings: LiftSettings, report: LiftReport, stamp: 
 
 
 def summary(report: LiftReport) -> Mapping[str, str]:
-    """What a person wants to read of it, in a line."""
+    """The report in one line, for a person."""
     door = report.door.name.removeprefix("DOOR_").lower()
     return {
         "mode": report.mode.name.removeprefix("MODE_"),

@@ -1,4 +1,4 @@
-"""What RMF is told about a lift: LiftState's content, from what is believed and who holds it."""
+"""What RMF is told about a lift: the content of LiftState."""
 
 from typing import Any
 
@@ -12,13 +12,14 @@ from bridges.rmf.definitions import LiftDoor, LiftMode, LiftMotion
 
 NOT_FRESH = "INPUTS_NOT_FRESH"
 OFFLINE = frozenset({"OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})
-"""With one of these faults, or without inputs to believe, the lift is shown OFFLINE."""
+"""With one of these faults, or without fresh inputs, the lift is shown OFFLINE."""
 
 
 class LiftReport(msgspec.Struct, frozen=True):
-    """LiftState without its name, floors and stamp, and what the status file says beside it.
+    """LiftState without its name, floors and stamp, and what only the status file shows.
 
     `floor`: RMF's name, "" when unknown. `read_at`: monotonic seconds, None before the first reading.
+    `estimated`: no contact proves what `door` shows.
     """
 
     read_at: float | None
@@ -37,7 +38,7 @@ class LiftReport(msgspec.Struct, frozen=True):
         return self.floor if self.door is LiftDoor.DOOR_OPEN else ""
 
     def news(self) -> Any:
-        """All but the age and the details of faults, which may differ with each reading."""
+        """All but the age and the faults' details, which may change with each reading."""
         shown = (self.floor, self.destination, self.door, self.motion, self.mode, self.session)
         return *shown, self.estimated, tuple(fault.code for fault in self.faults)
 
@@ -49,7 +50,7 @@ def report(
     faults: tuple[Fault, ...],
     limits: LiftLimits,
 ) -> LiftReport:
-    """The state as it is shown now. `wanted`: the outputs if no relay needed a rest."""
+    """The state as it is shown now. `wanted`: the outputs that would be on if no relay had to rest."""
     session, relays = memory.session, memory.relays
     destination = session.destination if session else ""
     floor = limits.floor_name(view.level, destination) if view.fresh and view.level else ""
@@ -77,11 +78,11 @@ def _may_enter(
     relays: Relays,
     faults: tuple[Fault, ...],
 ) -> bool:
-    """Is an open door shown as open? A robot that sees it drives through.
+    """May an open door be shown as OPEN? A robot that sees OPEN drives through.
 
-    Not while the door is to be held and its relay still rests: it may stand open for its own dwell
-    time, and would then close on the robot. And for a session that has not boarded, only in AGV mode
-    with nothing wrong.
+    Not while the hold is wanted and its relay must rest: the door stands open only for its own dwell
+    time, and would then close on the robot. For a session that has not boarded, only in AGV mode and
+    without a fault.
     """
     if wanted.hold_door is not None and relays.hold.on is None:
         return False
@@ -91,7 +92,7 @@ def _may_enter(
 
 
 def _mode(view: View, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:
-    """Where no AGV mode status is wired, our own request stands in for it."""
+    """RMF's mode. If no AGV mode status is wired, our own request for it counts as the status."""
     codes = {fault.code for fault in faults}
     if codes & {"FIRE", "FIRE_LATCHED"}:
         return LiftMode.MODE_FIRE
@@ -108,9 +109,9 @@ def _mode(view: View, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:
 def _door(
     session: Session | None, view: View, floor: str, limits: LiftLimits
 ) -> tuple[LiftDoor, bool]:
-    """The door as it is seen, and whether that rests on an estimate.
+    """The door as the inputs show it, and whether that is an estimate.
 
-    With a session at a known floor only the door that serves that floor counts.
+    With a session and a known floor, only the door that serves that floor counts.
     """
     if not view.fresh:
         return LiftDoor.DOOR_MOVING, False
@@ -128,7 +129,7 @@ def _door(
 
 
 def _motion(view: View, door: LiftDoor) -> LiftMotion:
-    """From the motion lines; without them a car with an open door at a floor stands."""
+    """From the motion lines. Without them, a car with an open door at a floor is stopped."""
     if not view.fresh:
         return LiftMotion.MOTION_UNKNOWN
     if view.motion is None:

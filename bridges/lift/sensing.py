@@ -1,21 +1,21 @@
 """What to believe of a lift's inputs: debounce, age, and whether they can be true together.
 
 Rules:
-- A change counts when it has lasted for its signal's debounce. The end of a hazard counts when it has
-  lasted for `hazard_clear_s`. No input is believed before every input has settled once, nor while
-  one of them keeps changing for longer than `RESTLESS_S`. That they settle for the first time is no
-  fault.
-- After `stale_after_s` without a reading, what was believed is forgotten: the lift may be anywhere.
-  A shorter gap changes nothing, but the debounce of a change that had begun starts again.
-- A floor code is believed only if the car can have come to that floor. It cannot if the code skips
+- A change counts once it has lasted for its signal's debounce. The end of a hazard counts once it has
+  lasted for `hazard_clear_s`. No input is believed before every input has settled once, or while any
+  input has kept changing for longer than `RESTLESS_S`. The time that inputs take to settle after the
+  start is no fault.
+- After `stale_after_s` without a reading, what was believed is forgotten: the car may be anywhere.
+  After a shorter gap the values stay, and a debounce that had begun starts again.
+- A floor code is believed only if the car can have reached that floor. It cannot if the code skips
   floors faster than a car travels, or (with motion lines) changes while the car stands. Then the
-  position is unknown until the code shows the last good floor or another one that can be true, or
-  until an operator resets.
-- While the floor code means nothing (`valid_when`, for longer than its debounce) the car may go
-  anywhere unseen. The next floor that it shows is believed.
-- A door is open when the contact that proves it says so. With one contact the other end is estimated
-  by the door's travel time, and marked.
-- A car stands when the motion lines say so; without motion lines it is taken to stand.
+  position is unknown until the code shows the last trusted floor, or one that the car can have
+  reached, or until an operator resets.
+- While the floor code is not valid (`valid_when`) for longer than its debounce, the car may go
+  anywhere unseen. The next floor that the code shows is believed.
+- A door is open when the contact that proves it says so. With only one contact the other end position
+  is estimated from the door's travel time, and marked as an estimate.
+- A car stands when the motion lines say so. Without motion lines it is taken to stand.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,14 +33,14 @@ from bridges.lift.signals import Door, Hazard, LiftSample, Motion, Side
 HAZARDS = tuple(Hazard)
 
 MOTION_MEMORY_S = 2.0
-"""For so long after the car was last seen moving, a new floor code can be true."""
+"""How long after the car was last seen moving a new floor code is still possible."""
 
 RESTLESS_S = 2.0
 """An input that does not settle within this time keeps changing: a loose wire, or interference."""
 
 
 class DoorSeen(msgspec.Struct, frozen=True):
-    """One door: is it open, is it closed (neither: moving), and is that an estimate?"""
+    """One door: open, closed or moving (neither). `settles_at`: when an estimate will be ready (s)."""
 
     open: bool
     closed: bool
@@ -51,10 +51,10 @@ class DoorSeen(msgspec.Struct, frozen=True):
 class View(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
-    `blind`: why no input can be believed, "" when all are fresh; `settling`: only because they are
-    read for the first time. `level`: the landing, None when
-    unknown; `level_settles`: the code is just changing. `agv`: None where not wired. `changes_at`:
-    when the view may change without a new reading (s).
+    `blind`: why no input can be believed, "" when all can. `settling`: the only reason is that they
+    have not settled since the start. `level`: the landing, None when unknown. `level_settles`: the
+    floor code is changing. `agv`: None where not wired. `changes_at`: when the view may change
+    without a new reading (s).
     """
 
     blind: str
@@ -106,7 +106,7 @@ def take(senses: Senses, sample: LiftSample, now: float, limits: LiftLimits) -> 
 
 
 def gap(senses: Senses, now: float) -> Senses:
-    """A reading has failed: debounce starts again, and the car may have moved."""
+    """A read has failed: the debounce starts again, and the car may have moved."""
     return Senses(
         senses.read_at,
         forget(senses.code),
@@ -119,7 +119,7 @@ def gap(senses: Senses, now: float) -> Senses:
 
 
 def unsure(senses: Senses, now: float) -> Senses:
-    """After a long time without a reading: nothing is believed but where the car was."""
+    """After a long time without a reading: forget everything but the last landing."""
     return Senses(position=replace(senses.position, moved_at=now))
 
 
@@ -174,7 +174,7 @@ def _settle_hazard(
 def _hazard_hold_s(
     before: Settled[bool] | None, hazard: Hazard, seen: bool, limits: LiftLimits
 ) -> float:
-    """How long the reading must last: the end of a hazard longer than its beginning."""
+    """How long the reading must last: longer for the end of a hazard than for its start."""
     hold_s = limits.debounce_s(hazard)
     clearing = before is not None and bool(before.value) and not seen
     return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
@@ -187,7 +187,7 @@ def _locate(
     now: float,
     limits: LiftLimits,
 ) -> Position:
-    """Follow the car from floor to floor; a floor where it cannot have gone is only suspected."""
+    """Follow the car from floor to floor. A floor that it cannot have reached is only suspected."""
     if sample.motion is not Motion.STOPPED:
         before = replace(before, moved_at=now)
     level = code.value[0] if code.value else None
@@ -211,7 +211,7 @@ def _can_have_come(before: Position, level: str, now: float, limits: LiftLimits)
 
 
 def _stands(motion: Settled[Motion | None] | None) -> bool:
-    """Does the car stand? Before the motion lines have settled, a first reading of movement counts."""
+    """Does the car stand? Until the motion lines have settled, the first reading decides."""
     if motion is None:
         return False
     return (motion.candidate if motion.value is None else motion.value) in (None, Motion.STOPPED)
@@ -234,7 +234,7 @@ def _door(seen: Settled[Door | None] | None, now: float, limits: LiftLimits) -> 
 
 
 class Unsettled(msgspec.Struct, frozen=True):
-    """An input that is changing or has never settled (`new`).
+    """An input that is changing, or has never settled (`new`).
 
     `due_at`: when it settles if it does not change again. `torn_at`: when it counts as restless. In s.
     """
@@ -281,7 +281,7 @@ def _blind(senses: Senses, unsettled: Sequence[Unsettled], now: float, limits: L
 
 
 def _settling(unsettled: Sequence[Unsettled], now: float) -> bool:
-    """Is each input read for the first time, and has had no time to settle?"""
+    """Has an input not settled since the start, and is none restless?"""
     first = any(wait.new for wait in unsettled)
     return first and not any(now >= wait.torn_at for wait in unsettled)
 

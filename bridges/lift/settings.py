@@ -1,4 +1,4 @@
-"""The part of a lift's YAML that does not depend on how it is wired."""
+"""The part of a lift's YAML that does not depend on its wiring."""
 
 from collections.abc import Mapping
 from typing import Annotated, Literal
@@ -13,9 +13,9 @@ from bridges.settings.building_map import FLOOR
 
 
 class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A floor that differs from its landing's name, or is served by the car's rear door.
+    """A floor whose landing has another name, or that the car's rear door serves.
 
-    `level`: the landing as the floor code table names it; the floor's own name when absent.
+    `level`: the landing's name in the floor code table; the floor's own name when absent.
     `side`: which of the car's doors opens there.
     """
 
@@ -26,19 +26,22 @@ class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations and counts of a lift.
 
-    `stale_after_s`: without a good reading, or without a good write, for this long the lift is
-    OFFLINE and its outputs off.
-    `release_grace_s`: how long AGV mode and the door are still held after END, for the same session.
-    `agv_timeout_s`, `floor_timeout_s`, `door_timeout_s`: AGV mode not granted, floor not reached,
-    door not open: outputs off and a fault; tried again after 10, 30 and 60 s, then latched.
-    `request_timeout_s`: RMF repeats requests at 1 Hz; after this silence the outputs go off unless a
-    robot may be inside, and a fault is shown.
-    `hazard_clear_s`: how long a hazard input must be clear before the lift is RMF's again.
-    `door_travel_s`: with one door contact, how long the door may take to its other end.
-    `floor_travel_min_s`: the least time from one floor to the next; a faster jump is no position.
-    `call_pulse_s`: a call is pulsed for so long; held until arrival when absent.
-    `dead_time_s`: between two calls, two doors' commands, and a call and a door command.
-    `min_off_s`, `max_cycles_per_min`: spare the relays; they delay switching on, never off.
+    `stale_after_s`: after so long without a good reading, or without a good write, the lift is OFFLINE
+    and its outputs are off.
+    `release_grace_s`: how long AGV mode and the door's hold stay on after END, for the same session.
+    `agv_timeout_s`, `floor_timeout_s`, `door_timeout_s`: how long AGV mode, the floor and the open
+    door may take. Then the outputs go off and a fault is shown. Retries follow after 10, 30 and 60 s;
+    then the fault latches.
+    `request_timeout_s`: how long RMF may be silent (it repeats requests at 1 Hz). Then a fault is
+    shown, and the outputs go off unless a robot may be inside.
+    `hazard_clear_s`: how long a hazard input must be clear before RMF may use the lift again.
+    `door_travel_s`: with one door contact, how long the door takes to its other end position.
+    `floor_travel_min_s`: the least time from one floor to the next. A faster change of the floor code
+    is not believed.
+    `call_pulse_s`: how long a call is pulsed; held until arrival when absent.
+    `dead_time_s`: the pause between two calls, between the commands of two doors, and between a call
+    and a door command.
+    `min_off_s`, `max_cycles_per_min`: spare the relays. They delay switching on, never off.
     """
 
     stale_after_s: Period = 1.0
@@ -57,16 +60,16 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What RMF and the building agree on about one lift.
+    """One lift, apart from its wiring.
 
-    `floors`: as RMF's map names them, from the lowest up; a mapping where a floor has another name
-    than its landing, or `side: rear`.
-    `agv_mode`: how it comes: `requested` by an output that is held, or `by_call`: a call brings it,
-    and it stays while the call is served and the door is held.
-    `limits`: durations and counts, where the defaults do not suit.
-    `fire_reset`: whether the lift is RMF's again when the alarm clears (`auto`), or only after
+    `floors`: their names on RMF's map, from the lowest up. Write a mapping if a floor's landing has
+    another name, or if the rear door serves it.
+    `agv_mode`: how AGV mode is switched on. `requested`: by an output that is held. `by_call`: by a
+    call; it stays on while the call is served and the door is held.
+    `limits`: durations and counts that differ from the defaults.
+    `fire_reset`: RMF may use the lift again when the alarm clears (`auto`), or only after
     `rmf-bridge reset` (`manual`).
-    `alarm`: tell the fleets of a fire on this topic; `none` unless the site has decided so.
+    `alarm`: the topic on which the fleets are told of a fire. `none` unless the site wants that.
     """
 
     floors: list[Name] | dict[Name, Floor]
@@ -76,11 +79,11 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
 
     def stale_after(self) -> float:
-        """As its limits say."""
+        """Its limits' `stale_after_s`."""
         return self.limits.stale_after_s
 
     def on_map(self) -> list[Place]:
-        """RMF's map has these floors too."""
+        """The floors, which RMF's map must name too."""
         if isinstance(self.floors, list):
             return [(("floors", str(i)), FLOOR, name) for i, name in enumerate(self.floors)]
         return [(("floors", name), FLOOR, name) for name in self.floors]

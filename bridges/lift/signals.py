@@ -1,4 +1,4 @@
-"""What a lift's driver and its core say to each other in one scan, and the core's events."""
+"""What passes between a lift's driver and its core in one scan, and the core's events."""
 
 from enum import Enum, StrEnum
 
@@ -11,8 +11,8 @@ class Door(Enum):
     """What the door contacts say at one instant.
 
     With two contacts: OPEN, CLOSED, BETWEEN (neither) or BOTH (a fault). With one that proves open:
-    OPEN or NOT_OPEN. With one that proves closed: CLOSED or NOT_CLOSED. Where the door is a number,
-    one that means nothing is UNKNOWN (a fault).
+    OPEN or NOT_OPEN. With one that proves closed: CLOSED or NOT_CLOSED. If the door is read as a
+    number, a number that the YAML does not list is UNKNOWN (a fault).
     """
 
     OPEN = "open"
@@ -25,7 +25,7 @@ class Door(Enum):
 
 
 class Motion(Enum):
-    """What the motion lines say; CONTRADICTORY is a code that cannot be (up and down at once)."""
+    """What the motion lines say. CONTRADICTORY: they cannot all be true (up and down at once)."""
 
     STOPPED = "stopped"
     UP = "up"
@@ -50,9 +50,9 @@ class LiftSample(msgspec.Struct, frozen=True):
     """Every input of one lift, decoded but not debounced.
 
     `level`: the landing that the floor code names, None for no code (between floors).
-    `code_fault`: "" or why the code cannot be (illegal, two of one-hot, parity). `floor_valid`: the
-    code means something now; while it does not, the car may go anywhere unseen.
-    `motion`, `agv`, `rear_door`: None where not wired; `agv` None also while its line means nothing.
+    `code_fault`: why the code is illegal (not listed, two of one-hot, parity), "" if it is not.
+    `floor_valid`: the code is valid now; while it is not, the car may go anywhere unseen.
+    `motion`, `agv`, `rear_door`: None where not wired. `agv` is also None while its line is not valid.
     """
 
     level: str | None
@@ -73,7 +73,7 @@ class Side(Enum):
 
 
 class Stop(msgspec.Struct, frozen=True):
-    """One of RMF's floors of this lift: the landing that the floor code names, and the car's door."""
+    """One of this lift's floors: the landing that the floor code names, and the door that serves it."""
 
     level: str
     side: Side = Side.FRONT
@@ -82,7 +82,7 @@ class Stop(msgspec.Struct, frozen=True):
 class LiftOutputs(msgspec.Struct, frozen=True):
     """Every output of one lift. The default is all off.
 
-    `call`: the level (landing) whose call is asserted. `hold_door`: the door whose open command is.
+    `call`: the landing whose call is energised. `hold_door`: the door whose open command is.
     """
 
     agv_request: bool = False
@@ -91,7 +91,7 @@ class LiftOutputs(msgspec.Struct, frozen=True):
 
 
 class Requested(msgspec.Struct, frozen=True):
-    """A LiftRequest for AGV or HUMAN mode that is ours, well formed and for a floor we serve."""
+    """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and a floor that it serves."""
 
     session_id: str
     agv: bool

@@ -1,4 +1,4 @@
-"""The lift supervisor: in the place of RMF's own, between fleet adapters and any number of lifts."""
+"""The lift supervisor: replaces RMF's own, between the fleet adapters and any number of lifts."""
 
 from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind

@@ -1,26 +1,28 @@
-"""The lift supervisor's core, for one lift: who is to have it, and what its node is told.
+"""The lift supervisor's core, for one lift: which session gets it, and what the lift's node is sent.
 
-It stands in for RMF's own (rmf_ros2, lift_supervisor/Node.cpp): fleet adapters ask on
-`adapter_lift_requests`, one session at a time is passed on to the lift's node on `lift_requests`,
-until the lift's states show that it has been obeyed. `bridges/core/freshness.py` says which requests
-count. Rules:
-1. Sessions are served in the order of their first requests. A session leaves the queue by END, or when
-   it has been silent for `silent_after_s`. While the lift itself is silent this time stands still:
-   adapters repeat their requests only when its states come.
-2. The lift's states say which session has it. That session goes before the queue if its robot asks
-   for it. If nobody has asked for it for `orphan_after_s`, it is ended.
-3. One session at a time has its turn. Its request is sent when it is new or changed. It is sent again
-   when the state does not show what was asked, and when the adapter has repeated it (the node takes
-   our silence for RMF's). It is never sent while the lift shows another session.
-4. A turn ends by END. Either the holder sends it, wherever the lift is and in whatever mode. Or we do:
-   for a holder that is silent and was never accepted by the lift, and after `holder_ttl_s` where the
-   site wants that. END is repeated until a later state shows another session, or none. Only then is
-   the next session served.
-5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the queue stands
-   still. END is passed on, and so is HUMAN mode, which asks for nothing.
-6. Until it may speak, and beside another supervisor, it only listens. It then starts from what the
-   states show and who has asked, so a restart ends no ride.
-7. Nothing is sent twice within GAP_S, and nothing again, unchanged, within REPEAT_S.
+It replaces RMF's own (rmf_ros2, lift_supervisor/Node.cpp). Fleet adapters send their requests on
+`adapter_lift_requests`. The supervisor passes on those of one session at a time to the lift's node,
+on `lift_requests`, until the lift's states show that they were obeyed. `bridges/core/freshness.py`
+says which requests count. Rules:
+1. Sessions are served in the order of their first requests. A session leaves the queue by END, or
+   after `silent_after_s` without a request. While the lift is silent this time does not run, as
+   adapters repeat their requests only when the lift's states come.
+2. The lift's states say which session has the lift. That session goes before the queue if its robot
+   still requests it. If nobody has requested it for `orphan_after_s`, the supervisor ends it.
+3. One session at a time has its turn. Its request is sent when it is new or has changed. It is
+   repeated when the lift's state does not show what was requested, and when the adapter has repeated
+   it (else the lift's node would take RMF to be silent). It is never sent while the lift shows another
+   session.
+4. A turn ends by END. Usually the holder sends it, wherever the lift is and in any mode. The
+   supervisor sends it for a silent holder that the lift has never accepted, and after `holder_ttl_s`
+   if the site has set that. END is repeated until a later state shows another session, or none. Only
+   then is the next session served.
+5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the queue waits.
+   END is passed on. So is HUMAN mode, which calls no robot to the lift.
+6. During the quiet start, and while another supervisor publishes, it only listens. Then it starts from
+   the lift's states and from the requests it has heard, so a restart ends no ride.
+7. Two messages are at least GAP_S apart, and a message is repeated unchanged after REPEAT_S at the
+   earliest.
 """
 
 import math
@@ -47,15 +49,15 @@ Decided = Decision[Memory, None, SupervisorReport]
 
 
 def initial(lift: str, started_at: float) -> Memory:
-    """Nobody was heard of; we may not speak yet."""
+    """Nothing has been heard, and we may not publish yet."""
     return Memory(lift, started_at)
 
 
 def idle(memory: Memory, now: float) -> bool:
-    """Nobody wants this lift, and nothing has been heard of it in a while.
+    """May this lift be forgotten? No session requests it, and it has been silent for a while.
 
-    A session that is still to be ended is found again in the lift's states, if they come back. Who
-    only waits for a lift that has been silent for long asks again when it is back.
+    If the lift comes back, its states show again a session that is still to be ended. A robot that
+    only waits for a lift is forgotten after a longer time; it requests again when the lift is back.
     """
     heard_at = max(memory.heard_at, memory.shown_at)
     has_it = memory.session_shown or (memory.turn and memory.turn.seen)
@@ -64,7 +66,7 @@ def idle(memory: Memory, now: float) -> bool:
 
 
 def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
-    """Take the event in, see whose turn it is, and send what is due: one message at the most."""
+    """Take the event in, decide whose turn it is, and send what is due: at most one message."""
     memory, refused = _take(memory, event, now, limits)
     memory = _forget_silent(memory, now, limits)
     memory = _take_turns(memory, now, limits)
@@ -106,7 +108,7 @@ def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Mem
 def _listen(
     memory: Memory, event: Requested | Ended, now: float, limits: Limits
 ) -> tuple[Memory, str]:
-    """Does it count?"""
+    """Does this request count?"""
     requesters, refused = hear(
         memory.requesters,
         event.session,
@@ -121,7 +123,7 @@ def _listen(
 
 
 def _ask(memory: Memory, request: Requested, now: float) -> tuple[Memory, str]:
-    """Join the queue, or say the same or something else from one's place in it."""
+    """Enter the queue, or repeat or change the request without losing the place in it."""
     before = memory.claim(request.session)
     served = memory.shown.floors if memory.shown else ()
     if served and request.target.request_type == AGV and request.target.floor not in served:
@@ -136,7 +138,7 @@ def _ask(memory: Memory, request: Requested, now: float) -> tuple[Memory, str]:
 
 
 def _still_there(memory: Memory, before: Claim | None, now: float) -> Memory:
-    """A request that cannot be obeyed still shows that its requester is there."""
+    """A request that cannot be obeyed still shows that its requester is alive."""
     return memory if before is None else _with(memory, before, replace(before, heard_at=now))
 
 
@@ -147,7 +149,7 @@ def _with(memory: Memory, before: Claim | None, claim: Claim) -> Memory:
 
 
 def _end(memory: Memory, session: str, now: float) -> Memory:
-    """It wants the lift no more; if it has it, or its turn, the node is told so."""
+    """The session leaves the queue. If it has the lift or its turn, the node is sent END."""
     memory = _without(memory, session)
     turn = memory.turn
     has_it = session in (memory.session_shown, turn.session if turn else "")
@@ -161,7 +163,7 @@ def _without(memory: Memory, session: str) -> Memory:
 
 
 def _see(memory: Memory, shown: StateHeard, now: float) -> Memory:
-    """A state: it may confirm an END, ask for a repeat, or show somebody else's session."""
+    """A state: it may confirm an END, call for a repeat, or show another session."""
     flowed = now <= memory.shown_at + SILENT_S
     same = flowed and shown.session == memory.session_shown
     turn, prompted = memory.turn, memory.prompted
@@ -185,7 +187,7 @@ def _see(memory: Memory, shown: StateHeard, now: float) -> Memory:
 
 
 def _speak(memory: Memory, yes: bool) -> Memory:
-    """While we may not speak nobody has a turn; later the lift's states show who has the lift."""
+    """While we may not publish nobody has a turn. Later the lift's states show who has the lift."""
     return replace(memory, may_speak=yes, turn=memory.turn if yes else None)
 
 
@@ -193,7 +195,7 @@ def _speak(memory: Memory, yes: bool) -> Memory:
 
 
 def _forget_silent(memory: Memory, now: float, limits: Limits) -> Memory:
-    """Drop the claims of sessions that wait and are silent; a holder leaves by END only."""
+    """Drop the claims of silent sessions that wait. A holder leaves by END only."""
     holder = memory.turn.session if memory.turn and not memory.turn.ends else ""
     staying = tuple(
         claim
@@ -221,7 +223,7 @@ def _take_turns(memory: Memory, now: float, limits: Limits) -> Memory:
 
 
 def _obey_the_lift(memory: Memory, shown: str, now: float, limits: Limits) -> Memory:
-    """The lift shows a session that has no turn: after our restart, or by a request not from us."""
+    """The lift shows a session without a turn: after our restart, or after another node's request."""
     if memory.claim(shown):
         return _begin(memory, Turn(shown, now, seen=True))
     if memory.shown_at >= memory.session_since + limits.orphan_after_s:
@@ -230,7 +232,8 @@ def _obey_the_lift(memory: Memory, shown: str, now: float, limits: Limits) -> Me
 
 
 def _let_go(memory: Memory, turn: Turn, now: float, limits: Limits) -> Memory:
-    """End the turn of a silent holder: soon if the lift never took it, else after `holder_ttl_s`."""
+    """End a silent holder's turn: after `silent_after_s` if the lift never took it, else after
+    `holder_ttl_s`."""
     claim = memory.claim(turn.session)
     assert claim is not None
     after_s = limits.holder_ttl_s if turn.seen else limits.silent_after_s
@@ -243,7 +246,7 @@ def _let_go(memory: Memory, turn: Turn, now: float, limits: Limits) -> Memory:
 
 
 def wanted(memory: Memory) -> LiftRequest | None:
-    """What the lift's node should have been told, without its stamp."""
+    """The request that the lift's node should have now, without its stamp."""
     turn = memory.turn
     if turn is None:
         return None
@@ -266,16 +269,16 @@ def wanted(memory: Memory) -> LiftRequest | None:
 
 
 def _due_at(memory: Memory, message: LiftRequest | None) -> float:
-    """When to send it. A repeated END may name another floor: that does not make it new."""
+    """When to send this request. An END that names another floor is a repeat, not a new one."""
     if message is None:
         return NEVER
     new = memory.sent is None or (message != memory.sent and message.request_type != END)
-    said = memory.sent is None and message == memory.last_sent  # in another turn, the same words
+    said = memory.sent is None and message == memory.last_sent  # the same, in an earlier turn
     return due_at(memory.sent_at, new=new and not said, again=memory.prompted or said)
 
 
 def _wake_at(memory: Memory, due: list[float], now: float, limits: Limits) -> float:
-    """When the decision may change though nothing is heard."""
+    """When the decision may change without an event."""
     if memory.shown is not None and memory.flows(now):
         due.append(math.nextafter(memory.shown_at + SILENT_S, NEVER))
     for claim in memory.claims:

@@ -11,7 +11,7 @@ from bridges.lift_supervisor.signals import StateHeard, Target
 from bridges.rmf.definitions import LiftMode, LiftRequest
 
 NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.MODE_OFFLINE)
-"""Modes in which a lift is not RMF's to send robots to."""
+"""The modes in which no robot is sent to a lift."""
 
 
 class Limits(msgspec.Struct, frozen=True):
@@ -39,7 +39,7 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 class Claim(msgspec.Struct, frozen=True):
-    """A session that wants the lift: what it last asked, since when it asks, and when it last did."""
+    """A session that wants the lift: its last request, and when its first and last requests came."""
 
     session: str
     target: Target
@@ -48,7 +48,7 @@ class Claim(msgspec.Struct, frozen=True):
 
 
 class Turn(msgspec.Struct, frozen=True):
-    """The session that we speak for. `ends`: we send its END. `seen`: the lift has shown it."""
+    """The session whose request we pass on. `ends`: we send its END. `seen`: the lift has shown it."""
 
     session: str
     since: float
@@ -59,10 +59,11 @@ class Turn(msgspec.Struct, frozen=True):
 class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
-    `claims`: in the order of first requests, the holder's among them. `heard_at`: when an adapter was
-    last heard; `requesters`: what of each. `shown`: the latest state, which came at `shown_at`;
-    `session_since`: since when its session is shown; `flowing_since`: since when states come without
-    a gap. `sent`: the last request of this turn, `last_sent` of any; `prompted`: it is worth repeating.
+    `claims`: in the order of first requests, with the holder's. `heard_at`: when an adapter was last
+    heard. `requesters`: what was heard of each. `shown`: the latest state, which came at `shown_at`;
+    `session_since`: since when it shows this session. `flowing_since`: since when states come without
+    a gap. `sent`: the last request of this turn; `last_sent`: of any turn, at `sent_at`. `prompted`:
+    something calls for a repeat.
     """
 
     lift: str
@@ -96,11 +97,11 @@ class Memory(msgspec.Struct, frozen=True):
         return self.shown is not None and self.shown.mode in NOBODY_IS_SENT
 
     def flows(self, now: float) -> bool:
-        """Do the lift's states come? Before the first one, nothing is waited for."""
+        """Do the lift's states come? True before the first one."""
         return self.shown is None or now <= self.shown_at + SILENT_S
 
     def gone_at(self, claim: Claim, now: float, after_s: float) -> float:
-        """When a requester will have been silent for so long; never while the lift is silent."""
+        """When this requester will have been silent for `after_s`; NEVER while the lift is silent."""
         if not self.flows(now):
             return NEVER
         return max(claim.heard_at, self.flowing_since) + after_s

@@ -1,4 +1,4 @@
-"""Adapters' LiftRequests and the lifts' LiftStates in: are they well formed, and for a lift of ours?"""
+"""LiftRequests and LiftStates in. Is a message well formed, and about a lift that we serve?"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -22,9 +22,9 @@ MAX_FLOORS: Final = 1000
 
 
 def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Requested | Ended:
-    """The event that an adapter's request is; `wall` is our clock (s since the epoch).
+    """An adapter's request as an event; `wall` is our clock (s since the epoch). Raises RequestRefused.
 
-    Of an END_SESSION only the session is looked at: fleet adapters send no floor with it
+    Of an END_SESSION only the session counts: fleet adapters send no floor with it
     (rmf_fleet_adapter RobotContext.cpp).
     """
     _check_lift(request.lift_name, settings)
@@ -46,7 +46,7 @@ def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Req
 
 
 def accept_state(state: LiftState, settings: Settings, wall: float) -> StateHeard:
-    """The event that a lift's state is."""
+    """A lift's state as an event. Raises RequestRefused."""
     _check_lift(state.lift_name, settings)
     check_length(
         session_id=state.session_id,
@@ -80,12 +80,12 @@ def device_name(message: LiftRequest | LiftState) -> str:
 
 
 def stamped(message: LiftRequest, time: Time) -> LiftRequest:
-    """As it is sent at this time."""
+    """The message with its time of sending."""
     return replace(message, request_time=time)
 
 
 def summary(report: SupervisorReport, now: float) -> Mapping[str, str]:
-    """What a person wants to read of one lift, in a line."""
+    """One lift in one line, for a person."""
     word = "ending" if report.ending else "holder"
     held = f"{report.holder} ({now - report.since:.0f} s)" if report.holder else "-"
     waiting = ", ".join(f"{session} ({now - since:.0f} s)" for session, since in report.waiting)

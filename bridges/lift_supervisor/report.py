@@ -10,14 +10,15 @@ from bridges.core.durations import SILENT_S
 from bridges.lift_supervisor.memory import Limits, Memory
 
 OVERDUE_S: Final = 30.0
-"""A lift that has not obeyed after so long is at fault."""
+"""After so long without obeying, a lift is at fault."""
 
 
 class SupervisorReport(msgspec.Struct, frozen=True):
     """One lift, for the log and the status file. Times are monotonic seconds.
 
-    `holder`: whom we speak for, `since` when; `ending`: by sending END. `waiting`: the queue, with
-    the time of each first request. `read_at`: when the lift's last state came.
+    `shown`: the session in the lift's state. `holder`: the session whose turn it is, `since` when.
+    `ending`: we send its END. `waiting`: the queue, with the time of each first request. `read_at`:
+    when the lift's last state came.
     """
 
     read_at: float | None
@@ -34,7 +35,7 @@ class SupervisorReport(msgspec.Struct, frozen=True):
 
 
 def report(memory: Memory, faults: Iterable[Fault]) -> SupervisorReport:
-    """As it is now, with what is wrong."""
+    """The lift as it is now, with these faults."""
     turn = memory.turn
     waiting = tuple(
         (claim.session, claim.since)
@@ -53,7 +54,7 @@ def report(memory: Memory, faults: Iterable[Fault]) -> SupervisorReport:
 
 
 def alarms(memory: Memory, now: float, limits: Limits) -> Iterator[tuple[float, Fault]]:
-    """Each fault that may come, and when it does if nothing changes."""
+    """Each fault that may come, and when it will if nothing changes."""
     turn = memory.turn
     if not memory.flows(now):
         if turn or memory.claims:

@@ -6,19 +6,20 @@ from bridges.core.fields import GraphSettings, Name, Patience, Seconds
 
 
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the lift supervisor may decide by itself.
+    """The lift supervisor's policy.
 
-    `lifts`: the lifts that it serves, whatever names anybody makes up; every lift that it hears of when
-    absent, as RMF's own does.
-    `quiet_start_s`: how long it only listens, so that a restart ends no ride; and how long a session
-    must be shown by a lift, with nobody asking for it, before it is ended.
-    `silent_after_s`: a requester without the lift that has been silent for so long has gone; fleet
-    adapters repeat themselves at every LiftState.
-    `holder_alarm_s`: a fault is shown when the holder has been silent for so long.
-    `holder_ttl_s`: then the session is ended. Off when absent: the robot may be in the car.
-    `clock_synchronised`: this clock and the fleet adapters' agree (NTP); only then is a request's age
-    judged. Without it only the order of each requester's own stamps is.
-    `max_request_age_s`: with `clock_synchronised`, older requests count only when repeated.
+    `lifts`: the lifts that it serves; messages about others are refused. When absent, it serves every
+    lift that it hears of, as RMF's own does.
+    `quiet_start_s`: how long it only listens after its start, so that a restart ends no ride. Also how
+    long a lift may show a session that nobody requests, before that session is ended.
+    `silent_after_s`: after so long without a request a waiting session leaves the queue. Fleet
+    adapters repeat their requests at every LiftState.
+    `holder_alarm_s`: how long the holder may be silent before a fault is shown.
+    `holder_ttl_s`: how long the holder may be silent before its session is ended. Never when absent,
+    as its robot may be in the car.
+    `clock_synchronised`: this clock and the fleet adapters' clocks agree (NTP), so that the age of a
+    request can be judged. Otherwise only the stamps of one requester are compared.
+    `max_request_age_s`: with `clock_synchronised`, an older request counts only when it is repeated.
     """
 
     lifts: list[Name] | None = None
@@ -29,7 +30,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
     max_request_age_s: Seconds = 10.0
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """An alarm comes before what it warns of."""
+        """An alarm after what it warns of, or an empty list of lifts."""
         if self.holder_ttl_s is not None and self.holder_ttl_s <= self.holder_alarm_s:
             text = f"must be more than 'holder_alarm_s' ({self.holder_alarm_s:g} s): alarm first"
             yield ("holder_ttl_s",), text

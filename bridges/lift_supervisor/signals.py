@@ -7,7 +7,7 @@ from bridges.core.graph_kind import MaySpeak, Woken
 
 
 class Target(msgspec.Struct, frozen=True):
-    """What a session asks of the lift, as LiftRequest has it."""
+    """What a session requests of the lift, in the terms of LiftRequest."""
 
     request_type: int
     floor: str
@@ -15,7 +15,7 @@ class Target(msgspec.Struct, frozen=True):
 
 
 class Requested(msgspec.Struct, frozen=True):
-    """An adapter's request for AGV or HUMAN mode; `stamp` is its own (s), `age_s` by our clock."""
+    """An adapter's request for AGV or HUMAN mode; `stamp` is by its clock (s), `age_s` by ours."""
 
     session: str
     target: Target
@@ -24,7 +24,7 @@ class Requested(msgspec.Struct, frozen=True):
 
 
 class Ended(msgspec.Struct, frozen=True):
-    """An adapter's, or an operator's, END_SESSION, whatever its other fields say."""
+    """An END_SESSION of an adapter or an operator, whatever its other fields say."""
 
     session: str
     stamp: float
@@ -42,7 +42,7 @@ class StateHeard(msgspec.Struct, frozen=True):
     floors: tuple[str, ...] = ()
 
     def satisfies(self, session: str, target: Target) -> bool:
-        """Does it show what was asked? The rule is rmf_lift_supervisor's."""
+        """Does the state show what was requested? The rule is rmf_lift_supervisor's."""
         there = target.floor == self.floor and not self.destination
         return (
             (target.floor == self.destination or there)
