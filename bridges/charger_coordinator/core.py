@@ -1,28 +1,28 @@
-"""The coordinator's core: which robot charges where, for all stations of a site at once.
+"""The coordinator's core: which robot charges where, for all stations of a site.
 
-It works from what fleets and stations say (FleetState, ChargerState) and from operators, and sends
-ChargerRequest and ChargerCancel, which no part of RMF does. Rules:
-1. A robot wants to be charged when its fleet shows it CHARGING or DOCKING at a place of ours for
-   SETTLES_S, and as long as it does, or is on its way in the same task. The mode alone would not do:
-   RMF's fleet adapter leaves it CHARGING through the tasks that follow (rmf_ros2 9dedd0f,
-   RobotContext::current_mode, set by WaitForCharge and DockRobot only). An operator's wish lasts until
-   its request is over or its robot full.
-2. Wishes are served first come, first served, among the stations that suit (`queue.py`). One station,
-   one robot: a station is nobody else's until it shows that it has let go.
-3. A request is repeated until the station shows it. A station that does not take it for TAKEN_S is
-   passed over for SHUNNED_S, and the wish goes to the end.
-4. The station shows how a request ends. Charged and released: the wish is fulfilled. Released without
-   having charged: the robot did not come. Then the wish of a robot that stands at a place of ours goes
-   to the end of the queue; any other wish is over. A robot that stands at that very station has failed
-   there.
-5. After an error of the station's side the robot gets another station and keeps its place in the queue.
-   An error of the robot's side, or one that nothing tells, counts as a failure of the robot too. After
-   its second failure (at a second station where it has one) it is not tried again, and a technician is
-   told. Another robot on the pad changes nothing for the robot assigned, for its start_timeout.
-6. A station that is not reached proves nothing. A robot that was charging there keeps it; one that was
-   on its way gets another station after LOST_S.
-7. A request for a robot of ours counts as that robot's, even if somebody else has made it.
-8. Until it may speak, and beside a charging schedule, it only listens.
+Its inputs are FleetState, ChargerState and the requests of operators. It sends ChargerRequest and
+ChargerCancel, which no part of RMF does. A wish is a robot's need to be charged. Rules:
+1. A robot has a wish once its fleet has shown it CHARGING or DOCKING at one of our waypoints for
+   SETTLES_S. The wish lasts while the fleet shows that, or shows the robot on its way in the same
+   task. The mode alone is not enough: RMF's fleet adapter leaves it at CHARGING through the tasks that
+   follow (rmf_ros2 9dedd0f, RobotContext::current_mode, set by WaitForCharge and DockRobot only). An
+   operator's wish lasts until its request is over or the robot is full.
+2. Wishes are served first come, first served, among the suitable stations (`queue.py`). A station has
+   one robot at a time. It is given to another only after its state shows that it has let the first go.
+3. A request is repeated until the station shows it. A station that does not take it within TAKEN_S is
+   passed over for SHUNNED_S, and the wish goes to the end of the queue.
+4. The station's state shows how a request ends. Released after charging: the wish is fulfilled.
+   Released without charging: the robot did not come. Then a fleet's wish goes to the end of the queue
+   if its robot stands at one of our waypoints; any other wish is over. If the robot stands at that very
+   station, it has failed there.
+5. After an error of the station, the robot gets another station and keeps its place in the queue. An
+   error of the robot, or one of an unclear side, also counts as a failure of the robot. After its
+   second failure (at a second station if it has one) it is not tried again, and a technician is told.
+   If another robot is on the pad, the assigned one keeps the station for its start_timeout.
+6. A station that cannot be reached says nothing about the charge. A robot that was charging there
+   keeps it; one that was on its way gets another station after LOST_S.
+7. A request for one of our robots counts as that robot's, even if another node has made it.
+8. During the quiet start, and while a charging schedule publishes, it only listens.
 """
 
 from typing import Final
@@ -72,17 +72,17 @@ Decided = Decision[Memory, None, SiteReport]
 
 
 def initial(subject: str, started_at: float) -> Memory:
-    """Nothing heard."""
+    """Nothing has been heard."""
     return Memory(began_at=started_at)
 
 
 def idle(memory: Memory, now: float) -> bool:
-    """The site stays."""
+    """Never: the one subject is the site."""
     return False
 
 
 def decide(memory: Memory, event: Event, now: float, site: Site) -> Decided:
-    """Take the event in, give what is free, and say what is due. Never raises."""
+    """Take the event in, allot free stations, and send what is due. Never raises."""
     memory, refused = _take(memory, event, now, site)
     memory = _in_time(_adopted(memory, now, site), now)
     if memory.may_speak:
@@ -115,7 +115,7 @@ def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory,
 
 
 def _may_speak(memory: Memory, yes: bool, now: float) -> Memory:
-    """Requests that no station has shown count from now; assignments are published anew."""
+    """A request that no station has shown yet counts from now; assignments are published again."""
     grants = {
         name: grant if grant.shown else replace(grant, made_at=now)
         for name, grant in memory.grants.items()
@@ -163,7 +163,7 @@ def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standi
 
 
 def _wants(memory: Memory, standing: Standing, wish: Wish | None, now: float, site: Site) -> bool:
-    """Does its fleet show that this robot is to be charged?"""
+    """Does its fleet show that this robot needs to be charged?"""
     sighting = standing.sighting
     if not sighting.charges or sighting.battery_percent >= site.full_percent:
         return False
@@ -245,13 +245,13 @@ def _followed(memory: Memory, name: str, grant: Grant, seen: Seen, site: Site) -
 
 
 def _gone(memory: Memory, name: str, grant: Grant, site: Site) -> Memory:
-    """The station shows that the request is there no more."""
+    """The station no longer shows the request."""
     memory = memory.with_grant(name, None)
     return _ended(memory, name, grant, site) if grant.shown and not grant.over else memory
 
 
 def _ended(memory: Memory, name: str, grant: Grant, site: Site) -> Memory:
-    """A request has come to its end by itself."""
+    """A request has ended without our cancel."""
     who, wish = grant.robot, memory.wish(grant.robot)
     if grant.started:
         return _fulfilled(memory, who)
@@ -263,7 +263,7 @@ def _ended(memory: Memory, name: str, grant: Grant, site: Site) -> Memory:
 
 
 def _fulfilled(memory: Memory, who: Robot) -> Memory:
-    """It was charged, in the task that it has now, and nothing is wrong with it."""
+    """The robot was charged in its present task, so its failures are forgotten."""
     standing = memory.robots.get(who)
     served = {**memory.served, who: standing.sighting.task_id if standing else ""}
     memory = replace(memory, served=served, strikes=without(memory.strikes, who))
@@ -271,14 +271,14 @@ def _fulfilled(memory: Memory, who: Robot) -> Memory:
 
 
 def _struck(memory: Memory, name: str, who: Robot) -> Memory:
-    """It has failed at this station. After the second time nobody tries again."""
+    """The robot has failed at this station. After its second failure it is not tried again."""
     strikes = {**memory.strikes, who: (*memory.strikes.get(who, ()), name)}
     memory = replace(memory, strikes=strikes)
     return memory.without_wish(who) if memory.faulty(who) else memory
 
 
 def _adopted(memory: Memory, now: float, site: Site) -> Memory:
-    """Take over requests that somebody else has made for robots of ours."""
+    """Adopt requests that another node has made for our robots."""
     for name, seen in memory.stations.items():
         if name not in memory.grants and seen.state in (ASSIGNED, CHARGING):
             memory = _adopt(memory, name, seen, now, site)
@@ -301,7 +301,7 @@ def _adopt(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Mem
 
 
 def _stands_at(memory: Memory, place: str) -> Robot | None:
-    """Which robot is charged there without a request: one that wants to be and stands there."""
+    """Which robot is charged at this waypoint without a name: one with a wish that stands there."""
     here = (w.robot for w in memory.wishes if memory.place_of(w.robot) == place)
     return next((who for who in here if memory.station_of(who) is None), None)
 
@@ -310,7 +310,7 @@ def _stands_at(memory: Memory, place: str) -> Robot | None:
 
 
 def _in_time(memory: Memory, now: float) -> Memory:
-    """What changes though nothing is heard."""
+    """What changes by time alone."""
     for name, grant in list(memory.grants.items()):
         if grant.over or grant.started:
             continue
@@ -324,8 +324,8 @@ def _in_time(memory: Memory, now: float) -> Memory:
 
 
 def _hopeless_at(memory: Memory, name: str, grant: Grant) -> float:
-    """When a robot on its way is better off elsewhere: its station is not reached, by its own daemon
-    or that one by us, or another robot does not leave the pad."""
+    """When a robot on its way should get another station. Reasons: we do not hear the station's
+    daemon, the daemon does not reach the station, or another robot does not leave the pad."""
     seen, at = memory.stations.get(name), memory.silent_since(name) + LOST_S
     if seen is not None and seen.diagnosis is Diagnosis.LOST:
         at = min(at, seen.since + LOST_S)

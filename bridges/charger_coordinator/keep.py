@@ -1,7 +1,7 @@
-"""What a restart must not forget: the queue, who has which station, and who has failed where.
+"""What is saved across a restart: the queue, who has which station, and who has failed where.
 
-States and sightings come anew within a second. A request that was sent and not kept is known again
-by its id when its station shows it.
+States of robots and stations come again within a second. A request that was sent but not saved is
+recognised by its id when its station shows it.
 """
 
 from collections.abc import Mapping
@@ -32,7 +32,7 @@ class WishRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GrantRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A Grant, but for what the station will say again."""
+    """A Grant, without what the station's states show again."""
 
     robot: Text
     request_id: str
@@ -54,7 +54,7 @@ class Record(keep.Record, frozen=True, forbid_unknown_fields=True):
 
 
 def persist(memories: Mapping[str, Memory]) -> bytes:
-    """What the next start needs; the same bytes as long as nothing of it changes."""
+    """What the next start needs. The bytes stay the same until some of it changes."""
     memory = memories.get(SITE, Memory())
     record = Record(
         VERSION,
@@ -78,9 +78,9 @@ def _grant(g: Grant) -> GrantRecord:
 
 
 def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
-    """The memory at start, for the robots and stations that the YAML still has.
+    """The memory at start, for the robots and stations that are still in the YAML.
 
-    ValueError if the bytes are not what `persist` gave. Durations are counted anew.
+    ValueError if the bytes are not those of `persist`. Durations count from now.
     """
     found = keep.read(kept, Record, VERSION, "a coordinator's memory")
     return {SITE: _memory(found, settings, now)}

@@ -1,4 +1,4 @@
-"""What the coordinator remembers, and the site that it is given."""
+"""What the coordinator remembers, and what it needs of its settings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ V = TypeVar("V")
 
 NODE: Final = "charger_coordinator"
 STATION_SILENT_S: Final = 5.0
-"""A station's states come at 1 Hz; after so long it is silent."""
+"""After so long without a state a station is silent. States come at 1 Hz."""
 STRIKES: Final = 2
-"""A robot that failed so often, at a second station where it has one, is not tried again."""
+"""After so many failures, at a second station if it has one, a robot is not tried again."""
 
 IDLE: Final = ChargerStateValue.CHARGER_IDLE
 ASSIGNED: Final = ChargerStateValue.CHARGER_ASSIGNED
@@ -32,10 +32,10 @@ ERROR: Final = ChargerStateValue.CHARGER_ERROR
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """The fixed facts of a site as its core needs them.
+    """What the core needs of the settings.
 
-    `robots`: stations that suit each, best first. `waits_at`: each robot's own waypoint. `places`:
-    station -> waypoint. `receivers`: id -> robot.
+    `robots`: robot -> the stations that suit it, best first. `waits_at`: robot -> the waypoint where
+    it waits. `places`: station -> waypoint. `receivers`: receiver id -> robot.
     """
 
     robots: Mapping[Robot, tuple[str, ...]]
@@ -66,10 +66,10 @@ class Site:
 
 
 class Wish(msgspec.Struct, frozen=True):
-    """One robot to be charged. `by`: a fleet's state shows it, or an operator said so.
+    """One robot's need to be charged. `by`: its fleet's state shows it, or an operator requested it.
 
-    `task_id`: the robot's task, by a fleet. `station`, `request_id`, `start_timeout_s`: the
-    operator's.
+    `task_id`: the robot's task, if by a fleet. `station`, `request_id`, `start_timeout_s`: those of the
+    operator's request.
     """
 
     robot: Robot
@@ -81,7 +81,7 @@ class Wish(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, wanted: Wanted) -> "Wish":
-        """An operator's."""
+        """The wish of an operator's request."""
         return cls(
             wanted.robot,
             "operator",
@@ -94,8 +94,9 @@ class Wish(msgspec.Struct, frozen=True):
 class Grant(msgspec.Struct, frozen=True):
     """A station given to a robot, since `made_at`, by the request `request_id`.
 
-    `shown`: the station says so. `started`: current has flowed. `over`: the robot has it no more,
-    and the station is to let go; it is nobody else's until it has. `sent_at`: the last word to it.
+    `shown`: the station's state has shown the request. `started`: current has flowed. `over`: the
+    robot no longer has the station, but no other robot gets it until the station has let go.
+    `sent_at`: when the last request or cancel was sent.
     """
 
     robot: Robot
@@ -109,7 +110,8 @@ class Grant(msgspec.Struct, frozen=True):
 
 
 class Standing(msgspec.Struct, frozen=True):
-    """A robot as its fleet showed it at `at`; so, at this place, `since` then (-inf: ever)."""
+    """A robot as its fleet showed it at `at`. `since`: since when its place and mode are the same
+    (-inf: since its first state)."""
 
     sighting: Sighting
     at: float
@@ -117,7 +119,7 @@ class Standing(msgspec.Struct, frozen=True):
 
 
 class Seen(msgspec.Struct, frozen=True):
-    """A station's last state, heard at `at`; it has been so, texts included, `since` then."""
+    """A station's last state, heard at `at`. `since`: since when state and error are the same."""
 
     state: ChargerStateValue
     request_id: str
@@ -128,19 +130,20 @@ class Seen(msgspec.Struct, frozen=True):
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """Whose fault the error is; NONE where there is none."""
+        """Which side is at fault; NONE without an error."""
         return diagnosis(self.error) if self.state is ERROR else Diagnosis.NONE
 
 
 class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
-    `wishes`: in the order in which they are served. `grants`: station -> to whom. `strikes`: where
-    each robot has failed. `served`: robot -> the task in which it was charged. `over`: operators'
-    wishes that are, whose late repeats are still known. `count`: requests made so far.
-    `robots`, `stations`: as last heard, and when. `shunned`: station -> until when it is given to
-    nobody, because it took no request. `preferred`: robot -> the station somebody else dedicated to it.
-    `assigned`: the assignments last published; `alerts`: which faults a person has been told of.
+    `wishes`: in the order in which they are served. `grants`: by station. `strikes`: robot -> the
+    stations where it has failed. `served`: robot -> the task in which it was charged. `over`: ids of
+    the last operators' requests that have ended, so that late repeats are refused. `count`: requests
+    made so far. `robots`, `stations`: as last heard, and when. `shunned`: station -> until when it is
+    passed over, because it took no request. `preferred`: robot -> the station that another node has
+    dedicated to it. `assigned`: the assignments last published. `alerts`: the faults that a person has
+    been told of.
     """
 
     began_at: float = 0.0
@@ -172,7 +175,7 @@ class Memory(msgspec.Struct, frozen=True):
         return standing.sighting.place if standing else None
 
     def faulty(self, robot: Robot) -> bool:
-        """It is not tried again until an operator says so."""
+        """Has it failed too often? It is not tried again until an operator resets."""
         return len(self.strikes.get(robot, ())) >= STRIKES
 
     def speaks(self, station: str, now: float) -> bool:
@@ -180,14 +183,14 @@ class Memory(msgspec.Struct, frozen=True):
         return station in self.stations and now < self.stations[station].at + STATION_SILENT_S
 
     def silent_since(self, station: str) -> float:
-        """When it fell silent, or will if it says nothing more."""
+        """When it fell silent, or will if no more states come."""
         seen = self.stations.get(station)
         return STATION_SILENT_S + (self.began_at if seen is None else seen.at)
 
     # ---- changed copies
 
     def with_grant(self, station: str, grant: Grant | None) -> "Memory":
-        """The memory with this station granted so; None: to nobody."""
+        """The memory with this grant of the station; None: it is granted to nobody."""
         rest = without(self.grants, station)
         return replace(self, grants=rest | ({} if grant is None else {station: grant}))
 

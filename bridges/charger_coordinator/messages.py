@@ -1,4 +1,4 @@
-"""Fleets, stations, schedules and operators in: is it well formed, and about what is ours?"""
+"""Messages of fleets, stations, schedules and operators in. Is each well formed, and for this site?"""
 
 import math
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ CHARGES = (d.RobotModeValue.MODE_CHARGING, d.RobotModeValue.MODE_DOCKING)
 
 
 def accept_fleet(state: d.FleetState, settings: Settings, wall: float) -> FleetSeen:
-    """The event that a FleetState is; robots that the YAML does not name are passed over."""
+    """A FleetState as an event. Robots that the YAML does not name are left out."""
     fleet = settings.fleets.get(state.name)
     if fleet is None:
         raise RequestRefused("fleet not ours", f"{state.name!r}")
@@ -55,7 +55,7 @@ def _sighting(
 
 
 def _nearest(at: d.Location, fleet: Fleet, places: set[str], near_m: float) -> str | None:
-    """The waypoint at which a robot stands, of those that matter."""
+    """The nearest of these waypoints within `near_m`; None if there is none."""
     away = {
         name: math.dist((at.x, at.y), (waypoint.x, waypoint.y))
         for name, waypoint in fleet.waypoints.items()
@@ -66,7 +66,7 @@ def _nearest(at: d.Location, fleet: Fleet, places: set[str], near_m: float) -> s
 
 
 def accept_state(state: d.ChargerState, settings: Settings, wall: float) -> StateHeard:
-    """The event that a ChargerState is."""
+    """A ChargerState as an event. Raises RequestRefused."""
     if state.charger_name not in settings.stations:
         raise RequestRefused("station not ours", f"{state.charger_name!r}")
     if state.state not in set(d.ChargerStateValue):
@@ -86,7 +86,7 @@ def accept_state(state: d.ChargerState, settings: Settings, wall: float) -> Stat
 
 
 def accept_wish(request: d.ChargerRequest, settings: Settings, wall: float) -> Wanted:
-    """The event that an operator's wish is; an empty charger_name is any that suits."""
+    """An operator's request as an event. An empty charger_name means any suitable station."""
     asked = accept_charger_request(request, ChargerSettings())
     if asked.who not in settings.robots():
         raise RequestRefused("robot not ours", f"{asked.who} is in no fleet of the YAML")
@@ -94,7 +94,7 @@ def accept_wish(request: d.ChargerRequest, settings: Settings, wall: float) -> W
 
 
 def accept_withdrawal(cancel: d.ChargerCancel, settings: Settings, wall: float) -> Unwanted:
-    """The event that an operator's cancel is."""
+    """An operator's cancel as an event. Raises RequestRefused."""
     if not cancel.request_id:
         raise RequestRefused("empty request_id", "which wish is withdrawn?")
     return Unwanted(cancel.request_id)
@@ -103,7 +103,7 @@ def accept_withdrawal(cancel: d.ChargerCancel, settings: Settings, wall: float) 
 def accept_assignments(
     message: d.ChargingAssignments, settings: Settings, wall: float
 ) -> Dedicated:
-    """The event that another's charging assignments are: whose station is where, as far as we know."""
+    """Another node's charging assignments as an event: those of our robots to our stations."""
     stations = {place: name for name, place in settings.places().items()}
     known = settings.robots()
     return Dedicated(
@@ -123,7 +123,7 @@ def subject(message: Any) -> str:
 
 
 def stamped(message: d.Message, time: Time) -> d.Message:
-    """As it is sent at this time."""
+    """The message with its time of sending."""
     if isinstance(message, d.Alert):
         return replace(message, id=f"{message.id}/{time.sec}")
     return message

@@ -1,11 +1,11 @@
-"""Who gets which station: first come, first served, among the stations that suit.
+"""Who gets which station: first come, first served, among the suitable stations.
 
-A station is free when its last state, no older than STATION_SILENT_S, is IDLE, nobody has it, it has
-not just failed to take a request, and no other robot stands there. A robot that turned up at a station
-without a request, and is refused there as such, may have that very station.
+A station is free if its last state is IDLE and no older than STATION_SILENT_S, no robot has it, it has
+not just failed to take a request, and no other robot stands there. A robot that stands on a station's
+pad without a request, so that the station shows an error, may have that very station.
 
-Where a robot has failed already it is tried again only if nothing else suits it: a second station
-tells whose fault it was.
+A station where a robot has failed is tried again only if no other one suits the robot: a second
+station shows which side was at fault.
 """
 
 from collections.abc import Iterator
@@ -19,11 +19,11 @@ from bridges.charger.settings import Robot
 from bridges.charger_coordinator.memory import ERROR, IDLE, NODE, Grant, Memory, Site, Wish
 
 REMEMBERED_S: Final = 30.0
-"""Where a robot was seen by its fleet counts for so long."""
+"""How long a robot's last place counts, after its fleet has shown it."""
 
 
 def allot(memory: Memory, now: float, site: Site) -> Memory:
-    """Give what is free to who waits, in their order."""
+    """Give the free stations to the robots that wait, in the order of the queue."""
     for wish in memory.wishes:
         if memory.station_of(wish.robot) is None:
             station = next(_free_for(memory, wish, now, site), None)
@@ -45,7 +45,8 @@ def _free_for(memory: Memory, wish: Wish, now: float, site: Site) -> Iterator[st
 
 
 def _suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
-    """The stations to try, best first: as asked, where it stands, as dedicated, as the YAML says."""
+    """The stations to try, best first: the operator's, the one where it stands, the dedicated one, then
+    the YAML's order."""
     suiting, failed = site.robots[wish.robot], memory.strikes.get(wish.robot, ())
     untried = [station for station in suiting if station not in failed] or list(suiting)
     stands_at = site.station_at(memory.place_of(wish.robot))
@@ -69,7 +70,7 @@ def _free(memory: Memory, station: str, robot: Robot, now: float, site: Site) ->
 def in_the_way(
     memory: Memory, station: str, robot: Robot | None, now: float, site: Site
 ) -> Robot | None:
-    """Another robot that stands at the station by its fleet's word."""
+    """Another robot that stands at the station, by its fleet's state; None if there is none."""
     return next(
         (
             who

@@ -1,12 +1,12 @@
-"""What stations, fleet adapters, technicians, log and status file are told.
+"""What is sent to stations, fleet adapters and technicians, and what log and status file show.
 
-1. A station that does not show our request is asked again each second; one that shows a request that
-   is over is told to cancel it each second.
-2. Every robot has one place at a time, and no two the same: the station that it has (MODE_CHARGE),
-   else the waypoint where it waits (MODE_WAIT). All fleets are told whenever one of the places
-   changes, as a fleet adapter that starts later reads them from what is retained. RMF then drives the
-   robot there if it has a charging task (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
-3. Each fault is an Alert once: rmf-web shows it to a person.
+1. A request is repeated each second until its station shows it. A cancel is repeated each second while
+   the station still shows the request.
+2. Every robot is assigned one place, and no place has two robots: its station (MODE_CHARGE), else the
+   waypoint where it waits (MODE_WAIT). When a place changes, the assignments of all fleets are
+   published, so that a fleet adapter that starts later finds them retained. RMF drives the robot there
+   if it has a charging task (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
+3. Each fault is sent as an Alert once; rmf-web shows it to a person.
 """
 
 from collections.abc import Iterator
@@ -52,8 +52,8 @@ ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
 
 
 class SiteReport(msgspec.Struct, frozen=True):
-    """`read_at`: when a station was heard last (monotonic s). `stations`: (station, who has it or
-    what it shows). `queue`: the robots that wait, in their order."""
+    """The site as it is shown. `read_at`: when a station was last heard (monotonic s). `stations`:
+    (station, its state and its robot). `queue`: the robots that wait, in order."""
 
     read_at: float | None
     stations: tuple[tuple[str, str], ...] = ()
@@ -66,7 +66,7 @@ class SiteReport(msgspec.Struct, frozen=True):
 
 
 def report(memory: Memory, now: float, site: Site) -> SiteReport:
-    """As it is now."""
+    """The site as it is now."""
     queue = [w.robot for w in memory.wishes if memory.station_of(w.robot) is None]
     return SiteReport(
         read_at=max((seen.at for seen in memory.stations.values()), default=None),
@@ -98,7 +98,7 @@ def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
 
 
 def _shown(memory: Memory, name: str, seen: Seen, site: Site) -> Iterator[Fault]:
-    """By what the station says of itself."""
+    """Faults that a station's state shows."""
     if seen.diagnosis in (Diagnosis.STATION, Diagnosis.LOST, Diagnosis.UNCLEAR):
         yield Fault("STATION_OUT_OF_SERVICE", f"{name}: {seen.error}")
     if seen.diagnosis is not Diagnosis.PAD:
@@ -112,7 +112,7 @@ def _shown(memory: Memory, name: str, seen: Seen, site: Site) -> Iterator[Fault]
 
 
 def on_pad(error: str, site: Site) -> Robot | None:
-    """Which robot of ours stands on a pad by its station's error; None for another's."""
+    """Which of our robots stands on the pad, by the station's error; None if it is none of ours."""
     found = misplaced_in(error)
     if found is None:
         return None
@@ -132,7 +132,7 @@ def _stranger(error: str) -> str:
 def messages(
     memory: Memory, faults: tuple[Fault, ...], now: float, site: Site
 ) -> tuple[Memory, Messages]:
-    """What is to be sent now; nothing while it may not speak."""
+    """The messages that are due; none while it may not publish."""
     if not memory.may_speak:
         return memory, ()
     found: list[tuple[AnyTopic, d.Message]] = []
@@ -150,7 +150,7 @@ def messages(
 
 
 def due(memory: Memory) -> list[float]:
-    """When the stations are to be told."""
+    """When requests and cancels are due."""
     if not memory.may_speak:
         return []
     return [_due_at(memory, name, grant) for name, grant in memory.grants.items()]
@@ -185,7 +185,7 @@ def _assignments(memory: Memory, site: Site) -> Iterator[d.ChargingAssignments]:
 
 
 def _alert(fault: Fault) -> d.Alert:
-    """Without its id's end, which is the time of sending: rmf-web drops an id that it knows."""
+    """The Alert of a fault. `stamped` appends the time to its id: rmf-web drops an id it knows."""
     tier = d.AlertTier.TIER_ERROR if fault.code in ERRORS else d.AlertTier.TIER_WARNING
     return d.Alert(
         id=f"{NODE}/{fault.code}/{fault.detail}",

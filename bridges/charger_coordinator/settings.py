@@ -1,6 +1,6 @@
 """The coordinator's section of its YAML: stations, and each fleet's waypoints and robots.
 
-`described` and `warnings` are what `check` says of it.
+`check` prints what `described` and `warnings` give.
 """
 
 import math
@@ -26,8 +26,8 @@ class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """A named vertex of the fleet's navigation graph, where the graph has it.
 
     `level`: its level's name.
-    `x`: as the graph says.
-    `y`: likewise.
+    `x`: its x coordinate in the graph.
+    `y`: its y coordinate in the graph.
     """
 
     level: Name
@@ -45,10 +45,10 @@ class Station(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is known of a robot.
+    """One robot.
 
-    `stations`: those that suit it, best first. `waits_at`: the waypoint where it waits for one, and
-    belongs while it wants none; no other robot's. `receivers`: the ids of its receivers.
+    `stations`: those that suit it, best first. `waits_at`: its own waypoint, where it waits for a
+    station and stays when it needs none. `receivers`: the ids of its receivers.
     """
 
     stations: Stations
@@ -59,8 +59,8 @@ class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A fleet by the name of its adapter.
 
-    `waypoints`: the places of its navigation graph that matter here. RMF's fleet adapter crashes on
-    a name that its graph does not have, so no other name is ever sent to it.
+    `waypoints`: the stations' and waiting places in its navigation graph. RMF's fleet adapter crashes
+    on a name that its graph does not have, so it is sent no other names.
     `robots`: those that charge here, by the adapter's names.
     """
 
@@ -74,9 +74,9 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
     `stations`: the chargers, by the names under which their daemons publish.
     `fleets`: the fleets whose robots charge at them.
     `start_timeout_s`: how long a station is kept for a robot that is on its way.
-    `near_m`: a robot stands at the nearest waypoint that is not farther away.
-    `full_percent`: a robot with so much charge gives its station up.
-    `again_percent`: a robot that was charged comes back within the same task only below this.
+    `near_m`: a robot stands at the nearest waypoint, if that is no farther away than this.
+    `full_percent`: the charge at which a robot gives up its station.
+    `again_percent`: a robot that was charged is charged again in the same task only below this.
     """
 
     stations: dict[Name, Station]
@@ -87,7 +87,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
     again_percent: Low = 90.0
 
     def on_map(self) -> Iterator[Place]:
-        """RMF's map has the stations' places, as chargers, and each fleet's waypoints."""
+        """The stations' places and each fleet's waypoints, which RMF's map must name too."""
         for name, station in self.stations.items():
             path = ("stations", name, *(["waypoint"] if station.waypoint else []))
             yield path, CHARGER, station.waypoint or name
@@ -96,7 +96,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
                 yield ("fleets", fleet, "waypoints", name), WAYPOINT, name
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """Names that lead nowhere, places given twice."""
+        """Unknown names, places given twice, contradictory percentages."""
         for key in ("stations", "fleets"):
             if not getattr(self, key):
                 yield (key,), f"'{key}' is empty: there is nothing to coordinate"
@@ -183,7 +183,7 @@ def described(settings: Settings) -> list[tuple[str, ...]]:
 
 
 def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
-    """What works, but not as well as it could."""
+    """What is legal but may be a mistake."""
     used = {name for robot in settings.robots().values() for name in robot.stations}
     for name in settings.stations:
         if name not in used:
@@ -197,7 +197,7 @@ def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
 
 
 def _near(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Places that a robot's position hardly tells apart."""
+    """Places so close together that a robot's position cannot tell them apart."""
     for fleet_name, fleet in settings.fleets.items():
         names = list(fleet.waypoints)
         for i, name in enumerate(names):

@@ -9,8 +9,8 @@ from bridges.rmf.definitions import ChargerStateValue
 
 
 class Sighting(msgspec.Struct, frozen=True):
-    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING. `place`: the waypoint
-    of ours at which it stands; None for none."""
+    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING. `place`: which of our
+    waypoints it stands at; None for none."""
 
     who: Robot
     charges: bool
@@ -20,7 +20,7 @@ class Sighting(msgspec.Struct, frozen=True):
 
 
 class FleetSeen(msgspec.Struct, frozen=True):
-    """A FleetState, of the robots that we know."""
+    """A FleetState, with the robots that the YAML names."""
 
     robots: tuple[Sighting, ...]
 
@@ -36,7 +36,7 @@ class StateHeard(msgspec.Struct, frozen=True):
 
 
 class Wanted(msgspec.Struct, frozen=True):
-    """An operator wants this robot charged; `station`: there rather than elsewhere, "" anywhere."""
+    """An operator wants this robot charged; `station`: preferably there, "" for anywhere."""
 
     robot: Robot
     station: str
@@ -45,13 +45,13 @@ class Wanted(msgspec.Struct, frozen=True):
 
 
 class Unwanted(msgspec.Struct, frozen=True):
-    """An operator's wish is withdrawn."""
+    """An operator withdraws a request."""
 
     request_id: str
 
 
 class Dedicated(msgspec.Struct, frozen=True):
-    """Somebody else's charging assignments: robot -> the station that it is to use."""
+    """Another node's charging assignments: each robot and the station that it is to use."""
 
     stations: tuple[tuple[Robot, str], ...]
 

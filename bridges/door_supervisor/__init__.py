@@ -1,4 +1,4 @@
-"""The door supervisor: in the place of RMF's own, between fleet adapters and any number of doors."""
+"""The door supervisor: replaces RMF's own, between the fleet adapters and any number of doors."""
 
 from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind

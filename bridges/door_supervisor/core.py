@@ -1,20 +1,23 @@
-"""The door supervisor's core, for one door: who holds it open, and what its node is told.
+"""The door supervisor's core, for one door: who holds it open, and what the door's node is sent.
 
-It stands in for RMF's own (rmf_ros2, door_supervisor/Node.cpp): fleet adapters and web users ask on
-`adapter_door_requests`; the door's node is told on `door_requests`, by "door_supervisor". Rules:
-1. OPEN enters its requester among the holders, or renews its stamp. CLOSE strikes it off. A stale
-   request (`bridges/core/freshness.py`) does neither.
-2. While anybody holds the door its node is told OPEN, and when nobody does CLOSE: OPEN for the first
-   holder, CLOSE when the last one goes. The request is repeated when a requester repeats OPEN, and
-   when the door's state disagrees: held, but CLOSED or MOVING; not held, but OPEN or MOVING. For
-   INSIST_S after a holder has come, OPEN is repeated at every state: the first one may be lost, and
-   the door about to close by an earlier CLOSE. The states OFFLINE and UNKNOWN cause nothing.
-3. Silence ends nothing: a robot in the doorway is silent. After `open_alarm_s` there is a fault,
-   and that is all.
-4. Until it may speak, and beside another supervisor, it only listens. It then begins with OPEN for a
-   door that somebody holds; with CLOSE only if a state that comes afterwards asks for it.
-5. Nothing is sent twice within GAP_S, and nothing again, unchanged, within REPEAT_S.
-The heartbeat (`report.py`) tells who holds the doors, and a restart does not forget it (`keep.py`).
+It replaces RMF's own (rmf_ros2, door_supervisor/Node.cpp). Fleet adapters and web users send their
+requests on `adapter_door_requests`; the supervisor sends its own on `door_requests`, as
+"door_supervisor". Rules:
+1. OPEN adds its requester to the holders, or renews its stamp. CLOSE removes it. A stale request
+   (`bridges/core/freshness.py`) does neither.
+2. The first holder causes an OPEN to the door's node, and the last one that goes causes a CLOSE.
+   - The request is repeated when a requester repeats OPEN, and when the door's state contradicts it:
+     held, but CLOSED or MOVING; not held, but OPEN or MOVING.
+   - For INSIST_S after a holder has come, OPEN is repeated at every state. The first OPEN may have been
+     lost, and an earlier CLOSE may be about to close the door.
+   - The states OFFLINE and UNKNOWN cause nothing.
+3. Silence ends no hold: a robot in the doorway is silent. After `open_alarm_s` a fault is shown, and
+   the door stays open.
+4. During the quiet start, and while another supervisor publishes, it only listens. After that it sends
+   OPEN for a door with holders at once. It sends CLOSE only when a new state of the door calls for it.
+5. Two messages are at least GAP_S apart, and a message is repeated unchanged after REPEAT_S at the
+   earliest.
+The heartbeat (`report.py`) says who holds the doors, and `keep.py` saves that across a restart.
 """
 
 from typing import Any, Final
@@ -32,7 +35,7 @@ from bridges.rmf.definitions import DoorMode, DoorRequest, Message
 from bridges.rmf.topics import DOOR_REQUESTS, Topic
 
 REQUESTER_ID: Final = "door_supervisor"
-"""As RMF's own signs (door_supervisor/Node.hpp)."""
+"""The requester_id that RMF's own uses (door_supervisor/Node.hpp)."""
 INSIST_S: Final = 5.0
 RULES: Final = Rules(retained=False)
 
@@ -40,18 +43,18 @@ Decided = Decision[Memory, None, DoorHoldReport]
 
 
 def initial(door: str, started_at: float) -> Memory:
-    """Nobody was heard of; we may not speak yet."""
+    """Nothing has been heard, and we may not publish yet."""
     return Memory(door)
 
 
 def idle(memory: Memory, now: float) -> bool:
-    """Nobody holds this door, and nothing has been heard of it in a while."""
+    """May this door be forgotten? Nobody holds it, and nothing was heard of it for FORGOTTEN_S."""
     heard = [memory.shown_at, *(who.heard_at for who in memory.requesters.values())]
     return not memory.holders and now >= max(heard) + FORGOTTEN_S
 
 
 def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
-    """Take the event in, and send what is due: one message at the most. Never raises."""
+    """Take the event in, and send what is due: at most one message. Never raises."""
     memory, refused = _take(memory, event, now)
     publish: tuple[tuple[Topic[Any], Message], ...] = ()
     if now >= _due_at(memory):
@@ -106,7 +109,7 @@ def _enter(memory: Memory, event: OpenRequested, now: float) -> Memory:
 
 
 def _see(memory: Memory, now: float) -> Memory:
-    """A state has come: is the last request worth repeating?"""
+    """A state has come: should the last request be repeated?"""
     insists = any(now < holder.since + INSIST_S for holder in memory.holders)
     return replace(memory, prompted=memory.disagrees or insists)
 
@@ -115,7 +118,7 @@ def _see(memory: Memory, now: float) -> Memory:
 
 
 def _request(memory: Memory) -> DoorRequest:
-    """What the door's node is told, without its stamp."""
+    """The request to the door's node, without its stamp."""
     return DoorRequest(
         requester_id=REQUESTER_ID,
         door_name=memory.door,
@@ -124,14 +127,14 @@ def _request(memory: Memory) -> DoorRequest:
 
 
 def _due_at(memory: Memory) -> float:
-    """When to send it."""
+    """When the next request is due."""
     if not memory.may_speak:
         return NEVER
     return due_at(memory.sent_at, new=memory.owed, again=memory.prompted)
 
 
 def _wake_at(memory: Memory, now: float, limits: Limits) -> float:
-    """When the decision may change though nothing is heard."""
+    """When the decision may change without an event."""
     due = [_due_at(memory), memory.silent_at]
     due += [holder.since + limits.open_alarm_s for holder in memory.holders]
     return min((at for at in due if at > now), default=NEVER)

@@ -1,6 +1,6 @@
-"""Who holds which door: what a restart must not forget.
+"""Who holds which door, saved across a restart.
 
-It is kept before the heartbeat tells it: a robot drives on by the heartbeat.
+It is saved before the heartbeat announces it: a robot drives on once the heartbeat lists it.
 """
 
 from collections.abc import Mapping
@@ -21,13 +21,13 @@ Stamp = Annotated[int, Meta(ge=0, lt=2**31 * SECOND_NS)]
 
 
 class Record(keep.Record, frozen=True, forbid_unknown_fields=True):
-    """`doors`: door -> requester -> the stamp (ns) of its present visit's first OPEN."""
+    """`doors`: door -> requester -> the stamp (ns) of the first OPEN of its present visit."""
 
     doors: dict[Text, dict[Text, Stamp]]
 
 
 def persist(memories: Mapping[str, Memory]) -> bytes:
-    """What the next start needs; the same bytes as long as nobody comes or goes."""
+    """What the next start needs. The bytes stay the same until a holder comes or goes."""
     doors = {
         name: {holder.requester: holder.visit for holder in by_name(memory)}
         for name, memory in sorted(memories.items())
@@ -37,10 +37,10 @@ def persist(memories: Mapping[str, Memory]) -> bytes:
 
 
 def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
-    """The memories at start, from what `persist` gave, for the doors still served.
+    """The memories at start, from the bytes of `persist`, for the doors still served.
 
-    ValueError if it is not that. How long each has held its door is counted anew: the clock that it
-    was counted by is gone.
+    ValueError for any other bytes. How long each has held its door counts from now: the monotonic
+    clock before the restart means nothing any more.
     """
     found = keep.read(kept, Record, VERSION, "a table of who holds which door")
     served = found.doors if settings.doors is None else set(settings.doors)

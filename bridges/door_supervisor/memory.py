@@ -11,7 +11,7 @@ from bridges.door_supervisor.settings import Settings
 from bridges.rmf.definitions import DoorModeValue
 
 VISIT_S: Final = 2.5
-"""A robot that waits for a door repeats itself at 1 Hz; after so much silence it has come again."""
+"""A waiting robot repeats OPEN at 1 Hz. An OPEN after a longer silence than this is a new visit."""
 
 CLOSED: Final = DoorModeValue.MODE_CLOSED
 MOVING: Final = DoorModeValue.MODE_MOVING
@@ -30,10 +30,10 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 class Holder(msgspec.Struct, frozen=True):
-    """Who holds the door open: since when by our clock, and the `stamp` of its latest OPEN.
+    """A requester that holds the door open, `since` when (our clock). `stamp`: of its latest OPEN.
 
-    `asked_at`: when that came. `visit`: the stamp of the first OPEN of its present visit, which does
-    not change while it repeats itself.
+    `asked_at`: when that OPEN came. `visit`: the stamp of the first OPEN of its present visit; repeats
+    do not change it.
     """
 
     requester: str
@@ -51,9 +51,9 @@ class Holder(msgspec.Struct, frozen=True):
 class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
-    `holders`: in the order in which they came. `requesters`: what was heard of each of late.
-    `mode`: the door's last, heard at `shown_at`. `sent`: the last request to the door's node since we
-    may speak; `prompted`: it is worth repeating.
+    `holders`: in the order in which they came. `requesters`: what was lately heard of each. `mode`:
+    the door's last mode, heard at `shown_at`. `sent`: the last request to the door's node since we may
+    publish. `prompted`: something calls for a repeat of it.
     """
 
     door: str
@@ -68,26 +68,26 @@ class Memory(msgspec.Struct, frozen=True):
 
     @property
     def wanted(self) -> DoorModeValue:
-        """What the door's node should hear."""
+        """The mode to request of the door's node."""
         return OPEN if self.holders else CLOSED
 
     @property
     def owed(self) -> bool:
-        """The door's node has not been told yet. A CLOSE is owed only where OPEN was sent."""
+        """Is a new request to be sent? A CLOSE is only if the last request was OPEN."""
         return self.wanted != self.sent and (self.wanted == OPEN or self.sent == OPEN)
 
     @property
     def disagrees(self) -> bool:
-        """The door's state is not what is wanted, and it can be changed."""
+        """Does the door's state contradict what is wanted? OFFLINE and UNKNOWN do not."""
         return self.mode == MOVING or self.mode == (CLOSED if self.holders else OPEN)
 
     @property
     def silent_at(self) -> float:
-        """When the door will have been silent for too long, for those who hold it."""
+        """When a held door will have been silent for too long; NEVER if nobody holds it."""
         if not self.holders:
             return NEVER
         return max(self.shown_at, self.holders[0].since) + SILENT_S
 
     def holder(self, requester: str) -> Holder | None:
-        """This requester, if it holds the door."""
+        """This requester's entry among the holders; None if it does not hold the door."""
         return next((h for h in self.holders if h.requester == requester), None)

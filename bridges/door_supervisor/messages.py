@@ -1,4 +1,4 @@
-"""Adapters' DoorRequests and the doors' DoorStates in: are they well formed, and for a door of ours?"""
+"""DoorRequests and DoorStates in. Is a message well formed, and about a door that we serve?"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,10 +16,12 @@ from bridges.rmf.definitions import DoorModeValue, DoorRequest, DoorState, Super
 def accept_request(
     request: DoorRequest, settings: Settings, wall: float
 ) -> OpenRequested | CloseRequested:
-    """The event that an adapter's request is; `wall` plays no part, as stamps are the requester's.
+    """An adapter's request as an event. Raises RequestRefused. `wall` is not used: stamps are compared
+    with those of the same requester only.
 
-    A request without a requester_id is a half-filled one, and its mode, 0 by default, would mean
-    CLOSE. One under our own name is what we send to the doors, come back by a renamed topic.
+    A request without a requester_id is refused: its fields were not filled in, and its default mode,
+    0, would mean CLOSE. A request with our own requester_id is one of those that we send to the doors,
+    and came back through a renamed topic.
     """
     _check_door(request.door_name, settings)
     who = request.requester_id
@@ -39,7 +41,7 @@ def accept_request(
 
 
 def accept_state(state: DoorState, settings: Settings, wall: float) -> StateHeard:
-    """The event that a door's state is."""
+    """A door's state as an event. Raises RequestRefused."""
     _check_door(state.door_name, settings)
     mode = state.current_mode.value
     if mode not in set(DoorModeValue):
@@ -63,14 +65,14 @@ def device_name(message: DoorRequest | DoorState) -> str:
 def stamped(
     message: DoorRequest | SupervisorHeartbeat, time: Time
 ) -> DoorRequest | SupervisorHeartbeat:
-    """As it is sent at this time; the stamps of a heartbeat are its requesters'."""
+    """The message with its time of sending. A heartbeat has only its requesters' stamps."""
     if isinstance(message, SupervisorHeartbeat):
         return message
     return replace(message, request_time=time)
 
 
 def summary(report: DoorHoldReport, now: float) -> Mapping[str, str]:
-    """What a person wants to read of one door, in a line."""
+    """One door in one line, for a person."""
     mode = "-" if report.mode is None else report.mode.name.removeprefix("MODE_")
     held = ", ".join(f"{who} ({now - since:.0f} s)" for who, since in report.holders)
     return {"mode": mode, "held_by": held or "-"}

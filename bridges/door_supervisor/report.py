@@ -1,9 +1,9 @@
-"""What RMF's heartbeat, the log and the status file are told of doors and of who holds them.
+"""What the heartbeat, the log and the status file say of doors and their holders.
 
-Fleet adapters rely on the heartbeat: DoorOpen ends only when it lists its robot, DoorClose when it
-does not, and a robot that is listed for a door it does not hold sends CLOSE (rmf_ros2,
-RobotContext.cpp _check_door_supervisor). RMF's own sends it on adapter requests alone, so a session
-of a fleet adapter that was restarted stays for ever; ours goes out each second as well.
+Fleet adapters rely on the heartbeat. Their phase DoorOpen ends only when it lists the robot, and
+DoorClose when it does not. A robot that is listed for a door it does not hold sends CLOSE (rmf_ros2,
+RobotContext.cpp _check_door_supervisor). RMF's own supervisor sends the heartbeat only after adapter
+requests, so the sessions of a restarted fleet adapter stay for ever. Ours is also sent each second.
 """
 
 from collections.abc import Iterator, Mapping
@@ -27,7 +27,7 @@ from bridges.rmf.topics import DOOR_SUPERVISOR_HEARTBEAT, AnyTopic
 class DoorHoldReport(msgspec.Struct, frozen=True):
     """One door, for the log and the status file. Times are monotonic seconds.
 
-    `holders`: each requester and since when. `mode`: of the door's last state, at `read_at`.
+    `holders`: each requester, and since when it holds the door. `mode`: the door's last, of `read_at`.
     """
 
     read_at: float | None
@@ -59,7 +59,7 @@ def _faults(memory: Memory, now: float, limits: Limits) -> Iterator[Fault]:
 
 
 def heartbeat(memories: Mapping[str, Memory]) -> tuple[AnyTopic, SupervisorHeartbeat]:
-    """All doors that somebody holds, and by whom, in the order of names."""
+    """All held doors with their holders, in the order of names."""
     doors = tuple(
         DoorSessions(name, tuple(map(_session, by_name(memory))))
         for name, memory in sorted(memories.items())

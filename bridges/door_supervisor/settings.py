@@ -6,19 +6,19 @@ from bridges.core.fields import GraphSettings, Name, Patience
 
 
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the door supervisor may decide by itself: nothing but when to complain.
+    """The door supervisor's policy.
 
-    `doors`: the doors that it serves, whatever names anybody makes up; every door that it hears of when
-    absent, as RMF's own does.
-    `quiet_start_s`: how long it only listens, so that a restart closes nothing.
-    `open_alarm_s`: a fault is shown when one requester has held a door open for so long. The door
-    stays open: its robot may stand in the doorway.
+    `doors`: the doors that it serves; messages about others are refused. When absent, it serves every
+    door that it hears of, as RMF's own does.
+    `quiet_start_s`: how long it only listens after its start, so that a restart closes no door.
+    `open_alarm_s`: how long one requester may hold a door open before a fault is shown. The door stays
+    open, as the robot may stand in the doorway.
     """
 
     doors: list[Name] | None = None
     open_alarm_s: Patience = 600.0
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """An empty list would serve nobody."""
+        """An empty list of doors."""
         if self.doors == []:
             yield ("doors",), "is empty: name the doors, or leave it out to serve every door"

@@ -8,14 +8,14 @@ from bridges.rmf.definitions import DoorModeValue
 
 
 class OpenRequested(msgspec.Struct, frozen=True):
-    """A requester's OPEN; `stamp` is its own (ns)."""
+    """A requester's OPEN; `stamp` is by its clock (ns)."""
 
     requester: str
     stamp: int
 
 
 class CloseRequested(msgspec.Struct, frozen=True):
-    """A requester's CLOSE; `stamp` is its own (ns)."""
+    """A requester's CLOSE; `stamp` is by its clock (ns)."""
 
     requester: str
     stamp: int
