@@ -247,10 +247,15 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         if self.calls and self.call:
             yield ("calls",), "calls and call are two ways of calling: keep one"
         taken: dict[str, int] = {}
-        for path, at, bits in self.places():
-            if at in taken and (not bits or bits & taken[at]):
-                yield (*path, "at"), f"another command has these bits of {at} already"
-            taken[at] = taken.get(at, 0) | bits
+        values = [(p, c.at, {"on": c.on, "off": c.off}) for _, p, c in self.singles()]
+        values += [
+            (path, at, {"at": bits}) for path, at, bits in self.places() if path == ("call",)
+        ]
+        for path, at, words in values:
+            for key, bits in words.items():
+                if bits & taken.get(at, 0):
+                    yield (*path, key), f"another command has these bits of {at} already"
+            taken[at] = functools.reduce(operator.or_, words.values(), taken.get(at, 0))
 
 
 class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
