@@ -2,14 +2,14 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-# Byte code is kept, whatever this shell says, and not beside the sources: eight workers and some hundred
-# processes of `make test` would compile the same files otherwise, for more CPU than the tests take.
+# Byte code is kept, whatever this shell says: otherwise each worker and each daemon of `make test` compiles
+# every file anew.
 export PYTHONDONTWRITEBYTECODE :=
-export PYTHONPYCACHEPREFIX := $(CURDIR)/.venv/bytecode
 
 .PHONY: help demo demo-charging test deep test-ros lint format bench flood soak torture mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
+	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
 	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
 	@echo "make deep    all tests, every walk to its full depth: some minutes more"

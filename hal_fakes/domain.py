@@ -1,10 +1,12 @@
-"""A DDS domain that nobody on this machine uses, for the demo and the tests."""
+"""A ROS domain that nobody on this machine uses, on DDS or zenoh, for the demo and the tests."""
 
 import random
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
+
+from bridges.rmf.zenoh_config import LOOPBACK_PORT
 
 DOMAINS: Final = range(10, 70)
 """`bench/` has those from 70 on; above 101 the ports reach into those that Linux hands to clients."""
@@ -41,13 +43,15 @@ def _claimed() -> tuple[int, socket.socket]:
     """
     for domain in random.sample(DOMAINS, len(DOMAINS)):
         base = 7400 + 250 * domain
-        if all(_is_free(base + offset) for offset in (0, 10, 11)) and (claim := _claim(domain)):
+        dds = all(_is_free(base + offset) for offset in (0, 10, 11))
+        zenoh = _is_free(LOOPBACK_PORT + domain, socket.SOCK_STREAM)
+        if dds and zenoh and (claim := _claim(domain)):
             return domain, claim
     raise OSError(f"every DDS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use on this machine")
 
 
-def _is_free(port: int) -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+def _is_free(port: int, kind: socket.SocketKind = socket.SOCK_DGRAM) -> bool:
+    with socket.socket(socket.AF_INET, kind) as probe:
         try:
             probe.bind(("", port))
         except OSError:

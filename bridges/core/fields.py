@@ -28,7 +28,7 @@ Name = Annotated[
         min_length=1,
         max_length=128,
         pattern=r"^[^\x00-\x20\x7f-\x9f]([^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\x9f])?$(?!\n)",
-        extra={"pattern": "text without control characters, or spaces at its ends,"},
+        extra={"pattern": "text without control characters, or spaces at its ends"},
     ),
 ]
 """A name that RMF uses: any text, quoted in YAML where YAML would read something else."""

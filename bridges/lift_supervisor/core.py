@@ -54,10 +54,13 @@ def initial(lift: str, started_at: float) -> Memory:
 def idle(memory: Memory, now: float) -> bool:
     """Nobody wants this lift, and nothing has been heard of it in a while.
 
-    A session that is still to be ended is found again in the lift's states, if they come back.
+    A session that is still to be ended is found again in the lift's states, if they come back. Who
+    only waits for a lift that has been silent for long asks again when it is back.
     """
     heard_at = max(memory.heard_at, memory.shown_at)
-    return not memory.claims and now >= heard_at + FORGOTTEN_S
+    has_it = memory.session_shown or (memory.turn and memory.turn.seen)
+    long_s = NEVER if has_it else 10 * FORGOTTEN_S
+    return now >= heard_at + (long_s if memory.claims else FORGOTTEN_S)
 
 
 def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:

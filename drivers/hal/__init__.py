@@ -23,7 +23,12 @@ Remark = tuple[tuple[str, ...], str]
 
 
 class Bus:
-    """What every bus has; the rest depends on its type (`points.PointsBus`, HTTP calls…)."""
+    """What every bus has; the rest depends on its type (`points.PointsBus`, HTTP calls…).
+
+    `calls`: how many calls have ended, well or not; systemd's watchdog is fed by it.
+    """
+
+    calls = 0
 
     def on_edge(self, wake: Callable[[], None]) -> None:
         """Call `wake` (from any thread) when an input may have changed; nothing where polled."""

@@ -165,6 +165,8 @@ class HttpBus(Bus):
             self._adapter.close()
             backoff.failed(str(error))
             raise
+        finally:
+            self.calls += 1
         backoff.mended()
 
     def _get(self, url: str) -> tuple[str, bytes]:

@@ -14,8 +14,7 @@ from msgspec.structs import replace
 from bridges.charger.core import decide
 from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import Durations as Limits
-from bridges.charger.settings import Robot, robot
+from bridges.charger.settings import Durations, Robot, robot
 from bridges.charger.signals import (
     Activity,
     Cancelled,
@@ -28,7 +27,7 @@ from bridges.charger.signals import (
 from bridges.core.decision import Decision, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from tests.walk import Walker
 
-LIMITS = Limits(
+LIMITS = Durations(
     misses=2, start_timeout_s=8.0, stop_timeout_s=4.0, released_s=2.0, peer_internal_timeout_s=16.0
 )
 RECEIVERS = {"1": robot("tiny/A"), "2": robot("tiny/B")}
@@ -41,7 +40,7 @@ SITES = {
     "refuses": ChargerLimits(LIMITS, RECEIVERS),
     "serves": ChargerLimits(LIMITS, RECEIVERS, "serve_known"),
     "clears by itself": ChargerLimits(
-        Limits(misses=2, start_timeout_s=8.0, clear_errors_per_h=60), RECEIVERS
+        Durations(misses=2, start_timeout_s=8.0, clear_errors_per_h=60), RECEIVERS
     ),
 }
 

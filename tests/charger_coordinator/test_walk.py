@@ -294,7 +294,7 @@ HISTORIES = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 2.0, 11.0, 31.0]), EVE
 
 @hypothesis_settings(max_examples=examples(400), deadline=None, derandomize=True, database=None)
 @given(HISTORIES)
-def test_whatever_is_heard_no_two_robots_share_and_nothing_is_said_out_of_turn(
+def test_in_every_history_no_two_robots_share_a_station_and_requests_go_out_in_turn(
     history: list[tuple[float, Any]],
 ) -> None:
     memory, now, speaks = core.initial("site", 0.0), 0.0, False
@@ -322,7 +322,7 @@ def test_whatever_is_heard_no_two_robots_share_and_nothing_is_said_out_of_turn(
 
 @hypothesis_settings(max_examples=examples(200), deadline=None, derandomize=True, database=None)
 @given(st.binary(max_size=60))
-def test_no_file_is_taken_by_halves(kept: bytes) -> None:
+def test_a_damaged_file_is_refused_as_a_whole(kept: bytes) -> None:
     try:
         keep.restore(kept, SETTINGS, 0.0)
     except ValueError:

@@ -7,10 +7,8 @@ from typing import Any
 from bridges.charger import core as charger
 from bridges.charger import messages as charger_messages
 from bridges.charger.memory import ChargerLimits
-from bridges.charger.settings import ChargerSettings, Robot
-from bridges.charger.settings import Durations as Limits
-from bridges.charger.signals import Activity, ChargerSample, Measured
-from bridges.charger.signals import FaultSide as Side
+from bridges.charger.settings import ChargerSettings, Durations, Robot
+from bridges.charger.signals import Activity, ChargerSample, FaultSide, Measured
 from bridges.charger_coordinator import KIND
 from bridges.charger_coordinator.settings import (
     Fleet as FleetSettings,
@@ -36,7 +34,7 @@ GRAPH = {
     "ward": ("L1", 50.0, 0.0),
 }
 PLACES = {"charger_a": "charger_a", "charger_b": "dock_b"}
-NO_ERROR: tuple[Side, str] = ("", "")
+NO_ERROR: tuple[FaultSide, str] = ("", "")
 RECEIVERS = {f"RX-{i}": Robot("tiny", f"AMR0{i}") for i in (1, 2, 3)}
 
 
@@ -73,14 +71,14 @@ class Charger:
     def __init__(self, name: str, knows: bool = True) -> None:
         receivers = RECEIVERS if knows else {}
         self.name = name
-        self.limits = ChargerLimits(Limits(misses=3, released_s=1.0), receivers)
+        self.limits = ChargerLimits(Durations(misses=3, released_s=1.0), receivers)
         self.memory = charger.initial(self.limits, 0.0)
         self.pad = ""
         self.percent = 0.0
         self.broken = self.unplugged = self.dead = False
         self.refuses: set[str] = set()
         self.activity = Activity.IDLE
-        self.error: tuple[Side, str] | None = None
+        self.error: tuple[FaultSide, str] | None = None
         self._since = 0.0
         self._power = False
         self._clears = 0

@@ -162,7 +162,7 @@ def test_a_decision_repeated_is_the_same_decision(
 
 @settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
-def test_nothing_is_decided_otherwise_before_the_time_it_asked_to_be_woken(
+def test_the_decision_stays_the_same_until_the_time_the_core_asked_to_be_woken(
     steps: list[tuple[float, Event]], limits: DoorLimits
 ) -> None:
     memory, now = initial(limits, 0.0), 0.0

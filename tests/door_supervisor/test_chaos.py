@@ -113,7 +113,7 @@ def rates(storm: Storm, topic: Any) -> list[float]:
 
 @pytest.mark.parametrize("fate", [lossy, late])
 @pytest.mark.parametrize("seed", range(12))
-def test_nobody_is_closed_on_and_nobody_waits_for_ever(seed: int, fate: Fate) -> None:
+def test_no_door_closes_on_a_robot_and_no_robot_waits_for_ever(seed: int, fate: Fate) -> None:
     storm = Storm(seed, fate)
     storm.rages()
     before = {who: walker.visits for who, walker in storm.walkers.items()}
@@ -140,7 +140,7 @@ class Forgetful(Disk):
         return None
 
 
-def test_the_watch_would_see_a_close_on_a_robot() -> None:
+def test_the_test_notices_a_close_on_a_robot() -> None:
     """Without the table a restart closes the door on those within."""
     wrong = 0
     for seed in range(4):

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import pytest
+
 from bridges.door_supervisor import KIND
 from bridges.door_supervisor.settings import Settings
 from bridges.rmf import definitions as d
@@ -100,7 +102,9 @@ def test_a_restart_closes_nothing_and_the_next_heartbeat_lists_who_holds() -> No
     ]
 
 
-def test_what_cannot_be_kept_is_still_told_and_what_was_spoilt_is_left_out() -> None:
+def test_a_table_that_cannot_be_written_is_still_published_and_damaged_entries_are_left_out() -> (
+    None
+):
     graph = Graph()
     graph.until(4.0)
     graph.disk.full = True
@@ -112,3 +116,41 @@ def test_what_cannot_be_kept_is_still_told_and_what_was_spoilt_is_left_out() -> 
     graph.transport.close()
     graph.starts()
     assert graph.node.subjects == {}
+
+
+def test_what_cannot_be_kept_is_a_fault_and_tried_again_until_it_is(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    graph = Graph()
+    graph.until(4.0)
+    graph.kept.full = True
+    graph.asks("a", 2)
+    before = graph.kept.kept
+    graph.until(10.0)
+    assert (graph.kept.kept, graph.heard[-1]) == (before, (9.1, "beat ward:a"))
+    [fault] = graph.node.status()["faults"]
+    assert fault["code"] == "NOT_KEPT"
+    graph.kept.full = False
+    graph.until(11.0)
+    assert b'"a"' in (graph.kept.kept or b"")
+    assert graph.node.status()["faults"] == []
+    lines = [r.getMessage() for r in caplog.records if "NOT_KEPT" in r.getMessage()]
+    assert len(lines) == 1
+
+
+def test_nothing_is_said_before_it_is_kept() -> None:
+    graph = Graph()
+    graph.until(4.0)
+    said: list[str] = []
+    write = graph.kept.write
+
+    def tells(kept: bytes) -> None:
+        said.extend(word for _, word in graph.heard if "lab" in word)
+        write(kept)
+
+    graph.kept.write = tells  # type: ignore[method-assign]
+    graph.asks("b", 2, "lab")
+    assert said == []
+    assert graph.heard[-1] == (4.0, "OPEN lab")
+    graph.until(4.2)
+    assert graph.heard[-1] == (4.1, "beat lab:b")

@@ -233,7 +233,7 @@ def test_the_heartbeat_goes_out_each_second_and_when_the_table_changes() -> None
     ]
 
 
-def test_doors_are_each_others_nobody() -> None:
+def test_each_door_has_its_own_table() -> None:
     site = Site(doors=None)
     DoorDaemon(site.world, "lab")
     site.world.run(5.0)

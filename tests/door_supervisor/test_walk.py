@@ -110,7 +110,7 @@ def asked(ledger: Ledger, move: tuple[Any, str]) -> Ledger:
     return after(ledger, lambda now: word(who, stamp(now)))
 
 
-def test_every_history_of_two_requesters_to_depth() -> None:
+def test_every_history_of_two_requesters_keeps_the_rules() -> None:
     words = list(product((OpenRequested, CloseRequested), "ab"))
     for ledger, history in histories(Ledger(speaks=True), words, depth(5, 7), asked):
         ledger.until(6.0)
@@ -121,7 +121,7 @@ def test_every_history_of_two_requesters_to_depth() -> None:
         assert words_sent[-1:] == ([2] if held else [0] if opened else [])
 
 
-def test_every_history_of_late_requests_states_and_leave_to_speak_to_depth() -> None:
+def test_every_history_of_late_requests_and_states_keeps_the_rules() -> None:
     events: list[Callable[[float], Any]] = [
         lambda now: OpenRequested("a", stamp(now)),
         lambda now: CloseRequested("a", stamp(now)),
@@ -174,7 +174,7 @@ def _would_be_believed(ledger: Ledger, event: Any) -> bool:
 
 @settings(max_examples=examples(300), deadline=None, derandomize=True)
 @given(HISTORIES)
-def test_in_every_history_the_words_are_what_the_table_says_and_never_too_many(
+def test_in_every_history_the_requests_follow_the_table_and_their_pace(
     history: list[tuple[float, Any]],
 ) -> None:
     ledger = told(history)
@@ -201,7 +201,7 @@ def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
 
 @settings(max_examples=examples(200), deadline=None, derandomize=True)
 @given(st.binary(max_size=60))
-def test_no_file_is_taken_by_halves(kept: bytes) -> None:
+def test_a_damaged_file_is_refused_as_a_whole(kept: bytes) -> None:
     try:
         restored = keep.restore(kept, Settings(), 0.0)
     except ValueError:

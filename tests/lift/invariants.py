@@ -9,8 +9,7 @@ from bridges.core.decision import IoFailed, Sampled, WriteFailed
 from bridges.lift.core import decide
 from bridges.lift.memory import LiftLimits, Memory
 from bridges.lift.report import LiftReport
-from bridges.lift.signals import Door, Ended, Hazard, LiftOutputs, Motion
-from bridges.lift.signals import Requested as Asked
+from bridges.lift.signals import Door, Ended, Hazard, LiftOutputs, Motion, Requested
 from bridges.rmf.definitions import LiftDoor
 from tests.lift.walk import Step, World, reading
 
@@ -78,7 +77,7 @@ def sessions_end_by_end_alone(step: Step) -> None:
     before, after, event = _id(step.before), _id(step.decision.memory), step.event
     if isinstance(event, Ended) and event.session_id == before:
         assert after is None
-    elif isinstance(event, Asked) and before is None:
+    elif isinstance(event, Requested) and before is None:
         assert after in (None, event.session_id)
         assert (after is None) == bool(step.decision.refused)
         grace = step.before.grace

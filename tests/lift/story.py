@@ -14,8 +14,7 @@ from bridges.core.decision import OperatorReset
 from bridges.core.kind import AnyDeviceKind
 from bridges.lift import KIND
 from bridges.lift.memory import LiftLimits
-from bridges.lift.settings import Durations as Limits
-from bridges.lift.settings import Floor, LiftSettings
+from bridges.lift.settings import Durations, Floor, LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.rmf.definitions import (
     LiftDoor,
@@ -203,7 +202,7 @@ class Story:
         self.building = building or Building()
         self.settings = LiftSettings(
             floors=floors or FLOORS,
-            limits=Limits(**limits),
+            limits=Durations(**limits),
             fire_reset=fire_reset,
             alarm=alarm,
             agv_mode=agv_mode,

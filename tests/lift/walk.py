@@ -15,10 +15,8 @@ from bridges.core.debounce import Settled
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from bridges.lift.core import decide, initial, published
 from bridges.lift.memory import Channel, LiftLimits, Memory
-from bridges.lift.settings import Durations as Limits
-from bridges.lift.settings import LiftSettings
-from bridges.lift.signals import Door, Ended, Event, Hazard, LiftSample, Motion
-from bridges.lift.signals import Requested as Asked
+from bridges.lift.settings import Durations, LiftSettings
+from bridges.lift.signals import Door, Ended, Event, Hazard, LiftSample, Motion, Requested
 from tests.walk import Walker
 
 LONG_S = 55.0
@@ -31,7 +29,7 @@ def limits_of(
     """The default durations, but for the age of readings, which costs scans."""
     settings = LiftSettings(
         floors=["L1", "L2", "L3"],
-        limits=Limits(**{"stale_after_s": 60.0, **changes}),
+        limits=Durations(**{"stale_after_s": 60.0, **changes}),
         fire_reset="manual",
         alarm="fire_alarm_trigger",
         agv_mode=agv_mode,
@@ -100,11 +98,11 @@ def reading(world: World) -> Event:
 
 MOVES: dict[str, Move] = {
     **{
-        f"{who} asks {floor}": _event(Asked(who, True, floor))
+        f"{who} asks {floor}": _event(Requested(who, True, floor))
         for who in ("A", "B")
         for floor in ("L1", "L3")
     },
-    "A asks human": _event(Asked("A", False, "L1")),
+    "A asks human": _event(Requested("A", False, "L1")),
     "A ends": _event(Ended("A")),
     "B ends": _event(Ended("B")),
     "agv on": _inputs(agv=True),

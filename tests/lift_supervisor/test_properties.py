@@ -54,7 +54,7 @@ Restart = st.tuples(st.floats(0, 150), st.sampled_from(["supervisor", "Lift1", *
     restarts=st.lists(Restart, max_size=6),
 )
 @example(seed=1, loss=0.0, our_skew=0.0, restarts=[])  # a late state began the same END again
-def test_whatever_is_lost_and_whoever_restarts_everybody_who_lives_is_served(
+def test_every_live_robot_is_served_whatever_is_lost_and_whoever_restarts(
     seed: int, loss: float, our_skew: float, restarts: list[tuple[float, str]]
 ) -> None:
     rng = random.Random(seed)
@@ -231,7 +231,7 @@ def test_long_histories_keep_the_rules_too(history: list[tuple[float, int]]) -> 
 
 @settings(derandomize=True, max_examples=examples(100), deadline=None)
 @given(histories())
-def test_from_wherever_it_is_a_lift_that_obeys_is_given_to_whoever_asks(
+def test_from_every_state_a_lift_that_obeys_is_granted_to_a_robot_that_asks(
     history: list[tuple[float, int]],
 ) -> None:
     desk = Watched(core.initial("Lift1", 0.0), 0.0)

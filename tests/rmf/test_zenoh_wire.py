@@ -113,7 +113,9 @@ def test_those_who_stay_find_who_comes_after_the_first_of_them_has_gone(here: He
         late = ZenohTransport("late", here.domain, loopback=True, settings=ZENOH[here.way])
         try:
             said = late.publisher(states)
-            wait_until(lambda: heard or peer.sent(said, d.LiftState(lift_name="Lift1")), "they meet too")
+            wait_until(
+                lambda: heard or peer.sent(said, d.LiftState(lift_name="Lift1")), "they meet too"
+            )
         finally:
             late.close()
     finally:

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
+from hal_fakes.wire import join, wire
 from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -40,7 +40,8 @@ doors:
 class Module:
     """The I/O module and the door behind it; it outlives every daemon."""
 
-    def __init__(self, directory: Path, domain: int, transport: str = "dds") -> None:
+    def __init__(self, directory: Path, domain: int, transport: str | None = None) -> None:
+        transport = transport or wire()
         self.directory = directory
         self.domain = domain
         self.edges: list[dict[str, Any]] = []
@@ -168,7 +169,7 @@ class Graph:
 
     def __init__(self, domain: int) -> None:
         self.states: list[DoorState] = []
-        self.transport = DdsTransport("rmf", domain, loopback=True)
+        self.transport = join("rmf", domain)
         self._requests = self.transport.publisher(DOOR_REQUESTS)
         self.heard = self.transport.subscribe(DOOR_STATES, self.states.append)
 

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from bridges.rmf import stamps
-from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import LiftMode, LiftRequest, LiftState
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.serve.clock import TELL_GAP_S
+from hal_fakes.wire import join, wire
 from tests.rmf import peer
 from tests.rmf.conftest import ROS2
 from tests.serve.site import Daemon, daemon, shipped
@@ -37,7 +37,7 @@ class Lift:
         self.domain = domain
         self.states: list[LiftState] = []
         self._status = status
-        self.transport = DdsTransport("rmf", domain, loopback=True)
+        self.transport = join("rmf", domain)
         self._requests = self.transport.publisher(LIFT_REQUESTS)
         self.transport.subscribe(LIFT_STATES, self.states.append)
         wait_until(self._requests.matched, "the node listens")
@@ -56,7 +56,7 @@ class Lift:
         return refused
 
 
-@pytest.fixture(params=["dds", ROS2])
+@pytest.fixture(params=[wire(), ROS2])
 def lift(domain: int, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Lift]:
     file = shipped("lift_dry_contact.yaml", tmp_path, request.param)
     options = ("--simulate", "--domain-id", str(domain))
@@ -105,7 +105,7 @@ def test_a_flood_ends_with_the_last_valid_request_and_states_go_on(lift: Lift) -
 def test_samples_that_are_no_requests_are_dropped_and_the_next_good_one_is_obeyed(
     lift: Lift,
 ) -> None:
-    with peer.running("hostile", lift.domain):
+    with peer.running("hostile", lift.domain, wire()):
         wait_until(lambda: lift.status()["samples_dropped"], "hostile samples are counted")
     lift.send(replace(RIGHT, request_type=0))
     lift.send(RIGHT)

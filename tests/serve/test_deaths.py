@@ -17,6 +17,8 @@ import pytest
 
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.signals import ENDING, WRITES
+from hal_fakes.wire import wire
+from tests.depth import depth
 from tests.serve.site import (
     YAML,
     Graph,
@@ -101,10 +103,21 @@ def test_the_rule_leaves_out_crashes_and_what_ends_nothing_by_default() -> None:
     }
 
 
-NAMED = sorted(n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX))
+USUAL = [
+    signal.SIGHUP,
+    signal.SIGINT,
+    signal.SIGQUIT,
+    signal.SIGTERM,
+    signal.SIGTSTP,
+    signal.SIGRTMAX,
+]
+EVERY = [n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX)]
+"""Of the realtime signals the first and the last."""
 
 
-@pytest.mark.parametrize("number", NAMED, ids=lambda number: signal.Signals(number).name)
+@pytest.mark.parametrize(
+    "number", depth(USUAL, sorted(EVERY)), ids=lambda number: signal.Signals(number).name
+)
 def test_every_signal_that_would_end_or_suspend_the_daemon_releases_the_relay(
     module: Module, graph: Graph, tmp_path: Path, number: signal.Signals
 ) -> None:
@@ -209,7 +222,7 @@ def test_a_reset_during_outputs_off_is_not_sent_and_does_not_end_it(
     hole = socket.create_server(("127.0.0.1", 0))
     port = hole.getsockname()[1]
     file = tmp_path / "silent.yaml"
-    file.write_text(YAML.format(domain=domain, transport="dds", port=port))
+    file.write_text(YAML.format(domain=domain, transport=wire(), port=port))
     off = subprocess.Popen(
         command("outputs-off", file, "--runtime-dir", tmp_path / "run"), env=environment()
     )
@@ -304,7 +317,7 @@ def test_a_start_first_switches_off_what_a_dead_daemon_left_on_under_another_yam
         assert len(list((tmp_path / "run").glob("claimed-*"))) == 1
 
 
-def test_hardware_that_a_dead_daemon_left_on_and_that_does_not_answer_is_tried_on(
+def test_hardware_that_a_dead_daemon_left_on_is_tried_until_it_answers(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     with daemon(module.file, tmp_path / "run", **SERVICE) as running:
@@ -357,7 +370,7 @@ def test_no_descriptor_left_ends_no_daemon(module: Module, graph: Graph, tmp_pat
     assert module.relay() == [True, False]
 
 
-def test_a_stranger_is_told_what_to_do_and_switches_nothing(
+def test_a_user_without_permission_is_told_what_to_do_and_switches_nothing(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     with tempfile.TemporaryDirectory(dir="/tmp") as base:
@@ -380,7 +393,7 @@ def test_a_stranger_is_told_what_to_do_and_switches_nothing(
             assert module.relay() == [True]
 
 
-def test_gpio_without_lgpio_or_permission_is_told_in_a_line(tmp_path: Path) -> None:
+def test_missing_lgpio_or_permission_is_told_in_one_line(tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
     done = _told("outputs-off", file, "--runtime-dir", tmp_path / "run")
     assert done.returncode == 1

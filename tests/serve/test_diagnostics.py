@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from bridges.rmf import definitions as d
-from bridges.rmf.dds import DdsTransport
 from bridges.rmf.topics import DIAGNOSTICS, DOOR_STATES
 from bridges.serve.diagnostics import MOST, diagnosis, faults
+from hal_fakes.wire import join
 from tests.serve.site import PATIENT, Module, daemon
 from tests.waiting import wait_until
 
@@ -86,7 +86,7 @@ def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(
 ) -> None:
     module = Module(tmp_path, domain)
     module.file.write_text(module.yaml.replace(PATIENT, "stale_after_s: 1"))
-    listener = DdsTransport("listener", domain, loopback=True)
+    listener = join("listener", domain)
     heard: list[d.DiagnosticArray] = []
     listener.subscribe(DIAGNOSTICS, heard.append)
     try:
@@ -107,7 +107,7 @@ def test_diagnostics_can_be_left_off(domain: int, tmp_path: Path) -> None:
     module = Module(tmp_path, domain)
     text = module.file.read_text()
     module.file.write_text(text.replace("rmf: {", "rmf: {diagnostics: false, "))
-    listener = DdsTransport("listener", domain, loopback=True)
+    listener = join("listener", domain)
     states: list[d.DoorState] = []
     listener.subscribe(DOOR_STATES, states.append)
     diagnostics = listener.subscribe(DIAGNOSTICS, lambda message: None)

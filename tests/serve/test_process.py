@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from bridges.rmf.definitions import DoorModeValue
+from hal_fakes.wire import wire
 from tests.rmf.conftest import ROS2
 from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment, hold_open
 from tests.waiting import LEASE_S, PATIENCE_S, wait_until
@@ -18,7 +19,7 @@ from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(params=["dds", ROS2])
+@pytest.fixture(params=[wire(), ROS2])
 def module(domain: int, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Module]:
     standing = Module(tmp_path, domain, request.param)
     yield standing
@@ -60,8 +61,8 @@ def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_th
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
 
 
-def test_outputs_that_cannot_be_verified_off_are_said_so(module: Module, tmp_path: Path) -> None:
-    module.file.write_text(YAML.format(domain=module.domain, transport="dds", port=1))
+def test_outputs_that_cannot_be_verified_off_are_reported(module: Module, tmp_path: Path) -> None:
+    module.file.write_text(YAML.format(domain=module.domain, transport=wire(), port=1))
     done = subprocess.run(
         command("outputs-off", module.file, "--runtime-dir", tmp_path / "run"),
         env=environment(),
@@ -142,7 +143,7 @@ def test_a_configuration_that_cannot_be_right_never_starts(tmp_path: Path) -> No
     ("options", "env", "why"),
     [
         (["--simulate"], {"RMF_BRIDGE_SERVICE": "1"}, "never simulates"),
-        (["--expose"], {}, "goes with"),
+        (["--expose"], {}, "needs --simulate"),
     ],
 )
 def test_a_service_never_simulates_and_a_real_device_needs_no_expose(

@@ -52,7 +52,7 @@ def test_a_lift_is_asked_for_through_the_supervisor_and_released_by_an_operator(
     building.lift.wait_for("outputs device=Lift1 outputs=-")
 
 
-def test_two_supervisors_are_never_two_opinions(building: Building, tmp_path: Path) -> None:
+def test_of_two_supervisors_only_one_speaks(building: Building, tmp_path: Path) -> None:
     file = CONFIG / "lift_supervisor.yaml"
     options = ("--simulate", "--domain-id", str(building.domain))
     with daemon(file, tmp_path / "second", *options) as second:

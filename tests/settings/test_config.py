@@ -63,7 +63,7 @@ def test_a_driver_without_a_table_has_no_wires(file: Path) -> None:
     assert config_of(file, text).wires("north") == []
 
 
-def test_what_is_legal_but_worth_a_look_is_kept_as_warnings(file: Path) -> None:
+def test_a_legal_but_unlikely_setting_is_kept_as_a_warning(file: Path) -> None:
     text = changed("    limits:", "    accept_unsafe: {hold: the door is light}\n    limits:")
     text = changed("tries: 2", "loud: true", text)
     assert config_of(file, text).warnings == (

@@ -103,7 +103,7 @@ class ChargerContract(ABC):
         bench.until(Activity.IDLE, OFF)
         assert bench.switched() == [True, False]
 
-    def test_the_same_level_again_is_no_new_command(self, bench: Bench) -> None:
+    def test_the_same_level_again_sends_no_command(self, bench: Bench) -> None:
         bench.driver.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
@@ -111,7 +111,7 @@ class ChargerContract(ABC):
             bench.scan(ON)
         assert bench.switched() == [True]
 
-    def test_no_level_leaves_a_charge_as_it_is(self, bench: Bench) -> None:
+    def test_without_a_wanted_level_a_charge_stays_as_it_is(self, bench: Bench) -> None:
         bench.driver.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
@@ -165,7 +165,7 @@ class ChargerContract(ABC):
         return bench.switched("range_check")
 
     @pytest.mark.parametrize("mode", ["off", "slow", "garbage", "wrong"])
-    def test_each_way_of_failing_is_a_driver_error_and_never_charging(
+    def test_every_failure_is_a_driver_error_and_never_reads_as_charging(
         self, bench: Bench, mode: Any
     ) -> None:
         bench.driver.open()

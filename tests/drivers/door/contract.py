@@ -102,9 +102,7 @@ class DoorContract(ABC):
         bench.plant.fail("opened", "off")
         wait_until(lambda: bench.ends() == BETWEEN, "neither")
 
-    def test_a_door_that_reads_open_and_closed_at_once_is_not_simply_open(
-        self, bench: Bench
-    ) -> None:
+    def test_open_and_closed_at_once_does_not_read_as_open(self, bench: Bench) -> None:
         bench.driver.open()
         bench.plant.fail("opened", "wrong")
         wait_until(lambda: bench.ends() != CLOSED, "seen")
@@ -112,7 +110,7 @@ class DoorContract(ABC):
         assert sample.opened == sample.closed
         assert sample.closed or sample.lost
 
-    def test_writing_the_same_again_is_no_new_command(self, bench: Bench) -> None:
+    def test_writing_the_same_again_sends_no_command(self, bench: Bench) -> None:
         bench.driver.open()
         for _ in range(3):
             bench.write(HOLD)
@@ -152,7 +150,7 @@ class WiredDoorContract(DoorContract):
         assert bench.relay() == [True]
 
     @pytest.mark.parametrize("mode", ["garbage", "wrong", "slow", "stuck"])
-    def test_each_way_of_failing_is_a_driver_error_and_never_open(
+    def test_every_failure_is_a_driver_error_and_never_reads_as_open(
         self, bench: Bench, mode: Any
     ) -> None:
         bench.driver.open()

@@ -164,8 +164,8 @@ WRONG = {
     ),
     "switches_off_after_s: 10 ": (
         "switches_off_after_s: 3 ",
-        "switches_off_after_s is 3, and it is renewed every 1 s (scan_s): at least 4 s, so that one"
-        " lost answer does not drop it",
+        "switches_off_after_s is 3, but it is renewed every 1 s (scan_s): write at least 4, so"
+        " that one lost reply does not drop the output",
     ),
     '      closed: {field: "input:1.state"} ': (
         "",

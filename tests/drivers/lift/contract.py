@@ -135,7 +135,7 @@ class LiftContract(ABC):
             ("call_B1", True),
         ]
 
-    def test_writing_the_same_again_is_no_new_command(self, bench: Bench) -> None:
+    def test_writing_the_same_again_sends_no_command(self, bench: Bench) -> None:
         bench.driver.open()
         for _ in range(3):
             bench.write(CALL)
@@ -158,7 +158,7 @@ class LiftContract(ABC):
         bench.driver.close()
         assert bench.relays() == []
 
-    def test_a_fire_is_read_while_it_burns(self, bench: Bench) -> None:
+    def test_a_fire_is_read_for_as_long_as_its_contact_says_so(self, bench: Bench) -> None:
         bench.driver.open()
         for burns in (True, False):
             bench.plant.press("fire_alarm", burns, time.monotonic())
@@ -174,7 +174,7 @@ class LiftContract(ABC):
             ("floor_1", lambda sample: sample.level is None),
         ],
     )
-    def test_a_cut_wire_reads_as_the_safe_of_its_two_meanings(
+    def test_a_cut_wire_reads_as_the_safe_one_of_its_two_meanings(
         self, bench: Bench, wire: str, safe: Callable[[LiftSample], bool]
     ) -> None:
         bench.driver.open()
@@ -204,7 +204,7 @@ class WiredLiftContract(LiftContract):
         assert bench.relays() == edges
 
     @pytest.mark.parametrize("mode", ["garbage", "wrong", "slow", "stuck"])
-    def test_each_way_of_failing_is_a_driver_error_and_nothing_that_is_not_so(
+    def test_every_failure_is_a_driver_error_and_never_a_false_reading(
         self, bench: Bench, mode: Any
     ) -> None:
         bench.driver.open()

@@ -304,7 +304,7 @@ def test_the_first_public_wiring_is_possible_when_its_two_unsafe_places_are_acce
     assert found(settings(**literal, accept_unsafe=accepted)) == []
 
 
-def test_an_acceptance_of_nothing_is_pointed_out() -> None:
+def test_accepting_wiring_that_does_not_exist_is_pointed_out() -> None:
     wired = settings(accept_unsafe={"door_closed": "why"})
     assert warned(wired) == [
         ("accept_unsafe.door_closed", "nothing is unsafe about door_closed: delete this")
@@ -359,7 +359,7 @@ def test_an_acceptance_of_nothing_is_pointed_out() -> None:
         ),
     ],
 )
-def test_what_works_and_deserves_a_second_look(
+def test_wiring_that_works_but_is_unlikely_is_warned_of(
     changes: dict[str, Any], expected: list[tuple[str, str]]
 ) -> None:
     assert warned(settings(**changes)) == expected

@@ -48,7 +48,7 @@ def test_an_id_of_29_bits_is_another_than_the_same_of_11(ends: Ends) -> None:
     assert (short, long) == ([Frame(0x123, b"\1")], [Frame(0x123 | EXTENDED, b"\2")])
 
 
-def test_remote_frames_and_fd_frames_are_nobodys(ends: Ends) -> None:
+def test_remote_frames_and_fd_frames_are_ignored(ends: Ends) -> None:
     bus, far, _ = ends
     heard = heard_by(bus, Wanted(0x10))
     far.put(can.Message(arbitration_id=0x10, is_extended_id=False, is_remote_frame=True))

@@ -107,7 +107,7 @@ def test_an_adapter_that_is_pulled_is_a_failure_and_is_found_again_when_it_is_ba
     wait_until(desk.passes, "it passes frames again")
 
 
-def test_noise_that_is_no_slcan_is_a_failure_and_ends_with_it(desk: Desk) -> None:
+def test_noise_on_the_adapter_is_a_failure_that_ends_with_the_noise(desk: Desk) -> None:
     assert desk.passes()
     desk.echo.plant.fail("bus", "garbage")
     wait_until(lambda: desk.text() != "", "it is noticed")
@@ -129,7 +129,7 @@ def test_an_adapter_that_another_program_has_is_named(desk: Desk) -> None:
     other.close()
 
 
-def test_an_adapter_that_takes_nothing_costs_its_time_and_no_more() -> None:
+def test_an_adapter_that_takes_nothing_costs_one_timeout() -> None:
     leader, follower = os.openpty()
     place = Slcan(port=os.ttyname(follower), bitrate=250_000)
     bus = CanBus(Settings(slcan=place, timeout_s=0.05))

@@ -37,7 +37,7 @@ def test_an_address_is_host_port_and_path(text: str, parts: Base, url: str | Non
         ("", "is no address of an API"),
     ],
 )
-def test_what_is_no_address_is_refused_with_the_fix(text: str, hint: str) -> None:
+def test_a_text_that_is_not_an_address_is_refused_with_its_fix(text: str, hint: str) -> None:
     with pytest.raises(ValueError, match=hint):
         base(text)
 
@@ -49,7 +49,7 @@ def test_a_wrong_address_is_a_problem_of_the_settings() -> None:
     assert list(Settings(api_base="tpu").problems()) == []
 
 
-def test_the_defaults_are_a_second() -> None:
+def test_the_default_timeout_and_scan_are_a_second() -> None:
     made = msgspec.convert({"type": "http", "api_base": "tpu"}, Settings)
     assert made == Settings(api_base="tpu", timeout_s=1.0, scan_s=1.0, token_file=None)
 

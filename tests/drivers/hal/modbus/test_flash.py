@@ -315,7 +315,7 @@ def test_the_fake_modules_pulse_is_ended_by_a_coil_that_is_written_off(
         ),
         (
             "unit 1 coil 0",
-            "30:64: unit 1 coil 0 is taken by ward_door outputs.hold_open on line 30:"
+            "30:64: unit 1 coil 0 is used by ward_door outputs.hold_open on line 30:"
             " ward_door outputs.hold_open needs a point of its own",
         ),
         (

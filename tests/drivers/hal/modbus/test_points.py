@@ -50,7 +50,7 @@ def test_a_point_has_one_spelling(spelled: str, one_spelling: str) -> None:
 
 @settings(derandomize=True)
 @given(POINTS)
-def test_the_one_spelling_spells_itself(point: Point) -> None:
+def test_the_canonical_spelling_reads_as_itself(point: Point) -> None:
     assert parse(str(point)) == point
     assert canonical(str(point)) == str(point)
 
@@ -119,7 +119,7 @@ MODEL = "looks like a number of the data model, which begins at 1"
         ("unit 1 relay 4", f"'unit 1 relay 4': there is no table 'relay': {HOW}"),
     ],
 )
-def test_what_is_no_point_is_refused_with_what_to_write(text: str, reason: str) -> None:
+def test_a_text_that_is_not_a_point_is_refused_with_an_example(text: str, reason: str) -> None:
     with pytest.raises(ValueError, match=f"^{re.escape(reason)}$"):
         canonical(text)
 

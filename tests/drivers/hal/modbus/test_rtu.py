@@ -63,7 +63,7 @@ NO_ANSWER: dict[str, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("what", NO_ANSWER)
-def test_what_does_not_answer_is_no_answer_and_the_next_reading_is_right(
+def test_a_wrong_reply_is_refused_and_the_next_reading_is_right(
     line: SerialModule, what: str
 ) -> None:
     door(line)
@@ -95,7 +95,7 @@ def test_noise_after_a_reply_does_not_reach_the_next(line: SerialModule) -> None
     assert [lines.read() for _ in range(5)] == [{IN0: False}] * 5
 
 
-def test_what_was_said_unasked_is_thrown_away(line: SerialModule) -> None:
+def test_an_unsolicited_frame_is_thrown_away(line: SerialModule) -> None:
     door(line)
     lines = bus_to(line.port).lines({IN0: None}, {})
     lines.read()
