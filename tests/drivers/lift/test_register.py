@@ -114,9 +114,9 @@ MODEL = "looks like a number of the data model, which begins at 1"
         ),
         ("bit: 0, active", "active", "41:7: a flag is one bit of a register: say which"),
         (
-            "on: 2, off: 0",
-            "on: 3, off: 0",
-            "44:50: another command has these bits of holding register 10 already",
+            "ask: 2, release: 0",
+            "ask: 3, release: 0",
+            "44:51: another command has these bits of holding register 10 already",
         ),
         ("none: 0", "none: 4", "47:43: 4 is no call, as none says"),
         (", 4: L4}\n          none", "}\n          none", "47:11: no code for L4"),
