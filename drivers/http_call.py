@@ -21,11 +21,11 @@ class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     body: Annotated[str, msgspec.Meta(max_length=1024)] | None = None
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """A body that is no JSON."""
+        """A body that is not JSON."""
         try:
             msgspec.json.decode(self.body or "{}")
         except msgspec.DecodeError as error:
-            yield ("body",), f"is no JSON: {error}"
+            yield ("body",), f"is not JSON: {error}"
 
 
 class Calls(Protocol):
@@ -38,6 +38,10 @@ class Calls(Protocol):
         self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
     ) -> None:
         """Once; `safe` where it takes power away. Raises HalError."""
+
+
+class InsistentCalls(Calls, Protocol):
+    """The same, for who must be heard at the end."""
 
     def insist(self) -> None:
         """Try at once what comes next."""

@@ -82,6 +82,15 @@ def same(value: object, given: Value) -> bool:
     return isinstance(value, bool) == isinstance(given, bool) and value == given
 
 
+def is_field(text: str) -> bool:
+    """Is it spelled as a place of an answer?"""
+    try:
+        msgspec.convert(text, Field)
+    except msgspec.ValidationError:
+        return False
+    return True
+
+
 def found(answer: Any, field: str) -> Any:
     """What stands there, or ABSENT."""
     for part in field.split("."):

@@ -13,6 +13,7 @@ from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
 from bridges.serve import places, signals
+from bridges.serve.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
 
@@ -53,6 +54,9 @@ def run(args: argparse.Namespace) -> int:
         for problem in error.problems:
             logging.error(str(problem))
         return EX_CONFIG
+    if slow := too_slow(config, watchdog_s()):
+        logging.error(slow)
+        return EX_CONFIG
     end = signals.End()  # before the lock names our pid, which others then signal
     signals.ignore_reset()
     try:
@@ -67,6 +71,18 @@ def run(args: argparse.Namespace) -> int:
         return EX_UNAVAILABLE
     finally:
         held.close()
+
+
+def too_slow(config: Config, watchdog: float | None) -> str:
+    """Which bus may take longer for one call than systemd's watchdog (s) waits; "" for none."""
+    for name, bus in config.buses.items():
+        timeout_s: float = getattr(bus, "timeout_s", 0.0)
+        if watchdog is not None and timeout_s > watchdog / 2:
+            return (
+                f"{config.path}: bus '{name}': timeout_s is {timeout_s:g} s, but the unit has"
+                f" WatchdogSec={watchdog:g}: a call may take half of that at most"
+            )
+    return ""
 
 
 def _held(args: argparse.Namespace) -> runtime.RuntimeDirectory:

@@ -1,1 +1,1 @@
-"""A YAML in service: the daemon, its loops, and the devices and subjects that they serve."""
+"""Runs one YAML: the daemon, its loops, and the devices and subjects that they serve."""

@@ -1,4 +1,4 @@
-"""Where the runtime's time comes from, and when what is told each second is told next."""
+"""The runtime's clocks, and the pace of publishing: each second, and at once after a change."""
 
 import time
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from bridges.rmf.definitions import Time
 
 TELL_EVERY_S = 1.0
 TELL_GAP_S = 0.1
-"""What is told goes out at 1 Hz, and at once when it changes, but never faster than 10 Hz."""
+"""States go out at 1 Hz, and at once when they change, but never faster than 10 Hz."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +21,10 @@ class Clock:
     wall: Callable[[], float]
 
     def stamp(self, read_at: float | None) -> Time:
-        """When a reading was taken, on the wall clock as it is now; 0 for never.
+        """The stamp of a reading taken at `read_at` (monotonic s); 0 for never.
 
-        The age is monotonic, so that a step of the wall clock bends neither age nor order.
+        It is the current wall clock minus the monotonic age, so that a step of the wall clock distorts
+        neither age nor order.
         """
         if read_at is None:
             return Time()
@@ -36,16 +37,16 @@ def machine_s() -> float:
 
 
 class Pace:
-    """When to tell something that is told each second and at once when it has changed."""
+    """Decides when to publish something: each second, and at once when it has changed."""
 
     def __init__(self) -> None:
         self.told_at = AGES_AGO
         self._told: object = None
 
     def due_at(self, news: object) -> float:
-        """When this is to be told (monotonic s)."""
+        """When this is to be published (monotonic s)."""
         return self.told_at + (TELL_EVERY_S if news == self._told else TELL_GAP_S)
 
     def told(self, news: object, now: float) -> None:
-        """It has been told."""
+        """Note that it has been published."""
         self._told, self.told_at = news, now

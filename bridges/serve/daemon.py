@@ -1,5 +1,5 @@
-"""The daemon: one YAML in service. Opens the transport, starts the service's loops, tells systemd how
-it is, and on SIGTERM, or whatever signal else would end it, switches every output off and leaves
+"""The daemon that serves one YAML. It opens the transport, starts the loops and feeds systemd's
+watchdog. On SIGTERM, or any other signal that would end it, it switches every output off and leaves
 RMF's graph.
 """
 
@@ -38,7 +38,7 @@ STARTING = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=30000000"
 
 
 class Daemon:
-    """Everything that one `rmf-bridge run` holds. `simulated` is shown wherever the state is."""
+    """Everything that one `rmf-bridge run` holds. `simulated`: shown in status and diagnostics."""
 
     def __init__(
         self,
@@ -52,9 +52,9 @@ class Daemon:
         ros_args: Sequence[str] = (),
         outputs_off: Sequence[str] = (),
     ) -> None:
-        """`outputs_off`: the command that switches off after a death of ours.
+        """`outputs_off`: the command that switches the outputs off after this process has died.
 
-        Raises TransportError or HalError when it cannot be.
+        Raises TransportError or HalError if a transport or bus cannot be opened.
         """
         self._config = config
         self._runtime = runtime
@@ -72,7 +72,7 @@ class Daemon:
             config.rmf, node_name, localhost=localhost, ros_args=ros_args
         )
         if config.buses and not simulated:
-            runtime.claim(ours)  # before anything is: `outputs-off` goes by it
+            runtime.claim(ours)  # before any output is claimed: `outputs-off` reads this record
             self._guard = Guard(outputs_off) if guard.needed() else None
         kept = None if simulated else KeptFile(state_file(config.path), runtime.path / KEPT)
         open_bus = open_bus or config.open_bus
@@ -138,7 +138,7 @@ class Daemon:
         return all(safe)
 
     def _convenience(self, what: str, do: Callable[[], None]) -> None:
-        """Whatever goes wrong with it is no reason to end; it is said once, and tried again."""
+        """A failure is logged once and tried again; the daemon runs on."""
         try:
             do()
         except Exception as error:  # noqa: BLE001 - logged by Once
@@ -151,7 +151,7 @@ class Daemon:
         return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
 
     def _tell(self) -> None:
-        """How everything is, to the status file and to ROS."""
+        """Write the status file and publish diagnostics."""
         daemon = {
             "simulated": self._simulated,
             "file": str(self._config.path),
@@ -168,5 +168,7 @@ class Daemon:
         found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
         try:
             self._diagnostics.publish(found)
-        except TransportError as error:  # the states, more urgent, say so as an error
+        except (
+            TransportError
+        ) as error:  # when states cannot be published, that is logged as an error
             log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))

@@ -75,11 +75,11 @@ class Node(Generic[S, L, M, X, E, O, R]):
 
     @property
     def ready(self) -> bool:
-        """Each input was read, or timed out, once, and the first state is out."""
+        """Whether each input was read or timed out once, and the first state is published."""
         return self._pace.told_at > AGES_AGO
 
     def event(self, topic: Topic[Message], message: Message) -> E | RivalSeen | None:
-        """What a message is to the core; None for one that is refused. From every thread."""
+        """The core's event for a message; None if it is refused. Called from any thread."""
         if topic == self._kind.states:
             return RivalSeen()
         try:
@@ -98,7 +98,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._bus_words.clear()
         self._decide(self._read())
         for event in events:
-            if isinstance(event, OperatorReset):  # a device that has failed is claimed anew
+            if isinstance(event, OperatorReset):  # a device that has failed is claimed again
                 self._open = self._open and not self._io_fault
             self._decide(event)
         self._write()
@@ -115,16 +115,16 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return True
 
     def close(self) -> None:
-        """Outputs off, and the points let go."""
+        """Outputs off, and the points released."""
         self._driver.close()
 
     @property
     def refused(self) -> dict[str, int]:
-        """What was not obeyed, by kind."""
+        """The number of refused requests, by reason."""
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """For the status file: what is shown to RMF, what is driven, what is wrong, and its age."""
+        """For the status file: the state shown to RMF, outputs, faults, and the age of the inputs."""
         decision = self.subject.decision
         if decision is None:
             return {}
@@ -156,7 +156,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._logged_outputs = outputs if self._logged_outputs is None else self._logged_outputs
 
     def _tell(self) -> None:
-        """Publish when it is due; never because a request came."""
+        """Publish if it is due; a request alone is no reason."""
         subject, now = self.subject, self._clock.monotonic()
         assert subject.decision is not None
         report = subject.decision.report
@@ -173,7 +173,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._publish(self._kind.states, state)
 
     def _log(self) -> None:
-        """Last of all: a line in the log takes as long as a scan."""
+        """Comes last: a log line takes as long as a scan."""
         decision = self.subject.decision
         assert decision is not None
         if decision.outputs != self._logged_outputs:
@@ -185,7 +185,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._io_fault = ""
 
     def _failed(self, error: DriverError) -> str:
-        """Log once when a device goes, not each scan."""
+        """Log once when a device is lost, not in each scan."""
         if not self._io_fault:
             log.error(pairs("device_lost", device=self.name, reason=error))
         self._failing = True
@@ -194,10 +194,9 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._io_fault
 
     def _identity(self, fault: Fault) -> object:
-        """With another detail it is another fault, but for a bus's own words: they change with each
-        attempt."""
+        """Code and detail; the code alone if the detail is a bus's error text, which varies."""
         return fault.code if fault.detail in ("", *self._bus_words) else fault
 
 
 AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]
-"""One of a kind that is found by its name."""
+"""A node of a kind that was found by its name."""

@@ -1,11 +1,11 @@
-"""What a daemon says of itself on ROS's `/diagnostics`, from what its status file says.
+"""A daemon's diagnostics for ROS's `/diagnostics`, made from its status file.
 
-One status for the daemon, and one for each device (of a supervisor: each lift or door that it looks
-after). `name` is `<node>: <device>`, as ROS's aggregator wants it; `hardware_id` is the device's name;
-`message` names the faults. The values are the status file's, with a fault's detail under its code.
-LiftState, DoorState and their like have no place for any of this.
+There is one status for the daemon and one for each device (of a supervisor: for each lift or door).
+`name` is `<node>: <device>`, as ROS's aggregator expects; `hardware_id` is the device's name; `message`
+names the faults. The values are the status file's, with each fault's detail under its code.
+LiftState, DoorState and ChargerState have no fields for this.
 
-    OK      the input is read, and nothing is wrong
+    OK      the input is read, and there is no fault
     WARN    the daemon: it is a simulation, or leaves its work to another node
     ERROR   the device has faults; the daemon: it cannot keep what a restart must not forget
     STALE   its input has not been read yet
@@ -27,7 +27,7 @@ from bridges.rmf.definitions import (
 from bridges.serve.subject import Status
 
 MOST: Final = 100
-"""A supervisor learns of its lifts from the network: no flood of names makes us say more than this."""
+"""At most this many devices: a supervisor learns names from the network, which may flood it."""
 SIMULATED: Final = "SIMULATED"
 PASSIVE: Final = "PASSIVE"
 
@@ -75,7 +75,7 @@ def _values(status: Status) -> tuple[KeyValue, ...]:
 
 
 def _pairs(status: Status) -> Iterator[tuple[str, str]]:
-    """Flat: a fault is its code and detail, a table of counts one value for each."""
+    """Flatten a status: a fault becomes code and detail, a table one value for each entry."""
     for key, value in status.items():
         if key == "faults":
             yield from ((fault["code"], fault["detail"]) for fault in value)

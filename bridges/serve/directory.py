@@ -1,12 +1,12 @@
-"""A daemon's directories while it runs: that it runs, and how it is doing.
+"""A daemon's files while it runs: its lock, its status and its record.
 
-`lock`          held by the daemon, or by `outputs-off`: who that is, for which YAML, and whether it
-                serves
+`lock`          held by the daemon or by `outputs-off`; names the process, its YAML, and whether
+                it serves
 `status.json`   the state of every device, for people and scripts
 `claimed-….json`   see `bridges/serve/record.py`
 
-None of them is vital: what cannot be written is said once and tried again each second, also where a
-directory has been removed; and the device is served.
+None of them is vital. A file that cannot be written is logged once and tried again each second, also
+after its directory was removed; meanwhile the device is served.
 """
 
 import fcntl
@@ -29,12 +29,12 @@ STATUS = "status.json"
 KEPT = "kept.json"
 LOCK = "lock"
 WAIT_S = 7.0
-"""Longer than `outputs-off` takes: who starts meanwhile waits for it."""
+"""How long a daemon that starts waits for `outputs-off`, which takes less."""
 LOOK_EVERY_S = 0.05
 
 
 class AlreadyRunning(Exception):
-    """Another daemon serves this YAML, or has these directories."""
+    """Another daemon serves this YAML, or uses these directories."""
 
 
 class Unknown(Exception):
@@ -53,13 +53,13 @@ class Holder(msgspec.Struct, frozen=True):
 
 
 NOBODY_KNOWN = Holder(0, "", False)
-"""A lock is held, and who holds it could not write that down."""
+"""The lock is held, but its holder could not write its name into it."""
 
 
 def find(file: Path, given: str | None) -> Places:
     """The directories of this file's daemon, by the one rule (`bridges/serve/places.py`).
 
-    Raises Unknown where the service's directory cannot be looked into.
+    Raises Unknown if the service's directory cannot be read.
     """
     told = as_told(given)
     if told:
@@ -74,7 +74,7 @@ def _is_about(places: Places, file: Path) -> bool:
 
 
 def holder(places: Places) -> Holder | None:
-    """Who runs in these directories now. Raises Unknown."""
+    """The process that holds the lock now; None if there is none. Raises Unknown."""
     for folder in places.folders:
         try:
             lock = _open(folder / LOCK, os.O_RDONLY)
@@ -92,7 +92,7 @@ def holder(places: Places) -> Holder | None:
 
 
 def _written(path: Path) -> Holder:
-    """What a lock says, whoever holds it. Raises Unknown."""
+    """The holder that the lock file names. Raises Unknown."""
     try:
         lock = _open(path, os.O_RDONLY)
     except (FileNotFoundError, NotADirectoryError):
@@ -108,7 +108,7 @@ def _written(path: Path) -> Holder:
 
 
 def _open(path: Path, flags: int) -> int:
-    """No symbolic link is followed, and no FIFO waited for."""
+    """Open without following a symbolic link or waiting for a FIFO."""
     return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o640)
 
 
@@ -116,21 +116,20 @@ def _what_to_do(folder: Path, error: OSError) -> str:
     owner = owner_of(folder)
     return (
         f"whether a daemon runs there cannot be seen: {folder}: {error.strerror}. It belongs to"
-        f" {owner}: use sudo, or name another directory with --runtime-dir"
+        f" {owner}: use sudo, or give another directory with --runtime-dir"
     )
 
 
 def state_file(file: Path) -> Path:
-    """What outlives a daemon and a reboot: where systemd says, else the user's state directory."""
+    """The file that outlives a daemon and a reboot: in systemd's state directory, else the user's."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given or state_base() / file.stem).absolute() / KEPT
 
 
 class KeptFile:
-    """A file that is replaced whole and is on the disk before `write` returns.
+    """A file that is replaced as a whole and is on disk when `write` returns.
 
-    `instead`: where it is kept as long as the first place cannot be written. What stands there is
-    newer than what stands in the first place.
+    `instead`: the path to use while the first cannot be written; a file there is the newer one.
     """
 
     def __init__(self, path: Path, instead: Path | None = None) -> None:
@@ -139,14 +138,14 @@ class KeptFile:
         self._once = Once()
 
     def read(self) -> bytes | None:
-        """What was kept; None when nothing was. Raises OSError."""
+        """The file's bytes; None if there is no file. Raises OSError."""
         for path in filter(None, (self._instead, self._path)):
             with suppress(FileNotFoundError, NotADirectoryError):
                 return path.read_bytes()
         return None
 
     def write(self, kept: bytes) -> None:
-        """Replace it. Raises OSError where neither place can be written; then the old one stands."""
+        """Replace the file. Raises OSError if neither path can be written; the old one then remains."""
         try:
             replace(self._path, kept)
             if self._instead is not None:
@@ -161,31 +160,31 @@ class KeptFile:
 
 
 class Once:
-    """One line when something goes wrong that is no reason to end, and one when it works again."""
+    """Logs one line when a write fails, and one when it works again; the daemon runs on."""
 
     def __init__(self) -> None:
         self._wrong: dict[str, str] = {}
 
     def failed(self, what: str, error: Exception) -> None:
-        """It did not work; it is tried again."""
+        """Note a failed attempt; the caller will try again."""
         if what not in self._wrong:
             log.warning(pairs("not_written", what=what, reason=error))
         self._wrong[what] = str(error)
 
     def works(self, what: str) -> None:
-        """It did."""
+        """Note a successful attempt."""
         if self._wrong.pop(what, None) is not None:
             log.info(pairs("written_again", what=what))
 
 
 class RuntimeDirectory:
-    """What one process has in its directories, for as long as the object lives.
+    """One process's lock, status and record.
 
-    `serves`: whether it is a daemon, which a reset may be sent to.
+    `serves`: whether the process is a daemon, to which a reset may be sent.
     """
 
     def __init__(self, places: Places, file: Path, *, serves: bool, wait_s: float = WAIT_S) -> None:
-        """Raises AlreadyRunning, after waiting for one that only switches off."""
+        """Take the locks; waits for an `outputs-off` that holds them. Raises AlreadyRunning."""
         self.places = places
         self.path = places.runtime
         self.records = Records(places, file)
@@ -198,12 +197,12 @@ class RuntimeDirectory:
             self._lock_by(folder, deadline)
 
     def claim(self, record: Record) -> None:
-        """Write down which outputs this daemon is about to claim; where that fails, tried again."""
+        """Write the record of what this daemon is about to claim; a failure is tried again."""
         self._record = record
         self._write_record()
 
     def released(self) -> None:
-        """Every output is off and let go."""
+        """Every output is off and released: remove the record."""
         record, self._record = self._record, None
         if record is not None:
             try:
@@ -212,7 +211,7 @@ class RuntimeDirectory:
                 self._once.failed("record", error)
 
     def write_status(self, json: bytes) -> None:
-        """Replace the status file in one step; and whatever could not be written before, or is gone."""
+        """Replace the status file; also write again what failed before or was removed."""
         for folder in self.places.folders:
             self._lock(folder)
         self._write_record()
@@ -224,7 +223,7 @@ class RuntimeDirectory:
             self._once.works(STATUS)
 
     def close(self) -> None:
-        """Let another daemon have it. The status of a daemon that is gone is nobody's truth."""
+        """Release the locks for another daemon, and remove the status, which is now outdated."""
         with suppress(OSError):
             (self.path / STATUS).unlink(missing_ok=True)
         for lock in self._locks.values():
@@ -232,7 +231,7 @@ class RuntimeDirectory:
         self._locks.clear()
 
     def _lock_by(self, folder: Path, deadline: float) -> None:
-        """Lock it; while `outputs-off` has it, wait."""
+        """Take the lock; wait while `outputs-off` holds it."""
         while not self._lock(folder):
             found = _written(folder / LOCK)
             if found.serves or time.monotonic() >= deadline:
@@ -241,7 +240,7 @@ class RuntimeDirectory:
             time.sleep(LOOK_EVERY_S)
 
     def _lock(self, folder: Path) -> bool:
-        """Hold the lock that stands there; False while another process does."""
+        """Hold the folder's lock; False while another process holds it."""
         try:
             return self._has(folder) or self._take(folder)
         except OSError as error:
@@ -249,7 +248,7 @@ class RuntimeDirectory:
             return True
 
     def _has(self, folder: Path) -> bool:
-        """Is the file that stands there the one that we hold?"""
+        """Whether the folder's lock file is the one that we hold."""
         lock = self._locks.get(folder)
         try:
             return lock is not None and os.path.samestat(os.fstat(lock), os.lstat(folder / LOCK))
@@ -272,14 +271,14 @@ class RuntimeDirectory:
         return True
 
     def _opened(self, path: Path) -> int:
-        """To be written, or where that is not allowed to be held at least."""
+        """Open for writing, or read-only if that is not permitted: it can still be locked."""
         try:
             return _open(path, os.O_RDWR | os.O_CREAT)
         except OSError:
             return _open(path, os.O_RDONLY)
 
     def _sign(self, lock: int) -> None:
-        """Write down who holds it; on a full disk rather nothing than who held it before."""
+        """Write our name into the lock; on a full disk an empty file is better than the old name."""
         content = msgspec.json.encode(self._holder)
         with suppress(OSError):
             os.ftruncate(lock, 0)

@@ -1,13 +1,13 @@
-"""Files that are replaced whole, so that whoever reads sees the old one or the new."""
+"""Files that are replaced as a whole, so that a reader sees either the old or the new one."""
 
 import os
 from pathlib import Path
 
 
 def replace(path: Path, content: bytes) -> None:
-    """Put this file on the disk, its folder's entry too, before returning; the folder is made.
+    """Replace a file and sync it and its folder to disk; makes the folder if needed.
 
-    Raises OSError, and then the old one stands.
+    Raises OSError, and then the old file remains.
     """
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     new = path.with_name(f".{path.name}.new")
@@ -20,7 +20,7 @@ def replace(path: Path, content: bytes) -> None:
 
 
 def show(path: Path, content: bytes) -> None:
-    """Replace a file that need not outlive the machine's next start. Raises OSError."""
+    """Replace a file that need not survive a reboot. Raises OSError."""
     new = path.with_name(f".{path.name}.new")
     new.write_bytes(content)
     new.replace(path)

@@ -1,11 +1,12 @@
-"""A kind without hardware in service: a core memory for each subject, and their place on RMF's graph.
+"""Serves a kind without hardware: a core memory for each subject, and its publishers on RMF's graph.
 
-A round takes what was heard, wakes whose time has come and sends what they say. A test calls it in
-virtual time; the daemon has a thread for it (`bridges/serve/serving.py`).
+A round takes the messages that arrived, wakes the subjects that are due and publishes their messages.
+A test calls it in virtual time; the daemon has a thread for it (`bridges/serve/serving.py`).
 """
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Generic
 
 from bridges.core.decision import Fault, M, OperatorReset, R, RequestRefused
@@ -25,9 +26,9 @@ from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Status, Subject
 
 MAX_SUBJECTS = 1000
-"""More lifts or doors than any site has: somebody makes names up."""
+"""More lifts or doors than any site has; more names must be invented ones."""
 MAX_UNSHOWN = 100
-"""Names that only requests speak of: no lift or door has shown itself by them."""
+"""At most this many names that only requests mention, without a state of such a lift or door."""
 
 
 DEFECT = "a defect"
@@ -36,7 +37,7 @@ log = logging.getLogger(__name__)
 
 
 def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> Core[M, GraphEvent[E], None, R]:
-    """A fault's detail says whose it is: another detail is another fault."""
+    """A fault is identified by code and detail: the detail says whose it is."""
 
     def itself(fault: Fault) -> Fault:
         return fault
@@ -54,7 +55,7 @@ def _same(topic: Topic[Message]) -> Topic[Message]:
 
 
 class GraphNode(Generic[S, L, M, E, R]):
-    """Serves one GraphKind. `named`: a topic under the site's own name for it."""
+    """Serves one GraphKind. `named`: renames topics as the site's YAML says."""
 
     def __init__(
         self,
@@ -66,7 +67,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         kept: Kept | None = None,
     ) -> None:
         self.name = f"graph-{kind.name}"
-        self.inbox: Inbox[tuple[Topic[Message], Message]] = Inbox()
+        self.inbox: Inbox[tuple[Topic[Message], E]] = Inbox()
         self.presence = Presence(kind.name, kind.quiet_s(settings))
         self.subjects: dict[str, Subject[M, GraphEvent[E], None, R]] = {}
         self._kind = kind
@@ -87,7 +88,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._add(name, memory)
 
     def subscribe(self) -> None:
-        """Begin to hear. What is retained for us comes at once."""
+        """Subscribe to every topic. Retained messages arrive at once."""
         self.presence.listen(self._transport, map(self._named, self._kind.sole))
         for topic in self._kind.requests:
             others_only = topic in self._kind.publishes
@@ -106,21 +107,21 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     @property
     def ready(self) -> bool:
-        """It listens. (A passive node is in order: the other one speaks.)"""
+        """Always: a passive node is ready too, as another one does its work."""
         return True
 
     @property
     def wake_at(self) -> float:
-        """When the next round is due if nothing is heard."""
+        """When the next round is due if no message arrives (monotonic s)."""
         due = (subject.wake_at for subject in self.subjects.values())
         return min(self.presence.look_at, self._keeper.wake_at, *due)
 
     def round(self) -> None:
-        """Take what was heard, wake whose time has come, send what they say."""
+        """Take the messages that arrived, wake the subjects that are due, publish."""
         self._look_around()
-        for name, messages in self.inbox.take().items():
-            for topic, message in messages:
-                self._receive(name, topic, message)
+        for name, events in self.inbox.take().items():
+            for topic, event in events:
+                self._receive(name, topic, event)
         if self._reset:
             self._reset = False
             self._decide_all(OperatorReset())
@@ -132,16 +133,16 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._keeper.tell(memories, now, self.presence.may_speak)
 
     def end(self) -> bool:
-        """It has no outputs."""
+        """Nothing to switch off."""
         return True
 
     @property
     def refused(self) -> dict[str, int]:
-        """What was not obeyed, by kind."""
+        """The number of refused requests, by reason."""
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """For the status file: how it stands on the graph."""
+        """For the status file: whether it is passive, and how many other nodes publish the same."""
         return {
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
@@ -154,15 +155,29 @@ class GraphNode(Generic[S, L, M, E, R]):
         return {subject.name: subject.status() for subject in list(self.subjects.values())}
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
-        """A callback for the transport's thread."""
+        """A callback for the transport's thread. Only what is accepted waits: it is not endless."""
 
         def put(message: Message) -> None:
-            self.inbox.put(self._kind.device_name(message), (topic, message))
+            with self._counting(topic.name):
+                event = self._kind.requests[topic](message, self._settings, self._clock.wall())
+                self.inbox.put(self._kind.device_name(message), (topic, event))
 
         return put
 
+    @contextmanager
+    def _counting(self, about: str) -> Iterator[None]:
+        """What is not obeyed, or fails for a defect of ours: a core that fails has changed nothing."""
+        try:
+            yield
+        except RequestRefused as refusal:
+            self._refusals.add(refusal.kind, refusal.detail)
+        except Exception as error:
+            if not self._refusals.counts().get(DEFECT):
+                log.exception(pairs("defect", kind=self._kind.name, about=about, reason=error))
+            self._refusals.add(DEFECT, f"{type(error).__name__} about {about}")
+
     def _look_around(self) -> None:
-        """Whoever may speak is a publisher, and nobody else."""
+        """Declare our publishers when we may speak, and withdraw them when not."""
         if not self.presence.look(self._clock.monotonic()):
             return
         if self.presence.may_speak:
@@ -180,20 +195,13 @@ class GraphNode(Generic[S, L, M, E, R]):
                 del self.subjects[subject.name]
                 self._shown.discard(subject.name)
 
-    def _receive(self, name: str, topic: Topic[Message], message: Message) -> None:
-        try:
-            event = self._kind.requests[topic](message, self._settings, self._clock.wall())
+    def _receive(self, name: str, topic: Topic[Message], event: E) -> None:
+        with self._counting(name):
             subject = self._subject(name, shows_itself=self._kind.shown_by in (None, topic))
             self._decide(subject, event)
-        except RequestRefused as refusal:
-            self._refusals.add(refusal.kind, refusal.detail)
-        except Exception as error:  # pure cores: what was known before still stands
-            if not self._refusals.counts().get(DEFECT):
-                log.exception(pairs("defect", kind=self._kind.name, subject=name, reason=error))
-            self._refusals.add(DEFECT, f"{type(error).__name__} about {name}")
 
     def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
-        """What this message is about; it may be new to us."""
+        """The subject of this name; made if it is new."""
         if name not in self.subjects and not self._has_room(name, shows_itself):
             raise RequestRefused("too many names", name)
         if shows_itself:
@@ -202,7 +210,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return found or self._add(name, self._kind.initial(name, self._started_at))
 
     def _has_room(self, name: str, shows_itself: bool) -> bool:
-        """Names that are made up take no place from what the YAML names, nor from what shows itself."""
+        """Invented names must not displace those of the YAML, or those whose states were heard."""
         if name in self._reserved:
             return True
         if shows_itself:
@@ -210,7 +218,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return len(self.subjects) - len(self._shown) < MAX_UNSHOWN
 
     def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
-        """In a flood of names that nobody has shown, they are not kept: it would come back with us."""
+        """Without names never shown, if there is a flood of them: it would return at the next start."""
         if len(memories) - len(self._shown) < MAX_UNSHOWN:
             return memories
         real = self._shown | self._reserved
@@ -231,7 +239,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _will_say(self, topic: Topic[Message], message: Message) -> None:
-        """Not before the round has kept what it rests on."""
+        """Hold the message back until the round has kept its memories on disk."""
         self._unsaid.append((topic, message))
 
     def _say(self) -> None:
@@ -240,9 +248,9 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._publish(topic, message)
 
     def _publish(self, topic: Topic[Message], message: Message) -> None:
-        """With the stamp of its sending."""
+        """Publish a message, stamped now."""
         self._outlet.publish(topic, self._kind.stamped(message, stamp(self._clock.wall())))
 
 
 AnyGraphNode = GraphNode[Any, Any, Any, Any, Any]
-"""One of a kind that is found by its name."""
+"""A node of a kind that was found by its name."""

@@ -1,8 +1,8 @@
 """The guard of a daemon that was started by hand: it switches off what a kill -9 has left on.
 
-A shell, since it only waits, in a session of its own, where neither Ctrl-C nor a closed terminal
-reaches it. It reads a pipe that the daemon alone holds: a word on it says that the outputs are off,
-its end without one that the daemon is dead. Under systemd the unit's ExecStopPost does this.
+It is a shell, because it only waits, in its own session, where neither Ctrl-C nor a closed terminal
+reaches it. It reads a pipe that only the daemon holds. A word on the pipe means that the outputs are
+off; the end of the pipe without a word, that the daemon is dead. Under systemd, ExecStopPost does this.
 """
 
 import logging
@@ -22,11 +22,11 @@ read -r word
 "$@"
 [ $? = 69 ] && sleep 1 && "$@"
 """
-"""69: the dead daemon's lock was not free yet."""
+"""Exit code 69: the dead daemon's lock was not free yet; one more try."""
 
 
 class Guard:
-    """`command`: what switches everything off."""
+    """The running guard. `command`: switches everything off."""
 
     def __init__(self, command: Sequence[str]) -> None:
         self._shell: subprocess.Popen[bytes] | None = None
@@ -40,7 +40,7 @@ class Guard:
             log.warning(pairs("no_guard", reason=error))
 
     def dismiss(self) -> None:
-        """The outputs are off: it has nothing to do, and ends."""
+        """The outputs are off: end the guard."""
         if self._shell is None or self._shell.stdin is None:
             return
         with suppress(OSError):
@@ -50,9 +50,9 @@ class Guard:
 
 
 UNIT = ("NOTIFY_SOCKET", "RUNTIME_DIRECTORY", "RMF_BRIDGE_SERVICE")
-"""What only a unit sets. (INVOCATION_ID is in a desktop's terminals as well.)"""
+"""Variables that only a unit sets. (INVOCATION_ID is also set in a desktop's terminals.)"""
 
 
 def needed(environ: Mapping[str, str] = os.environ) -> bool:
-    """Whether no unit stands behind us, which would run `outputs-off` itself."""
+    """Whether this daemon needs a guard: no unit would run `outputs-off` for it."""
     return not any(environ.get(name) for name in UNIT)

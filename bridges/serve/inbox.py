@@ -1,4 +1,4 @@
-"""What has come for the devices or subjects of one thread, and the bell that wakes it."""
+"""Events waiting for the devices or subjects of one thread, and the bell that wakes it."""
 
 import queue
 import threading
@@ -6,7 +6,10 @@ from collections.abc import Hashable
 from typing import Generic, TypeVar
 
 INBOX_SIZE = 512
-"""More events than this for one device between two scans are a flood: the oldest go, counted."""
+"""More events for one device between two scans are a flood: the oldest are dropped and counted."""
+
+MOST_NAMES = 2000
+"""More devices than anybody serves: names beyond are made up, and dropped."""
 
 T = TypeVar("T")
 
@@ -15,8 +18,7 @@ class Inbox(Generic[T]):
     """Every thread may put; the thread that serves takes.
 
     A request is a level, not a pulse: of several with the same `key` only the last one is kept, so that
-    a flood of repeats costs a scan no more than one of them. What is kept stays in the order in which
-    it came.
+    a flood of repeats costs a scan no more than one of them. Events stay in order of arrival.
     """
 
     def __init__(self) -> None:
@@ -30,6 +32,9 @@ class Inbox(Generic[T]):
     def put(self, name: str, item: T, key: Hashable = None) -> None:
         """Add one event for a device and wake the thread. An event without a key replaces none."""
         with self._lock:
+            if len(self._items) >= MOST_NAMES and name not in self._items:
+                self.dropped += 1
+                return
             waiting = self._items.setdefault(name, {})
             key = object() if key is None else key
             if waiting.pop(key, None) is None and len(waiting) == INBOX_SIZE:
@@ -39,18 +44,18 @@ class Inbox(Generic[T]):
         self.wake()
 
     def wake(self) -> None:
-        """Wake the thread without an event. A bell that rings already is not rung again."""
+        """Wake the thread without an event; does nothing if the bell already rings."""
         if not self._rung:
             self._rung = True
             self._bell.put(None)
 
     def close(self) -> None:
-        """No more rounds: the one under way ends as soon as it can."""
+        """Ask for no more rounds; the current one ends as soon as it can."""
         self.closed = True
         self.wake()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for the bell; False when the time is up first."""
+        """Wait for the bell; False after `timeout_s`."""
         try:
             self._bell.get(timeout=max(0.0, timeout_s))
         except queue.Empty:
@@ -59,7 +64,7 @@ class Inbox(Generic[T]):
         return True
 
     def take(self) -> dict[str, list[T]]:
-        """All events so far, by device, in order."""
+        """Take all waiting events: by device, in order."""
         with self._lock:
             taken, self._items = self._items, {}
         return {name: list(waiting.values()) for name, waiting in taken.items()}

@@ -1,7 +1,7 @@
-"""What a kind without hardware keeps for its next start, and what it tells of all its subjects at once.
+"""What a kind without hardware keeps on disk, and the message that it publishes about all subjects.
 
-What is kept is kept before it is told: others act on what they are told. Where it cannot be kept the
-kind serves all the same, with the fault NOT_KEPT, and it is tried again each second.
+It writes to disk before it publishes, because others act on what is published. If writing fails, the
+kind serves on with the fault NOT_KEPT, and writing is tried again each second.
 """
 
 import logging
@@ -23,8 +23,8 @@ NOT_KEPT: Final = "NOT_KEPT"
 
 
 class Kept(Protocol):
-    """What outlives the daemon: one file, or nothing yet. `write` replaces it whole; both may raise
-    OSError."""
+    """The file that outlives the daemon; None before the first `write`, which replaces it as a whole.
+    Both may raise OSError."""
 
     def read(self) -> bytes | None: ...
 
@@ -32,7 +32,7 @@ class Kept(Protocol):
 
 
 class Keeper(Generic[S, L, M, E, R]):
-    """Of one node. `kept`: None to forget. `tell_at`: when all subjects are to be told of next."""
+    """The keeper of one node. `kept`: None to keep nothing. `tell_at`: when to publish next."""
 
     def __init__(self, kind: GraphKind[S, L, M, E, R], kept: Kept | None, publish: Publish) -> None:
         self.tell_at = NEVER
@@ -45,7 +45,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._pace = Pace()
 
     def restore(self, settings: S, now: float) -> Mapping[str, M]:
-        """What was kept; a file that cannot be right is as good as none, and says so."""
+        """The memories that were kept; an invalid file is logged and ignored."""
         if self._kept is None or self._kind.restore is None:
             return {}
         try:
@@ -59,16 +59,16 @@ class Keeper(Generic[S, L, M, E, R]):
 
     @property
     def wake_at(self) -> float:
-        """When to tell next, or to try again to keep."""
+        """When to publish next, or to try writing again."""
         return min(self.tell_at, self._again_at if self._fault else NEVER)
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """That what was told last is not kept."""
+        """NOT_KEPT, while the last memories are not on disk."""
         return (self._fault,) if self._fault else ()
 
     def keep(self, memories: Mapping[str, M], now: float) -> None:
-        """Write down what must outlive us, if it has changed."""
+        """Write what must survive a restart, if it has changed."""
         if (
             self._kept is None
             or self._kind.persist is None
@@ -99,7 +99,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._fault = None
 
     def tell(self, memories: Mapping[str, M], now: float, may_speak: bool) -> None:
-        """Tell of all subjects together, when that is due."""
+        """Publish the message about all subjects, if it is due."""
         if self._kind.together is None or not may_speak:
             self.tell_at = NEVER
             return

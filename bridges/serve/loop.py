@@ -1,8 +1,8 @@
 """The loop: one bus and the devices on it.
 
 RMF callbacks and GPIO edges only put something into the inbox. A round scans each device that is due,
-has something in the inbox, or may have changed; and every output is made safe at the end, however that
-comes.
+has something in the inbox, or may have changed. At the end, whatever its cause, every output is made
+safe.
 """
 
 import logging
@@ -23,7 +23,7 @@ SUSPENDED_S = 0.5
 
 
 class Loop:
-    """Scans the nodes of one bus, each once in `scan_s` (s) and whenever it asks for it."""
+    """Scans the nodes of one bus, each every `scan_s` (s) and whenever it asks to be woken."""
 
     def __init__(
         self, bus_name: str, bus: Bus, nodes: Sequence[AnyNode], scan_s: float, clock: Clock
@@ -54,7 +54,7 @@ class Loop:
 
     @property
     def ready(self) -> bool:
-        """Every device has been tried once and its first state is out."""
+        """Whether every device has been tried once and has published its first state."""
         return all(node.ready for node in self.nodes)
 
     def round(self) -> None:
@@ -71,7 +71,7 @@ class Loop:
         self._ran_at = self._clock.monotonic()
 
     def end(self) -> bool:
-        """Every output off, and the bus let go."""
+        """Every output off, and the bus released."""
         self._bus.insist()
         safe = [node.make_safe() for node in self.nodes]
         for node in self.nodes:
@@ -103,7 +103,7 @@ class Loop:
         self.inbox.wake()
 
     def _take_edge(self) -> bool:
-        """Was there an edge? One that comes meanwhile is of this round, or rings for the next."""
+        """Whether there was an edge. One that comes meanwhile counts now or wakes the next round."""
         if not self._edge:
             return False
         self._edge = False

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 
 def notify(state: str, environ: Mapping[str, str] = os.environ) -> None:
-    """Tell systemd; nothing happens where NOTIFY_SOCKET is not set. A full socket loses the word.
+    """Notify systemd; does nothing if NOTIFY_SOCKET is not set. A full socket drops the message.
 
-    Raises OSError where it cannot be told: no descriptor is left, or nobody may write there.
+    Raises OSError if no file descriptor is left, or writing is not permitted.
     """
     path = environ.get("NOTIFY_SOCKET", "")
     if not path:

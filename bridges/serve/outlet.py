@@ -1,4 +1,4 @@
-"""What a node publishes: its ends on the graph, by topic."""
+"""A node's publishers, by topic."""
 
 import logging
 from collections.abc import Callable, Iterable
@@ -11,7 +11,7 @@ from bridges.rmf.transport import Publisher, Transport, TransportError
 log = logging.getLogger(__name__)
 
 Named = Callable[[Topic[Message]], Topic[Message]]
-"""Gives a topic under the name that the site has given it."""
+"""Renames a topic as the site's YAML says."""
 
 
 class Outlet:
@@ -28,14 +28,14 @@ class Outlet:
             self._ends[topic.name] = self._transport.publisher(self._named(topic))
 
     def publish(self, topic: Topic[Message], message: Message) -> None:
-        """Send. A wire that is gone is logged: the next message may find it again."""
+        """Publish. A failure is logged: the next message may get through."""
         try:
             self._ends[topic.name].publish(message)
         except TransportError as error:
             log.error(pairs("not_published", topic=topic.name, reason=error))
 
     def close(self) -> None:
-        """Be no publisher to anybody."""
+        """Withdraw every publisher."""
         for end in self._ends.values():
             end.close()
         self._ends.clear()

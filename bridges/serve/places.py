@@ -1,10 +1,10 @@
-"""Where a daemon keeps what is its own, found by one rule for every command.
+"""Where a daemon keeps its files, found by one rule for every command.
 
-A directory that was given is the only one; else systemd's, in a unit; else the service's, where that
-is about this very file; else the one of a daemon started by hand, for root perhaps by who called sudo.
+A directory given on the command line; else systemd's, in a unit; else the service's, if its lock or
+record names this file; else that of a daemon started by hand, for root also the sudo user's.
 
-`runtime` goes with a reboot: the lock and the status. `state` outlives it: what is claimed, since a
-Modbus relay outlives a power cut of ours. A directory that was given is both.
+`runtime` is lost at a reboot: lock and status. `state` survives it: the record of claimed outputs,
+because a Modbus relay outlives a power cut of the Pi. A given directory is both.
 """
 
 import grp
@@ -21,7 +21,7 @@ USERS_RUN = Path("/run/user")
 TMP = Path("/tmp")
 SERVICE_USER = "rmf-bridge"
 GROUPS = ("gpio", "dialout")
-"""What the unit gives this user beside its own group."""
+"""The groups that the unit gives this user beside its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,17 +33,17 @@ class Places:
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """Both, the lasting one first."""
+        """Both, `state` first."""
         return tuple(dict.fromkeys((self.state, self.runtime)))
 
 
 def named(file: Path) -> str:
-    """A file's one name, by which a lock or a record is about it."""
+    """A file's canonical path, as locks and records name it."""
     return os.path.realpath(file)
 
 
 def as_told(given: str | None, environ: Mapping[str, str] = os.environ) -> Places | None:
-    """What the command line or systemd's unit says; None where neither does."""
+    """The directories that the command line or systemd's unit gives; None if neither does."""
     if given:
         return Places(Path(given).absolute(), Path(given).absolute())
     runtime = environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
@@ -52,26 +52,26 @@ def as_told(given: str | None, environ: Mapping[str, str] = os.environ) -> Place
 
 
 def of_service(file: Path) -> Places:
-    """Where `rmf-bridge@.service` has them."""
+    """The directories of `rmf-bridge@.service`."""
     return Places(SERVICE_RUN / file.stem, SERVICE_STATE / file.stem)
 
 
 def by_hand(file: Path, environ: Mapping[str, str] = os.environ) -> Places:
-    """Where a daemon has them that this user starts by hand."""
+    """The directories of a daemon that this user starts by hand."""
     runtime = Path(environ.get("XDG_RUNTIME_DIR") or TMP / f"rmf-bridge-{os.getuid()}")
     return Places(runtime / "rmf-bridge" / file.stem, state_base(environ) / file.stem)
 
 
 def state_base(environ: Mapping[str, str] = os.environ) -> Path:
-    """This user's state directory; one below /tmp where there is no home."""
+    """This user's state directory; one below /tmp if there is no home."""
     home = os.path.expanduser("~")
     default = Path(home) / ".local/state" if os.path.isabs(home) else TMP / f"rmf-{os.getuid()}"
     return Path(environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
 
 
 def everywhere(file: Path) -> Iterator[Places]:
-    """Where a daemon of this file may be: the service's, and the one of a daemon by hand, for root
-    also that of the user who has become root by sudo.
+    """Where a daemon of this file may be: in the service's directories, or those of a daemon started by
+    hand; for root also those of the user who called sudo.
     """
     yield of_service(file)
     if os.geteuid() == 0 and (uid := os.environ.get("SUDO_UID", "")).isdecimal():
@@ -80,7 +80,7 @@ def everywhere(file: Path) -> Iterator[Places]:
 
 
 def _of_user(uid: int, file: Path) -> Iterator[Places]:
-    """What is in his directories; nobody else has put it there."""
+    """The directories of this user, if they belong to that user."""
     for base in (USERS_RUN / str(uid), TMP / f"rmf-bridge-{uid}"):
         runtime = base / "rmf-bridge" / file.stem
         try:
@@ -93,9 +93,9 @@ def _of_user(uid: int, file: Path) -> Iterator[Places]:
 
 
 def distrusted(folder: Path) -> str:
-    """Why nothing in a directory may be believed; "" when nobody but its owner and root made it.
+    """Why a directory cannot be trusted; "" if only its owner or root can have made it.
 
-    Nobody else may have been able to put it, or a directory above it, where it is.
+    This holds for each directory above it as well.
     """
     owner = folder.lstat().st_uid
     others = 0o022 if os.geteuid() == 0 else 0o002
@@ -116,19 +116,19 @@ def own(places: Places) -> None:
     for folder in _existing(places):
         if folder.stat().st_uid != os.geteuid():
             raise PermissionError(
-                f"{folder} belongs to {owner_of(folder)}: sudo -u {owner_of(folder)} does it"
+                f"{folder} belongs to {owner_of(folder)}: run this with sudo -u {owner_of(folder)}"
             )
 
 
 def act_as_owner(places: Places) -> None:
-    """Root becomes the directories' owner, for good, with the groups that the unit gives.
+    """Root permanently becomes the directories' owner, with the groups that the unit gives.
 
-    What stands in them can then do no more than their owner could. Raises PermissionError where
-    somebody else could have made them.
+    Files in them can then do no more than their owner could. Raises PermissionError if somebody else
+    could have made them.
     """
     for folder in _existing(places):
         if why := distrusted(folder):
-            raise PermissionError(f"{why}, so nothing in {folder} is believed")
+            raise PermissionError(f"{why}, so {folder} cannot be trusted")
         found = folder.lstat()
         if os.geteuid() == 0 and found.st_uid != 0:
             _become(found.st_uid, found.st_gid)
@@ -146,7 +146,7 @@ def _become(uid: int, gid: int) -> None:
 
 
 def _groups(uid: int, gid: int) -> list[int]:
-    """Those that the user has, and for the unit's those that the unit gives it."""
+    """The user's groups; for the service's user also those that the unit gives."""
     try:
         user = pwd.getpwuid(uid)
     except KeyError:
@@ -158,7 +158,7 @@ def _groups(uid: int, gid: int) -> list[int]:
 
 
 def owner_of(path: Path) -> str:
-    """Whose it is, for a text."""
+    """The owner's name, for messages."""
     try:
         return pwd.getpwuid(path.lstat().st_uid).pw_name
     except (KeyError, OSError):
@@ -166,7 +166,7 @@ def owner_of(path: Path) -> str:
 
 
 def work_somewhere(places: Places) -> None:
-    """Be where lgpio can leave its FIFO when it is imported: in one of these, or below /tmp."""
+    """Change to a directory where lgpio can make its FIFO: one of these, or a temporary one."""
     for folder in (places.runtime, places.state, TMP, Path("/dev/shm"), Path("/var/tmp")):
         probe = folder / f".rmf-bridge-{os.getpid()}"
         try:

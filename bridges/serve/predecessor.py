@@ -1,8 +1,8 @@
-"""What a dead daemon has left on: switched off before this one claims anything.
+"""Switches off what a dead daemon has left on, before this daemon claims anything.
 
-A process of its own does it, as it does after a death: what hangs there hangs nobody here, and it
-knows the profiles as the dead daemon knew them. What does not answer is a fault that is shown, and is
-tried on while we serve; but for our own record, whose outputs each device claims as soon as it answers.
+A separate process does it, as after every death: if it hangs, this daemon does not, and it uses the
+profiles as the dead daemon had them. Devices that do not answer are reported and retried while we
+serve. Those of our own record are not: each is made safe as soon as it answers.
 """
 
 import logging
@@ -19,7 +19,7 @@ from drivers import Driver
 log = logging.getLogger(__name__)
 
 PATIENCE_S = 15.0
-"""For a process that gives up by itself after 5 s (and a slow machine)."""
+"""Time for a process that gives up after 5 s, on a slow machine."""
 PAUSE_FIRST_S, PAUSE_MOST_S = 5.0, 60.0
 
 
@@ -27,7 +27,7 @@ LOOK_EVERY_S = 0.02
 
 
 class Predecessor:
-    """`ours`: the record that this daemon is about to claim by. `command`: its file's `outputs-off`."""
+    """`ours`: this daemon's own record. `command`: the `outputs-off` of its file."""
 
     def __init__(self, records: Records, ours: Record, command: Sequence[str]) -> None:
         self._records = records
@@ -38,10 +38,10 @@ class Predecessor:
         self._next_at = math.inf
 
     def make_safe(self, wait: Callable[[float], bool]) -> frozenset[str]:
-        """Before anything is claimed: everything off that was left on.
+        """Switch off what was left on, before anything is claimed.
 
-        Returns when it is off, has not answered in time, or `wait(s)` says that we are to end: the
-        devices of our own record that are not verified off.
+        Ends when everything is off, time is up, or `wait(s)` returns True because we are to end.
+        Returns the devices of our own record that are not verified off.
         """
         found = self._records.unreleased()
         if found:
@@ -55,18 +55,18 @@ class Predecessor:
         return self._own_unsafe()
 
     def left(self) -> list[str]:
-        """The records of others' outputs that are not verified off."""
+        """The names of other records whose outputs are not verified off."""
         return [r.name for r in self._records.unreleased() if r.name != self._ours.name]
 
     def tick(self, now: float) -> None:
-        """Once a second or so: try again what has not answered."""
+        """Call about once a second: retries what has not answered."""
         if self._child is not None and not self._running():
             self._judge(now)
         elif self._child is None and now >= self._next_at:
             self._start(self.left())
 
     def close(self) -> None:
-        """We end, and switch off what is ours; `outputs-off` after us has its turn with the rest."""
+        """Stop trying; the `outputs-off` that runs after us handles the rest."""
         if self._child is not None:
             self._child.kill()
             self._child.wait()
@@ -89,7 +89,7 @@ class Predecessor:
         return self._child is not None and self._child.poll() is None
 
     def _judge(self, now: float, unsafe: Collection[str] = ()) -> None:
-        """What came of a try. `unsafe`: what is left of our own record, which is not tried again."""
+        """Note the result of a try. `unsafe`: the rest of our own record, which is not retried here."""
         self.close()
         if left := self.left():
             if self._next_at == math.inf:
@@ -103,8 +103,8 @@ class Predecessor:
 
 
 class SafeFirst:
-    """A device (`drivers.Driver`) that a dead daemon may have left on, and that did not answer yet:
-    made safe as soon as it does, before anything else is asked of it.
+    """Wraps a driver whose device a dead daemon may have left on and that has not answered yet: makes
+    it safe as soon as it answers, before anything else.
     """
 
     def __init__(self, name: str, driver: Driver[Any, Any]) -> None:
@@ -117,7 +117,7 @@ class SafeFirst:
         self.close = driver.close
 
     def open(self) -> None:
-        """Claim it, and the first time make it safe."""
+        """Claim the device, and make it safe the first time."""
         self._driver.open()
         if not self._safe:
             self._driver.make_safe()

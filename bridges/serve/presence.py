@@ -1,7 +1,7 @@
-"""Whether a node without hardware may speak: one alone serves a graph, any other one only listens.
+"""Decides whether a node without hardware may publish: only one serves a graph, any other only listens.
 
-It has been alone on its topics for the kind's quiet time before it says a word; only then are its
-publishers declared, so that a node that waits for another's end is no rival to it.
+A node publishes after it has been alone on its topics for the kind's quiet time. Only then are its
+publishers declared, so that a waiting node is not counted as a rival.
 """
 
 import logging
@@ -17,13 +17,13 @@ from bridges.rmf.transport import Subscription, Transport
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S = 0.25
-"""How often to look who else is on the graph."""
+"""How often to look for other nodes on the graph."""
 SPREAD_LEAST_S, SPREAD_MOST_S = 0.5, 3.0
-"""How much longer one listens that has met a rival: more than discovery takes, and never alike."""
+"""Extra listening time after meeting a rival: longer than discovery takes, and random."""
 
 
 class Presence:
-    """Looks for rivals. `kind`: for the log. `rivals`: how many others publish what one alone may."""
+    """Looks for rivals. `kind`: for the log. `rivals`: how many other nodes publish our topics."""
 
     def __init__(self, kind: str, quiet_s: float) -> None:
         self.may_speak = False
@@ -36,11 +36,11 @@ class Presence:
         self._ends: list[Subscription] = []
 
     def listen(self, transport: Transport, sole: Iterable[Topic[Message]]) -> None:
-        """Count from now on who publishes these topics."""
+        """Count the publishers of these topics from now on."""
         self._ends += [transport.subscribe(topic, _ignore, others_only=True) for topic in sole]
 
     def look(self, now: float) -> bool:
-        """Look, if it is time to. True when `may_speak` has changed."""
+        """Look, if it is due. True if `may_speak` has changed."""
         if now < self.look_at:
             return False
         self._count(now)
@@ -61,7 +61,7 @@ class Presence:
             log.info(pairs("other_node_gone", kind=self._kind))
 
     def _set(self, yes: bool) -> bool:
-        """Two that began at once both fall silent; one is back before the other."""
+        """Two nodes that began at once both fall silent; by chance one returns before the other."""
         if yes == self.may_speak:
             return False
         self.may_speak = yes
@@ -73,4 +73,4 @@ class Presence:
 
 
 def _ignore(message: Message) -> None:
-    """A rival is counted, not listened to."""
+    """The messages do not matter: rivals are only counted."""

@@ -1,9 +1,8 @@
-"""What a daemon has claimed, written down before it claims: all that is needed to switch it off.
+"""The record of what a daemon claims, written before it claims: all that is needed to switch it off.
 
-A record is a file of its own, named by its content, in the daemon's state directory, or where that
-takes none in its runtime directory. So a daemon that starts anew on the same YAML finds its record as
-it stands, and one on another YAML writes none over. Tokens are not in it: they are read where the YAML
-says, when they are used.
+A record is a file named by its content, in the daemon's state directory, or in its runtime directory
+if that cannot be written. So a daemon that restarts on the same YAML finds its record, and one on
+another YAML overwrites none. Tokens are not in it: they are read from their files when used.
 """
 
 import hashlib
@@ -25,9 +24,9 @@ SIZE_MAX = 64 << 20
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """`file`: the YAML's path. `yaml`: its text. `texts`: those of profiles and DBC files, by name.
+    """`file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files, by name.
 
-    `safe`: the devices whose outputs have been verified off since.
+    `safe`: the devices whose outputs have since been verified off.
     """
 
     file: str
@@ -37,39 +36,39 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def name(self) -> str:
-        """The name of its file, by what was claimed."""
+        """The name of its file, a hash of what was claimed."""
         claimed = msgspec.json.encode(msgspec.structs.replace(self, safe=()))
         return f"claimed-{hashlib.sha256(claimed).hexdigest()[:16]}.json"
 
     def config(self) -> Config:
-        """What was claimed. Raises SettingsError.
+        """The Config that was claimed. Raises SettingsError.
 
-        The process then knows this record's texts, and no others.
+        From then on this process uses the record's profiles and DBC files, and no others.
         """
         texts.give(self.texts)
         return understood(self.file, self.yaml)
 
 
 def of(config: Config) -> Record:
-    """The record of what this process has loaded, and loaded alone."""
+    """The record of this config, which must be the only one that this process has loaded."""
     return Record(named(config.path), config.text, dict(sorted(texts.all_known().items())))
 
 
 class Records:
-    """The records in a daemon's places that are about one file."""
+    """The records of one file in a daemon's directories."""
 
     def __init__(self, places: Places, file: Path) -> None:
         self._places = places
         self._file = named(file)
 
     def unreleased(self) -> list[Record]:
-        """What was claimed and not released; what is unreadable or about another file is left out."""
+        """The records not yet released; unreadable ones and those of other files are left out."""
         found = (record for path in paths(self._places) if (record := read(path)))
         by_name = {record.name: record for record in found if record.file == self._file}
         return list(by_name.values())
 
     def write(self, record: Record) -> Path:
-        """Where it stands now. Raises OSError when neither directory takes it."""
+        """Write a record; returns its path. Raises OSError if neither directory takes it."""
         content = msgspec.json.encode(record)
         refused: OSError | None = None
         for folder in self._places.folders:
@@ -85,12 +84,12 @@ class Records:
         raise refused
 
     def still_unsafe(self, record: Record, devices: Collection[str], config: Config) -> None:
-        """These devices' outputs are not verified off; the others' are. Raises OSError."""
+        """Note that these devices are not verified off, and all others are. Raises OSError."""
         safe = tuple(name for name in config.devices if name not in devices)
         self.write(msgspec.structs.replace(record, safe=safe))
 
     def release(self, record: Record) -> None:
-        """Every output of it is off and let go. Raises OSError."""
+        """Remove a record whose outputs are all off. Raises OSError."""
         for folder in self._places.folders:
             (folder / record.name).unlink(missing_ok=True)
 
@@ -103,7 +102,7 @@ def paths(places: Places) -> Iterator[Path]:
 
 
 def read(path: Path) -> Record | None:
-    """A record; None for what is none or cannot be read. No symbolic link is followed."""
+    """The record in a file; None if it is invalid, unreadable or a symbolic link."""
     try:
         with open(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as source:
             content = source.read(SIZE_MAX)

@@ -1,4 +1,4 @@
-"""What was not obeyed: counted by its kind, and the first of each kind logged."""
+"""Counts refused requests by reason, and logs the first of each reason."""
 
 import logging
 import threading
@@ -10,14 +10,14 @@ log = logging.getLogger(__name__)
 
 
 class Refusals:
-    """Those of one device, or of one node."""
+    """The refusals of one device or node."""
 
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
         self._lock = threading.Lock()
 
     def add(self, kind: str, detail: object, **whose: str) -> None:
-        """One more, from any thread."""
+        """Count one refusal; from any thread."""
         with self._lock:
             self._counts[kind] += 1
             first = self._counts[kind] == 1
@@ -25,6 +25,6 @@ class Refusals:
             log.warning(pairs("refused", **whose, kind=kind, detail=detail))
 
     def counts(self) -> dict[str, int]:
-        """Kind -> how many."""
+        """Reason -> count."""
         with self._lock:
             return dict(self._counts)

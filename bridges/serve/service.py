@@ -1,6 +1,6 @@
-"""What one daemon serves: devices on buses, or a kind that lives on RMF's graph alone.
+"""What one daemon serves: devices on buses, or a kind without hardware.
 
-Either has threads, subscribes for them, and says how they are.
+Either has threads, subscribes to RMF's topics for them, and reports their status.
 """
 
 import logging
@@ -42,20 +42,20 @@ class Service(Protocol):
         """Its threads."""
 
     def subscribe(self) -> None:
-        """Begin to hear RMF."""
+        """Subscribe to RMF's topics."""
 
     def reset(self) -> None:
         """An operator says that latched faults may clear."""
 
     def status(self) -> Status:
-        """For the status file: how the service as a whole is."""
+        """For the status file: the service as a whole."""
 
     def devices(self) -> Mapping[str, Status]:
         """For the status file: each device, lift or door by name."""
 
 
 def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
-    """A topic under the name that the site has given it."""
+    """The topic, renamed if the YAML says so."""
     return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
 
@@ -66,10 +66,10 @@ def service(
     kept: Kept | None = None,
     unsafe: Collection[str] = (),
 ) -> Service:
-    """What serves this YAML. Raises HalError when a bus cannot be opened.
+    """The service for this YAML. Raises HalError when a bus cannot be opened.
 
-    `kept`: where a kind that has to remembers across restarts; None to forget. `unsafe`: devices that
-    a dead daemon may have left on.
+    `kept`: where a kind without hardware keeps its memory across restarts; None to keep nothing.
+    `unsafe`: devices that a dead daemon may have left on.
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
@@ -117,14 +117,14 @@ class Devices:
         self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
 
     def subscribe(self) -> None:
-        """Begin to hear RMF, and whoever else publishes our devices' states."""
+        """Subscribe to requests, and to states of our devices that other nodes publish."""
         for topic in self._kind.requests:
             self._transport.subscribe(self._named(topic), self._to_inbox(topic))
         states = self._kind.states
         self._transport.subscribe(self._named(states), self._to_inbox(states), others_only=True)
 
     def reset(self) -> None:
-        """Each device hears of it in its own loop."""
+        """Put the reset into the inbox of each device."""
         for device, (_, loop) in self._placed.items():
             loop.inbox.put(device, OperatorReset())
 
@@ -159,7 +159,7 @@ class Devices:
         return Node(name, self._kind, device, limits, driver, self._outlet.publish, self._clock)
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
-        """A callback for the transport's thread. Other nodes' states are not ours to count."""
+        """A callback for the transport's thread. States of others' devices are not counted."""
         states = topic == self._kind.states
 
         def put(message: Message) -> None:

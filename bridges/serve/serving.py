@@ -1,4 +1,4 @@
-"""A thread that serves: rounds, one after the other, until it is stopped."""
+"""A thread that runs rounds, one after the other, until it is stopped."""
 
 import logging
 import threading
@@ -11,7 +11,7 @@ from bridges.serve.contained import LeftOn
 log = logging.getLogger(__name__)
 
 LEAST_GAP_S = 0.001
-"""Time alone never asks for rounds faster than this."""
+"""The least time between rounds that no event has caused."""
 
 
 class Bell(Protocol):
@@ -33,15 +33,15 @@ class Rounds(Protocol):
 
     @property
     def name(self) -> str:
-        """What the thread is called."""
+        """The thread's name."""
 
     @property
     def inbox(self) -> Bell:
-        """What wakes it between its times."""
+        """What wakes it before `wake_at`."""
 
     @property
     def wake_at(self) -> float:
-        """When the next round is due if nothing is heard (monotonic s)."""
+        """When the next round is due if no event comes (monotonic s)."""
 
     @property
     def finished(self) -> int:
@@ -49,13 +49,13 @@ class Rounds(Protocol):
 
     @property
     def ready(self) -> bool:
-        """It does what it is for."""
+        """Whether it is in service."""
 
     def round(self) -> None:
-        """Take what was heard, and do what is due."""
+        """Take the waiting events, and do what is due."""
 
     def end(self) -> bool:
-        """Outputs off, and everything let go. False when that could not be verified."""
+        """Outputs off, and everything released. False if that could not be verified."""
 
 
 class Serving:
@@ -69,18 +69,18 @@ class Serving:
         self._thread = threading.Thread(target=self._run, name=serves.name, daemon=True)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self, timeout_s: float) -> bool:
-        """End after the round under way, outputs off; False if it does not end, or not safely."""
+        """End after the current round, outputs off; False if it does not end, or not safely."""
         self._serves.inbox.close()
         self._thread.join(timeout_s)
         return not self._thread.is_alive() and self._safe
 
     @property
     def alive(self) -> bool:
-        """False when it has ended, by stop or by a defect of ours."""
+        """False when the thread has ended, by `stop` or by a defect."""
         return self._thread.is_alive()
 
     @property

@@ -1,9 +1,9 @@
-"""Signals: whatever would end or suspend a daemon ends it in good order, its outputs off.
+"""Signals: each one that would end or suspend a daemon makes it shut down, outputs off.
 
-The rule is by what a signal does to a process that has not asked for it (signal(7)). Left alone:
-a crash, and SIGABRT, which is the watchdog's: the process can be trusted no more, and `outputs-off`
-follows. SIGPIPE and SIGXFSZ stay ignored, as Python has them: they come from a log that nobody reads
-or a full disk, which end no daemon; the write fails. SIGKILL and SIGSTOP cannot be caught.
+What counts is a signal's default action (signal(7)). Not caught: crashes, and SIGABRT from the
+watchdog; such a process cannot be trusted any more, and `outputs-off` follows. SIGPIPE and SIGXFSZ stay
+ignored, as Python sets them: an unread log or a full disk must not end a daemon, only fail the write.
+SIGKILL and SIGSTOP cannot be caught.
 """
 
 import os
@@ -24,7 +24,7 @@ CRASHES: Final = {
     signal.SIGTRAP,
 }
 HARMLESS: Final = {signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH}
-"""By default nothing ends or stops when they come."""
+"""Their default action neither ends nor suspends a process."""
 WRITES: Final = {signal.SIGPIPE, signal.SIGXFSZ}
 RESET: Final = signal.SIGUSR1
 TERMINAL: Final = {signal.SIGTTIN, signal.SIGTTOU}
@@ -40,23 +40,23 @@ ENDING: Final = frozenset(signal.valid_signals()) - {
 
 
 class End:
-    """Set for good by the first signal that ends us. (A threading.Event is not to be set by a signal:
-    one that came while its lock was held would wait for ever.)
+    """Set permanently by the first signal that ends us. (A threading.Event cannot be used: a signal
+    that came while its lock was held would wait forever.)
     """
 
     def __init__(self) -> None:
-        """From now on; a SIGHUP that the starter ignores (nohup) stays ignored."""
+        """Catch the signals from now on; a SIGHUP ignored by the parent (nohup) stays ignored."""
         self._read, self._write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         for number in ENDING:
             if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self._on_signal)
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for it this long (s); True once it has come."""
+        """Wait up to `timeout_s`; True once a signal has come."""
         return bool(select.select([self._read], [], [], timeout_s)[0])
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        for each in TERMINAL:  # else the last lines of a job in the background would raise it again
+        for each in TERMINAL:  # else a background job's last log lines would raise it again
             signal.signal(each, signal.SIG_IGN)
         with suppress(BlockingIOError):  # full of earlier ones
             os.write(self._write, b".")
@@ -68,11 +68,11 @@ def on_reset(reset: Callable[[], None]) -> None:
 
 
 def ignore() -> None:
-    """Nothing but SIGKILL ends this process before it has finished: it is short, and switches off."""
+    """Let only SIGKILL end this process, which runs shortly and switches outputs off."""
     for number in ENDING | {RESET}:
         signal.signal(number, signal.SIG_IGN)
 
 
 def ignore_reset() -> None:
-    """A reset does no harm before anybody serves, nor while another program replaces this one."""
+    """Ignore a reset until the daemon serves; by default the signal would end the process."""
     signal.signal(RESET, signal.SIG_IGN)

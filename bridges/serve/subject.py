@@ -1,5 +1,5 @@
-"""One lift, door or charger (or a coordinator's site): its core's memory, and what becomes of a
-decision: messages go out, refusals are counted, states and faults are logged when they change."""
+"""One lift, door or charger (or a coordinator's site): holds its core's memory and acts on each
+decision: publishes messages, counts refusals, and logs states and faults when they change."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -17,22 +17,22 @@ from bridges.serve.refusals import Refusals
 log = logging.getLogger(__name__)
 
 Status = Mapping[str, Any]
-"""What the status file says of something, as JSON has it."""
+"""A part of the status file, as JSON values."""
 
 Publish = Callable[[Topic[Message], Message], None]
 """Sends to RMF, and does not raise."""
 
 V = TypeVar("V")
-"""Everything that a core may be told."""
+"""The events of a core."""
 
 
 @dataclass(frozen=True, slots=True)
 class Core(Generic[M, V, O, R]):
     """A kind's core with its limits, as subjects need it.
 
-    `word`: what a subject is called in the log. `decide(memory, event, now)`. `summary(report, now)`:
-    key -> value for the log and the status file. `identity(fault)`: by what a fault is the one that
-    was logged before.
+    `word`: the key of a subject's name in the log. `decide(memory, event, now)`.
+    `summary(report, now)`: key -> value for the log and the status file. `identity(fault)`: two faults
+    with equal identity are the same one, logged once.
     """
 
     word: str
@@ -42,7 +42,7 @@ class Core(Generic[M, V, O, R]):
 
 
 class Subject(Generic[M, V, O, R]):
-    """What one core looks after."""
+    """One subject of a core."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class Subject(Generic[M, V, O, R]):
         return decision
 
     def log(self, report: R) -> None:
-        """Say once what is new in a report."""
+        """Log what has changed since the last report."""
         news = report.news()
         if news != self._logged_news:
             self._logged_news = news

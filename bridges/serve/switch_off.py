@@ -1,4 +1,4 @@
-"""Every output of a YAML or of a record off, from a fresh process. Imports only what switches."""
+"""Switches off every output of a YAML or record, from a new process. Imports no more than it needs."""
 
 import logging
 import threading
@@ -15,9 +15,9 @@ log = logging.getLogger(__name__)
 
 
 def outputs_off(config: Config, timeout_s: float, but: Collection[str] = ()) -> set[str]:
-    """Switch off every output that a file names, `but` these devices; those that are verified off.
+    """Switch off every output of a file, except those of the devices in `but`.
 
-    Bounded: a bus that does not answer is given up after `timeout_s` (s) in all.
+    Returns the devices that are verified off. Gives up after `timeout_s` in total.
     """
     results: dict[str, bool] = {}
     left = [name for name in config.devices if name not in but]
@@ -34,7 +34,7 @@ def outputs_off(config: Config, timeout_s: float, but: Collection[str] = ()) -> 
 def _started(
     config: Config, bus_name: str, left: Collection[str], results: dict[str, bool]
 ) -> threading.Thread:
-    """One bus that does not answer takes no time from the others."""
+    """Start a thread for one bus, so that a dead bus does not delay the others."""
     devices = [name for name in config.devices_on(bus_name) if name in left]
     arguments = (config, bus_name, devices, results)
     thread = threading.Thread(target=_bus_off, args=arguments, daemon=True)
@@ -66,7 +66,7 @@ def _device_off(name: str, driver: Driver[Any, Any]) -> bool:
     except DriverError as error:
         log.error(pairs("outputs_not_off", device=name, reason=error))
         return False
-    except Exception as error:  # a defect of ours; the other devices have their turn
+    except Exception as error:  # a defect of ours must not stop the other devices
         log.error(pairs("outputs_not_off", device=name, reason=repr(error)), exc_info=True)
         return False
     finally:

@@ -8,7 +8,7 @@ that is not seen is not fed either; only the frames that take its power away are
 
 import functools
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Final
+from typing import Annotated
 
 import msgspec
 
@@ -19,13 +19,13 @@ from bridges.settings.nodes import unknown
 from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows
+from drivers.charger.rules import MEANINGS, UNKNOWN, judge, places
 from drivers.driver_type import DriverType
 from drivers.hal import can
 from drivers.hal.can.broadcasts import Broadcasts, Said
 from drivers.profiles import profile_problems
 
 Volume = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
-UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -44,7 +44,10 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
         """What the fields cannot say one by one."""
         yield from super().problems()
         if self.on_death == "keep":
-            yield ("on_death",), "it stops when it is not fed any more: leave this out"
+            yield (
+                ("on_death",),
+                "it stops when our frames cease, so it cannot be kept: leave this out",
+            )
         before = list(profile_problems(PROFILE, self.profile, self.map))
         yield from before
         if not before and not any(self.map.problems() if self.map else ()):
@@ -65,7 +68,7 @@ def _setpoint_problems(settings: Settings) -> Problems:
     found = frame_map(settings)
     wanted, given = found.wanted_setpoints(), set(settings.setpoints)
     for name in sorted(wanted - given):
-        yield ("setpoints",), f"needs '{name}', which the charger is told while it charges"
+        yield ("setpoints",), f"needs '{name}', which is sent to the charger while it charges"
     for name in sorted(given - wanted):
         yield ("setpoints", name), unknown("setpoint", name, sorted(wanted))
     if wanted == given:
@@ -99,7 +102,7 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
     """What `check` prints in place of a wiring table: (what, meaning)."""
     found = frame_map(settings)
     stops_s = settings.limits.peer_internal_timeout_s
-    after = "a time that the maker knows" if stops_s is None else f"{stops_s:g} s"
+    after = "a time to be asked of the maker" if stops_s is None else f"{stops_s:g} s"
     return [
         ("bus", can.describe(bus_settings)),
         *rows(found, settings.setpoints),
@@ -152,11 +155,14 @@ class FrameDriver:
         self._seen = False
         values = self._values(self._frames.read())
         code = int(values.get(self._map.state.at, -1))
-        activity, side = self._meanings.get(code, UNKNOWN)
+        rule = judge(self._map.rules, lambda at: _heard(values, at))
+        activity, side = MEANINGS[rule.means] if rule else self._meanings.get(code, UNKNOWN)
         if self._undiagnosed(activity, values):
             state, *_ = self._map.frames()
-            values = self._values(self._frames.read_after(state, self._map.errors.frames()))
+            values = self._values(self._frames.read_after(state, self._map.error_frames()))
         found = self._errors(values)
+        if rule and rule.text:
+            found = [(side, rule.text), *found]
         self._seen = True
         return ChargerSample(
             activity,
@@ -216,16 +222,8 @@ class FrameDriver:
         }
 
     def _errors(self, values: dict[str, float]) -> list[tuple[FaultSide, str]]:
-        sides: tuple[tuple[FaultSide, dict[str, str]], ...] = (
-            ("station", self._map.errors.station),
-            ("robot", self._map.errors.robot),
-        )
-        return [
-            (side, text)
-            for side, texts in sides
-            for signal, text in texts.items()
-            if values.get(signal, 0)
-        ]
+        """What is wrong by the frames that are heard."""
+        return self._map.errors.found(values.get)
 
     def _measured(self, values: dict[str, float]) -> Measured:
         found = self._map
@@ -243,16 +241,23 @@ def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
     """What is heard. Without its state, and who is there, there is no reading."""
     state, *_ = found.frames()
     receiver = (found.receiver or "").split(".")[0]
+    ruled = {signal.split(".")[0] for _, signal in places(found.rules)}
     return {
         name: Said(
             id=frames.id(name),
             mask=found.masks.get(name, 0x1FFF_FFFF),
             length=frames.length(name),
             fresh_s=found.state_timeout_s if name == state else found.others_timeout_s,
-            needed=name in (state, receiver),
+            needed=name in {state, receiver, *ruled},
         )
         for name in found.frames()
     }
+
+
+def _heard(values: Mapping[str, float], signal: str) -> float:
+    if signal not in values:
+        raise DriverError(f"{signal} is not heard, and a rule looks at it")
+    return values[signal]
 
 
 def _receiver(number: float | None) -> str | None:

@@ -27,7 +27,7 @@ class Dbc:
         try:
             database: Any = cantools.database.load_string(text, "dbc")
         except Error as error:
-            raise ValueError(f"is no DBC file: {' '.join(str(error).split())[:200]}") from None
+            raise ValueError(f"is not a DBC file: {' '.join(str(error).split())[:200]}") from None
         self._messages: dict[str, Any] = {message.name: message for message in database.messages}
 
     def frames(self) -> list[str]:

@@ -21,17 +21,20 @@ from bridges.charger.signals import (
     Activity,
     ChargerOutputs,
     ChargerSample,
-    FaultSide,
     Measured,
 )
+from bridges.core.fields import Timeout
 from drivers import json_fields
+from drivers.charger import rules
+from drivers.charger.rules import Errors, Rule, judged
 from drivers.charger.state_codes import CODE_MAX, Code, Codes
 from drivers.driver_type import DriverType
 from drivers.hal import http
 from drivers.http_call import Call, Calls, send, told
 from drivers.json_fields import Field, Flag
+from drivers.unsafe import unaccepted
 
-UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
+POWER: Final = "power"
 WORD_MAX: Final = 64
 Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
 
@@ -77,24 +80,36 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One station. The paths follow the bus's `api_base`.
 
-    `codes`: what the maker's state numbers mean.
+    `codes`: what the maker's state numbers mean; not needed with `rules`.
+    `rules`: the state by what else the answer says, before `codes`; their places are fields.
+    `errors`: what is an error whatever the state says; its places are fields.
     `state_words`: word -> the number that stands for it in `codes`, where the maker says words.
     `state_path`: where GET answers the station's state.
     `fields`: where that answer has what.
-    `clear_error_path`: where POST clears the station's error.
+    `clear_error_path`: where POST clears the station's error; `null` where nothing does.
     `start`: begins to charge who is on the pad.
+    `switches_off_after_s`: the timer that `start` sets, by which the power is off without a new one:
+    `start` is then sent in every scan while the power is on.
     `stop`: takes the power away.
     `range_check`: has the station look where the robot stands, where it does not by itself.
     """
 
-    codes: Codes
+    codes: Codes | None = None
+    rules: list[Rule] = msgspec.field(default_factory=list)
+    errors: Errors = Errors()
     state_words: dict[Word, Code] = msgspec.field(default_factory=dict)
     state_path: http.Path = "/state"
     fields: Fields = Fields()
-    clear_error_path: http.Path = "/clear_error"
+    clear_error_path: http.Path | None = "/clear_error"
     start: Call | None = None
+    switches_off_after_s: Timeout | None = None
     stop: Call | None = None
     range_check: Call | None = None
+
+    def off_after(self) -> tuple[float, tuple[str, ...]] | None:
+        """The timer of its power."""
+        path = ("switches_off_after_s",)
+        return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
     def can_stop(self) -> bool:
         """Only where the YAML says how."""
@@ -103,15 +118,41 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
         """What the fields cannot say one by one."""
         yield from super().problems()
+        yield from rules.problems(self.rules, self.codes is not None)
+        yield from _place_problems(self)
+        yield from _timer_problems(self)
         if self.receivers and self.fields.receiver_id is None:
             text = "receivers needs it: where does the station say whose receiver it sees?"
             yield ("fields", "receiver_id"), text
         if self.start and not self.stop:
-            yield ("start",), "needs stop as well: nobody starts what cannot be stopped"
+            yield ("start",), "needs stop as well: a charge that cannot be stopped is not started"
         if self.range_check and self.fields.in_range is None:
             yield ("fields", "in_range"), "range_check needs it: where is its result?"
         if self.on_death == "keep" and self.stop is None:
             yield ("on_death",), "this station cannot be stopped: leave this out"
+
+
+def _place_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+    looked_at = [(("rules", *path), at) for path, at in rules.places(settings.rules)]
+    looked_at += [(("errors", *path), at) for path, at in settings.errors.places()]
+    for path, at in looked_at:
+        if not json_fields.is_field(at):
+            yield path, f"{at!r} is no field: write names with dots between them (status.code)"
+
+
+def _timer_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What has no state of its own is a relay: nothing but its timer knows that the network is gone."""
+    timer = settings.switches_off_after_s
+    if timer and not settings.start:
+        yield ("switches_off_after_s",), "is set by start: give it, or leave this out"
+    if timer and settings.on_death == "keep":
+        yield ("on_death",), "it switches off when it is not told again: leave this out"
+    if settings.start and settings.codes is None and timer is None:
+        text = (
+            "when the network dies nothing switches the power off: have start set the relay's own"
+            " timer, and write that as switches_off_after_s"
+        )
+        yield from unaccepted([(POWER, ("start",), text)], settings.accept_unsafe)
 
 
 def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
@@ -126,13 +167,21 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
     for what in ("start", "stop", "range_check"):
         if call := getattr(settings, what):
             rows.append((what.replace("_", " "), told(call, api)))
-    clear = f"POST {api.url(settings.clear_error_path)}, {_how_often(settings)}"
-    rows.append(("clear error", clear))
+    if settings.switches_off_after_s:
+        after = f"{settings.switches_off_after_s:g} s without a new start"
+        rows.append(("power off", f"by itself after {after}, sent every {bus_settings.scan_s:g} s"))
+    if settings.clear_error_path:
+        clear = f"POST {api.url(settings.clear_error_path)}, {_how_often(settings)}"
+        rows.append(("clear error", clear))
     for name in fields.__struct_fields__ if fields != Fields() else ():
+        if name == "state" and settings.codes is None:
+            continue
         if place := getattr(fields, name):
             rows.append((f"field {name}", _place(place)))
     rows += [(f"word {word}", str(code)) for word, code in settings.state_words.items()]
-    rows += settings.codes.rows()
+    rows += rules.rows(settings.rules, settings.errors)
+    if settings.codes:
+        rows += settings.codes.rows()
     rows += [(f"receiver {known}", who) for known, who in settings.receivers.items()]
     if settings.stop:
         rows.append(("on death", settings.on_death))
@@ -161,10 +210,10 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield (), f"{sort}without {' and '.join(missing)}, {what}"
     if not _lacks(settings, "receiver_id") and not settings.receivers:
         yield ("fields",), "receiver_id is read, but without receivers nobody is verified"
-    if not settings.codes.error:
+    if settings.codes and not settings.codes.error:
         yield ("codes",), "no code means error: each of them will be shown as an unknown state"
 
-    known = settings.codes.meanings()
+    known = settings.codes.meanings() if settings.codes else {}
     for word, code in settings.state_words.items():
         if code not in known:
             yield ("state_words", word), f"{code} stands nowhere in codes: an unknown state"
@@ -189,7 +238,6 @@ class HttpCharger:
     def __init__(self, settings: Settings, bus: Calls) -> None:
         self._settings = settings
         self._bus = bus
-        self._meaning = settings.codes.meanings()
         self._activity = Activity.UNKNOWN
         self._power: bool | None = None
         self._cleared = 0
@@ -202,10 +250,15 @@ class HttpCharger:
         """The station's state now. Raises DriverError for an answer that has no meaning."""
         answer = self._bus.get_json(self._settings.state_path)
         fields = self._settings.fields
-        code = _code(answer, fields.state, self._settings.state_words)
-        self._activity, side = self._meaning.get(code, UNKNOWN)
-        said = json_fields.text(answer, fields.error_text)
-        return ChargerSample(self._activity, code, said, _measured(answer, fields), side)
+        words, code = self._settings.state_words, None
+        if self._settings.codes is not None:
+            code = _code(answer, fields.state, words)
+        found = judged(self._settings, lambda at: json_fields.needed(answer, at), code)
+        self._activity = found.activity
+        said = "; ".join(filter(None, (found.text, json_fields.text(answer, fields.error_text))))
+        return ChargerSample(
+            found.activity, found.code, said, _measured(answer, fields), found.side
+        )
 
     def write(self, outputs: ChargerOutputs) -> None:
         """Bring the station to this level. Power that is taken goes first.
@@ -217,7 +270,8 @@ class HttpCharger:
             self._stop_if_needed()
         if outputs.clear_errors != self._cleared:
             self._cleared = outputs.clear_errors
-            self._bus.send(self._settings.clear_error_path)
+            if self._settings.clear_error_path:
+                self._bus.send(self._settings.clear_error_path)
         if outputs.range_checks != self._checked:
             self._checked = outputs.range_checks
             send(self._bus, self._settings.range_check)
@@ -242,7 +296,8 @@ class HttpCharger:
     def _start_if_needed(self) -> None:
         given, self._power = self._power, None
         waits = self._activity is Activity.IDLE
-        if waits or (not given and self._activity is Activity.HANDSHAKE):
+        renewed = self._settings.switches_off_after_s and self._activity not in AT_FAULT
+        if waits or renewed or (not given and self._activity is Activity.HANDSHAKE):
             send(self._bus, self._settings.start)
 
 
@@ -288,5 +343,6 @@ DRIVER = DriverType(
     create=create,
     describe=describe,
     warnings=warnings,
+    unwired=lambda settings: (POWER,) if settings.start else (),
     fake="hal_fakes.http_charger",
 )

@@ -17,7 +17,7 @@ from drivers import DriverError, json_fields
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, Calls, send, told
+from drivers.http_call import Call, InsistentCalls, send, told
 from drivers.json_fields import Flag
 from drivers.unsafe import Unsafe, unaccepted
 
@@ -128,7 +128,7 @@ def warnings(settings: Settings) -> Problems:
         yield ("feedback",), "RMF is told OPEN or CLOSED by the clock, whatever the door does"
 
 
-def create(name: str, settings: Settings, bus: Calls) -> "HttpDoor":
+def create(name: str, settings: Settings, bus: InsistentCalls) -> "HttpDoor":
     """The door on its bus; nothing is sent before `open`."""
     return HttpDoor(settings, bus)
 
@@ -136,7 +136,7 @@ def create(name: str, settings: Settings, bus: Calls) -> "HttpDoor":
 class HttpDoor:
     """`drivers.Driver` of one door. What was told is None while it is not known to be so."""
 
-    def __init__(self, settings: Settings, bus: Calls) -> None:
+    def __init__(self, settings: Settings, bus: InsistentCalls) -> None:
         self._settings = settings
         self._bus = bus
         self._renews = settings.switches_off_after_s is not None

@@ -42,7 +42,8 @@ Header = Annotated[
         extra={"pattern": "the name of an HTTP header (X-API-Key)"},
     ),
 ]
-Timeout = Annotated[float, msgspec.Meta(ge=0.1, le=30, extra={"unit": "s"})]
+Timeout = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
+"""A call that takes longer would be taken for a hang (`WatchdogSec=10` of the unit)."""
 
 _HINTS = {
     3: "redirects are not followed: put the final address in api_base",

@@ -22,19 +22,19 @@ def json_object(url: str, content_type: str, body: bytes) -> dict[str, Any]:
             body.decode(), parse_constant=_no_number, object_pairs_hook=_without_doubles
         )
     except (ValueError, RecursionError) as error:
-        raise HalError(f"{url} answered JSON that is none: {shown(str(error))}") from None
+        raise HalError(f"{url} answered invalid JSON: {shown(str(error))}") from None
     if not isinstance(found, dict):
-        raise HalError(f"{url} answered JSON that is no object: {shown(repr(found))}")
+        raise HalError(f"{url} answered JSON that is not an object: {shown(repr(found))}")
     return found
 
 
 def _no_number(word: str) -> Any:
-    raise ValueError(f"{word} is no JSON")
+    raise ValueError(f"{word} is not JSON")
 
 
 def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """An object that says two things under one name says nothing."""
+    """Refuse an object with a duplicate key: which value counts is undefined."""
     found = dict(pairs)
     if len(found) < len(pairs):
-        raise ValueError("a name stands twice in one object")
+        raise ValueError("a key occurs twice in one object")
     return found

@@ -162,7 +162,7 @@ def test_once_prints_the_table_or_says_that_nothing_is_there(
     ]
     nobody = MemoryTransport(MemoryNetwork(), "alone")
     assert watch.show_once(watch.listen_on(nobody), 0.01, out) == 1
-    assert "same domain" in capsys.readouterr().err
+    assert "check the domain and network" in capsys.readouterr().err
 
 
 # --- command lines -----------------------------------------------------------------------------

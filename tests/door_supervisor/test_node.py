@@ -123,16 +123,16 @@ def test_what_cannot_be_kept_is_a_fault_and_tried_again_until_it_is(
 ) -> None:
     graph = Graph()
     graph.until(4.0)
-    graph.kept.full = True
+    graph.disk.full = True
     graph.asks("a", 2)
-    before = graph.kept.kept
+    before = graph.disk.kept
     graph.until(10.0)
-    assert (graph.kept.kept, graph.heard[-1]) == (before, (9.1, "beat ward:a"))
+    assert (graph.disk.kept, graph.heard[-1]) == (before, (9.1, "beat ward:a"))
     [fault] = graph.node.status()["faults"]
     assert fault["code"] == "NOT_KEPT"
-    graph.kept.full = False
+    graph.disk.full = False
     graph.until(11.0)
-    assert b'"a"' in (graph.kept.kept or b"")
+    assert b'"a"' in (graph.disk.kept or b"")
     assert graph.node.status()["faults"] == []
     lines = [r.getMessage() for r in caplog.records if "NOT_KEPT" in r.getMessage()]
     assert len(lines) == 1
@@ -142,13 +142,13 @@ def test_nothing_is_said_before_it_is_kept() -> None:
     graph = Graph()
     graph.until(4.0)
     said: list[str] = []
-    write = graph.kept.write
+    write = graph.disk.write
 
     def tells(kept: bytes) -> None:
         said.extend(word for _, word in graph.heard if "lab" in word)
         write(kept)
 
-    graph.kept.write = tells  # type: ignore[method-assign]
+    graph.disk.write = tells  # type: ignore[method-assign]
     graph.asks("b", 2, "lab")
     assert said == []
     assert graph.heard[-1] == (4.0, "OPEN lab")

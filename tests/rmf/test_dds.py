@@ -134,3 +134,49 @@ def test_a_domain_that_is_open_on_the_network_is_not_taken_for_loopback(
             DdsTransport("simulated", domain, loopback=True)
     finally:
         exposed.close()
+
+
+def test_a_reader_that_fails_joins_anew_and_hears_again(
+    join_dds: Join, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    received: list[d.LiftState] = []
+    node = join_dds("here")
+    assert isinstance(node, DdsTransport)
+    node.subscribe(LIFT_STATES, received.append)
+    publisher = join_dds("there").publisher(LIFT_STATES)
+    wait_until(lambda: received or peer.sent(publisher, d.LiftState()), "it hears")
+    whole = node._read_once
+    failures = iter([MemoryError("none left")])
+
+    def fails() -> None:
+        for failure in failures:
+            raise failure
+        whole()
+
+    monkeypatch.setattr(node, "_read_once", fails)
+    publisher.publish(d.LiftState(lift_name="wakes it"))
+    received.clear()
+    after = d.LiftState(lift_name="after")
+    wait_until(
+        lambda: after in received or peer.sent(publisher, after), "it hears when it has joined anew"
+    )
+    assert node.lives
+    assert [r.getMessage() for r in caplog.records if r.exc_info] == [
+        'reader_failed node=here reason="none left"'
+    ]
+
+
+def test_a_reader_that_fails_again_and_again_is_dead_and_says_so(
+    join_dds: Join, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = join_dds("here")
+    assert isinstance(node, DdsTransport)
+    node.subscribe(LIFT_STATES, lambda state: None)
+    publisher = join_dds("there").publisher(LIFT_STATES)
+
+    def fails() -> None:
+        raise MemoryError("none left")
+
+    monkeypatch.setattr("bridges.rmf.dds.LOOK_EVERY_S", 0.01)
+    monkeypatch.setattr(node, "_read_once", fails)
+    wait_until(lambda: peer.sent(publisher, d.LiftState()) or not node.lives, "it is dead")

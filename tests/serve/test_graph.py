@@ -211,7 +211,7 @@ def test_a_defect_in_a_core_costs_one_message_and_is_told_once(
     assert [request.session_id for request in site.sent] == ["fleet/a"]
     assert site.node.refused == {"a defect": 3}
     assert [r.getMessage() for r in caplog.records if r.exc_info] == [
-        "defect kind=lift_supervisor subject=Lift1 reason=defect"
+        "defect kind=lift_supervisor about=lift_states reason=defect"
     ]
 
 

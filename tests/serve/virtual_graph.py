@@ -152,6 +152,8 @@ class WorldTransport:
             self.received[topic.name].append(received)
         return _End(self, topic)
 
+    lives = True
+
     def wall(self) -> float:
         return EPOCH + self.world.now
 

@@ -83,6 +83,10 @@ class DdsPlace:
 
         return self._inner.subscribe(topic, post, others_only=others_only)
 
+    @property
+    def lives(self) -> bool:
+        return self._inner.lives
+
     def wall(self) -> float:
         return self._inner.wall()
 

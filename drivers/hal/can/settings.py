@@ -67,9 +67,12 @@ class Settings(
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """What the fields cannot say one by one."""
         if self.socketcan is None and self.slcan is None:
-            yield (), "says not which bus: write socketcan: can0, or slcan: {port: …, bitrate: …}"
+            yield (), "needs an interface: write socketcan: can0, or slcan: {port: …, bitrate: …}"
         elif self.socketcan and self.slcan:
-            yield ("slcan",), "a bus has socketcan or slcan: write a second bus for the other"
+            yield (
+                ("slcan",),
+                "a bus has either socketcan or slcan: define a second bus for the other",
+            )
         if self.slcan and self.slcan.bitrate not in BITRATES:
             known = ", ".join(map(str, BITRATES))
             yield ("slcan", "bitrate"), f"slcan adapters know {known}"
@@ -79,7 +82,7 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
     """What is legal but worth a look: (path, text)."""
     if settings.slcan and not settings.slcan.port.startswith("/dev/serial/by-"):
         port = settings.slcan.port
-        text = f"{port} may be another adapter after the next start: ls /dev/serial/by-id"
+        text = f"{port} may be another adapter after a reboot: use a path of /dev/serial/by-id"
         yield ("slcan", "port"), text
 
 

@@ -276,7 +276,7 @@ def test_setpoints_are_those_that_the_map_takes() -> None:
     [(path, text)] = problems(setpoints={"max_volts": 29.4, "volts": 29.2})
     assert (path, text) == (
         ("setpoints",),
-        "needs 'amps', which the charger is told while it charges",
+        "needs 'amps', which is sent to the charger while it charges",
     )
     [(path, text)] = problems(setpoints=SETPOINTS | {"ampere": 1.0})
     assert (path, text) == (
@@ -315,7 +315,7 @@ def map_problems(**changed: Any) -> list[tuple[tuple[str, ...], str]]:
     ("changed", "path", "text"),
     [
         ({"dbc": "other.dbc"}, ("dbc",), "No such file or directory"),
-        ({"dbc": "wiferion.yaml"}, ("dbc",), "is no DBC file"),
+        ({"dbc": "wiferion.yaml"}, ("dbc",), "is not a DBC file"),
         ({"volts": "ChargerStatus.Voltage"}, ("volts",), "'OutputVoltage'"),
         ({"amps": "ChargeStatus.Amps"}, ("amps",), "'ChargerStatus'"),
         ({"masks": {"Mobile": 1}}, ("masks", "Mobile"), "unknown frame 'Mobile'"),

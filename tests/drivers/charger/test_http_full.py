@@ -12,9 +12,10 @@ from bridges.charger.settings import robot
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings.load import SettingsError, load
 from drivers import DriverError, json_fields
-from drivers.charger.http import Call, InRange, Settings, create, describe, warnings
+from drivers.charger.http import InRange, Settings, create, describe, warnings
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
+from drivers.http_call import Call
 from tests.depth import examples
 from tests.drivers.charger.test_http import Station
 
@@ -287,7 +288,7 @@ def problems(tmp_path: Path, old: str, new: str) -> list[str]:
         ("      receiver_id: pad.receiver", "      #", "receivers needs it"),
         ("    stop: {path: /output/off}", "", "needs stop as well"),
         ("      in_range:", "      #", "range_check needs it"),
-        ("""'{"enabled": true}'""", """'{"enabled": yes}'""", "is no JSON"),
+        ("""'{"enabled": true}'""", """'{"enabled": yes}'""", "is not JSON"),
         ("pad.receiver ", "pad..receiver ", "names with dots between them"),
         ("PUT", "DELETE", "PUT"),
     ],

@@ -52,10 +52,10 @@ class HttpContract(WiredDoorContract):
         super().test_a_link_that_is_gone_is_a_driver_error_and_a_hold_survives_it(bench, part)
 
     @pytest.mark.parametrize("mode", ["garbage", "wrong", "slow"])
-    def test_each_way_of_failing_is_a_driver_error_and_never_open(
+    def test_every_failure_is_a_driver_error_and_never_reads_as_open(
         self, bench: Bench, mode: Any
     ) -> None:
-        super().test_each_way_of_failing_is_a_driver_error_and_never_open(bench, mode)
+        super().test_every_failure_is_a_driver_error_and_never_reads_as_open(bench, mode)
 
 
 class TestARelayWithATimer(HttpContract):

@@ -297,7 +297,7 @@ def test_a_bus_is_one_of_the_two_sorts() -> None:
     assert problems(Settings(socketcan="can0")) == []
     assert problems(Settings(slcan=place)) == []
     [(nowhere, what)] = problems(Settings())
-    assert (nowhere, what[:18]) == ((), "says not which bus")
+    assert (nowhere, what[:18]) == ((), "needs an interface")
     [(path, text)] = problems(Settings(socketcan="can0", slcan=place))
     assert (path, text[:30]) == (("slcan",), "a bus has socketcan or slcan: ")
 

@@ -203,6 +203,19 @@ def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side
     assert failure(ours.alive) == ""
 
 
+def test_a_node_that_was_lost_counts_as_started_anew(side: Side) -> None:
+    """Its boot-up frame may have come while nobody listened: what it was told is told again."""
+    ours, _, far, _, clock = side
+    far.send(0x70A, "05")
+    ours.alive()
+    assert ours.starts == 0
+    clock.now += 0.55
+    assert failure(ours.alive)
+    far.send(0x70A, "05")
+    ours.alive()
+    assert ours.starts == 1
+
+
 def test_another_nodes_heartbeat_does_not_count_and_is_named(side: Side) -> None:
     ours, _, far, _, _ = side
     far.send(0x70B, "05")

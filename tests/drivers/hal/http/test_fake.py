@@ -122,8 +122,8 @@ ANSWERED = [
     ("headers", "off", "answered no content type"),
     ("headers", "garbage", "no whole HTTP answer"),
     ("headers", "wrong", "answered status 500"),
-    ("body", "off", "answered JSON that is none"),
-    ("body", "garbage", "answered JSON that is none"),
+    ("body", "off", "answered invalid JSON"),
+    ("body", "garbage", "answered invalid JSON"),
 ]
 ENDLESS = [
     ("server", "slow"),
