@@ -348,6 +348,7 @@ class _Reading:
         else:
             self._check_signals(settings, spot, wiring, driver)
             self._check_pace(settings, spot, bus)
+            self._check_reach(wiring, bus)
         if len(self._page.problems) == before:
             self._collect_warnings(settings, spot, driver)
             for node, text in wiring.warnings(driver.wires(settings), spot):
@@ -369,6 +370,15 @@ class _Reading:
         read = self._buses[bus].settings if bus else BROKEN
         for path, text in () if read is BROKEN else out_of_step(settings, read):
             self._page.note(locate(spot, path).where(), text)
+
+    def _check_reach(self, wiring: Wiring, bus: str | None) -> None:
+        """Points that no bus of these settings can have."""
+        read = self._buses[bus] if bus else None
+        for use in wiring.uses if read and read.hal and read.settings is not BROKEN else ():
+            assert read
+            assert read.hal
+            if reason := read.hal.unreachable(read.settings, use.point):
+                self._page.note(use.node, reason)
 
     def _collect_warnings(self, settings: Any, spot: Spot, driver: AnyDriver) -> None:
         """Collect the warnings about a valid device."""

@@ -57,7 +57,8 @@ class BusType(Generic[Settings]):
     `canonical(point)`: one spelling; ValueError says what to write instead;
     `describe(point)`: every spelling, for the table that an electrician reads;
     `wire_problems(wire)`: what cannot be right about this wire on this bus;
-    `wire_warnings(wire)`: what is legal about it but worth a look.
+    `wire_warnings(wire)`: what is legal about it but worth a look;
+    `unreachable(settings, point)`: why no such bus reaches this point, which is in its one spelling.
     """
 
     settings: type[Settings]
@@ -69,6 +70,7 @@ class BusType(Generic[Settings]):
     describe: Callable[[str], str] = str
     wire_problems: Callable[[Wire], Iterable[str]] = lambda wire: ()
     wire_warnings: Callable[[Wire], Iterable[str]] = lambda wire: ()
+    unreachable: Callable[[Settings, str], str | None] = lambda settings, point: None
 
 
 AnyBus: TypeAlias = BusType[Any]

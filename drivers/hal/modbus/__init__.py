@@ -15,7 +15,7 @@ from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.points import canonical, describe, wire_problems
-from drivers.hal.modbus.settings import Settings, warnings
+from drivers.hal.modbus.settings import Settings, unreachable, warnings
 
 __all__ = [
     "BUS",
@@ -44,4 +44,5 @@ BUS = BusType(
     canonical=canonical,
     describe=describe,
     wire_problems=wire_problems,
+    unreachable=unreachable,
 )

@@ -51,3 +51,12 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield ("serial", *path), text
     for path, text in settings.module_watchdog.warnings() if settings.module_watchdog else ():
         yield ("module_watchdog", *path), text
+
+
+def unreachable(settings: Settings, point: str) -> str | None:
+    """On a serial line units are 1 to 247 (Modbus over Serial Line V1.02, 2.2)."""
+    unit = int(point.split()[1])
+    if settings.serial is None or 1 <= unit <= 247:
+        return None
+    why = "is everybody at once, and nobody answers" if unit == 0 else "is for Modbus TCP"
+    return f"unit {unit} {why}: units on a serial line are 1 to 247"
