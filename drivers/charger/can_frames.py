@@ -19,6 +19,7 @@ from bridges.settings.nodes import unknown
 from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows
+from drivers.charger.state_codes import first_side
 from drivers.driver_type import DriverType
 from drivers.hal import can
 from drivers.hal.can.broadcasts import Broadcasts, Said
@@ -156,14 +157,15 @@ class FrameDriver:
         if self._undiagnosed(activity, values):
             state, *_ = self._map.frames()
             values = self._values(self._frames.read_after(state, self._map.errors.frames()))
-        found = self._errors(values)
+        found = self._errors(values, activity)
         self._seen = True
         return ChargerSample(
-            activity,
+            Activity.ERROR if found else activity,
             code,
             "; ".join(text for _, text in found),
             self._measured(values),
-            side=found[0][0] if found else side,
+            side=first_side([side, *(whose for whose, _ in found)]),
+            charges=bool(found) and activity is Activity.CHARGING,
         )
 
     def write(self, outputs: ChargerOutputs) -> None:
@@ -205,7 +207,7 @@ class FrameDriver:
         An error of no side counts as the station's, and takes it out of service.
         """
         before, self._in_error = self._in_error, activity is Activity.ERROR
-        return self._in_error and not before and not self._errors(values)
+        return self._in_error and not before and not self._errors(values, activity)
 
     def _values(self, frames: Mapping[str, bytes]) -> dict[str, float]:
         """Every signal of these frames, by Frame.Signal. Raises DriverError."""
@@ -215,7 +217,12 @@ class FrameDriver:
             for signal, value in self._dbc.decode(frame, payload).items()
         }
 
-    def _errors(self, values: dict[str, float]) -> list[tuple[FaultSide, str]]:
+    def _errors(self, values: dict[str, float], activity: Activity) -> list[tuple[FaultSide, str]]:
+        """Side and text of what is wrong, whatever the state says.
+
+        The signal of `out_of_range` is one in an error's state only: else it says where the robot is.
+        """
+        position = "" if activity is Activity.ERROR else self._map.out_of_range
         sides: tuple[tuple[FaultSide, dict[str, str]], ...] = (
             ("station", self._map.errors.station),
             ("robot", self._map.errors.robot),
@@ -224,7 +231,7 @@ class FrameDriver:
             (side, text)
             for side, texts in sides
             for signal, text in texts.items()
-            if values.get(signal, 0)
+            if values.get(signal, 0) and signal != position
         ]
 
     def _measured(self, values: dict[str, float]) -> Measured:

@@ -39,7 +39,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Signals that are not 0 while something is wrong, each with its text.
+    """Signals that are not 0 while something is wrong, each with its text: an error, whatever the state.
 
     `station`: faults of the station.
     `robot`: faults of the robot, its receiver and where it stands.
@@ -93,7 +93,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     `others_timeout_s`: likewise for all other frames.
     `volts`, `amps`: at the battery.
     `receiver`: whose receiver it is, as a number; 0 is nobody's. Without its frame there is no reading.
-    `out_of_range`: not 0 while the robot stands where it cannot be charged.
+    `out_of_range`: not 0 while the robot stands where it cannot be charged. Among the `errors` too, it
+    is one only while the state says error: a robot that has yet to come is none.
     `errors`: what is wrong.
     `send`: what must be sent, and how often.
     """

@@ -11,7 +11,7 @@ mean; one that is in no list is an error, and none is ever passed on as if it we
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, Final, Protocol
+from typing import Annotated, Any, Final, Literal, Protocol
 
 import msgspec
 
@@ -26,13 +26,14 @@ from bridges.charger.signals import (
 )
 from drivers.charger import json_fields
 from drivers.charger.json_fields import Field
-from drivers.charger.state_codes import CODE_MAX, Code, Codes
+from drivers.charger.state_codes import CODE_MAX, Code, Codes, first_side
 from drivers.driver_type import DriverType
 from drivers.hal import http
 
 UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 WORD_MAX: Final = 64
 Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
+TextMeans = Literal["none", "station", "robot"]
 Path = Annotated[str, msgspec.Meta(pattern=r"^/[A-Za-z0-9._~/-]*$", max_length=256)]
 
 
@@ -62,7 +63,9 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Where the answer to `state_path` has what: names with dots between them.
 
     `state`: what the station does; `codes` says what it means.
-    `error_text`: the station's own words for an error.
+    `error_text`: the station's own words for an error: any text there is one, whatever `state` says.
+    `error_texts`: text -> whose error it is, `station` or `robot`; or `none` for a text that is no error
+    (`OK`). Of others `codes` says it, or nobody.
     `receiver_id`: whose receiver it sees; null or "" for nobody's.
     `in_range`: whether the robot stands where it can be charged.
     `volts`: at the battery.
@@ -73,6 +76,7 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     state: Field = "state"
     error_text: Field = "error_msg"
+    error_texts: dict[Word, TextMeans] = msgspec.field(default_factory=dict)
     receiver_id: Field | None = None
     in_range: InRange | None = None
     volts: Number | None = None
@@ -169,8 +173,11 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
     clear = f"POST {api.url(settings.clear_error_path)}, {_how_often(settings)}"
     rows.append(("clear error", clear))
     for name in fields.__struct_fields__ if fields != Fields() else ():
-        if place := getattr(fields, name):
+        place = getattr(fields, name)
+        if place and place is not fields.error_texts:
             rows.append((f"field {name}", _place(place)))
+    for text, means in fields.error_texts.items():
+        rows.append((f"text {text}", "no error" if means == "none" else f"{means}'s error"))
     rows += [(f"word {word}", str(code)) for word, code in settings.state_words.items()]
     rows += settings.codes.rows()
     rows += [(f"receiver {known}", who) for known, who in settings.receivers.items()]
@@ -231,6 +238,7 @@ class HttpCharger:
         self._bus = bus
         self._meaning = settings.codes.meanings()
         self._activity = Activity.UNKNOWN
+        self._at_fault = False
         self._power: bool | None = None
         self._cleared = 0
         self._checked = 0
@@ -243,9 +251,18 @@ class HttpCharger:
         answer = self._bus.get_json(self._settings.state_path)
         fields = self._settings.fields
         code = _code(answer, fields.state, self._settings.state_words)
-        self._activity, side = self._meaning.get(code, UNKNOWN)
-        said = json_fields.text(answer, fields.error_text)
-        return ChargerSample(self._activity, code, said, _measured(answer, fields), side)
+        does, code_side = self._meaning.get(code, UNKNOWN)
+        said, text_side = _error(answer, fields)
+        shown = Activity.ERROR if said else does
+        self._activity, self._at_fault = does, shown in AT_FAULT
+        return ChargerSample(
+            shown,
+            code,
+            said,
+            _measured(answer, fields),
+            first_side((text_side, code_side)),
+            charges=bool(said) and does is Activity.CHARGING,
+        )
 
     def write(self, outputs: ChargerOutputs) -> None:
         """Bring the station to this level. Power that is taken goes first.
@@ -276,7 +293,7 @@ class HttpCharger:
     def _stop_if_needed(self) -> None:
         given, self._power = self._power, None
         on = self._activity in (Activity.HANDSHAKE, Activity.CHARGING)
-        if on or (given is not False and self._activity in AT_FAULT):
+        if on or (given is not False and self._at_fault):
             self._send(self._settings.stop, safe=True)
 
     def _start_if_needed(self) -> None:
@@ -301,6 +318,15 @@ def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> in
     if not 0 <= code <= CODE_MAX:
         raise json_fields.wrong(field, code, f"0 to {CODE_MAX}")
     return code
+
+
+def _error(answer: Mapping[str, Any], fields: Fields) -> tuple[str, FaultSide]:
+    """The station's words for its error, and whose they say that it is."""
+    said = json_fields.text(answer, fields.error_text)
+    means = fields.error_texts.get(said)
+    if means == "none":
+        return "", ""
+    return said, means or ""
 
 
 def _measured(answer: Mapping[str, Any], fields: Fields) -> Measured:
