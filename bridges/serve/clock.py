@@ -22,7 +22,8 @@ class Clock:
     def stamp(self, read_at: float | None) -> Time:
         """When a reading was taken, on the wall clock as it is now; 0 for never.
 
-        The age is monotonic, so that a step of the wall clock bends neither age nor order.
+        The age is monotonic, so that a step of the wall clock bends neither age nor order. Raises
+        ClockError for a clock past 2038.
         """
         if read_at is None:
             return Time()

@@ -4,14 +4,16 @@ A round takes what was heard, wakes whose time has come and sends what they say.
 virtual time; the daemon has a thread for it (`bridges/serve/serving.py`).
 """
 
+import logging
 from collections.abc import Callable, Mapping
 from typing import Any, Generic
 
 from bridges.core.decision import Fault, M, OperatorReset, R, RequestRefused
 from bridges.core.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
 from bridges.core.kind import E, L, S
+from bridges.log import pairs
 from bridges.rmf.definitions import Message
-from bridges.rmf.stamps import stamp
+from bridges.rmf.stamps import ClockError, stamp
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
 from bridges.serve.clock import Clock
@@ -21,6 +23,8 @@ from bridges.serve.outlet import Named, Outlet
 from bridges.serve.presence import Presence
 from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Status, Subject
+
+log = logging.getLogger(__name__)
 
 MAX_SUBJECTS = 1000
 """More lifts or doors than any site has: somebody makes names up."""
@@ -192,7 +196,12 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _publish(self, topic: Topic[Message], message: Message) -> None:
         """With the stamp of its sending."""
-        self._outlet.publish(topic, self._kind.stamped(message, stamp(self._clock.wall())))
+        try:
+            stamped = self._kind.stamped(message, stamp(self._clock.wall()))
+        except ClockError as error:
+            log.error(pairs("not_published", topic=topic.name, reason=error))
+            return
+        self._outlet.publish(topic, stamped)
 
 
 AnyGraphNode = GraphNode[Any, Any, Any, Any, Any]

@@ -39,7 +39,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Signals that are not 0 while something is wrong, each with its text: an error, whatever the state.
+    """Signals that are not 0 while something is wrong, whatever the state, each with its text.
 
     `station`: faults of the station.
     `robot`: faults of the robot, its receiver and where it stands.

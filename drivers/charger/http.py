@@ -64,7 +64,7 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     `state`: what the station does; `codes` says what it means.
     `error_text`: the station's own words for an error: any text there is one, whatever `state` says.
-    `error_texts`: text -> whose error it is, `station` or `robot`; or `none` for a text that is no error
+    `error_texts`: text -> whose error it is, `station` or `robot`; or `none` for a text that is none
     (`OK`). Of others `codes` says it, or nobody.
     `receiver_id`: whose receiver it sees; null or "" for nobody's.
     `in_range`: whether the robot stands where it can be charged.

@@ -264,7 +264,7 @@ def test_every_odd_form_is_named_with_its_place() -> None:
         ("levels: " + "[" * 40, "map.yaml:1:40: nested more than 32 deep"),
         ("levels: &a [*a]", "map.yaml:1:13: an alias ('*name') inside the very value that it"),
         ("levels: !!python/name:os.system x", "map.yaml:1:9: tags ('!...') are not read"),
-        (b" " * (MAP.max_bytes + 1), "map.yaml:1:1: longer than 4096 KiB: this is no building map"),
+        (b" " * (MAP.max_bytes + 1), "map.yaml:1:1: longer than 1024 KiB: this is no building map"),
     ],
 )
 def test_a_hostile_file_ends_in_a_clear_text(text: str | bytes, problem: str) -> None:
@@ -275,5 +275,5 @@ def test_values_that_multiply_by_aliases_are_not_written_out() -> None:
     lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 8)]
     assert problems_of("\n".join(lines)) == [
-        f"map.yaml:6:5: more than {MAP.max_values} values, with aliases written out"
+        f"map.yaml:5:5: more than {MAP.max_values} values, with aliases written out"
     ]
