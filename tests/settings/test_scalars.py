@@ -59,7 +59,8 @@ def test_the_same_name_in_quotes_is_that_name(file: Path, text: str) -> None:
 def test_thousands_of_digits_are_a_problem_at_their_place(file: Path, begin: str) -> None:
     text = begin + "1" * 9000
     (problem,) = problems_of(file, changed("[in, out]", f"[in, out, {text}]"))
-    assert problem.startswith("8:22: item 3 of 'lanes' is written ") and len(problem) < 300
+    assert problem.startswith("8:22: item 3 of 'lanes' is written ")
+    assert len(problem) < 300
 
 
 @pytest.mark.parametrize("name", ["L1", "B1", "8F_r", "nO", "1.2.3", "-", "L-1", "走廊", "a b"])

@@ -2,7 +2,8 @@
 
 Nothing is written before a first good reading of what is written. What is written is read back, and
 looked at again in each reading: a module that restarts with its outputs off, or whose watchdog has
-tripped, is noticed; so is another master (`rivals.py`). What goes to its safe value is tried for each output, whatever fails meanwhile:
+tripped, is noticed; so is another master (`rivals.py`).
+What goes to its safe value is tried for each output, whatever fails meanwhile:
 another output, an input, the unit's watchdog.
 """
 

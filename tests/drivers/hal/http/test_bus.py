@@ -54,9 +54,7 @@ def failure(talk: Conversation, timeout_s: float = 5.0) -> str:
         return str(caught.value).replace(f":{far.port}", "")
 
 
-CHUNKED = (
-    b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
-)
+CHUNKED = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
 CHUNK_SIZES = [b"-1", b"-5", b"-" + b"f" * 16, b"-" + b"f" * 5000, b"f" * 5000, b"zz", b""]
 """Of which no chunk can be."""
 

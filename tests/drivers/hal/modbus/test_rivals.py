@@ -26,7 +26,9 @@ DOOR = msgspec.convert(
     Settings,
 )
 SCAN_S = 0.1
-NAMED = "another master writes unit 1 coil 0 too: it reads other than it was written, again and again"
+NAMED = (
+    "another master writes unit 1 coil 0 too: it reads other than it was written, again and again"
+)
 
 
 class Door:
