@@ -53,6 +53,9 @@ class Station(Protocol):
     def obey(self, signal: str, asserted: bool) -> None:
         """Somebody has asked for it."""
 
+    def tick(self) -> None:
+        """Called often: what ends by itself, ends."""
+
 
 class HttpServer:
     """The running server. `replace`: what must stand in the bus's settings instead.
@@ -88,9 +91,15 @@ class _Listener(ThreadingHTTPServer):
             for (method, below), does in s.commands.items()
         }
         self.timeout_s = timeout_s
+        self._stations = stations
         self._callers: set[socket.socket] = set()
         self._lock = threading.Lock()
         super().__init__(("127.0.0.1", 0), _Call)
+
+    def service_actions(self) -> None:
+        """The server's own pause between requests."""
+        for station in self._stations:
+            station.tick()
 
     def get_request(self) -> tuple[socket.socket, Any]:
         caller, address = super().get_request()
@@ -123,6 +132,9 @@ class _Call(BaseHTTPRequestHandler):
     server: _Listener
 
     def do_GET(self) -> None:
+        if ("GET", self.path) in self.server.commands:
+            self.do_POST()
+            return
         station = self.server.get.get(self.path)
         if station is None:
             self._answer(404, b"{}")

@@ -7,20 +7,17 @@ called.
 import json
 import time
 from collections.abc import Iterator, Mapping
-from typing import Any, Final, cast
+from typing import Any, cast
 
 from bridges.charger.signals import Activity
 from drivers.charger.http import Settings
+from drivers.charger.rules import places
+from drivers.charger.state_codes import ROBOT_ERROR
+from drivers.json_fields import Value, found, put, value_of
+from hal_fakes.charger_values import NEAREST, values
 from hal_fakes.fake import Fake
-from hal_fakes.plants.charger import ROBOTS_FAULTS, ChargerPlant, Reading
+from hal_fakes.plants.charger import CAUSES, ROBOTS_FAULTS, ChargerPlant, Reading
 from hal_fakes.plants.plant import Plant
-
-NEAREST: Final = {
-    Activity.HANDSHAKE: Activity.IDLE,
-    Activity.STOPPING: Activity.CHARGING,
-    Activity.RELEASED: Activity.IDLE,
-}
-"""What a maker shows who has no number of its own for an activity."""
 
 
 def build(name: str, settings: Settings) -> ChargerPlant:
@@ -37,7 +34,8 @@ class HttpCharger:
         self.reads = settings.state_path
         self.commands: Mapping[tuple[str, str], tuple[str, bool]] = dict(_commands(settings))
         self._settings = settings
-        self._lists: Mapping[Activity, list[int]] = settings.codes.lists()
+        self._lists = settings.codes.lists() if settings.codes else {}
+        self._off_at = float("inf")
         self._words: Mapping[int | str, str] = {
             code: word for word, code in settings.state_words.items()
         }
@@ -50,7 +48,18 @@ class HttpCharger:
 
     def obey(self, signal: str, asserted: bool) -> None:
         """Somebody has asked for it."""
-        self.plant.drive(signal, asserted, time.monotonic())
+        now, after_s = time.monotonic(), self._settings.switches_off_after_s
+        if signal == "power":
+            self._off_at = now + after_s if asserted and after_s else float("inf")
+        self.plant.drive(signal, asserted, now)
+
+    def tick(self) -> None:
+        """The timer of the power; and what nobody can clear clears itself."""
+        if time.monotonic() >= self._off_at:
+            self.obey("power", False)
+        faulty = self._settings.clear_error_path is None and self.reading().error_text
+        if faulty and not any(map(self.plant.sense, CAUSES)):
+            self.obey("clear_error", True)
 
     def answer(self) -> bytes:
         """The answer to `GET state_path` now."""
@@ -61,32 +70,51 @@ class HttpCharger:
         server, body = reading.failures.get("server"), reading.failures.get("body")
         if server == "stuck" and self._last is not None:
             return self._last
-        code: int | str = self._unknown() if body == "wrong" else self._code(reading)
+        code: int | str = ""
+        if self._settings.codes is not None:
+            code = self._unknown() if body == "wrong" else self._code(reading)
         if server == "wrong":
             code = str(code)
-        self._last = json.dumps(self._answer(code, reading)).encode()
+        answer = self._answer(code, reading)
+        if "wrong" in (server, body):
+            for _, at in places(self._settings.rules):
+                put(answer, at.split(".")[0], None)
+        self._last = json.dumps(answer).encode()
         return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
 
     def _answer(self, code: int | str, reading: Reading) -> dict[str, Any]:
         """Everything where the YAML says that it is."""
         fields, answer = self._settings.fields, dict[str, Any]()
-        _put(answer, fields.state, self._words.get(code, code))
-        _put(answer, fields.error_text, reading.error_text)
+        if self._settings.codes is not None:
+            put(answer, fields.state, self._words.get(code, code))
+            put(answer, fields.error_text, reading.error_text)
         if fields.receiver_id:
-            _put(answer, fields.receiver_id, reading.receiver or None)
+            put(answer, fields.receiver_id, reading.receiver or None)
         if where := fields.in_range:
-            yes = where.when[0] if where.when else True
-            no = next(n for n in range(256) if n not in where.when) if where.when else False
-            _put(answer, where.field, yes if reading.in_range else no)
+            put(answer, where.field, value_of(where, bool(reading.in_range)))
         percent = None if reading.battery is None else 100 * reading.battery
         for name, value in (("battery_percent", percent), *_numbers(reading)):
             if number := getattr(fields, name):
-                _put(answer, number.field, None if value is None else value / number.scale)
+                put(answer, number.field, None if value is None else value / number.scale)
+        for at, shown in self._by_rules(reading, answer).items():
+            put(answer, at, shown)
         return answer
 
+    def _by_rules(self, reading: Reading, answer: dict[str, Any]) -> dict[str, Value]:
+        """What the places of rules and errors hold."""
+        said = self._settings
+        robots = reading.error_text in ROBOTS_FAULTS
+        wanted = ROBOT_ERROR if robots else (reading.activity, "")
+        looked_at = (at for _, at in places(said.rules))
+        natural = {
+            at: found(answer, at) for at in looked_at if isinstance(found(answer, at), Value)
+        }
+        return values(said.rules, said.errors, wanted, natural) or {}
+
     def _code(self, reading: Reading) -> int:
-        if reading.error_text in ROBOTS_FAULTS and self._settings.codes.robot_error:
-            return self._settings.codes.robot_error[0]
+        own = self._settings.codes
+        if own and own.robot_error and reading.error_text in ROBOTS_FAULTS:
+            return own.robot_error[0]
         nearest = NEAREST.get(reading.activity, Activity.ERROR)
         codes = self._lists[reading.activity] or self._lists[nearest] or [self._unknown()]
         return codes[min(int(reading.progress * len(codes)), len(codes) - 1)]
@@ -98,7 +126,8 @@ class HttpCharger:
 
 def _commands(settings: Settings) -> Iterator[tuple[tuple[str, str], tuple[str, bool]]]:
     """Method and path of each command, and what it does to the plant."""
-    yield ("POST", settings.clear_error_path), ("clear_error", True)
+    if settings.clear_error_path:
+        yield ("POST", settings.clear_error_path), ("clear_error", True)
     for call, signal, asserted in (
         (settings.start, "power", True),
         (settings.stop, "power", False),
@@ -111,14 +140,6 @@ def _commands(settings: Settings) -> Iterator[tuple[tuple[str, str], tuple[str, 
 def _numbers(reading: Reading) -> list[tuple[str, float | None]]:
     names = ("volts", "amps", "time_to_full_s")
     return [(name, getattr(reading, name)) for name in names]
-
-
-def _put(answer: dict[str, Any], field: str, value: Any) -> None:
-    """A value at its place; list items have no place here."""
-    *above, last = field.split(".")
-    for name in above:
-        answer = answer.setdefault(name, {})
-    answer[last] = value
 
 
 FAKE = Fake[Settings](

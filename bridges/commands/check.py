@@ -1,7 +1,7 @@
-"""`rmf-bridge check FILE...`: what is wrong with device YAMLs, or their wiring as a table.
+"""`rmf-bridge check FILE...`: the problems of device YAMLs, or their wiring as a table.
 
-The table is for the person at the terminal block: each signal with its point in every spelling, and
-what its levels mean, at rest and when its wire breaks.
+The table is for the person at the terminal block: each signal with every spelling of its point, its
+level at rest, and what it reads when its wire breaks.
 """
 
 import argparse
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check every file. Returns 0, or 78 (EX_CONFIG) if any cannot be right."""
+    """Check every file. Returns 0, or 78 (EX_CONFIG) if any has a problem."""
     try:
         building = load_map(args.building_map) if args.building_map else None
     except SettingsError as error:
@@ -70,6 +70,7 @@ def _check(file: str, quiet: bool, building: BuildingMap | None) -> bool:
         lines = described(config)
         if building and not problems:
             lines += [_agreement(config, building), ""]
+        lines += map(str, config.notes)
         sys.stdout.write("\n".join(lines) + "\n")
     if problems:
         _print_problems(file, problems)
@@ -79,8 +80,8 @@ def _check(file: str, quiet: bool, building: BuildingMap | None) -> bool:
 def _agreement(config: Config, building: BuildingMap) -> str:
     names = ", ".join(dict.fromkeys(name for _, _, name in places(config)))
     if not names:
-        return f"nothing in this file stands on {building.file}"
-    return f"named as on {building.file}: {names}"
+        return f"this file uses no names that {building.file} could confirm"
+    return f"same names as in {building.file}: {names}"
 
 
 def _print_problems(file: str, problems: Sequence[Problem]) -> None:
@@ -89,13 +90,13 @@ def _print_problems(file: str, problems: Sequence[Problem]) -> None:
 
 
 def _complain(lines: Iterable[str]) -> None:
-    """To stderr, after what was printed: the two often end in one log."""
+    """To stderr, in order with stdout: both often end in one log."""
     sys.stdout.flush()
     sys.stderr.writelines(f"{line}\n" for line in lines)
 
 
 def described(config: Config) -> list[str]:
-    """A right file as lines: what it is, and its wiring or what it talks to."""
+    """A valid file as lines: its kind and driver, and its wiring or what it talks to."""
     if config.section is not None:
         kind = named.kind_called(config.kind)
         assert isinstance(kind, GraphKind)
@@ -116,21 +117,22 @@ def _numbers(section: Any) -> list[tuple[str, ...]]:
 
 
 def _bus(config: Config, bus: str, devices: Sequence[str]) -> list[str]:
+    """The wires of its devices, and what those say that have none."""
     wires = [(name, wire) for name in devices for wire in config.wires(name)]
-    if wires:
-        point = config.bus_type(bus).describe
-        return aligned([HEADINGS, *(_row(name, wire, point(wire.point)) for name, wire in wires)])
-    describe = config.driver_type.describe
-    rows = [
-        (name, what, text)
-        for name in devices
-        for what, text in describe(config.devices[name], config.buses[bus]) or [("", "")]
-    ]
-    return aligned(rows)
+    point = config.bus_type(bus).describe
+    table = [_row(name, wire, point(wire.point)) for name, wire in wires]
+    rows = [row for name in devices for row in _described(config, name, bus)]
+    return [*aligned([HEADINGS, *table] if table else []), *aligned(rows)]
+
+
+def _described(config: Config, name: str, bus: str) -> list[tuple[str, str, str]]:
+    describe = config.driver_type(name).describe
+    rows = [(name, *row) for row in describe(config.devices[name], config.buses[bus])]
+    return rows if rows or config.wires(name) else [(name, "", "")]
 
 
 def _row(device: str, wire: Wire, point: str) -> tuple[str, ...]:
-    """One wire. `point`: as the bus describes it; how the YAML spells it is put beside."""
+    """One wire. `point`: as the bus describes it; the YAML's spelling is added if it differs."""
     spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"
     if wire.flash is not None:
         spelled += f", {wire.flash.on_s:g} s by the module at {wire.flash.point}"
@@ -153,7 +155,7 @@ def _debounce(wire: Wire) -> str:
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of equal length as lines with their columns under each other."""
+    """Rows of equal length as lines with aligned columns."""
     widths = [max(map(_width, column)) for column in zip(*rows, strict=True)]
     return [
         "".join(f"  {c}{' ' * (w - _width(c))}" for c, w in zip(row, widths, strict=True)).rstrip()

@@ -1,8 +1,8 @@
-"""`rmf-bridge outputs-off FILE`: every output off, from a fresh process, after any death of the daemon.
+"""`rmf-bridge outputs-off FILE`: every output off, from a new process, after any death of the daemon.
 
-systemd runs it as ExecStopPost, and the guard of a daemon that was started by hand. What the dead
-daemon wrote down before it claimed anything comes before the YAML, which may have been edited since.
-The wires come first: a directory that is full, missing or not to be written holds nothing up.
+systemd runs it as ExecStopPost; so does the guard of a daemon started by hand. The record that the dead
+daemon wrote before it claimed anything takes precedence over the YAML, which may have been edited
+since. A directory that is full, missing or read-only does not delay switching off.
 """
 
 import argparse
@@ -57,10 +57,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _places(file: Path, given: str | None) -> Places | None:
-    """The daemon's directories, where it can be known who lives there; None where systemd says that
-    nobody does, and the directories say nothing that can be believed.
+    """The daemon's directories. None if they cannot be trusted and systemd says that it is dead.
 
-    Raises Unknown or PermissionError.
+    Raises Unknown or PermissionError if it cannot be known whether a daemon runs there.
     """
     try:
         places = runtime.find(file, given)
@@ -69,13 +68,13 @@ def _places(file: Path, given: str | None) -> Places | None:
     except (runtime.Unknown, PermissionError) as error:
         if "SERVICE_RESULT" not in os.environ:  # set for ExecStopPost: systemd.exec(5)
             raise
-        logging.error("%s; %s is what is switched off", error, file)
+        logging.error("%s; switching off what %s names", error, file)
         return None
     return places
 
 
 def _asked_by_our_daemon(places: Places) -> bool:
-    """What lives there is our parent (`bridges/serve/predecessor.py`), or could not say so."""
+    """Whether our parent holds the lock (`serve/predecessor.py`), or its pid is not readable."""
     found = runtime.holder(places)
     return found is None or found.pid in (0, os.getppid())
 
@@ -93,7 +92,7 @@ def _off_by_yaml(file: Path) -> int:
 
 
 def _off_by_records(records: Records, names: list[str] | None = None) -> int:
-    """Each record, or those of these names."""
+    """Switch off what these records name; all records by default."""
     found = [r for r in records.unreleased() if names is None or r.name in names]
     return _told(not [r for r in found if not _off_by_record(records, r)])
 

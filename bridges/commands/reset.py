@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when the daemon was told, 1 when none is running, 69 where this user cannot know or may not."""
+    """0 when the daemon was told, 1 when none runs, 69 if this user may not see or signal it."""
     try:
         places = runtime.find(args.file.absolute(), args.runtime_dir)
         act_as_owner(places)
@@ -32,8 +32,8 @@ def run(args: argparse.Namespace) -> int:
 def _reset(file: Path, places: Places) -> int:
     found = runtime.holder(places)
     if found is None or not found.serves or found.pid <= 1:
-        why = f"{found}, and does not serve" if found else "nobody is there"
-        print(f"no daemon serves {file}: in {places.runtime} {why}", file=sys.stderr)
+        why = f"{found}, which is not a daemon" if found else "no process holds it"
+        print(f"no daemon serves {file}: {places.runtime}: {why}", file=sys.stderr)
         return 1
     try:
         os.kill(found.pid, RESET)

@@ -1,7 +1,7 @@
 """What `ros2 launch rmf_bridges <kind>.launch.py config:=FILE` starts: the daemon, as a ROS node.
 
-After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/serve/guard.py`). The
-launch files stand in `ros/launch/`, one for each kind; imported by them alone, with ROS's `launch`.
+After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/serve/guard.py`). Only
+the launch files in `ros/launch/`, one for each kind, import this module; it needs ROS's `launch`.
 """
 
 from pathlib import Path
@@ -18,7 +18,7 @@ __all__ = ["LaunchDescription", "daemon"]
 
 
 def daemon(kind: str) -> LaunchDescription:
-    """The launch description for one kind. A file of another kind, or a wrong one, starts nothing."""
+    """The launch description for one kind. A file of another kind, or with errors, starts nothing."""
     return LaunchDescription(
         [
             DeclareLaunchArgument("config", description=f"the YAML of the {kind}"),

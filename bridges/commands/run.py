@@ -7,13 +7,13 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import msgspec
-
 from bridges import log
+from bridges.commands.graph import TRANSPORTS, overridden
 from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
 from bridges.serve import places, signals
+from bridges.serve.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
 
@@ -31,28 +31,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--expose", action="store_true", help="with --simulate: let the network see the fake device"
     )
-    parser.add_argument("--domain-id", type=int, metavar="N", help="instead of the YAML's")
+    parser.add_argument("--domain-id", type=int, metavar="N", help="overrides the YAML's domain_id")
+    parser.add_argument("--transport", choices=TRANSPORTS, help="overrides the YAML's transport")
     parser.add_argument(
-        "--runtime-dir", metavar="DIR", help="default: as systemd says, or the user's"
+        "--runtime-dir", metavar="DIR", help="default: systemd's, else one of the user's"
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Validate, claim, serve. 78 for a configuration that cannot be right."""
+    """Validate, claim, serve. Returns 78 for an invalid configuration."""
     log.start()
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: --simulate is refused where RMF_BRIDGE_SERVICE=1")
         return EX_USAGE
     if args.expose and not args.simulate:
-        logging.error("--expose goes with --simulate: a real device is on the network already")
+        logging.error("--expose needs --simulate: a real device is on the network anyway")
         return EX_USAGE
     try:
-        config = _overridden(load(args.file), args)
+        config = load(args.file)
+        config = replace(config, rmf=overridden(config.rmf, args))
     except SettingsError as error:
         for problem in error.problems:
             logging.error(str(problem))
         return EX_CONFIG
-    end = signals.End()  # before the lock says who is to be told what
+    if slow := too_slow(config, watchdog_s()):
+        logging.error(slow)
+        return EX_CONFIG
+    end = signals.End()  # before the lock names our pid, which others then signal
     signals.ignore_reset()
     try:
         held = _held(args)
@@ -68,15 +73,23 @@ def run(args: argparse.Namespace) -> int:
         held.close()
 
 
-def _overridden(config: Config, args: argparse.Namespace) -> Config:
-    rmf = config.rmf
-    if args.domain_id is not None:
-        rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
-    return replace(config, rmf=rmf)
+def too_slow(config: Config, watchdog: float | None) -> str:
+    """Which bus may take longer for one call than systemd's watchdog (s) waits; "" for none."""
+    for name, bus in config.buses.items():
+        timeout_s: float = getattr(bus, "timeout_s", 0.0)
+        if watchdog is not None and timeout_s > watchdog / 2:
+            return (
+                f"{config.path}: bus '{name}': timeout_s is {timeout_s:g} s, but the unit has"
+                f" WatchdogSec={watchdog:g}: a call may take half of that at most"
+            )
+    return ""
 
 
 def _held(args: argparse.Namespace) -> runtime.RuntimeDirectory:
-    """A simulation is always one by hand. Raises AlreadyRunning, Unknown or PermissionError."""
+    """Our directories, locked. A simulation never takes a service's.
+
+    Raises AlreadyRunning, Unknown or PermissionError.
+    """
     file = args.file.absolute()
     if args.simulate:
         found = places.as_told(args.runtime_dir) or places.by_hand(file)
@@ -87,7 +100,7 @@ def _held(args: argparse.Namespace) -> runtime.RuntimeDirectory:
 
 
 def _outputs_off(args: argparse.Namespace) -> list[str]:
-    """The command that switches off what this one may leave on."""
+    """The command that switches off what this daemon may leave on."""
     given = ["--runtime-dir", os.path.abspath(args.runtime_dir)] if args.runtime_dir else []
     file = str(args.file.absolute())
     return [sys.executable, "-m", "bridges.cli", "outputs-off", file, *given]
@@ -102,13 +115,13 @@ def _serve(
         from bridges.serve.daemon import Daemon
 
         outputs_off = _outputs_off(args)
-        places.work_somewhere(held.places)  # lgpio leaves a FIFO where it is imported
+        places.work_somewhere(held.places)  # lgpio leaves a FIFO in the working directory
         return Daemon(config, held, end, ros_args=args.ros_args, outputs_off=outputs_off).serve()
     from hal_fakes.simulate import Simulation
 
-    logging.warning("SIMULATED: no hardware moves, and nothing that RMF is told is true")
+    logging.warning("SIMULATED: no hardware moves, and RMF is told simulated states")
     simulation = Simulation(config, held.path)
-    from bridges.serve.daemon import Daemon  # the far sides start meanwhile
+    from bridges.serve.daemon import Daemon  # imported while the fakes start
 
     try:
         return Daemon(

@@ -33,4 +33,6 @@ KIND: GraphKind[
     stamped=messages.stamped,
     summary=messages.summary,
     idle=core.idle,
+    shown_by=LIFT_STATES,
+    reserved=lambda settings: settings.lifts or (),
 )

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
-from bridges.rmf import cdr
+from bridges.rmf import cdr, notices
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
@@ -53,6 +53,11 @@ class MemoryTransport:
         subscription.catch_up()
         return subscription
 
+    @property
+    def lives(self) -> bool:
+        """Until it is closed."""
+        return not self._closed
+
     def wall(self) -> float:
         """The wall clock (s since the epoch)."""
         return time.time()
@@ -85,7 +90,7 @@ class _Publisher(Generic[M]):
             self.retained.append(message)
         for subscription in self._network.subscriptions:
             if subscription.hears(self):
-                subscription.received(message)
+                subscription.hand_on(message)
 
     def matched(self) -> int:
         """How many subscriptions are reached; 0 after close."""
@@ -123,6 +128,10 @@ class _Subscription(Generic[M]):
             and not (self._others_only and publisher.node is self.node)
         )
 
+    def hand_on(self, message: M) -> None:
+        """As on a wire, a defect of who listens is none of who publishes."""
+        notices.hand_on(self.node.dropped, self._topic, self.received, message)
+
     def catch_up(self) -> None:
         """Receive what each publisher has retained, the newest `depth` of each."""
         if self._topic.subscribe.durability == "volatile":
@@ -130,7 +139,7 @@ class _Subscription(Generic[M]):
         for publisher in self._network.publishers:
             if self.hears(publisher):
                 for message in list(publisher.retained)[-self._topic.subscribe.depth :]:
-                    self.received(message)
+                    self.hand_on(message)
 
     def matched(self) -> int:
         """How many publishers are heard; 0 after close."""

@@ -6,7 +6,8 @@ RMF's graph.
 import logging
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -20,7 +21,7 @@ from bridges.rmf.topics import DIAGNOSTICS
 from bridges.rmf.transport import Publisher, TransportError
 from bridges.serve import guard, record, signals
 from bridges.serve.diagnostics import diagnosis
-from bridges.serve.directory import KeptFile, Once, RuntimeDirectory, state_file
+from bridges.serve.directory import KEPT, KeptFile, Once, RuntimeDirectory, state_file
 from bridges.serve.guard import Guard
 from bridges.serve.notify import notify, watchdog_s
 from bridges.serve.predecessor import Predecessor
@@ -31,6 +32,9 @@ log = logging.getLogger(__name__)
 
 STOP_WITHIN_S = 5.0
 STATUS_EVERY_S = 1.0
+ALIVE = "WATCHDOG=1"
+STARTING = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=30000000"
+"""Many units that do not answer make a long start, and no hung one."""
 
 
 class Daemon:
@@ -70,7 +74,7 @@ class Daemon:
         if config.buses and not simulated:
             runtime.claim(ours)  # before anything is: `outputs-off` goes by it
             self._guard = Guard(outputs_off) if guard.needed() else None
-        kept = None if simulated else KeptFile(state_file(config.path))
+        kept = None if simulated else KeptFile(state_file(config.path), runtime.path / KEPT)
         open_bus = open_bus or config.open_bus
         self._service = service(config, self._transport, open_bus, kept, unsafe)
         self._loops = self._service.loops
@@ -97,26 +101,33 @@ class Daemon:
         told_ready = False
         fed = [-1] * len(self._loops)
         while not self._end.wait(0.02 if not told_ready else period_s):
-            if not all(loop.alive for loop in self._loops):
-                raise SystemExit(70)  # a defect of ours, logged by its thread; systemd restarts us
+            self._require_life()
             if not told_ready and all(loop.ready for loop in self._loops):
-                self._notify("READY=1")
+                self._convenience("sd_notify", partial(notify, "READY=1"))
                 log.info(pairs("ready", file=self._config.path))
                 told_ready = True
-            scans = [loop.scans for loop in self._loops]
-            if all(now > before for now, before in zip(scans, fed, strict=True)):
-                self._notify("WATCHDOG=1")
-                fed = scans
+            finished = [loop.finished for loop in self._loops]
+            if all(now > before for now, before in zip(finished, fed, strict=True)):
+                self._convenience("sd_notify", partial(notify, ALIVE if told_ready else STARTING))
+                fed = finished
             if self._predecessor is not None:
                 self._predecessor.tick(time.monotonic())
             if told_ready:
-                self._tell()
+                self._convenience("status", self._tell)
+
+    def _require_life(self) -> None:
+        """What has died cannot be restarted in here; systemd starts us again."""
+        if not self._transport.lives:
+            log.critical(pairs("died", transport=self._transport.name))
+        elif all(loop.alive for loop in self._loops):
+            return
+        raise SystemExit(70)
 
     def _shut_down(self) -> bool:
-        self._notify("STOPPING=1")
+        self._convenience("sd_notify", partial(notify, "STOPPING=1"))
         deadline = time.monotonic() + STOP_WITHIN_S
         safe = [loop.stop(max(0.1, deadline - time.monotonic())) for loop in self._loops]
-        self._transport.close()
+        self._convenience("transport", self._transport.close)
         if self._predecessor is not None:
             self._predecessor.close()
         if all(safe):
@@ -126,14 +137,14 @@ class Daemon:
         log.info(pairs("stopped", outputs_off=all(safe)))
         return all(safe)
 
-    def _notify(self, state: str) -> None:
-        """Tell systemd; that it cannot be told is no reason to end, and is tried again."""
+    def _convenience(self, what: str, do: Callable[[], None]) -> None:
+        """Whatever goes wrong with it is no reason to end; it is said once, and tried again."""
         try:
-            notify(state)
-        except OSError as error:
-            self._once.failed("sd_notify", error)
+            do()
+        except Exception as error:  # noqa: BLE001 - logged by Once
+            self._once.failed(what, error)
         else:
-            self._once.works("sd_notify")
+            self._once.works(what)
 
     def _about(self) -> dict[str, Any]:
         about = {"version": __version__, "node": self._transport.name, "pid": os.getpid()}

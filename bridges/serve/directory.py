@@ -26,6 +26,7 @@ from bridges.serve.record import Record, Records, paths, read
 log = logging.getLogger(__name__)
 
 STATUS = "status.json"
+KEPT = "kept.json"
 LOCK = "lock"
 WAIT_S = 7.0
 """Longer than `outputs-off` takes: who starts meanwhile waits for it."""
@@ -122,25 +123,41 @@ def _what_to_do(folder: Path, error: OSError) -> str:
 def state_file(file: Path) -> Path:
     """What outlives a daemon and a reboot: where systemd says, else the user's state directory."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
-    return Path(given or state_base() / file.stem).absolute() / "kept.json"
+    return Path(given or state_base() / file.stem).absolute() / KEPT
 
 
 class KeptFile:
-    """One file that is replaced whole and is on the disk before `write` returns."""
+    """A file that is replaced whole and is on the disk before `write` returns.
 
-    def __init__(self, path: Path) -> None:
+    `instead`: where it is kept as long as the first place cannot be written. What stands there is
+    newer than what stands in the first place.
+    """
+
+    def __init__(self, path: Path, instead: Path | None = None) -> None:
         self._path = path
+        self._instead = instead
+        self._once = Once()
 
     def read(self) -> bytes | None:
         """What was kept; None when nothing was. Raises OSError."""
-        try:
-            return self._path.read_bytes()
-        except (FileNotFoundError, NotADirectoryError):
-            return None
+        for path in filter(None, (self._instead, self._path)):
+            with suppress(FileNotFoundError, NotADirectoryError):
+                return path.read_bytes()
+        return None
 
     def write(self, kept: bytes) -> None:
-        """Replace it. Raises OSError, and then the old one stands."""
-        replace(self._path, kept)
+        """Replace it. Raises OSError where neither place can be written; then the old one stands."""
+        try:
+            replace(self._path, kept)
+            if self._instead is not None:
+                self._instead.unlink(missing_ok=True)
+        except OSError as error:
+            self._once.failed(str(self._path), error)
+            if self._instead is None:
+                raise
+            replace(self._instead, kept)
+        else:
+            self._once.works(str(self._path))
 
 
 class Once:
@@ -149,7 +166,7 @@ class Once:
     def __init__(self) -> None:
         self._wrong: dict[str, str] = {}
 
-    def failed(self, what: str, error: OSError) -> None:
+    def failed(self, what: str, error: Exception) -> None:
         """It did not work; it is tried again."""
         if what not in self._wrong:
             log.warning(pairs("not_written", what=what, reason=error))

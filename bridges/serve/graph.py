@@ -5,7 +5,8 @@ virtual time; the daemon has a thread for it (`bridges/serve/serving.py`).
 """
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Generic
 
 from bridges.core.decision import Fault, M, OperatorReset, R, RequestRefused
@@ -28,6 +29,11 @@ log = logging.getLogger(__name__)
 
 MAX_SUBJECTS = 1000
 """More lifts or doors than any site has: somebody makes names up."""
+MAX_UNSHOWN = 100
+"""Names that only requests speak of: no lift or door has shown itself by them."""
+
+
+DEFECT = "a defect"
 
 
 def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> Core[M, GraphEvent[E], None, R]:
@@ -61,7 +67,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         kept: Kept | None = None,
     ) -> None:
         self.name = f"graph-{kind.name}"
-        self.inbox: Inbox[tuple[Topic[Message], Message]] = Inbox()
+        self.inbox: Inbox[tuple[Topic[Message], E]] = Inbox()
         self.presence = Presence(kind.name, kind.quiet_s(settings))
         self.subjects: dict[str, Subject[M, GraphEvent[E], None, R]] = {}
         self._kind = kind
@@ -75,6 +81,9 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
         self._reset = False
+        self._unsaid: list[tuple[Topic[Message], Message]] = []
+        self._shown: set[str] = set()
+        self._reserved = frozenset(kind.reserved(settings))
         for name, memory in self._keeper.restore(settings, self._started_at).items():
             self._add(name, memory)
 
@@ -92,6 +101,11 @@ class GraphNode(Generic[S, L, M, E, R]):
         self.inbox.wake()
 
     @property
+    def finished(self) -> int:
+        """Nothing within a round."""
+        return 0
+
+    @property
     def ready(self) -> bool:
         """It listens. (A passive node is in order: the other one speaks.)"""
         return True
@@ -100,21 +114,23 @@ class GraphNode(Generic[S, L, M, E, R]):
     def wake_at(self) -> float:
         """When the next round is due if nothing is heard."""
         due = (subject.wake_at for subject in self.subjects.values())
-        return min(self.presence.look_at, self._keeper.tell_at, *due)
+        return min(self.presence.look_at, self._keeper.wake_at, *due)
 
     def round(self) -> None:
         """Take what was heard, wake whose time has come, send what they say."""
         self._look_around()
-        for name, messages in self.inbox.take().items():
-            for topic, message in messages:
-                self._receive(name, topic, message)
+        for name, events in self.inbox.take().items():
+            for topic, event in events:
+                self._receive(name, topic, event)
         if self._reset:
             self._reset = False
             self._decide_all(OperatorReset())
         self._wake()
         memories = {name: subject.memory for name, subject in self.subjects.items()}
-        self._keeper.keep(memories)
-        self._keeper.tell(memories, self._clock.monotonic(), self.presence.may_speak)
+        now = self._clock.monotonic()
+        self._keeper.keep(self._real(memories), now)
+        self._say()
+        self._keeper.tell(memories, now, self.presence.may_speak)
 
     def end(self) -> bool:
         """It has no outputs."""
@@ -131,6 +147,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
             "refused": self.refused,
+            "faults": [{"code": f.code, "detail": f.detail} for f in self._keeper.faults],
         }
 
     def devices(self) -> Mapping[str, Status]:
@@ -138,12 +155,26 @@ class GraphNode(Generic[S, L, M, E, R]):
         return {subject.name: subject.status() for subject in list(self.subjects.values())}
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
-        """A callback for the transport's thread."""
+        """A callback for the transport's thread. Only what is accepted waits: it is not endless."""
 
         def put(message: Message) -> None:
-            self.inbox.put(self._kind.device_name(message), (topic, message))
+            with self._counting(topic.name):
+                event = self._kind.requests[topic](message, self._settings, self._clock.wall())
+                self.inbox.put(self._kind.device_name(message), (topic, event))
 
         return put
+
+    @contextmanager
+    def _counting(self, about: str) -> Iterator[None]:
+        """What is not obeyed, or fails for a defect of ours: a core that fails has changed nothing."""
+        try:
+            yield
+        except RequestRefused as refusal:
+            self._refusals.add(refusal.kind, refusal.detail)
+        except Exception as error:
+            if not self._refusals.counts().get(DEFECT):
+                log.exception(pairs("defect", kind=self._kind.name, about=about, reason=error))
+            self._refusals.add(DEFECT, f"{type(error).__name__} about {about}")
 
     def _look_around(self) -> None:
         """Whoever may speak is a publisher, and nobody else."""
@@ -162,27 +193,40 @@ class GraphNode(Generic[S, L, M, E, R]):
                 self._decide(subject, Woken())
             if self._kind.idle(subject.memory, now):
                 del self.subjects[subject.name]
+                self._shown.discard(subject.name)
 
-    def _receive(self, name: str, topic: Topic[Message], message: Message) -> None:
-        try:
-            event = self._kind.requests[topic](message, self._settings, self._clock.wall())
-            subject = self._subject(name)
-        except RequestRefused as refusal:
-            self._refusals.add(refusal.kind, refusal.detail)
-            return
-        self._decide(subject, event)
+    def _receive(self, name: str, topic: Topic[Message], event: E) -> None:
+        with self._counting(name):
+            subject = self._subject(name, shows_itself=self._kind.shown_by in (None, topic))
+            self._decide(subject, event)
 
-    def _subject(self, name: str) -> Subject[M, GraphEvent[E], None, R]:
+    def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
         """What this message is about; it may be new to us."""
-        if name in self.subjects:
-            return self.subjects[name]
-        if len(self.subjects) == MAX_SUBJECTS:
+        if name not in self.subjects and not self._has_room(name, shows_itself):
             raise RequestRefused("too many names", name)
-        return self._add(name, self._kind.initial(name, self._started_at))
+        if shows_itself:
+            self._shown.add(name)
+        found = self.subjects.get(name)
+        return found or self._add(name, self._kind.initial(name, self._started_at))
+
+    def _has_room(self, name: str, shows_itself: bool) -> bool:
+        """Names that are made up take no place from what the YAML names, nor from what shows itself."""
+        if name in self._reserved:
+            return True
+        if shows_itself:
+            return len(self._shown) < MAX_SUBJECTS
+        return len(self.subjects) - len(self._shown) < MAX_UNSHOWN
+
+    def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
+        """In a flood of names that nobody has shown, they are not kept: it would come back with us."""
+        if len(memories) - len(self._shown) < MAX_UNSHOWN:
+            return memories
+        real = self._shown | self._reserved
+        return {name: memory for name, memory in memories.items() if name in real}
 
     def _add(self, name: str, memory: M) -> Subject[M, GraphEvent[E], None, R]:
-        publish, refusals, clock = self._publish, self._refusals, self._clock
-        subject = Subject(name, memory, self._core, publish, refusals, clock)
+        refusals, clock = self._refusals, self._clock
+        subject = Subject(name, memory, self._core, self._will_say, refusals, clock)
         self.subjects[name] = subject
         self._decide(subject, MaySpeak(self.presence.may_speak))
         return subject
@@ -193,6 +237,15 @@ class GraphNode(Generic[S, L, M, E, R]):
     def _decide_all(self, event: GraphEvent[E]) -> None:
         for subject in self.subjects.values():
             self._decide(subject, event)
+
+    def _will_say(self, topic: Topic[Message], message: Message) -> None:
+        """Not before the round has kept what it rests on."""
+        self._unsaid.append((topic, message))
+
+    def _say(self) -> None:
+        unsaid, self._unsaid = self._unsaid, []
+        for topic, message in unsaid:
+            self._publish(topic, message)
 
     def _publish(self, topic: Topic[Message], message: Message) -> None:
         """With the stamp of its sending."""

@@ -8,6 +8,9 @@ from typing import Generic, TypeVar
 INBOX_SIZE = 512
 """More events than this for one device between two scans are a flood: the oldest go, counted."""
 
+MOST_NAMES = 2000
+"""More devices than anybody serves: names beyond are made up, and dropped."""
+
 T = TypeVar("T")
 
 
@@ -30,6 +33,9 @@ class Inbox(Generic[T]):
     def put(self, name: str, item: T, key: Hashable = None) -> None:
         """Add one event for a device and wake the thread. An event without a key replaces none."""
         with self._lock:
+            if len(self._items) >= MOST_NAMES and name not in self._items:
+                self.dropped += 1
+                return
             waiting = self._items.setdefault(name, {})
             key = object() if key is None else key
             if waiting.pop(key, None) is None and len(waiting) == INBOX_SIZE:

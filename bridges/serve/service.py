@@ -4,7 +4,6 @@ Either has threads, subscribes for them, and says how they are.
 """
 
 import logging
-import time
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
@@ -17,7 +16,7 @@ from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import M_co, Topic
 from bridges.rmf.transport import Transport
-from bridges.serve.clock import Clock
+from bridges.serve.clock import Clock, machine_s
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
 from bridges.serve.keeper import Kept
@@ -74,7 +73,7 @@ def service(
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
-    clock = Clock(time.monotonic, transport.wall)  # durations by the machine's, stamps by RMF's
+    clock = Clock(machine_s, transport.wall)  # durations by the machine's, stamps by RMF's
     if isinstance(kind, GraphKind):
         return GraphService(GraphNode(kind, config.section, transport, clock, named, kept), clock)
     return Devices(config, kind, transport, open_bus, named, clock, unsafe)
@@ -107,7 +106,6 @@ class Devices:
         self._config = config
         self._unsafe = unsafe
         self._kind = kind
-        self._driver = config.driver_type
         self._transport = transport
         self._clock = clock
         self._named = named
@@ -153,8 +151,9 @@ class Devices:
 
     def _node(self, name: str, bus: Bus) -> AnyNode:
         device = self._config.devices[name]
-        limits = self._kind.limits(device, self._driver.debounce(device))
-        driver = self._driver.create(name, device, bus)
+        driver_type = self._config.driver_type(name)
+        limits = self._kind.limits(device, driver_type.debounce(device))
+        driver = driver_type.create(name, device, bus)
         if name in self._unsafe:
             driver = SafeFirst(name, driver)
         return Node(name, self._kind, device, limits, driver, self._outlet.publish, self._clock)

@@ -54,7 +54,7 @@ def _bus_off(
         results.update(dict.fromkeys(devices, False))
         return
     for name in devices:
-        driver = config.driver_type.create(name, config.devices[name], bus)
+        driver = config.driver_type(name).create(name, config.devices[name], bus)
         results[name] = _device_off(name, driver)
     bus.close()
 

@@ -8,7 +8,7 @@ that is not seen is not fed either; only the frames that take its power away are
 
 import functools
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Final
+from typing import Annotated
 
 import msgspec
 
@@ -19,6 +19,7 @@ from bridges.settings.nodes import unknown
 from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows
+from drivers.charger.rules import MEANINGS, UNKNOWN, judge, places
 from drivers.charger.state_codes import first_side
 from drivers.driver_type import DriverType
 from drivers.hal import can
@@ -26,7 +27,6 @@ from drivers.hal.can.broadcasts import Broadcasts, Said
 from drivers.profiles import profile_problems
 
 Volume = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
-UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -153,11 +153,14 @@ class FrameDriver:
         self._seen = False
         values = self._values(self._frames.read())
         code = int(values.get(self._map.state.at, -1))
-        activity, side = self._meanings.get(code, UNKNOWN)
+        rule = judge(self._map.rules, lambda at: _heard(values, at))
+        activity, side = MEANINGS[rule.means] if rule else self._meanings.get(code, UNKNOWN)
         if self._undiagnosed(activity, values):
             state, *_ = self._map.frames()
-            values = self._values(self._frames.read_after(state, self._map.errors.frames()))
+            values = self._values(self._frames.read_after(state, self._map.error_frames()))
         found = self._errors(values, activity)
+        if rule and rule.text:
+            found = [(side, rule.text), *found]
         self._seen = True
         return ChargerSample(
             Activity.ERROR if found else activity,
@@ -218,21 +221,13 @@ class FrameDriver:
         }
 
     def _errors(self, values: dict[str, float], activity: Activity) -> list[tuple[FaultSide, str]]:
-        """Side and text of what is wrong, whatever the state says.
+        """What is wrong by the frames that are heard, whatever the state says.
 
-        The signal of `out_of_range` is one in an error's state only: else it says where the robot is.
+        The signal of `out_of_range` is an error in an error's state only; else it tells where
+        the robot is.
         """
         position = "" if activity is Activity.ERROR else self._map.out_of_range
-        sides: tuple[tuple[FaultSide, dict[str, str]], ...] = (
-            ("station", self._map.errors.station),
-            ("robot", self._map.errors.robot),
-        )
-        return [
-            (side, text)
-            for side, texts in sides
-            for signal, text in texts.items()
-            if values.get(signal, 0) and signal != position
-        ]
+        return self._map.errors.found(lambda at: 0 if at == position else values.get(at))
 
     def _measured(self, values: dict[str, float]) -> Measured:
         found = self._map
@@ -250,16 +245,23 @@ def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
     """What is heard. Without its state, and who is there, there is no reading."""
     state, *_ = found.frames()
     receiver = (found.receiver or "").split(".")[0]
+    ruled = {signal.split(".")[0] for _, signal in places(found.rules)}
     return {
         name: Said(
             id=frames.id(name),
             mask=found.masks.get(name, 0x1FFF_FFFF),
             length=frames.length(name),
             fresh_s=found.state_timeout_s if name == state else found.others_timeout_s,
-            needed=name in (state, receiver),
+            needed=name in {state, receiver, *ruled},
         )
         for name in found.frames()
     }
+
+
+def _heard(values: Mapping[str, float], signal: str) -> float:
+    if signal not in values:
+        raise DriverError(f"{signal} is not heard, and a rule looks at it")
+    return values[signal]
 
 
 def _receiver(number: float | None) -> str | None:

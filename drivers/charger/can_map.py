@@ -11,6 +11,8 @@ import msgspec
 from bridges.core.fields import Name, Period
 from bridges.settings.nodes import unknown
 from drivers.charger import dbc
+from drivers.charger import rules as by_rules
+from drivers.charger.rules import Errors, Rule
 from drivers.charger.state_codes import Codes
 from drivers.hal.can import named
 from drivers.profiles import Profile
@@ -20,7 +22,7 @@ Signal = Annotated[
     str,
     msgspec.Meta(
         pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}\.[A-Za-z_][A-Za-z0-9_]{0,63}$",
-        extra={"pattern": "Frame.Signal, by their names in the DBC file,"},
+        extra={"pattern": "Frame.Signal, by their names in the DBC file"},
     ),
 ]
 Mask = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]
@@ -36,21 +38,6 @@ class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     at: Signal
     codes: Codes
-
-
-class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Signals that are not 0 while something is wrong, whatever the state, each with its text.
-
-    `station`: faults of the station.
-    `robot`: faults of the robot, its receiver and where it stands.
-    """
-
-    station: dict[Signal, Name] = msgspec.field(default_factory=dict)
-    robot: dict[Signal, Name] = msgspec.field(default_factory=dict)
-
-    def frames(self) -> set[str]:
-        """The frames that they are in."""
-        return {signal.split(".")[0] for signal in (*self.station, *self.robot)}
 
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -95,7 +82,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     `receiver`: whose receiver it is, as a number; 0 is nobody's. Without its frame there is no reading.
     `out_of_range`: not 0 while the robot stands where it cannot be charged. Among the `errors` too, it
     is one only while the state says error: a robot that has yet to come is none.
-    `errors`: what is wrong.
+    `rules`: the state by other signals, before its codes; their places are signals.
+    `errors`: what is wrong, whatever the state; its places are signals.
     `send`: what must be sent, and how often.
     """
 
@@ -108,6 +96,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     amps: Signal | None = None
     receiver: Signal | None = None
     out_of_range: Signal | None = None
+    rules: list[Rule] = msgspec.field(default_factory=list)
     errors: Errors = Errors()
     send: Annotated[list[Sent], msgspec.Meta(min_length=1)]
 
@@ -119,7 +108,9 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield ("dbc",), str(error)
             return
         for path, signal in self.signals():
-            yield from _lacks(found, path, *signal.split("."))
+            frame, _, name = signal.partition(".")
+            yield from _lacks(found, path, frame, name or "?")
+        yield from by_rules.problems(self.rules, has_codes=True)
         for name in self.masks:
             yield from _lacks(found, ("masks", name), name)
         for n, sent in enumerate(self.send):
@@ -134,9 +125,14 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         for key in ("volts", "amps", "receiver", "out_of_range"):
             if signal := getattr(self, key):
                 yield (key,), signal
-        for side in ("station", "robot"):
-            for signal in getattr(self.errors, side):
-                yield ("errors", side, signal), signal
+        for path, signal in self.errors.places():
+            yield ("errors", *path), signal
+        for path, signal in by_rules.places(self.rules):
+            yield ("rules", *path), signal
+
+    def error_frames(self) -> set[str]:
+        """The frames that errors are in."""
+        return {signal.split(".")[0] for _, signal in self.errors.places()}
 
     def frames(self) -> list[str]:
         """The frames that are read, that of the state first."""
@@ -163,9 +159,12 @@ def rows(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[tuple[str,
     yield "frames", str(dbc.path(found.dbc))
     for path, signal in found.signals():
         at = named(frames.id(signal.split(".")[0]))
-        text = getattr(found.errors, path[1])[signal] if path[0] == "errors" else ""
-        what = f"{path[1]}'s error" if text else path[0]
-        yield what, f"{signal} ({at}){f': {text}' if text else ''}"
+        if path[0] not in ("errors", "rules"):
+            yield path[0], f"{signal} ({at})"
+        elif path[1] in ("station", "robot"):
+            text = getattr(found.errors, path[1])[signal]
+            yield f"{path[1]}'s error", f"{signal} ({at}): {text}"
+    yield from by_rules.rows(found.rules, Errors(codes=found.errors.codes, bits=found.errors.bits))
     for sent in found.send:
         where = f"{sent.frame} ({named(frames.id(sent.frame))}) every {sent.every_s:g} s"
         for on in (True, False):

@@ -11,7 +11,7 @@ mean; one that is in no list is an error, and none is ever passed on as if it we
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, Final, Literal, Protocol
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 
@@ -24,17 +24,21 @@ from bridges.charger.signals import (
     FaultSide,
     Measured,
 )
-from drivers.charger import json_fields
-from drivers.charger.json_fields import Field
+from bridges.core.fields import Timeout
+from drivers import json_fields
+from drivers.charger import rules
+from drivers.charger.rules import Errors, Rule, judged
 from drivers.charger.state_codes import CODE_MAX, Code, Codes, first_side
 from drivers.driver_type import DriverType
 from drivers.hal import http
+from drivers.http_call import Call, Calls, send, told
+from drivers.json_fields import Field, Flag
+from drivers.unsafe import unaccepted
 
-UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
+POWER: Final = "power"
 WORD_MAX: Final = 64
 Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
 TextMeans = Literal["none", "station", "robot"]
-Path = Annotated[str, msgspec.Meta(pattern=r"^/[A-Za-z0-9._~/-]*$", max_length=256)]
 
 
 class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -48,15 +52,8 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     scale: float = 1.0
 
 
-class InRange(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Whether the robot's coil is where it can be charged.
-
-    `field`: where it is in the answer.
-    `when`: the values that say so; without them it must be true or false.
-    """
-
-    field: Field
-    when: list[Code] = []
+InRange = Flag
+"""Whether the robot's coil is where it can be charged."""
 
 
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -85,47 +82,39 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     time_to_full_s: Number | None = None
 
 
-class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One command to the station.
-
-    `path`: below the bus's `api_base`.
-    `method`: how it is sent.
-    `body`: JSON that is sent along, in quotes; nothing when absent.
-    """
-
-    path: Path
-    method: http.Method = "POST"
-    body: Annotated[str, msgspec.Meta(max_length=1024)] | None = None
-
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """A body that is no JSON."""
-        try:
-            msgspec.json.decode(self.body or "{}")
-        except msgspec.DecodeError as error:
-            yield ("body",), f"is no JSON: {error}"
-
-
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One station. The paths follow the bus's `api_base`.
 
-    `codes`: what the maker's state numbers mean.
+    `codes`: what the maker's state numbers mean; not needed with `rules`.
+    `rules`: the state by what else the answer says, before `codes`; their places are fields.
+    `errors`: what is an error whatever the state says; its places are fields.
     `state_words`: word -> the number that stands for it in `codes`, where the maker says words.
     `state_path`: where GET answers the station's state.
     `fields`: where that answer has what.
-    `clear_error_path`: where POST clears the station's error.
+    `clear_error_path`: where POST clears the station's error; `null` where nothing does.
     `start`: begins to charge who is on the pad.
+    `switches_off_after_s`: the timer that `start` sets, by which the power is off without a new one:
+    `start` is then sent in every scan while the power is on.
     `stop`: takes the power away.
     `range_check`: has the station look where the robot stands, where it does not by itself.
     """
 
-    codes: Codes
+    codes: Codes | None = None
+    rules: list[Rule] = msgspec.field(default_factory=list)
+    errors: Errors = Errors()
     state_words: dict[Word, Code] = msgspec.field(default_factory=dict)
-    state_path: Path = "/state"
+    state_path: http.Path = "/state"
     fields: Fields = Fields()
-    clear_error_path: Path = "/clear_error"
+    clear_error_path: http.Path | None = "/clear_error"
     start: Call | None = None
+    switches_off_after_s: Timeout | None = None
     stop: Call | None = None
     range_check: Call | None = None
+
+    def off_after(self) -> tuple[float, tuple[str, ...]] | None:
+        """The timer of its power."""
+        path = ("switches_off_after_s",)
+        return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
     def can_stop(self) -> bool:
         """Only where the YAML says how."""
@@ -134,6 +123,9 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
         """What the fields cannot say one by one."""
         yield from super().problems()
+        yield from rules.problems(self.rules, self.codes is not None)
+        yield from _place_problems(self)
+        yield from _timer_problems(self)
         if self.receivers and self.fields.receiver_id is None:
             text = "receivers needs it: where does the station say whose receiver it sees?"
             yield ("fields", "receiver_id"), text
@@ -145,16 +137,27 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
             yield ("on_death",), "this station cannot be stopped: leave this out"
 
 
-class Calls(Protocol):
-    """What this driver needs of an HTTP bus."""
+def _place_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+    looked_at = [(("rules", *path), at) for path, at in rules.places(settings.rules)]
+    looked_at += [(("errors", *path), at) for path, at in settings.errors.places()]
+    for path, at in looked_at:
+        if not json_fields.is_field(at):
+            yield path, f"{at!r} is no field: write names with dots between them (status.code)"
 
-    def get_json(self, path: str) -> dict[str, Any]:
-        """One JSON object. Raises HalError."""
 
-    def send(
-        self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
-    ) -> None:
-        """Once; `safe` where it takes power away. Raises HalError."""
+def _timer_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What has no state of its own is a relay: nothing but its timer knows that the network is gone."""
+    timer = settings.switches_off_after_s
+    if timer and not settings.start:
+        yield ("switches_off_after_s",), "is set by start: give it, or leave this out"
+    if timer and settings.on_death == "keep":
+        yield ("on_death",), "it switches off when it is not told again: leave this out"
+    if settings.start and settings.codes is None and timer is None:
+        text = (
+            "when the network dies nothing switches the power off: have start set the relay's own"
+            " timer, and write that as switches_off_after_s"
+        )
+        yield from unaccepted([(POWER, ("start",), text)], settings.accept_unsafe)
 
 
 def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
@@ -168,18 +171,25 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
     rows = [("state", f"GET {api.url(settings.state_path)} every {bus_settings.scan_s:g} s")]
     for what in ("start", "stop", "range_check"):
         if call := getattr(settings, what):
-            body = f" {call.body}" if call.body else ""
-            rows.append((what.replace("_", " "), f"{call.method} {api.url(call.path)}{body}"))
-    clear = f"POST {api.url(settings.clear_error_path)}, {_how_often(settings)}"
-    rows.append(("clear error", clear))
+            rows.append((what.replace("_", " "), told(call, api)))
+    if settings.switches_off_after_s:
+        after = f"{settings.switches_off_after_s:g} s without a new start"
+        rows.append(("power off", f"by itself after {after}, sent every {bus_settings.scan_s:g} s"))
+    if settings.clear_error_path:
+        clear = f"POST {api.url(settings.clear_error_path)}, {_how_often(settings)}"
+        rows.append(("clear error", clear))
     for name in fields.__struct_fields__ if fields != Fields() else ():
         place = getattr(fields, name)
-        if place and place is not fields.error_texts:
+        if place is fields.error_texts or (name == "state" and settings.codes is None):
+            continue
+        if place:
             rows.append((f"field {name}", _place(place)))
     for text, means in fields.error_texts.items():
         rows.append((f"text {text}", "no error" if means == "none" else f"{means}'s error"))
     rows += [(f"word {word}", str(code)) for word, code in settings.state_words.items()]
-    rows += settings.codes.rows()
+    rows += rules.rows(settings.rules, settings.errors)
+    if settings.codes:
+        rows += settings.codes.rows()
     rows += [(f"receiver {known}", who) for known, who in settings.receivers.items()]
     if settings.stop:
         rows.append(("on death", settings.on_death))
@@ -190,7 +200,7 @@ def _place(place: str | Number | InRange) -> str:
     if isinstance(place, Number):
         return place.field if place.scale == 1.0 else f"{place.field} x {place.scale:g}"
     if isinstance(place, InRange):
-        return f"{place.field} is {', '.join(map(str, place.when)) or 'true'}"
+        return json_fields.place_text(place)
     return place
 
 
@@ -208,10 +218,10 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield (), f"{sort}without {' and '.join(missing)}, {what}"
     if not _lacks(settings, "receiver_id") and not settings.receivers:
         yield ("fields",), "receiver_id is read, but without receivers nobody is verified"
-    if not settings.codes.error:
+    if settings.codes and not settings.codes.error:
         yield ("codes",), "no code means error: each of them will be shown as an unknown state"
 
-    known = settings.codes.meanings()
+    known = settings.codes.meanings() if settings.codes else {}
     for word, code in settings.state_words.items():
         if code not in known:
             yield ("state_words", word), f"{code} stands nowhere in codes: an unknown state"
@@ -236,7 +246,6 @@ class HttpCharger:
     def __init__(self, settings: Settings, bus: Calls) -> None:
         self._settings = settings
         self._bus = bus
-        self._meaning = settings.codes.meanings()
         self._activity = Activity.UNKNOWN
         self._at_fault = False
         self._power: bool | None = None
@@ -250,18 +259,20 @@ class HttpCharger:
         """The station's state now. Raises DriverError for an answer that has no meaning."""
         answer = self._bus.get_json(self._settings.state_path)
         fields = self._settings.fields
-        code = _code(answer, fields.state, self._settings.state_words)
-        does, code_side = self._meaning.get(code, UNKNOWN)
+        words, code = self._settings.state_words, None
+        if self._settings.codes is not None:
+            code = _code(answer, fields.state, words)
+        found = judged(self._settings, lambda at: json_fields.needed(answer, at), code)
         said, text_side = _error(answer, fields)
-        shown = Activity.ERROR if said else does
-        self._activity, self._at_fault = does, shown in AT_FAULT
+        shown = Activity.ERROR if said else found.activity
+        self._activity, self._at_fault = found.does, shown in AT_FAULT
         return ChargerSample(
             shown,
-            code,
-            said,
+            found.code,
+            "; ".join(filter(None, (found.text, said))),
             _measured(answer, fields),
-            first_side((text_side, code_side)),
-            charges=bool(said) and does is Activity.CHARGING,
+            first_side((found.side, text_side)),
+            charges=shown is Activity.ERROR and found.does is Activity.CHARGING,
         )
 
     def write(self, outputs: ChargerOutputs) -> None:
@@ -274,10 +285,11 @@ class HttpCharger:
             self._stop_if_needed()
         if outputs.clear_errors != self._cleared:
             self._cleared = outputs.clear_errors
-            self._bus.send(self._settings.clear_error_path)
+            if self._settings.clear_error_path:
+                self._bus.send(self._settings.clear_error_path)
         if outputs.range_checks != self._checked:
             self._checked = outputs.range_checks
-            self._send(self._settings.range_check)
+            send(self._bus, self._settings.range_check)
         if outputs.power:
             self._start_if_needed()
         self._power = outputs.power
@@ -285,7 +297,7 @@ class HttpCharger:
     def make_safe(self) -> None:
         """No power; a station that may go on charging without us is left as it is."""
         if self._settings.on_death == "stop":
-            self._send(self._settings.stop, safe=True)
+            send(self._bus, self._settings.stop, safe=True)
 
     def close(self) -> None:
         """Nothing to let go."""
@@ -294,17 +306,14 @@ class HttpCharger:
         given, self._power = self._power, None
         on = self._activity in (Activity.HANDSHAKE, Activity.CHARGING)
         if on or (given is not False and self._at_fault):
-            self._send(self._settings.stop, safe=True)
+            send(self._bus, self._settings.stop, safe=True)
 
     def _start_if_needed(self) -> None:
         given, self._power = self._power, None
         waits = self._activity is Activity.IDLE
-        if waits or (not given and self._activity is Activity.HANDSHAKE):
-            self._send(self._settings.start)
-
-    def _send(self, call: Call | None, safe: bool = False) -> None:
-        if call:
-            self._bus.send(call.path, call.method, call.body, safe)
+        renewed = self._settings.switches_off_after_s and self._activity not in AT_FAULT
+        if waits or renewed or (not given and self._activity is Activity.HANDSHAKE):
+            send(self._bus, self._settings.start)
 
 
 def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> int | str:
@@ -349,16 +358,7 @@ def _number(answer: Mapping[str, Any], number: Number | None) -> float | None:
 
 def _in_range(answer: Mapping[str, Any], place: InRange | None) -> bool | None:
     """Null is not in range."""
-    if place is None:
-        return None
-    value = json_fields.needed(answer, place.field)
-    if value is None:
-        return False
-    if place.when:
-        return not isinstance(value, bool | float) and value in place.when
-    if not isinstance(value, bool):
-        raise json_fields.wrong(place.field, value, "true or false")
-    return value
+    return None if place is None else json_fields.flag(answer, place)
 
 
 DRIVER = DriverType(
@@ -367,5 +367,6 @@ DRIVER = DriverType(
     create=create,
     describe=describe,
     warnings=warnings,
+    unwired=lambda settings: (POWER,) if settings.start else (),
     fake="hal_fakes.http_charger",
 )

@@ -12,6 +12,8 @@ from bridges.charger.signals import Activity, FaultSide
 
 CODE_MAX = 65535
 Code = Annotated[int, msgspec.Meta(ge=0, le=CODE_MAX)]
+STATION_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "station")
+ROBOT_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "robot")
 
 
 class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -305,5 +305,7 @@ def warnings(settings: ChargerSettings, wire: str) -> Iterator[tuple[tuple[str, 
         "the maker's published numbers are not tried on hardware: watch the first charge, and pull"
     )
     yield (), f"{text} the {wire} plug during one"
+    name = "an RCU rides on a robot and is no station"
+    yield (), f"{name}: the device is named after the waypoint where that robot charges"
     if settings.receivers:
         yield ("receivers",), "this controller tells no receiver's id: it will charge nobody"

@@ -15,6 +15,7 @@ import msgspec
 
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire
 from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, slow_alarms, unaccepted
@@ -206,5 +207,6 @@ DRIVER = DriverType(
     create=create,
     wires=wires,
     debounce=debounce,
+    describe=lambda settings, bus: (CLOSING,),
     warnings=warnings,
 )

@@ -29,9 +29,14 @@ class Backoff:
         return self._insisted
 
     @property
+    def failing(self) -> bool:
+        """Has the last attempt failed?"""
+        return self._pause_s > 0
+
+    @property
     def probing(self) -> bool:
         """Is the next attempt only to see whether it works again?"""
-        return self._pause_s > 0 and not self._insisted
+        return self.failing and not self._insisted
 
     def check(self, not_yet: bool = False) -> None:
         """Raises HalError with the last failure's text while it is not time again, or `not_yet`."""

@@ -48,6 +48,11 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
     return lift_checks.warnings(settings)
 
 
+def notes(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+    """What the site decides: (path below the device, text)."""
+    return lift_checks.notes(settings, lift_checks.sees_fire(settings))
+
+
 def debounce(settings: Settings) -> Mapping[str, float]:
     """How long a change must last (s): `floor`, `door`, `rear_door`, `motion`, `agv_mode`, hazards."""
     return lift_table.debounce(settings)
@@ -128,7 +133,7 @@ def decode(
 def _service(inputs: Inputs, shown: Mapping[str, bool]) -> str | None:
     if inputs.service is None:
         return None
-    return inputs.service.codes[_number("service", len(inputs.service.bits), shown)]
+    return inputs.service.means(_number("service", len(inputs.service.bits), shown))
 
 
 def _agv(inputs: Inputs, shown: Mapping[str, bool], service: str | None) -> bool | None:
@@ -177,4 +182,5 @@ DRIVER = DriverType(
     wires=wires,
     debounce=debounce,
     warnings=warnings,
+    notes=notes,
 )

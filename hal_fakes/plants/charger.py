@@ -15,12 +15,13 @@ takes ten times as long for it, `wrong` fails it, `garbage` loses contact while 
 `server`, `headers` and `body` fail on the wire (`hal_fakes/http.py`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
 from bridges.charger.signals import CURRENT_FLOWS, Activity
+from drivers.hal.points import Wire
 from hal_fakes.plants.machine import Machine
 from hal_fakes.plants.plant import FailureMode
 
@@ -69,6 +70,7 @@ class ChargerPlant(Machine):
 
     `receivers`: id -> robot. `commanded`: it charges only while `power` is on. `asked`: it knows
     whether a robot is in range only by a range check. `pace`: how many times as fast it is.
+    `wires`: its contacts, where it has any (`contact_charger.py`). `parts`: what of it can fail.
     """
 
     def __init__(
@@ -78,8 +80,10 @@ class ChargerPlant(Machine):
         commanded: bool = False,
         asked: bool = False,
         pace: float = 1.0,
+        wires: Iterable[Wire] = (),
+        parts: Iterable[str] = PARTS,
     ) -> None:
-        super().__init__(name, parts=PARTS)
+        super().__init__(name, wires, parts)
         self._pace = pace
         self.activity = Activity.IDLE
         self.error_text = ""

@@ -7,8 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-from hal_fakes.domain import free_domain
-
 NODE = """
 import sys
 from bridges import log
@@ -27,8 +25,8 @@ def _malformed(kind: int, length: int) -> bytes:
     return header + struct.pack("<BBH", kind, 5, length) + b"\xa5" * length
 
 
-def test_malformed_datagrams_write_no_line_each(tmp_path: Path) -> None:
-    domain, log = free_domain(), tmp_path / "log"
+def test_malformed_datagrams_write_no_line_each(domain: int, tmp_path: Path) -> None:
+    log = tmp_path / "log"
     command = [sys.executable, "-c", NODE, str(domain)]
     with (
         log.open("wb") as err,

@@ -203,3 +203,29 @@ def test_a_message_that_cannot_be_put_into_bytes_is_refused_where_it_is_sent(joi
 def test_a_node_has_the_name_that_it_was_given_and_has_dropped_nothing(join: Join) -> None:
     node = join("lift_node")
     assert (node.name, node.dropped) == ("lift_node", {})
+
+
+def test_a_defect_of_who_listens_costs_one_message_and_the_transport_lives(
+    join: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    received: list[d.DoorRequest] = []
+
+    def listens(message: d.DoorRequest) -> None:
+        if message.request_time.sec == 1:
+            raise ZeroDivisionError("defect")
+        received.append(message)
+
+    listener = join("listener")
+    subscription = listener.subscribe(HEARD, listens)
+    publisher = join("speaker").publisher(HEARD)
+    wait_for_match(publisher, subscription)
+    for number in (1, 2):
+        publisher.publish(numbered(number))
+    wait_until(lambda: received, "the next message arrives")
+    assert (numbers(received), listener.dropped, listener.lives) == ([2], {"heard": 1}, True)
+    assert [r.getMessage() for r in caplog.records if r.exc_info] == [
+        'sample_dropped topic=heard reason="a defect: ZeroDivisionError: defect"'
+        ' further="only counted"'
+    ]
+    listener.close()
+    assert not listener.lives

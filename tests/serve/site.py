@@ -12,12 +12,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
-from tests.waiting import wait_until
+from hal_fakes.wire import join, wire
+from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
+PATIENT = "stale_after_s: 30"
+"""A busy machine that keeps the daemon from scanning for a while does not take its door away."""
 YAML = """
 kind: door
 driver: dry_contact
@@ -26,7 +28,7 @@ buses:
   module: {{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}}}
 doors:
   ward_door:
-    limits: {{close_grace_s: 0}}
+    limits: {{close_grace_s: 0, stale_after_s: 30}}
     inputs:
       opened: {{point: "unit 1 discrete input 0", active: high}}
       closed: {{point: "unit 1 discrete input 1", active: high}}
@@ -38,7 +40,8 @@ doors:
 class Module:
     """The I/O module and the door behind it; it outlives every daemon."""
 
-    def __init__(self, directory: Path, domain: int, transport: str = "dds") -> None:
+    def __init__(self, directory: Path, domain: int, transport: str | None = None) -> None:
+        transport = transport or wire()
         self.directory = directory
         self.domain = domain
         self.edges: list[dict[str, Any]] = []
@@ -87,7 +90,7 @@ class Module:
         assert self._far_side.stdin
         assert self._far_side.stdout
         self._far_side.stdin.close()
-        self._far_side.wait(10)
+        self._far_side.wait(PATIENCE_S)
         self._far_side.stdout.close()
 
 
@@ -132,7 +135,7 @@ class Daemon:
     def end(self, number: int) -> int:
         """Send a signal and give the exit code."""
         self.process.send_signal(number)
-        return self.process.wait(20)
+        return self.process.wait(PATIENCE_S)
 
 
 @contextmanager
@@ -166,7 +169,7 @@ class Graph:
 
     def __init__(self, domain: int) -> None:
         self.states: list[DoorState] = []
-        self.transport = DdsTransport("rmf", domain, loopback=True)
+        self.transport = join("rmf", domain)
         self._requests = self.transport.publisher(DOOR_REQUESTS)
         self.heard = self.transport.subscribe(DOOR_STATES, self.states.append)
 

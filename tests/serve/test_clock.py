@@ -20,7 +20,7 @@ def test_a_clock_past_2038_is_an_error_by_name(wall: float) -> None:
         Clock(lambda: 0.0, lambda: wall).stamp(0.0)
 
 
-def test_what_is_told_is_told_each_second_at_once_when_it_changes_and_10_times_a_second_at_most() -> (
+def test_a_state_is_due_each_second_and_at_once_when_it_changes_but_10_times_a_second_at_most() -> (
     None
 ):
     pace = Pace()

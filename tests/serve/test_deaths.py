@@ -17,7 +17,8 @@ import pytest
 
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.signals import ENDING, WRITES
-from hal_fakes.domain import free_domain
+from hal_fakes.wire import wire
+from tests.depth import depth
 from tests.serve.site import (
     YAML,
     Graph,
@@ -34,9 +35,11 @@ SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 
 
 @pytest.fixture(scope="module")
-def wall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Module, Graph]]:
+def wall(
+    module_domain: int, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[Module, Graph]]:
     """A module and an RMF that see many daemons come and go."""
-    standing = Module(tmp_path_factory.mktemp("wall"), free_domain())
+    standing = Module(tmp_path_factory.mktemp("wall"), module_domain)
     joined = Graph(standing.domain)
     yield standing, joined
     joined.transport.close()
@@ -100,10 +103,21 @@ def test_the_rule_leaves_out_crashes_and_what_ends_nothing_by_default() -> None:
     }
 
 
-NAMED = sorted(n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX))
+USUAL = [
+    signal.SIGHUP,
+    signal.SIGINT,
+    signal.SIGQUIT,
+    signal.SIGTERM,
+    signal.SIGTSTP,
+    signal.SIGRTMAX,
+]
+EVERY = [n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX)]
+"""Of the realtime signals the first and the last."""
 
 
-@pytest.mark.parametrize("number", NAMED, ids=lambda number: signal.Signals(number).name)
+@pytest.mark.parametrize(
+    "number", depth(USUAL, sorted(EVERY)), ids=lambda number: signal.Signals(number).name
+)
 def test_every_signal_that_would_end_or_suspend_the_daemon_releases_the_relay(
     module: Module, graph: Graph, tmp_path: Path, number: signal.Signals
 ) -> None:
@@ -202,11 +216,13 @@ def test_reset_and_outputs_off_as_typed_find_the_daemon_started_by_hand(
     assert (ended.returncode, "no daemon serves" in ended.stderr) == (1, True)
 
 
-def test_a_reset_during_outputs_off_is_not_sent_and_does_not_end_it(tmp_path: Path) -> None:
+def test_a_reset_during_outputs_off_is_not_sent_and_does_not_end_it(
+    domain: int, tmp_path: Path
+) -> None:
     hole = socket.create_server(("127.0.0.1", 0))
     port = hole.getsockname()[1]
     file = tmp_path / "silent.yaml"
-    file.write_text(YAML.format(domain=free_domain(), transport="dds", port=port))
+    file.write_text(YAML.format(domain=domain, transport=wire(), port=port))
     off = subprocess.Popen(
         command("outputs-off", file, "--runtime-dir", tmp_path / "run"), env=environment()
     )
@@ -301,7 +317,7 @@ def test_a_start_first_switches_off_what_a_dead_daemon_left_on_under_another_yam
         assert len(list((tmp_path / "run").glob("claimed-*"))) == 1
 
 
-def test_hardware_that_a_dead_daemon_left_on_and_that_does_not_answer_is_tried_on(
+def test_hardware_that_a_dead_daemon_left_on_is_tried_until_it_answers(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     with daemon(module.file, tmp_path / "run", **SERVICE) as running:
@@ -354,7 +370,7 @@ def test_no_descriptor_left_ends_no_daemon(module: Module, graph: Graph, tmp_pat
     assert module.relay() == [True, False]
 
 
-def test_a_stranger_is_told_what_to_do_and_switches_nothing(
+def test_a_user_without_permission_is_told_what_to_do_and_switches_nothing(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     with tempfile.TemporaryDirectory(dir="/tmp") as base:
@@ -377,7 +393,7 @@ def test_a_stranger_is_told_what_to_do_and_switches_nothing(
             assert module.relay() == [True]
 
 
-def test_gpio_without_lgpio_or_permission_is_told_in_a_line(tmp_path: Path) -> None:
+def test_missing_lgpio_or_permission_is_told_in_one_line(tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
     done = _told("outputs-off", file, "--runtime-dir", tmp_path / "run")
     assert done.returncode == 1
@@ -385,7 +401,7 @@ def test_gpio_without_lgpio_or_permission_is_told_in_a_line(tmp_path: Path) -> N
     assert "Traceback" not in done.stderr
 
 
-def test_a_simulation_needs_no_token(tmp_path: Path) -> None:
+def test_a_simulation_needs_no_token(domain: int, tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "config" / "charger_http.yaml"
     text = file.read_text()
     with_token = tmp_path / "charger.yaml"
@@ -393,7 +409,7 @@ def test_a_simulation_needs_no_token(tmp_path: Path) -> None:
         re.sub(r'(api_base: "[^"]*")', r"\1, token_file: /none/token", text, count=1)
     )
     assert "token_file" in with_token.read_text()
-    options = ("--simulate", "--domain-id", str(free_domain()))
+    options = ("--simulate", "--domain-id", str(domain))
     with daemon(with_token, tmp_path / "run", *options) as running:
         running.wait_for("ready")
         assert "token_file" not in running.log.read_text()

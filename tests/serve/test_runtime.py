@@ -122,7 +122,7 @@ def test_the_status_of_a_daemon_that_is_gone_is_not_left_behind(tmp_path: Path) 
     assert not (tmp_path / "status.json").exists()
 
 
-def test_what_cannot_be_written_is_said_once_and_tried_again_until_it_is(
+def test_a_failed_write_is_logged_once_and_tried_again_until_it_works(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level("INFO")
@@ -152,7 +152,7 @@ def test_a_directory_that_was_removed_is_made_again_with_its_lock_and_its_record
     serving.close()
 
 
-def test_who_starts_while_outputs_are_switched_off_waits_for_that(tmp_path: Path) -> None:
+def test_a_start_waits_while_outputs_are_being_switched_off(tmp_path: Path) -> None:
     text = (
         "import sys; from pathlib import Path; from bridges.serve.directory import *;"
         "from bridges.serve.places import Places; p = Path(sys.argv[1]);"
@@ -184,7 +184,7 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_given_directory_is_the_only_one_then_systemds_then_the_services_then_by_hand(
+def test_the_runtime_directory_is_the_given_one_or_systemds_or_the_services_or_the_users(
     machine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     by_hand = Places(machine / "user/7/rmf-bridge/lift", machine / "home/rmf-bridge/lift")
@@ -268,3 +268,34 @@ def test_what_must_outlive_the_daemon_is_replaced_whole(
     monkeypatch.delenv("STATE_DIRECTORY")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "home"))
     assert state_file(Path("doors.yaml")) == tmp_path / "home/rmf-bridge/doors/kept.json"
+
+
+def test_what_cannot_be_kept_in_the_state_directory_is_kept_in_the_runtime_directory(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
+    kept = KeptFile(state, runtime)
+    kept.write(b"one")
+    state.unlink()
+    state.mkdir()  # nothing can be put in its place
+    kept.write(b"two")
+    kept.write(b"three")
+    assert (kept.read(), runtime.read_bytes()) == (b"three", b"three")
+    assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_written"]
+    state.rmdir()
+    state.write_bytes(b"one")  # as a disk that has come back has it
+    assert KeptFile(state, runtime).read() == b"three"
+    kept.write(b"four")
+    assert (KeptFile(state, runtime).read(), runtime.exists()) == (b"four", False)
+
+
+def test_where_neither_can_be_written_the_old_one_stands(tmp_path: Path) -> None:
+    state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
+    kept = KeptFile(state, runtime)
+    kept.write(b"one")
+    for folder in (state.parent, runtime.parent):
+        folder.mkdir(exist_ok=True)
+        (folder / ".kept.json.new").mkdir()
+    with pytest.raises(OSError, match=r"kept\.json\.new"):
+        kept.write(b"two")
+    assert kept.read() == b"one"

@@ -11,7 +11,7 @@ from typing import Any
 from drivers.hal import HalError, points
 from drivers.hal.modbus.points import Point
 from drivers.hal.points import Pull, Wire
-from hal_fakes.http_charger import HttpCharger as Station
+from hal_fakes.http_charger import HttpCharger
 from hal_fakes.modbus.register_door import RegisterDoor
 from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.machine import Machine
@@ -124,7 +124,7 @@ class HttpFar:
         self.down = False
         self._timeline = timeline
         self._plant = plant
-        self._station = Station(plant, settings)
+        self._station = HttpCharger(plant, settings)
 
     def watchdog(self) -> None:
         """It charges by itself."""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.signals import ENDING
-from hal_fakes.domain import free_domain
+from hal_fakes.domain import domain_for_a_while
 from tests.serve.site import Daemon, Graph, Module, command, environment
 from tests.torture.table import Table
 from tests.waiting import wait_until
@@ -26,9 +26,9 @@ PATIENCE_S = 60.0
 class Door:
     """A module on the wall, and an RMF that never stops to ask for OPEN."""
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, domain: int) -> None:
         directory.mkdir()
-        self.module = Module(directory, free_domain())
+        self.module = Module(directory, domain)
         self.graph = Graph(self.module.domain)
         self.run = directory / "run"
         self._stop = threading.Event()
@@ -74,11 +74,12 @@ class Door:
 @contextmanager
 def door(directory: Path) -> Iterator[Door]:
     """One door, until the end of the block."""
-    standing = Door(directory)
-    try:
-        yield standing
-    finally:
-        standing.close()
+    with domain_for_a_while() as domain:
+        standing = Door(directory, domain)
+        try:
+            yield standing
+        finally:
+            standing.close()
 
 
 def kills(directory: Path, rng: random.Random, times: int, table: Table) -> None:

@@ -15,7 +15,7 @@ import tty
 from collections.abc import Callable
 from pathlib import Path
 
-from hal_fakes.domain import free_domain
+from hal_fakes.domain import domain_for_a_while
 from tests.serve.site import ROOT, YAML, Daemon
 from tests.torture.table import Table
 
@@ -132,16 +132,17 @@ def forged(directory: Path, rng: random.Random, each_s: float, table: Table) -> 
     for name, begin in WIRES.items():
         here = directory / name.replace(" ", "_")
         here.mkdir(parents=True)
-        liar, yaml = begin(rng, free_domain())
-        file = here / "device.yaml"
-        file.write_text(yaml)
-        running = Daemon(file, here / "run", **SERVICE)
-        ended = _dies_within(running, each_s)
-        liar.close()
-        assert not ended, f"{name}: {running.log.read_text()}"
-        began = time.monotonic()
-        code = running.end(signal.SIGTERM)
-        assert time.monotonic() - began < 15
+        with domain_for_a_while() as domain:
+            liar, yaml = begin(rng, domain)
+            file = here / "device.yaml"
+            file.write_text(yaml)
+            running = Daemon(file, here / "run", **SERVICE)
+            ended = _dies_within(running, each_s)
+            liar.close()
+            assert not ended, f"{name}: {running.log.read_text()}"
+            began = time.monotonic()
+            code = running.end(signal.SIGTERM)
+            assert time.monotonic() - began < 15
         said = running.log.read_text()
         assert "Traceback" not in said, said
         assert said.count("\n") < LINES_MOST, said

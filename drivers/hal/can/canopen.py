@@ -68,6 +68,8 @@ class CanOpenNode:
             self._beat_pause.check()
             if not self._bus.wait(self._beats, self._timeout_s):
                 raise self._beat_pause.failed(self._silent())
+        if self._beat_pause.failing:
+            self.starts += 1  # nobody heard whether it has restarted meanwhile
         self._beat_pause.mended()
         if self._state != OPERATIONAL:
             state = STATES.get(self._state, f"in state {self._state}")

@@ -7,18 +7,32 @@ from typing import ClassVar
 
 import msgspec
 
+from bridges.charger.signals import Activity, ChargerOutputs
 from bridges.settings.load import load
+from drivers.charger import dry_contact as charger_contacts
 from drivers.charger import http as charger_http
 from drivers.charger import modbus as charger_modbus
+from drivers.charger import register as charger_register
 from drivers.hal import http, modbus
 from hal_fakes.http import HttpServer
-from hal_fakes.http_charger import HttpCharger as Station
+from hal_fakes.http_charger import HttpCharger
 from hal_fakes.modbus import ModbusServer
+from hal_fakes.modbus.register_charger import PARTS, RegisterCharger
 from hal_fakes.plants.charger import ChargerPlant
+from hal_fakes.plants.contact_charger import ContactCharger
 from hal_fakes.plants.pad import PadPlant
 from hal_fakes.plants.xnergy_rcu import ModbusRcu
 from hal_fakes.realtime import RealTime
-from tests.drivers.charger.contract import PACE, Bench, ChargerContract, ChargerDriver, OnDeath
+from hal_fakes.wiring import Wiring
+from tests.drivers.charger.contract import (
+    AS_IT_IS,
+    ON,
+    PACE,
+    Bench,
+    ChargerContract,
+    ChargerDriver,
+    OnDeath,
+)
 from tests.drivers.hal.modbus.module import Time
 
 CONFIG = Path(__file__).parents[3] / "config"
@@ -26,13 +40,16 @@ CONFIG = Path(__file__).parents[3] / "config"
 
 class TestAnotherMakeOnHttp(ChargerContract):
     link: ClassVar = "server"
+    example: ClassVar = ("charger_http_full.yaml", "charger_b")
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = load(CONFIG / "charger_http_full.yaml").devices["charger_b"]
-        plant = ChargerPlant("a", settings.receivers, commanded=True, asked=True, pace=PACE)
+        file, device = self.example
+        settings = load(CONFIG / file).devices[device]
+        asked = settings.range_check is not None
+        plant = ChargerPlant("a", settings.receivers, commanded=True, asked=asked, pace=PACE)
         world, clock = RealTime({"a": plant}), Time()
-        server = HttpServer([Station(world.plants["a"], settings)], "", timeout_s=0.5)
+        server = HttpServer([HttpCharger(world.plants["a"], settings)], "", timeout_s=0.5)
         plain = {"type": "http", "api_base": "tpu", "timeout_s": 0.5, **server.replace}
         bus = http.HttpBus(msgspec.convert(plain, http.Settings), clock)
 
@@ -46,6 +63,17 @@ class TestAnotherMakeOnHttp(ChargerContract):
             bus.close()
             server.close()
             world.close()
+
+
+class TestASupplyOnARelay(TestAnotherMakeOnHttp):
+    example: ClassVar = ("charger_relay.yaml", "charger_d")
+    foreign_object: ClassVar = "the relay is too hot"
+
+    def test_a_check_of_the_range_is_sent_once_for_a_rise(self, bench: Bench) -> None:
+        bench.driver.open()
+        bench.driver.read()
+        bench.driver.write(ChargerOutputs(False, range_checks=1))
+        assert self.checks(bench) == []
 
 
 class RcuBench(Bench):
@@ -78,3 +106,87 @@ class TestAReceiverOnModbus(ChargerContract):
 
     def checks(self, bench: Bench) -> list[bool]:
         return bench.switched("check_range")
+
+
+class TestAnyMakeOnRegisters(ChargerContract):
+    link: ClassVar = "unit"
+
+    @contextmanager
+    def benches(self) -> Iterator[Bench]:
+        settings = load(CONFIG / "charger_register.yaml").devices["charger_f"]
+        plant = ChargerPlant("a", commanded=True, asked=True, pace=PACE, parts=PARTS)
+        world, clock = RealTime({"a": plant}), Time()
+        server = ModbusServer([RegisterCharger(world.plants["a"], settings)], slow_s=0.3)
+        plain = {"type": "modbus", "timeout_s": 0.2, **server.replace}
+        bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
+
+        def new(on_death: OnDeath) -> ChargerDriver:
+            changed = msgspec.structs.replace(settings, on_death=on_death)
+            return charger_register.create("a", changed, bus)
+
+        try:
+            yield Bench(new, world.plants["a"], clock)
+        finally:
+            bus.close()
+            server.close()
+            world.close()
+
+
+class ContactBench(Bench):
+    """A relay is on."""
+
+    switch: ClassVar = "enable"
+
+
+class TestContactsAtAModule(ChargerContract):
+    """Its relay is off without its daemon, whatever that leaves behind."""
+
+    link: ClassVar = "unit"
+    measures: ClassVar = False
+    foreign_object: ClassVar = "the fault contact"
+
+    @contextmanager
+    def benches(self) -> Iterator[Bench]:
+        settings = load(CONFIG / "charger_contacts.yaml").devices["charger_e"]
+        table = charger_contacts.wires(settings)
+        world, clock = RealTime({"a": ContactCharger("a", table, pace=PACE)}), Time()
+        wiring = Wiring(world.plants["a"], table, modbus.canonical)
+        server = ModbusServer([wiring], slow_s=0.3)
+        plain = {"type": "modbus", "timeout_s": 0.2, **server.replace}
+        bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
+
+        def new(on_death: OnDeath) -> ChargerDriver:
+            return charger_contacts.create("a", settings, bus)
+
+        try:
+            yield ContactBench(new, world.plants["a"], clock)
+        finally:
+            bus.close()
+            server.close()
+            world.close()
+
+    def test_a_new_daemon_finds_a_charge_and_can_stop_it(self, bench: Bench) -> None:
+        bench.driver.open()
+        bench.press("robot")
+        bench.until(Activity.CHARGING, ON)
+        bench.driver = bench.new("stop")
+        bench.driver.open()
+        bench.until(Activity.IDLE, AS_IT_IS)
+        assert bench.switched() == [True, False]
+
+    def test_the_daemons_end_stops_a_charge_or_keeps_it_as_the_yaml_says(
+        self, bench: Bench
+    ) -> None:
+        bench.driver.open()
+        bench.press("robot")
+        bench.until(Activity.CHARGING, ON)
+        bench.driver.make_safe()
+        bench.driver.close()
+        bench.until(Activity.IDLE, AS_IT_IS)
+        assert bench.switched() == [True, False]
+
+    def test_a_check_of_the_range_is_sent_once_for_a_rise(self, bench: Bench) -> None:
+        bench.driver.open()
+        bench.driver.read()
+        bench.driver.write(ChargerOutputs(False, range_checks=1))
+        assert bench.switched() == []

@@ -1,0 +1,172 @@
+"""A charging station on contacts: a relay that enables it, and contacts that say what it does.
+
+They stand on the GPIO header, or at a Modbus I/O module (coils and discrete inputs). The relay is off
+before the daemon starts, so a charge ends with its daemon.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+import msgspec
+
+from bridges.charger.settings import ChargerSettings
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide
+from drivers.driver_type import DriverType
+from drivers.hal.points import Input, Output, Points, PointsBus, Wire
+from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
+
+CUT_MUST_READ: Final = {
+    "fault": (True, "a fault of the station is not seen"),
+    "ready": (False, "a station that is not ready reads ready"),
+}
+"""What a cut wire has to read as, and what it would mean if it did not."""
+ENABLE: Final = "enable"
+Problems = Iterator[tuple[tuple[str, ...], str]]
+
+
+class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The contacts that are read.
+
+    `charging`: current flows, ramping down too.
+    `ready`: the station could charge whoever comes; without it, it counts as ready.
+    `fault`: the station is out of order.
+    """
+
+    charging: Input
+    ready: Input | None = None
+    fault: Input | None = None
+
+
+class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the station is told.
+
+    `enable`: it may charge while this relay is on.
+    """
+
+    enable: Output
+
+
+class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One station and its wiring.
+
+    `inputs`: the contacts that are read.
+    `outputs`: the relay that is driven.
+    """
+
+    inputs: Inputs
+    outputs: Outputs
+
+    def problems(self) -> Problems:
+        """What the fields cannot say one by one."""
+        yield from super().problems()
+        if self.on_death == "keep":
+            yield ("on_death",), "its relay is off without the daemon: leave this out"
+        if self.receivers:
+            yield ("receivers",), "contacts tell nobody's receiver: leave this out"
+        yield from unaccepted(_unsafe(self), self.accept_unsafe)
+
+
+def wires(settings: Settings) -> list[Wire]:
+    """The wiring table, inputs first."""
+    inputs = [
+        Wire(
+            signal=signal,
+            direction="in",
+            point=contact.point,
+            active=contact.active,
+            pull=contact.pull,
+            debounce_s=contact.debounce_s,
+            path=("inputs", signal),
+        )
+        for signal in settings.inputs.__struct_fields__
+        if (contact := getattr(settings.inputs, signal)) is not None
+    ]
+    relay = settings.outputs.enable
+    path = ("outputs", ENABLE)
+    return [*inputs, Wire(ENABLE, "out", relay.point, relay.active, path=path)]
+
+
+def _unsafe(settings: Settings) -> Iterator[Unsafe]:
+    table = wires(settings)
+    for wire in table:
+        if wire.signal in CUT_MUST_READ:
+            yield from cut_must_read(wire, *CUT_MUST_READ[wire.signal])
+    yield from energised_at_boot(table)
+
+
+def warnings(settings: Settings) -> Problems:
+    """What is legal, but should be read before the station is put into service: (path, text)."""
+    for wire in wires(settings):
+        if wire.debounce_s is not None:
+            text = "contacts of a charger are not debounced: the next scan corrects a bounce"
+            yield (*wire.path, "debounce_s"), f"{text}; leave this out"
+        if wire.signal == "charging" and wire.broken_reads() is not True:
+            yield wire.path, "a cut wire reads as no charge: look at it where a charge never begins"
+    if settings.inputs.fault is None:
+        yield ("inputs",), "without a fault contact a station that is out of order reads idle"
+    for signal in settings.accept_unsafe.keys() - {signal for signal, _, _ in _unsafe(settings)}:
+        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
+    yield (), "contacts tell nobody's receiver: the robot on the pad is not verified"
+
+
+def create(name: str, settings: Settings, bus: PointsBus) -> "DryContactCharger":
+    """The station on its bus; nothing is touched before `open`."""
+    return DryContactCharger(Points(wires(settings), bus))
+
+
+class DryContactCharger:
+    """`drivers.Driver` of one station."""
+
+    def __init__(self, points: Points) -> None:
+        self._points = points
+        self._enabled = False
+
+    def open(self) -> None:
+        """Claim every contact; the relay is off, or as it was after a failure."""
+        self._points.open()
+
+    def read(self) -> ChargerSample:
+        """Every contact, read now."""
+        return decode(self._points.read(), self._enabled)
+
+    def write(self, outputs: ChargerOutputs) -> None:
+        """The relay to this; None leaves it as it is. Nothing can be cleared or checked."""
+        if outputs.power is not None:
+            self._enabled = outputs.power
+        self._points.write({ENABLE: self._enabled})
+
+    def make_safe(self) -> None:
+        """The relay off, and seen to be off."""
+        self._enabled = False
+        self._points.make_safe()
+
+    def close(self) -> None:
+        """The relay off, and let go."""
+        self._enabled = False
+        self._points.close()
+
+
+def decode(shown: Mapping[str, bool], enabled: bool) -> ChargerSample:
+    """What these contacts say; `enabled`: the relay is on."""
+    activity, text = Activity.IDLE, ""
+    side: FaultSide = ""
+    if shown.get("fault"):
+        activity, text, side = Activity.ERROR, "the fault contact", "station"
+    elif shown["charging"]:
+        activity = Activity.CHARGING
+    elif shown.get("ready") is False:
+        activity = Activity.RELEASED
+    elif enabled:
+        activity = Activity.HANDSHAKE
+    on = [signal for signal, asserted in shown.items() if asserted]
+    return ChargerSample(activity, "+".join(on) or "no contact", text, side=side)
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("gpio", "modbus"),
+    create=create,
+    wires=wires,
+    warnings=warnings,
+    fake="hal_fakes.plants.contact_charger",
+)

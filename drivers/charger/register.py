@@ -1,0 +1,226 @@
+"""A charging station of any make on Modbus registers, by a map of where it has what.
+
+Power is a level: it is written while the station shows another. Nothing is written when the daemon
+starts: a charge under way is not ours to end before it has been read.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from bridges.charger.settings import ChargerSettings
+from bridges.charger.signals import ChargerOutputs, ChargerSample, Measured
+from bridges.core.fields import Name
+from drivers import DriverError
+from drivers.charger import rules
+from drivers.charger.register_map import MEASURED, PROFILE, ChargerMap, Number, Problems
+from drivers.charger.rules import judged
+from drivers.driver_type import DriverType
+from drivers.hal.modbus import ModbusBus
+from drivers.hal.modbus.points import Point
+from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
+from drivers.profiles import profile_problems
+
+POWER: Final = "power"
+
+
+class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One station.
+
+    `unit`: its Modbus unit.
+    `profile`: a file of drivers/profiles/ that has the map.
+    `map`: the map, written here.
+    """
+
+    unit: Unit
+    profile: Name | None = None
+    map: ChargerMap | None = None
+
+    def can_stop(self) -> bool:
+        """Only where the map says how."""
+        return charger_map(self).power is not None
+
+    def problems(self) -> Problems:
+        """What the fields cannot say one by one."""
+        yield from super().problems()
+        before = list(profile_problems(PROFILE, self.profile, self.map))
+        yield from before
+        if before:
+            return
+        if self.receivers and "receiver" not in charger_map(self).values:
+            text = "the map needs the value receiver: whose receiver does the station see?"
+            yield ("receivers",), text
+        if self.on_death == "keep" and not self.can_stop():
+            yield ("on_death",), "this station cannot be stopped: leave this out"
+
+
+def charger_map(settings: Settings) -> ChargerMap:
+    """The map, from wherever it is."""
+    found: ChargerMap = settings.map or PROFILE.load(settings.profile or "")
+    return found
+
+
+def cells(settings: Settings) -> dict[str, list[Point]]:
+    """The registers or bit of each value."""
+    found: Mapping[str, Number] = charger_map(settings).values
+    return {name: [at(settings.unit, p) for p in n.places()] for name, n in found.items()}
+
+
+def orders(settings: Settings) -> dict[str, Point]:
+    """Where each order is written."""
+    return {n: at(settings.unit, text) for n, text in charger_map(settings).orders().items()}
+
+
+def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """What no other device may use: what is written; nothing while that is not right."""
+    if any(profile_problems(PROFILE, settings.profile, settings.map)):
+        return
+    for name, text in charger_map(settings).orders().items():
+        if misplaced(text, WRITABLE) is None:
+            path = ("map", name, "at") if settings.map else ("unit",)
+            yield str(at(settings.unit, text)), path
+
+
+def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
+    """For `check`: where each value is, what is written, and what it means."""
+    found = charger_map(settings)
+    for name, points in cells(settings).items():
+        number = found.values[name]
+        scaled = "" if number.scale == 1.0 else f" x {number.scale:g}"
+        bit = "" if number.bit is None else f" bit {number.bit}"
+        yield name, f"{' and '.join(map(str, points))}{bit}{scaled}"
+    written = orders(settings)
+    if found.power:
+        yield POWER, f"{written[POWER]}: {found.power.on} may charge, {found.power.off} must not"
+        yield "end of the daemon", "off is written" if settings.on_death == "stop" else "nothing"
+    for name, order in (("clear_error", found.clear_error), ("range_check", found.range_check)):
+        if order:
+            yield name.replace("_", " "), f"{written[name]}: write {order.write}"
+    yield from rules.rows(found.rules, found.errors)
+    yield from found.codes.rows() if found.codes else ()
+
+
+def warnings(settings: Settings) -> Problems:
+    """What is legal but worth a look: (path, text)."""
+    if settings.profile and PROFILE.untried(settings.profile):
+        text = f"nobody has tried the profile {settings.profile} on hardware"
+        yield ("profile",), f"{text}: watch the first charge"
+    found = charger_map(settings)
+    if found.power is None:
+        yield (), "observe-only: the map has no power, so it is not switched off after a fault"
+    elif not found.power.read_back:
+        yield (), "power cannot be read back: that it was taken away is not verified"
+    if not settings.receivers:
+        yield (), "without receivers the robot on the pad is not verified"
+
+
+def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterCharger":
+    """The station on its bus; nothing is sent before the first reading."""
+    return RegisterCharger(settings, bus)
+
+
+class RegisterCharger:
+    """`drivers.Driver` of one station. `power` as it shows it is None while that is not known."""
+
+    def __init__(self, settings: Settings, bus: ModbusBus) -> None:
+        self._settings = settings
+        self._map = charger_map(settings)
+        self._cells = cells(settings)
+        self._orders = orders(settings)
+        self._bus = bus
+        self._power: bool | None = None
+        self._touched = False
+        self._cleared = 0
+        self._checked = 0
+
+    def open(self) -> None:
+        """Nothing is claimed and nothing sent."""
+
+    def read(self) -> ChargerSample:
+        """The station now. Raises DriverError."""
+        power, self._power = self._power, None
+        command = self._map.power
+        shown = [self._orders[POWER]] if command and command.read_back else []
+        image = self._bus.cells([*shown, *(p for points in self._cells.values() for p in points)])
+        values = {
+            name: self._map.values[name].value([image[point] for point in points])
+            for name, points in self._cells.items()
+        }
+        self._power = power
+        if command and shown:
+            self._power = {command.on: True, command.off: False}.get(image[shown[0]])
+        return decode(self._map, values)
+
+    def write(self, outputs: ChargerOutputs) -> None:
+        """Bring the station to this level: off first. What is no level is written once for a rise."""
+        if outputs.power is False:
+            self._switch(on=False)
+        if outputs.clear_errors != self._cleared:
+            self._cleared = outputs.clear_errors
+            self._order("clear_error")
+        if outputs.range_checks != self._checked:
+            self._checked = outputs.range_checks
+            self._order("range_check")
+        if outputs.power:
+            self._switch(on=True)
+
+    def make_safe(self) -> None:
+        """No power, and read back where it can be; or left alone, as the YAML says."""
+        if self._settings.on_death == "stop":
+            self._switch(on=False, anyway=True)
+            command = self._map.power
+            if command and command.read_back:
+                point = self._orders[POWER]
+                if self._bus.cells([point])[point] != command.off:
+                    raise DriverError(f"{point} is not off after {command.off} was written")
+
+    def close(self) -> None:
+        """Off, if it was ever driven and may be on; and let go."""
+        if self._touched and self._power is not False:
+            self._bus.insist()
+            try:
+                self.make_safe()
+            except DriverError:
+                return  # it was tried; make_safe has said so before
+
+    def _switch(self, on: bool, anyway: bool = False) -> None:
+        command = self._map.power
+        if command is None or (self._power is on and command.read_back and not anyway):
+            return
+        self._power, self._touched = None, True
+        self._bus.write(self._orders[POWER], command.on if on else command.off, safe=not on)
+        self._power = on
+
+    def _order(self, name: str) -> None:
+        order = getattr(self._map, name)
+        if order is not None:
+            self._bus.write(self._orders[name], order.write)
+
+
+def decode(found: ChargerMap, values: Mapping[str, float]) -> ChargerSample:
+    """What these values say of the station. Never raises."""
+    code = int(values["state"]) if found.codes else None
+    said = judged(found, values.__getitem__, code)
+    receiver, in_range = values.get("receiver"), values.get("in_range")
+    return ChargerSample(
+        said.activity,
+        said.code,
+        said.text,
+        Measured(
+            receiver_id=None if receiver is None else f"{receiver:g}" if receiver else "",
+            in_range=None if in_range is None else bool(in_range),
+            **{name: values[name] for name in MEASURED if name in values},
+        ),
+        said.side,
+        said.charges,
+    )
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("modbus",),
+    create=create,
+    describe=describe,
+    claims=claims,
+    warnings=warnings,
+    fake="hal_fakes.modbus.register_charger",
+)

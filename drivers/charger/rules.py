@@ -1,0 +1,292 @@
+"""A charger's state by rules, and its errors by numbers and bits: on HTTP, Modbus and CAN alike.
+
+Where a value is, the protocol spells: a field of an answer, a place of a unit, a signal of a frame.
+Rules come before `codes`: the first one whose tests all hold says what the station does.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Final, Protocol
+
+import msgspec
+
+from bridges.charger.signals import Activity, FaultSide
+from bridges.core.fields import Name
+from drivers.charger.state_codes import ROBOT_ERROR, STATION_ERROR, Codes, first_side
+from drivers.json_fields import Value, same
+
+Problems = Iterator[tuple[tuple[str, ...], str]]
+Read = Callable[[str], object]
+"""What stands at a place; raises DriverError where nothing does."""
+Meaning = tuple[Activity, FaultSide]
+Found = list[tuple[FaultSide, str]]
+"""What is wrong: whose fault, and its text."""
+
+MEANINGS: Final[Mapping[str, Meaning]] = {
+    **{str(a): (a, "") for a in Activity if a is not Activity.UNKNOWN},
+    "station_error": STATION_ERROR,
+    "robot_error": ROBOT_ERROR,
+}
+UNKNOWN: Final[Meaning] = (Activity.UNKNOWN, "")
+Bit = Annotated[int, msgspec.Meta(ge=0, le=31)]
+
+
+class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What a value must be; all that is given must hold.
+
+    `one_of`: it is one of these.
+    `above`: it is greater than this.
+    `below`: it is less than this.
+    """
+
+    one_of: list[Value] = []
+    above: float | None = None
+    below: float | None = None
+
+    def problems(self) -> Problems:
+        """A test of nothing, or one that nothing passes."""
+        if not self.one_of and self.above is None and self.below is None:
+            yield (), "tests nothing: give one_of, above or below"
+        if self.above is not None and self.below is not None and self.above >= self.below:
+            yield ("below",), "must be greater than above"
+
+    def holds(self, value: object) -> bool:
+        """Is the value so? True and false count as 1 and 0 where limits are given."""
+        if self.one_of and not any(same(value, given) for given in self.one_of):
+            return False
+        if self.above is None and self.below is None:
+            return True
+        if not isinstance(value, int | float):
+            return False
+        over = self.above is None or value > self.above
+        return over and (self.below is None or value < self.below)
+
+    def text(self) -> str:
+        """For `check`."""
+        parts = [f"one of {', '.join(map(str, self.one_of))}"] if self.one_of else []
+        parts += [f"above {self.above:g}"] if self.above is not None else []
+        parts += [f"below {self.below:g}"] if self.below is not None else []
+        return " and ".join(parts)
+
+
+class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One way of seeing what the station does.
+
+    `means`: what it does then, as the lists of `codes` are called.
+    `when`: place -> what stands there; without it the rule always holds.
+    `text`: for an error, what is wrong.
+    """
+
+    means: str
+    when: dict[Name, Test] = msgspec.field(default_factory=dict)
+    text: Name | None = None
+
+    def problems(self) -> Problems:
+        """A meaning that there is not; a text that nobody reads."""
+        if self.means not in MEANINGS:
+            yield ("means",), f"is '{self.means}': one of {', '.join(MEANINGS)} is wanted"
+        elif self.text and MEANINGS[self.means][0] is not Activity.ERROR:
+            yield ("text",), "is for an error"
+
+
+class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An error as a number: a code, or a word of bits. One that is not listed is shown as it is.
+
+    `at`: where it is.
+    `well`: the numbers that are no error.
+    `station`: number -> text, faults of the station.
+    `robot`: number -> text, faults of the robot, its receiver and where it stands.
+    """
+
+    at: Name
+    well: tuple[int, ...] = (0,)
+    station: dict[int, Name] = msgspec.field(default_factory=dict)
+    robot: dict[int, Name] = msgspec.field(default_factory=dict)
+
+    def problems(self) -> Problems:
+        """A number that means two things."""
+        for number in self.station.keys() & self.robot.keys():
+            yield ("robot", str(number)), f"{number} is a fault of the station already"
+        for number in {*self.station, *self.robot}.intersection(self.well):
+            yield ("well",), f"{number} is an error as well"
+
+    def errors(self, value: object) -> Found:
+        """The one error that it is."""
+        if not isinstance(value, int | float) or value in self.well:
+            return [] if isinstance(value, int | float) else [("", f"error {value}")]
+        sides: tuple[tuple[FaultSide, Mapping[int, str]], ...] = (
+            ("station", self.station),
+            ("robot", self.robot),
+        )
+        known: Found = [(side, texts[int(value)]) for side, texts in sides if value in texts]
+        return known or [("", f"error {value:g}")]
+
+
+class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Errors as bits of one number: a flag byte or word. One that is not listed is shown by its number.
+
+    `at`: where it is.
+    `ignore`: bits that are no error.
+    `station`: bit (0 is the least) -> text, faults of the station.
+    `robot`: bit -> text, faults of the robot, its receiver and where it stands.
+    """
+
+    at: Name
+    ignore: list[Bit] = []
+    station: dict[Bit, Name] = msgspec.field(default_factory=dict)
+    robot: dict[Bit, Name] = msgspec.field(default_factory=dict)
+
+    def problems(self) -> Problems:
+        """A bit that means two things."""
+        for bit in self.station.keys() & self.robot.keys():
+            yield ("robot", str(bit)), f"bit {bit} is a fault of the station already"
+
+    def errors(self, value: object) -> Found:
+        """Each bit that is set: the station's first, the robot's last."""
+        if not isinstance(value, int | float) or value != int(value) or value < 0:
+            return [("", f"error flags {value}")]
+        number = int(value)
+        on = [b for b in range(number.bit_length()) if number >> b & 1 and b not in self.ignore]
+        known: Found = [("station", self.station[bit]) for bit in on if bit in self.station]
+        known += [("", f"error bit {b}") for b in on if b not in {*self.station, *self.robot}]
+        return known + [("robot", self.robot[bit]) for bit in on if bit in self.robot]
+
+
+class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is wrong with the station or with the robot on it, whatever the state says.
+
+    `station`: place -> text: what is not 0 while the station has that fault.
+    `robot`: likewise, faults of the robot, its receiver and where it stands.
+    `codes`: errors that are one number with texts.
+    `bits`: errors that are the bits of a flag byte or word.
+    """
+
+    station: dict[Name, Name] = msgspec.field(default_factory=dict)
+    robot: dict[Name, Name] = msgspec.field(default_factory=dict)
+    codes: list[ErrorNumber] = []
+    bits: list[ErrorBits] = []
+
+    def found(self, read: Read) -> Found:
+        """All that is wrong now; what reads None is not known, and no error."""
+        sides: tuple[tuple[FaultSide, Mapping[str, str]], ...] = (
+            ("station", self.station),
+            ("robot", self.robot),
+        )
+        flags = [(side, t) for side, texts in sides for at, t in texts.items() if read(at)]
+        numbers: Found = []
+        for number in (*self.codes, *self.bits):
+            assert isinstance(number, ErrorNumber | ErrorBits)
+            if (value := read(number.at)) is not None:
+                numbers += number.errors(value)
+        order = ("station", "", "robot")
+        return sorted([*flags, *numbers], key=lambda error: order.index(error[0]))
+
+    def places(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Each place that is read, and where the YAML says so below this."""
+        for side in ("station", "robot"):
+            for at in getattr(self, side):
+                yield (side, at), at
+        for key in ("codes", "bits"):
+            for n, number in enumerate(getattr(self, key)):
+                yield (key, str(n), "at"), number.at
+
+
+def places(rules: list[Rule]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Each place that rules look at, and where the YAML says so below them."""
+    for n, rule in enumerate(rules):
+        for at in rule.when:
+            yield (str(n), "when", at), at
+
+
+def judge(rules: list[Rule], read: Read) -> Rule | None:
+    """The first rule that holds."""
+    return next((r for r in rules if all(t.holds(read(at)) for at, t in r.when.items())), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What the station does, whose fault an error is, its code for texts, and what is wrong.
+
+    `does`: what it does beneath an error.
+    """
+
+    activity: Activity
+    side: FaultSide
+    code: int | str
+    text: str
+    does: Activity
+
+    @property
+    def charges(self) -> bool:
+        """It is at fault, and charges all the same."""
+        return self.activity is Activity.ERROR and self.does is Activity.CHARGING
+
+
+def judged(station: "Station", read: Read, code: int | str | None) -> Judged:
+    """What rules, codes and errors say together; `code`: the maker's state, where there are codes.
+
+    An error is an error whatever the state says. Raises DriverError.
+    """
+    rule = judge(station.rules, read)
+    if rule is not None:
+        activity, side = MEANINGS[rule.means]
+        code = f"rule {station.rules.index(rule) + 1}"
+    elif station.codes is not None and code is not None:
+        activity, side = station.codes.meanings().get(code, UNKNOWN)
+    else:
+        activity, side, code = *UNKNOWN, "of no rule"
+    wrong = station.errors.found(read)
+    if rule is not None and rule.text:
+        wrong = [(side, rule.text), *wrong]
+    shown = Activity.ERROR if wrong else activity
+    side = first_side([side, *(whose for whose, _ in wrong)])
+    return Judged(shown, side, "" if code is None else code, said(wrong), activity)
+
+
+class Station(Protocol):
+    """What a station's settings, or its map, say of its state."""
+
+    @property
+    def codes(self) -> Codes | None:
+        """What the maker's state numbers mean."""
+
+    @property
+    def rules(self) -> list[Rule]:
+        """What comes before them."""
+
+    @property
+    def errors(self) -> Errors:
+        """What is wrong, whatever the state."""
+
+
+def rows(rules: list[Rule], errors: Errors) -> Iterator[tuple[str, str]]:
+    """For `check`."""
+    for n, rule in enumerate(rules):
+        tests = (f"{at} {test.text()}" for at, test in rule.when.items())
+        text = f": {rule.text}" if rule.text else ""
+        yield f"rule {n + 1}", f"{' and '.join(tests) or 'else'} is {rule.means}{text}"
+    for side in ("station", "robot"):
+        for at, text in getattr(errors, side).items():
+            yield f"{side}'s error", f"{at} not 0: {text}"
+        for kind, numbers in (("", errors.codes), ("bit ", errors.bits)):
+            for number in numbers:
+                for value, text in getattr(number, side).items():
+                    yield f"{side}'s error", f"{number.at} {kind}{value}: {text}"
+
+
+def problems(rules: list[Rule], has_codes: bool) -> Problems:
+    """Rules that are never asked; a station whose state nothing says. Paths are below the station."""
+    if not rules and not has_codes:
+        yield ("codes",), "needs codes (what the maker's state numbers mean), or rules"
+    for n, rule in enumerate(rules[:-1]):
+        if not rule.when:
+            yield ("rules", str(n)), "always holds: the rules below it are never asked"
+            return
+    means = {rule.means for rule in rules}
+    if rules and not has_codes and not {"idle", "charging"} <= means:
+        yield ("rules",), "must say what is idle and what is charging"
+
+
+def said(found: Found) -> str:
+    """The texts of all that is wrong."""
+    return "; ".join(text for _, text in found)

@@ -1,0 +1,84 @@
+"""What a charger's places hold while it does something, so that its rules and errors say so.
+
+The rules are those that the driver reads by: values are tried until they judge as is wanted.
+"""
+
+import itertools
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from bridges.charger.signals import Activity
+from drivers.charger.rules import MEANINGS, UNKNOWN, Errors, Meaning, Rule, Test, judge, places
+from drivers.charger.state_codes import ROBOT_ERROR
+from drivers.json_fields import Value
+
+NEAREST: Final = {
+    Activity.HANDSHAKE: Activity.IDLE,
+    Activity.STOPPING: Activity.CHARGING,
+    Activity.RELEASED: Activity.IDLE,
+}
+"""What is shown where an activity has no way of its own."""
+
+
+def values(
+    rules: list[Rule],
+    errors: Errors,
+    wanted: Meaning,
+    natural: Mapping[str, Value],
+) -> dict[str, Value] | None:
+    """What to show at each place. `natural`: what stands there anyway, tried first.
+
+    None where no rule can say it; an error without a rule is shown at the first place of errors.
+    """
+    shown: dict[str, Value] = {at: 0 for _, at in errors.places()}
+    shown |= {n.at: n.well[0] for n in errors.codes}
+    is_shown = wanted[0] is Activity.ERROR and _shows_error(errors, shown, wanted == ROBOT_ERROR)
+    at = dict.fromkeys(at for _, at in places(rules))
+    tried = [_candidates(place, rules, natural, shown) for place in at]
+    if is_shown or not rules:
+        return {**{place: first for place, (first, *_) in zip(at, tried, strict=True)}, **shown}
+    for found in itertools.product(*tried):
+        said = {**shown, **dict(zip(at, found, strict=True))}
+        rule = judge(rules, said.__getitem__)
+        if (MEANINGS[rule.means] if rule else UNKNOWN) == wanted:
+            return said
+    activity = NEAREST.get(wanted[0])
+    return values(rules, errors, (activity, ""), natural) if activity else None
+
+
+def _shows_error(errors: Errors, shown: dict[str, Value], robot: bool) -> bool:
+    """Show an error of this side, or of the other where this one has none."""
+    sides = ("robot", "station") if robot else ("station", "robot")
+    for side in sides:
+        for number in errors.codes:
+            for code in getattr(number, side):
+                shown[number.at] = code
+                return True
+        for flags in errors.bits:
+            for bit in getattr(flags, side):
+                shown[flags.at] = 1 << bit
+                return True
+        for at in getattr(errors, side):
+            shown[at] = 1
+            return True
+    return False
+
+
+def _candidates(
+    at: str, rules: list[Rule], natural: Mapping[str, Value], shown: Mapping[str, Value]
+) -> list[Value]:
+    if at in shown:
+        return [shown[at]]
+    first: list[Value] = [natural[at]] if at in natural else []
+    tests = (rule.when[at] for rule in rules if at in rule.when)
+    return [*first, *(value for test in tests for value in _near(test)), 0, False]
+
+
+def _near(test: Test) -> Iterator[Value]:
+    """Values that pass a test, and some that do not."""
+    yield from test.one_of
+    for limit in (test.above, test.below):
+        if limit is not None:
+            yield from (limit + 1, limit - 1, limit)
+    if any(isinstance(value, bool) for value in test.one_of):
+        yield from (True, False)

@@ -1,0 +1,90 @@
+"""A charging station on registers: its plant in the numbers of its map."""
+
+from typing import Final, cast
+
+from bridges.charger.signals import Activity
+from drivers.charger.register import POWER, Settings, cells, charger_map, orders
+from drivers.charger.rules import UNKNOWN
+from drivers.charger.state_codes import ROBOT_ERROR
+from drivers.hal.modbus.points import Point
+from drivers.json_fields import Value
+from hal_fakes.charger_values import NEAREST, values
+from hal_fakes.fake import Fake
+from hal_fakes.plants.charger import ROBOTS_FAULTS, ChargerPlant, Reading
+from hal_fakes.plants.plant import Plant
+
+PARTS: Final = ("receiver", "unit", "server")
+
+
+class RegisterCharger:
+    """The cells of one station (`hal_fakes.modbus.units`)."""
+
+    def __init__(self, plant: Plant, settings: Settings) -> None:
+        self.plant = plant
+        self.unit: int = settings.unit
+        self._map = charger_map(settings)
+        self._cells = cells(settings)
+        self._orders = {point: name for name, point in orders(settings).items()}
+        self._written = dict.fromkeys(self._orders, 0)
+        if self._map.power:
+            self._written[orders(settings)[POWER]] = self._map.power.off
+        self.points = frozenset((*self._orders, *(p for c in self._cells.values() for p in c)))
+        self.outputs = frozenset(self._orders)
+
+    def get(self, point: Point, now: float) -> int:
+        """What is read there at `now` (monotonic s): several values may share a register."""
+        if point in self._written:
+            return self._written[point]
+        self.plant.advance(now)
+        shown = self._values(cast(Reading, self.plant.sense("reading")))
+        word = 0
+        for name, points in self._cells.items():
+            if point in points:
+                word |= self._map.values[name].encoded(float(shown[name]))[points.index(point)]
+        return word
+
+    def set(self, point: Point, value: int, now: float) -> bool:
+        """A write; False where nothing can be written."""
+        if point not in self._written:
+            return False
+        self._written[point] = value
+        name, power = self._orders[point], self._map.power
+        on = power is not None and value == power.on if name == POWER else True
+        self.plant.drive(name, on, now)
+        return True
+
+    def _values(self, reading: Reading) -> dict[str, Value]:
+        robots = reading.error_text in ROBOTS_FAULTS
+        wanted = ROBOT_ERROR if robots else (reading.activity, "")
+        measured: dict[str, Value] = {
+            "volts": reading.volts,
+            "amps": reading.amps,
+            "battery_percent": 100 * (reading.battery or 0.0),
+            "time_to_full_s": reading.time_to_full_s or 0.0,
+            "receiver": float(reading.receiver or 0),
+            "in_range": bool(reading.in_range),
+            "state": self._code(reading.activity),
+        }
+        natural = {name: value for name, value in measured.items() if name in self._cells}
+        found = values(self._map.rules, self._map.errors, wanted, natural)
+        if found is None:
+            found = values(self._map.rules, self._map.errors, UNKNOWN, natural) or {}
+        return {**dict.fromkeys(self._cells, 0), **natural, **found}
+
+    def _code(self, activity: Activity) -> int:
+        lists = self._map.codes.lists() if self._map.codes else {}
+        codes = lists.get(activity) or lists.get(NEAREST.get(activity, Activity.IDLE)) or [0]
+        return codes[0]
+
+
+def build(name: str, settings: Settings) -> ChargerPlant:
+    """The station that this map speaks of."""
+    found = charger_map(settings)
+    commanded, asked = found.power is not None, found.range_check is not None
+    return ChargerPlant(name, settings.receivers, commanded, asked, parts=PARTS)
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: build(name, settings),
+    station=lambda plant, settings, bus: RegisterCharger(plant, settings),
+)

@@ -1,0 +1,115 @@
+"""A charger on registers by a map: what its words mean, and what a map may not say."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from bridges.charger.signals import Activity, ChargerSample, Measured
+from bridges.settings.load import SettingsError, load
+from drivers.charger.register import Settings, decode
+from drivers.charger.register_map import ChargerMap, Number
+
+EXAMPLE = Path(__file__).parents[3] / "config" / "charger_register.yaml"
+SETTINGS: Settings = load(EXAMPLE).devices["charger_f"]
+WELL = {"state": 0.0, "fault": 0.0, "flags": 0.0, "volts": 48.5, "amps": 0.0, "in_range": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("number", "words", "value"),
+    [
+        (Number(at="input register 1"), [65535], 65535),
+        (Number(at="input register 1", signed=True, scale=0.01), [65286], -2.5),
+        (Number(at="input register 1", words=2, scale=0.001), [1, 34464], 100.0),
+        (Number(at="input register 1", words=2, signed=True), [65535, 65534], -2),
+        (Number(at="input register 1", bit=3), [8], 1),
+        (Number(at="coil 1"), [1], 1),
+    ],
+)
+def test_words_are_read_and_written_alike(number: Number, words: list[int], value: float) -> None:
+    assert number.value(words) == value
+    assert number.encoded(value) == words
+
+
+def test_the_low_word_may_be_the_first_of_two() -> None:
+    number = Number(at="holding register 8", words=2, low_first=True)
+    assert number.places() == ["holding register 9", "holding register 8"]
+
+
+def read(**values: float) -> tuple[Activity, int | str, str, str]:
+    assert SETTINGS.map
+    sample = decode(SETTINGS.map, {**WELL, **values})
+    return sample.activity, sample.code, sample.error_text, sample.side
+
+
+@pytest.mark.parametrize(
+    ("values", "wanted"),
+    [
+        ({}, (Activity.IDLE, 0, "", "")),
+        ({"state": 2}, (Activity.HANDSHAKE, 2, "", "")),
+        ({"state": 3}, (Activity.HANDSHAKE, "rule 2", "", "")),
+        ({"state": 3, "amps": 0.6}, (Activity.CHARGING, "rule 1", "", "")),
+        ({"state": 0, "amps": 0.6}, (Activity.STOPPING, "rule 3", "", "")),
+        ({"state": 77}, (Activity.UNKNOWN, 77, "", "")),
+        ({"flags": 1}, (Activity.IDLE, 0, "", "")),
+        ({"flags": 5}, (Activity.ERROR, 0, "fan stuck", "station")),
+        ({"fault": 33}, (Activity.ERROR, 0, "no receiver answers", "robot")),
+        ({"fault": 99, "state": 4}, (Activity.ERROR, 4, "error 99", "")),
+    ],
+)
+def test_rules_codes_and_errors_say_what_it_does(values: dict[str, float], wanted: object) -> None:
+    assert read(**values) == wanted
+
+
+def test_what_it_measures_is_told() -> None:
+    assert SETTINGS.map
+    values = {**WELL, "receiver": 4711.0}
+    assert decode(SETTINGS.map, values) == ChargerSample(
+        Activity.IDLE, 0, measured=Measured("4711", True, 48.5, 0.0)
+    )
+    assert decode(SETTINGS.map, {**WELL, "receiver": 0}).measured.receiver_id == ""
+
+
+WRONG: dict[str, tuple[str, str]] = {
+    "state: {at: input register 0}": (
+        "stat: {at: input register 0}",
+        "needs 'state', of which codes speaks",
+    ),
+    "{at: flags, ignore": ("{at: flagz, ignore", "'flagz' is no value of this map"),
+    "{at: coil 0, on: 1, off: 0}": ("{at: coil 0, on: 1, off: 1}", "is the value of on"),
+    "{at: input register 4, scale: 0.01, signed: true}": (
+        "{at: input register 4, bit: 16}",
+        "1 registers have bits 0 to 15",
+    ),
+    "in_range: {at: discrete input 0}": (
+        "in_range: {at: discrete input 0, words: 2}",
+        "is one bit: leave words, signed and bit out",
+    ),
+    "    unit: 3\n": (
+        "    unit: 3\n    receivers: {a: fleet/robot}\n",
+        "the map needs the value rec",
+    ),
+}
+
+
+@pytest.mark.parametrize("old", WRONG)
+def test_a_map_that_cannot_be_right_is_refused(tmp_path: Path, old: str) -> None:
+    new, wanted = WRONG[old]
+    text = EXAMPLE.read_text()
+    assert text.count(old) == 1
+    file = tmp_path / "charger.yaml"
+    file.write_text(text.replace(old, new))
+    with pytest.raises(SettingsError) as caught:
+        load(file)
+    assert any(problem.text.startswith(wanted) for problem in caught.value.problems)
+
+
+def test_without_power_it_is_only_observed() -> None:
+    plain: dict[str, Any] = {
+        "unit": 1,
+        "map": {"values": {"state": {"at": "coil 0"}}, "codes": {"idle": [0], "charging": [1]}},
+    }
+    made = msgspec.convert(plain, Settings)
+    assert not made.can_stop()
+    assert isinstance(made.map, ChargerMap)

@@ -1,0 +1,168 @@
+"""A charger's state by rules, and its errors by numbers and bits, whatever the protocol."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
+from bridges.settings.load import SettingsError, load
+from drivers import DriverError
+from drivers.charger.http import Settings, create
+from drivers.charger.rules import ErrorBits, ErrorNumber, Errors, Test
+from hal_fakes.charger_values import values
+from tests.drivers.charger.test_http import Station
+
+EXAMPLE = Path(__file__).parents[3] / "config" / "charger_relay.yaml"
+RELAY: Settings = load(EXAMPLE).devices["charger_d"]
+
+
+def answer(watts: float = 0.0, on: bool = False, degrees: float = 40.5) -> dict[str, Any]:
+    return {"apower": watts, "output": on, "temperature": {"tC": degrees}}
+
+
+def read(said: Any, settings: Settings = RELAY) -> tuple[Activity, int | str, str, str]:
+    sample: ChargerSample = create("a", settings, Station(said)).read()
+    return sample.activity, sample.code, sample.error_text, sample.side
+
+
+@pytest.mark.parametrize(
+    ("said", "wanted"),
+    [
+        (answer(), (Activity.IDLE, "rule 4", "", "")),
+        (answer(on=True), (Activity.HANDSHAKE, "rule 3", "", "")),
+        (answer(20.0, on=True), (Activity.HANDSHAKE, "rule 3", "", "")),
+        (answer(20.5, on=True), (Activity.CHARGING, "rule 2", "", "")),
+        (answer(20.5, on=False), (Activity.CHARGING, "rule 2", "", "")),
+        (answer(500, True, 90.5), (Activity.ERROR, "rule 1", "the relay is too hot", "")),
+    ],
+)
+def test_the_first_rule_that_holds_says_what_the_station_does(said: Any, wanted: object) -> None:
+    assert read(said) == wanted
+
+
+def test_a_rule_about_what_is_not_there_is_no_reading() -> None:
+    with pytest.raises(DriverError, match=r"no 'temperature\.tC'"):
+        read({"apower": 0.0, "output": False})
+
+
+def made(**also: Any) -> Settings:
+    return msgspec.convert(also, Settings)
+
+
+def test_what_no_rule_and_no_code_names_is_unknown() -> None:
+    rules = [
+        {"means": "idle", "when": {"a": {"one_of": [1]}}},
+        {"means": "charging", "when": {"a": {"above": 4}}},
+    ]
+    assert read({"a": 1}, made(rules=rules)) == (Activity.IDLE, "rule 1", "", "")
+    assert read({"a": True}, made(rules=rules)) == (Activity.UNKNOWN, "of no rule", "", "")
+
+
+def test_rules_come_before_codes_and_errors_before_both() -> None:
+    station = made(
+        codes={"idle": [0], "charging": [1]},
+        rules=[{"means": "stopping", "when": {"state": {"one_of": [1]}, "amps": {"below": 0.5}}}],
+        errors={
+            "station": {"hot": "too hot"},
+            "codes": [{"at": "fault", "well": [0, 255], "robot": {17: "no receiver"}}],
+            "bits": [{"at": "flags", "ignore": [7], "station": {0: "grid"}, "robot": {3: "coil"}}],
+        },
+    )
+    well = {"state": 1, "amps": 12.5, "hot": False, "fault": 255, "flags": 0x80}
+    assert read(well, station) == (Activity.CHARGING, 1, "", "")
+    assert read({**well, "amps": 0.25}, station) == (Activity.STOPPING, "rule 1", "", "")
+    assert read({**well, "hot": True}, station) == (Activity.ERROR, 1, "too hot", "station")
+    assert read({**well, "fault": 17}, station) == (Activity.ERROR, 1, "no receiver", "robot")
+    assert read({**well, "fault": 18}, station) == (Activity.ERROR, 1, "error 18", "")
+    several = {**well, "fault": 17, "flags": 0b1011}
+    text = "grid; error bit 1; no receiver; coil"
+    assert read(several, station) == (Activity.ERROR, 1, text, "station")
+
+
+def test_a_test_holds_for_what_it_says_and_nothing_else() -> None:
+    assert [Test(one_of=[1, "on"]).holds(v) for v in (1, 1.0, "on", True, 0, None)] == [
+        *[True] * 3,
+        *[False] * 3,
+    ]
+    assert [Test(above=0, below=2).holds(v) for v in (1, 0.5, True, 0, 2, "1", None)] == [
+        *[True] * 3,
+        *[False] * 4,
+    ]
+
+
+def test_numbers_that_are_none_are_errors_with_what_there_is() -> None:
+    assert ErrorNumber(at="a").errors("E7") == [("", "error E7")]
+    assert ErrorNumber(at="a").errors(0) == []
+    assert ErrorBits(at="a").errors(None) == [("", "error flags None")]
+
+
+def test_a_renewed_start_is_sent_in_each_scan_and_a_stop_once_it_is_off() -> None:
+    station = Station(answer())
+    charger = create("a", RELAY, station)
+    for said, power in (
+        (answer(), True),
+        (answer(on=True), True),
+        (answer(300.0, on=True), True),
+        (answer(300.0, on=True), False),
+        (answer(), False),
+    ):
+        station.answer = said
+        charger.read()
+        charger.write(ChargerOutputs(power))
+    on, off = (
+        "GET /rpc/Switch.Set?id=0&on=true&toggle_after=30",
+        "GET /rpc/Switch.Set?id=0&on=false",
+    )
+    sent = [call for call in station.calls if "Set" in call]
+    assert sent == [on, on, on, off]
+
+
+WRONG = {
+    "    switches_off_after_s: 30 ": (
+        "    #",
+        "unsafe: when the network dies nothing switches the power off: have start set the relay's own"
+        " timer, and write that as switches_off_after_s;"
+        " or accept_unsafe: {power: <why it is safe here>}",
+    ),
+    "switches_off_after_s: 30 ": (
+        "switches_off_after_s: 2 ",
+        "switches_off_after_s is 2, and it is renewed every 1 s (scan_s): at least 4 s, so that one"
+        " lost answer does not drop it",
+    ),
+    "{means: idle}": (
+        "{means: idel}",
+        "is 'idel': one of idle, handshake, charging, stopping, released, error, robot_error is wanted",
+    ),
+    "temperature.tC: {above": (
+        "tempe rature: {above",
+        "'tempe rature' is no field: write names with dots between them (status.code)",
+    ),
+    "{above: 20}": ("{above: 20, below: 20}", "must be greater than above"),
+    "{means: charging, when: {apower: {above: 20}}} ": (
+        "{means: idle} ",
+        "always holds: the rules below it are never asked",
+    ),
+}
+
+
+@pytest.mark.parametrize("old", WRONG)
+def test_rules_that_cannot_be_right_are_refused(tmp_path: Path, old: str) -> None:
+    new, wanted = WRONG[old]
+    text = EXAMPLE.read_text()
+    assert text.count(old) == 1
+    file = tmp_path / "charger.yaml"
+    file.write_text(text.replace(old, new))
+    with pytest.raises(SettingsError) as caught:
+        load(file)
+    assert wanted in [problem.text for problem in caught.value.problems]
+
+
+def test_the_fake_shows_what_the_rules_then_read() -> None:
+    shown = {a: values(RELAY.rules, RELAY.errors, (a, ""), {"apower": 600.0}) for a in Activity}
+    assert [a for a, said in shown.items() if said is None] == [Activity.UNKNOWN]
+    charging = shown[Activity.CHARGING]
+    assert charging is not None
+    assert charging["apower"] == 600.0
+    assert Errors().found(charging.__getitem__) == []
