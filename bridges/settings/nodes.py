@@ -15,6 +15,8 @@ import yaml
 from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNode, SequenceNode
 from yaml.reader import ReaderError
 
+from bridges import regular_file
+
 MAX_DEPTH = 32
 
 
@@ -138,6 +140,7 @@ class _Composer(yaml.SafeLoader):
         self._page = page
         self._max_values = max_values
         self._depth = 0
+        self._count = 0
         self._sizes: dict[int, int] = {}
 
     def compose_node(self, parent: Node | None, index: int) -> Node | None:
@@ -145,14 +148,19 @@ class _Composer(yaml.SafeLoader):
         mark = cast(Mark, event.start_mark)
         if getattr(event, "tag", None) is not None:
             self._page.note(mark, "a tag ('!...') is not accepted: delete it, or quote the text")
+        self._count += 1
+        self._refuse_more_than_most(mark, self._count)
         with self._deeper(mark):
             node = super().compose_node(parent, index)
         if isinstance(event, AliasEvent) and id(node) not in self._sizes:
             raise _Refused(mark, "an alias ('*name') inside the value that it repeats")
         self._sizes[id(node)] = size = 1 + sum(self._sizes[id(n)] for n in _children(node))
-        if size > self._max_values:
-            raise _Refused(mark, f"more than {self._max_values} values, counting repeated aliases")
+        self._refuse_more_than_most(mark, size)
         return node
+
+    def _refuse_more_than_most(self, mark: Mark, values: int) -> None:
+        if values > self._max_values:
+            raise _Refused(mark, f"more than {self._max_values} values, counting repeated aliases")
 
     @contextmanager
     def _deeper(self, mark: Mark) -> Iterator[None]:
@@ -174,8 +182,7 @@ def _children(node: Node | None) -> Iterator[Node]:
 def read(file: str, sort: Sort = DEVICE) -> bytes:
     """The file's bytes. Raises SettingsError if it is unreadable or too long."""
     try:
-        with open(file, "rb") as source:
-            text = source.read(sort.max_bytes + 1)
+        text = regular_file.read(file, sort.max_bytes).content
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SettingsError([Problem(file, 1, 1, f"cannot be read: {reason}")]) from None

@@ -80,9 +80,10 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     `others_timeout_s`: likewise for all other frames.
     `volts`, `amps`: at the battery.
     `receiver`: whose receiver it is, as a number; 0 is nobody's. Without its frame there is no reading.
-    `out_of_range`: not 0 while the robot stands where it cannot be charged.
+    `out_of_range`: not 0 while the robot stands where it cannot be charged. Among the `errors` too, it
+    is one only while the state says error: a robot that has yet to come is none.
     `rules`: the state by other signals, before its codes; their places are signals.
-    `errors`: what is wrong; its places are signals.
+    `errors`: what is wrong, whatever the state; its places are signals.
     `send`: what must be sent, and how often.
     """
 

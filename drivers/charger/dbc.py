@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from bridges import regular_file
 from drivers import DriverError
 from drivers.profiles import texts
 
@@ -92,8 +93,7 @@ def _understood(file: Path, text: bytes) -> Dbc:
 
 def _read(file: Path) -> bytes:
     try:
-        with file.open("rb") as opened:
-            text = opened.read(SIZE_MAX + 1)
+        text = regular_file.read(file, SIZE_MAX).content
     except OSError as error:
         raise ValueError(f"{file} cannot be read: {error.strerror}") from None
     if len(text) > SIZE_MAX:

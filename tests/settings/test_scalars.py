@@ -56,6 +56,14 @@ def test_the_same_name_in_quotes_is_that_name(file: Path, text: str) -> None:
         assert config.devices["north"].lanes == ["in", "out", text]
 
 
+@pytest.mark.parametrize("begin", ["", "-", "0x", "0o", "0b", "0", "1e", "."])
+def test_thousands_of_digits_are_a_problem_at_their_place(file: Path, begin: str) -> None:
+    text = begin + "1" * 9000
+    (problem,) = problems_of(file, changed("[in, out]", f"[in, out, {text}]"))
+    assert problem.startswith("8:22: item 3 of 'lanes' is written ")
+    assert len(problem) < 300
+
+
 @pytest.mark.parametrize("name", ["L1", "B1", "8F_r", "nO", "1.2.3", "-", "L-1", "走廊", "a b"])
 def test_an_ordinary_name_needs_no_quotes(file: Path, name: str) -> None:
     config = config_of(file, changed("[in, out]", f"[in, out, {name}]"))

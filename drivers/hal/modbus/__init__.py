@@ -4,6 +4,7 @@
     points.py     contacts and relays by their spelling; registers.py: places of a map
     bus.py        the units of one connection or line: retries, pauses
     lines.py      one device's coils and registers: claim, read, write, read back, let go
+    rivals.py     two masters on one output: a fault by that name, and no relay that chatters
     dead_man.py   keeps the modules' watchdogs from tripping
     wire.py       a question and its answer; tcp.py and rtu.py carry them, frames.py spells them
 
