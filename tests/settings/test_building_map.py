@@ -237,7 +237,7 @@ def test_what_is_no_map_is_refused_where_it_is_none(capsys: pytest.CaptureFixtur
     assert capsys.readouterr() == (
         "",
         "device.yaml:1:1: this is no building map or navigation graph: it has no 'levels:'\n"
-        "device.yaml: 1 problem\n",
+        "1 error\n",
     )
 
 

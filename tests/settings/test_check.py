@@ -17,6 +17,20 @@ bus header (pins)
   north   closed  A1 = 1A  in         low     none  0.01 s    -        floats
   north   hold    A2 = 2A  out        low     -     -         high     not asserted
 
+north: settings
+  setting         value        not the default
+  lanes           in, out
+  codes           1: in, 2: out
+  limits.open_s   3 s          default: 5 s
+  limits.close_s  -
+  limits.tries    2            default: 3
+  limits.even     2
+  limits.gain     1
+  limits.loud     no
+  limits.baud     9600
+  limits.label    0
+
+OK
 """
 
 
@@ -49,8 +63,8 @@ def test_each_bus_has_its_table(capsys: pytest.CaptureFixture[str]) -> None:
     Path("gate.yaml").write_text(text)
     assert check("gate.yaml") == 0
     out = capsys.readouterr().out
-    assert out[out.index("bus box") :] == (
-        "bus box (module)\n"
+    assert out[out.index("bus box") : out.index("north: settings")] == (
+        "bus box (module): host h, port 502\n"
         "  device  signal  point   direction  active  pull  debounce  at rest  wire broken\n"
         "  走廊    hold    coil 7  out        high    -     -         low      not asserted\n"
         "\n"
@@ -63,12 +77,22 @@ def test_a_driver_without_wires_says_what_it_talks_to(capsys: pytest.CaptureFixt
     assert capsys.readouterr() == (
         "gate.yaml: gate, driver web\n"
         "\n"
-        "bus server (web)\n"
-        "  north  polls     http://192.168.1.7/side\n"
-        "  north  identity  not verified\n"
-        "  south  polls     http://192.168.1.7/gate\n"
-        "  south  identity  not verified\n"
-        "\n",
+        "bus server (web): host 192.168.1.7\n"
+        "  device  what      meaning\n"
+        "  north   polls     http://192.168.1.7/side\n"
+        "  north   identity  not verified\n"
+        "  south   polls     http://192.168.1.7/gate\n"
+        "  south   identity  not verified\n"
+        "\n"
+        "north: settings\n"
+        "  setting  value  not the default\n"
+        "  page     side   default: gate\n"
+        "\n"
+        "south: settings\n"
+        "  setting  value\n"
+        "  page     gate\n"
+        "\n"
+        "OK\n",
         "",
     )
 
@@ -81,7 +105,7 @@ def test_problems_go_to_stderr_with_their_number(capsys: pytest.CaptureFixture[s
         "gate.yaml:15:32: 'tries' is 0: a whole number of at least 1 is wanted\n"
         "gate.yaml:15:35: unknown key 'gian': did you mean 'gain'? known here: "
         "open_s, close_s, tries, even, gain, loud, baud, label\n"
-        "gate.yaml: 2 problems\n",
+        "2 errors\n",
     )
 
 
@@ -90,7 +114,7 @@ def test_one_wrong_file_among_several_is_wrong(capsys: pytest.CaptureFixture[str
     assert check("no.yaml", "gate.yaml") == 78
     out, err = capsys.readouterr()
     assert out.startswith("gate.yaml: gate, driver contact\n")
-    assert err == ("no.yaml:1:1: cannot be read: No such file or directory\nno.yaml: 1 problem\n")
+    assert err == ("no.yaml:1:1: cannot be read: No such file or directory\n1 error\n")
 
 
 def test_warnings_do_not_make_a_file_wrong(capsys: pytest.CaptureFixture[str]) -> None:
@@ -99,6 +123,7 @@ def test_warnings_do_not_make_a_file_wrong(capsys: pytest.CaptureFixture[str]) -
     assert check("gate.yaml") == 0
     out, err = capsys.readouterr()
     assert out.startswith("gate.yaml: gate, driver contact\n")
+    assert out.endswith("\nOK, 2 warnings\n")
     assert err == (
         "gate.yaml:15:21: warning: 'north': unsafe wiring of 'hold' is accepted: "
         "the door is light\n"

@@ -219,5 +219,5 @@ def test_a_choice_is_compared_as_it_is_written(file: Path) -> None:
 
 def test_a_long_value_is_shown_in_part(file: Path) -> None:
     assert problems_of(file, changed("dds", "x" * 1000)) == [
-        f"3:18: 'transport' is '{'x' * 37}...': auto, dds or ros2 is wanted"
+        f"3:18: 'transport' is '{'x' * 37}...': auto, dds, ros2 or zenoh is wanted"
     ]

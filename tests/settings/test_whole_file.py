@@ -36,7 +36,7 @@ gates:
 extra: 1
 """
 FOUND = """\
-4:18: 'transport' is 'ddss': auto, dds or ros2 is wanted (did you mean 'dds'?)
+4:18: 'transport' is 'ddss': auto, dds, ros2 or zenoh is wanted (did you mean 'dds'?)
 4:35: 'domain_id' is written 017, which YAML may read as the number 15: \
 write a whole number from 0 to 232 plainly
 4:62: 'gate_states' is written no, which YAML may read as false: \

@@ -6,6 +6,7 @@ from typing import Annotated
 import msgspec
 
 from bridges.core.fields import Period
+from drivers.hal import Where
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.watchdog import Watchdog
 
@@ -51,3 +52,11 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield ("serial", *path), text
     for path, text in settings.module_watchdog.warnings() if settings.module_watchdog else ():
         yield ("module_watchdog", *path), text
+
+
+def where(settings: Settings) -> Where:
+    """The gateway or module, or the port of the line, which has one owner."""
+    if settings.serial:
+        return Where(settings.serial.port, local=True, clients="one")
+    assert settings.tcp  # or `problems` has said so
+    return Where(f"{settings.tcp.host}:{settings.tcp.port}", local=False, clients=None)
