@@ -18,12 +18,12 @@ bus header (pins)
   north   hold    A2 = 2A  out        low     -     -         high     not asserted
 
 north: settings
-  setting         value        not the default
+  setting         value          not the default
   lanes           in, out
   codes           1: in, 2: out
-  limits.open_s   3 s          default: 5 s
+  limits.open_s   3 s            default: 5 s
   limits.close_s  -
-  limits.tries    2            default: 3
+  limits.tries    2              default: 3
   limits.even     2
   limits.gain     1
   limits.loud     no
