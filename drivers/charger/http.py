@@ -33,7 +33,14 @@ from drivers.hal import http
 UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 WORD_MAX: Final = 64
 Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
-Path = Annotated[str, msgspec.Meta(pattern=r"^/[A-Za-z0-9._~/-]*$", max_length=256)]
+Path = Annotated[
+    str,
+    msgspec.Meta(
+        pattern=r"^/[A-Za-z0-9._~/-]*$",
+        max_length=256,
+        extra={"pattern": "a path that begins with / (/api/state), without a query,"},
+    ),
+]
 
 
 class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

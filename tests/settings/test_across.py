@@ -100,7 +100,10 @@ def test_domains_that_differ_are_an_error(capsys: pytest.CaptureFixture[str]) ->
     second = SECOND.replace("192.168.1.50", "192.168.1.51")
     assert said(capsys, DOOR, second.replace("domain_id: 3", "domain_id: 4")) == (
         78,
-        ["b.yaml:3:18: DDS domain 4, and a.yaml is in domain 3: neither hears the other", "1 error"],
+        [
+            "b.yaml:3:18: DDS domain 4, and a.yaml is in domain 3: neither hears the other",
+            "1 error",
+        ],
     )
     assert said(capsys, DOOR, second.replace("{domain_id: 3}", "{}")) == (
         78,

@@ -1,0 +1,61 @@
+"""What a device YAML that is right has become; the daemon and `check` know no other."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from bridges.core.fields import Rmf
+from bridges.settings import names as named
+from bridges.settings.nodes import Problem
+from drivers.driver_type import AnyDriver
+from drivers.hal import AnyBus, Bus
+from drivers.hal.points import Wire
+
+
+@dataclass(frozen=True)
+class Config:
+    """A file that is right.
+
+    `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's
+    or driver's record. `bus_types`: name -> `type:`. `warnings`: what is legal but worth a look.
+    `section`: the settings of a kind without devices (`bridges/core/graph_kind.py`): it has no driver
+    and no buses.
+    """
+
+    path: Path
+    text: bytes
+    kind: str
+    driver: str
+    rmf: Rmf
+    buses: Mapping[str, Any]
+    devices: Mapping[str, Any]
+    bus_types: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[Problem, ...] = ()
+    section: Any = None
+
+    def bus_of(self, device_name: str) -> str:
+        """The name of the bus that a device stands on."""
+        named_bus: str | None = self.devices[device_name].bus
+        return named_bus or next(iter(self.buses))
+
+    def devices_on(self, bus: str) -> list[str]:
+        """The names of the devices that stand on this bus."""
+        return [name for name in self.devices if self.bus_of(name) == bus]
+
+    @property
+    def driver_type(self) -> AnyDriver:
+        """The driver of its devices."""
+        return named.driver_called(self.kind, self.driver)
+
+    def wires(self, device_name: str) -> list[Wire]:
+        """A device's wiring table; empty where its driver has none."""
+        return list(self.driver_type.wires(self.devices[device_name]))
+
+    def bus_type(self, name: str) -> AnyBus:
+        """What the bus of this name is."""
+        return named.bus_called(self.bus_types[name])
+
+    def open_bus(self, name: str) -> Bus:
+        """The real bus of this name. Raises HalError."""
+        return self.bus_type(name).open_bus(self.buses[name])
