@@ -8,11 +8,10 @@ import unicodedata
 
 from yaml import Mark, MarkedYAMLError
 
+_SECOND = "mapping values are not allowed here"
 FIXES = {
     "found character '\\t' that cannot start any token": "a tab: YAML indents with spaces",
-    "mapping values are not allowed here": (
-        "a second ': ' here: indent the line like its neighbours, or put the text in quotes"
-    ),
+    _SECOND: ("a second ': ' here: indent the line like its neighbours, or put the text in quotes"),
     "could not find expected ':'": "a key without ': ' after it, or a line indented wrongly",
     "found unexpected end of stream": "the file ends inside a text: its closing quote is missing",
     "but found another document": (
@@ -43,6 +42,8 @@ def reason(error: MarkedYAMLError, text: str) -> str:
     since = error.context_mark or where
     if where and since and (odd := _odd_in(lines, since.line, where.line)):
         return odd
+    if where and (_INDENT.search(problem) or _SECOND in problem) and _follows_no_key(lines, where):
+        return "the line above has no ': ': a key is followed by a colon and a space"
     if where and _INDENT.search(problem):
         return _indent(lines, where, since or where)
     for expected, bracket in _OPEN.items():
@@ -68,13 +69,20 @@ def _odd_in(lines: list[str], first: int, last: int) -> str:
 
 def _indent(lines: list[str], where: Mark, since: Mark) -> str:
     above = [line for line in lines[since.line : where.line] if line.strip(" ")]
-    above = [line for line in above if not line.lstrip(" ").startswith("#")]
-    indents = sorted({len(line) - len(line.lstrip(" ")) for line in above})
-    ours = len(lines[where.line]) - len(lines[where.line].lstrip(" "))
-    if ours in indents and above and ": " not in f"{above[-1]} ":
-        return "the line above has no ': ': a key is followed by a colon and a space"
+    indents = sorted({_spaces(line) for line in above if not line.lstrip(" ").startswith("#")})
     begin = " or ".join(map(str, indents))
+    ours = _spaces(lines[where.line])
     return f"wrong indent: {ours} before this line, {begin} before those above it (in spaces)"
+
+
+def _spaces(line: str) -> int:
+    return len(line) - len(line.lstrip(" "))
+
+
+def _follows_no_key(lines: list[str], where: Mark) -> bool:
+    """Whether the line above stands beside this one and is no key."""
+    above, line = lines[max(where.line - 1, 0)], lines[where.line]
+    return _spaces(above) == _spaces(line) and ": " not in f"{above} " and where.line > 0
 
 
 def named(character: str) -> str:

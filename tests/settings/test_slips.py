@@ -36,7 +36,7 @@ SLIPS = {
     ),
     "a key without a space after its colon": (
         changed("{transport: dds, domain_id: 7}", "\n  transport:dds\n  domain_id: 7"),
-        ["5:3: the line above has no ': ': a key is followed by a colon and a space"],
+        ["5:12: the line above has no ': ': a key is followed by a colon and a space"],
     ),
     "a bracket that is never closed": (
         changed("lanes: [in, out]", "lanes: [in, out"),
@@ -112,7 +112,7 @@ SLIPS = {
         [
             "1:1: a no-break space (U+00A0): write an ordinary space, or put the text in quotes if it"
             " is meant",
-            "2:7: a second ': ' here: indent the line like its neighbours, or put the text in quotes",
+            "2:7: the line above has no ': ': a key is followed by a colon and a space",
         ],
     ),
     "a no-break space as an indent": (

@@ -55,7 +55,10 @@ def test_without_parity_a_cut_line_reads_as_another_floor(tmp_path: Path) -> Non
 
 
 def test_a_line_that_floats_may_read_either_way(tmp_path: Path) -> None:
-    bit = ('{point: "J8:32", active: high, pull: down}', '{point: "J8:32", active: high, pull: none}')
+    bit = (
+        '{point: "J8:32", active: high, pull: down}',
+        '{point: "J8:32", active: high, pull: none}',
+    )
     assert table(tmp_path, "floor code (binary)", (PARITY, ""), bit)[:2] == [
         "between floors 0 none L4: floor_bit2",
         "L1 1 floor_bit0 between floors: floor_bit0; a fault: floor_bit2",
