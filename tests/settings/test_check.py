@@ -1,5 +1,7 @@
 """`rmf-bridge check`: problems or the wiring table, as a person sees them."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -129,6 +131,19 @@ def test_warnings_do_not_make_a_file_wrong(capsys: pytest.CaptureFixture[str]) -
         "the door is light\n"
         "gate.yaml:16:31: warning: 'north': it will be loud\n"
     )
+
+
+def test_check_loads_no_library_of_a_bus_that_is_not_asked() -> None:
+    lift = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
+    libraries = (
+        "cantools can canopen pymodbus serial requests gpiozero cyclonedds zenoh rclpy jinja2"
+    )
+    program = (
+        "import sys; from bridges.cli import main; main(['check', '-q', sys.argv[1]]);"
+        f"print(sorted(set('{libraries}'.split()) & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program, lift], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("[]\n", "")
 
 
 def test_quiet_prints_problems_only(capsys: pytest.CaptureFixture[str]) -> None:

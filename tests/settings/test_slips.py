@@ -76,7 +76,8 @@ SLIPS = {
     "a comma that may be either": (
         changed(LIMIT, "limits:\n      open_s: 3,500"),
         [
-            "16:15: 'open_s' is written 3,500: write 3.500, or 3500; a number from 0.1 to 60 s is wanted"
+            "16:15: 'open_s' is written 3,500: write 3.500, or 3500;"
+            " a number from 0.1 to 60 s is wanted"
         ],
     ),
     "a whole number with its thousands apart": (
@@ -90,7 +91,8 @@ SLIPS = {
     "a unit of its own": (
         changed("open_s: 3", "open_s: 300 ms"),
         [
-            "15:22: 'open_s' is written 300 ms: write the number alone; a number from 0.1 to 60 s is wanted"
+            "15:22: 'open_s' is written 300 ms: write the number alone;"
+            " a number from 0.1 to 60 s is wanted"
         ],
     ),
     "a no-break space within a number": (

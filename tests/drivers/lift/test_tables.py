@@ -1,4 +1,4 @@
-"""What `check` shows of a lift's codes: the two likeliest mistakes change it, and each cut line is told."""
+"""What `check` shows of a lift's codes: likely mistakes change it, and each cut line is told."""
 
 from pathlib import Path
 
