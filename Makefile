@@ -2,16 +2,23 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: help demo demo-charging test test-ros lint format bench flood soak mutate clean
+# Byte code is kept, whatever this shell says: otherwise each worker and each daemon of `make test` compiles
+# every file anew.
+export PYTHONDONTWRITEBYTECODE :=
+
+.PHONY: help demo demo-charging test deep test-ros lint format bench flood soak torture mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
+	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
 	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
+	@echo "make deep    all tests, every walk to its full depth: some minutes more"
 	@echo "make test-ros  the tests that need ROS 2, in a shell that has sourced its setup file"
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again"
-	@echo "make mutate  break the lift's core in every small way, and list what no test noticed (docs/mutation.md)"
+	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
+	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make format  rewrite the sources as the linter wants them"
 	@echo "make clean   remove the virtual environment and everything generated"
 
@@ -28,8 +35,14 @@ demo: .venv/ready
 demo-charging: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo charging
 
+# Many tests wait for a process or a wire: more of them than there are cores run side by side.
+SIDE_BY_SIDE := -n 8 --dist load --maxschedchunk 2
 test: .venv/ready lint
-	$(BIN)/pytest
+	$(BIN)/pytest $(SIDE_BY_SIDE)
+
+# Walks to their full depth, and every example: before a release, and after a change to a core.
+deep: .venv/ready
+	DEEP=1 $(BIN)/pytest $(SIDE_BY_SIDE)
 
 # rclpy belongs to ROS's own Python and needs its packages (numpy): an environment of its own, on top.
 ROS_BIN := .venv-ros/bin
@@ -62,15 +75,18 @@ flood: .venv/ready
 soak: .venv/ready
 	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED))
 
+torture: .venv/ready
+	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))
+
 # Mutants live in a copy; stopped and started again, only what is not known yet is run. Some of it:
-# make mutate ONLY='bridges.lift.drive.*'; everything afresh: rm -rf the directory first.
+# make mutate ONLY='bridges.door.*' CHILDREN=1; everything afresh: rm -rf the directory first.
 MUTANTS ?= $(or $(TMPDIR),/tmp)/rmf-bridges-mutants-$(shell id -u)
 MUTATED := bridges config drivers hal_fakes tests pyproject.toml
 mutate: .venv/ready
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[mutate]'
 	@mkdir -p $(MUTANTS) && cd $(MUTANTS) && rm -rf $(MUTATED)
 	@cp -Rp $(MUTATED) $(MUTANTS)
-	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut run --max-children 2 $(if $(ONLY),'$(ONLY)')
+	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut run --max-children $(or $(CHILDREN),2) $(if $(ONLY),'$(ONLY)')
 	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut results | grep -v ': not checked' || true
 	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut export-cicd-stats >/dev/null && cat mutants/mutmut-cicd-stats.json && echo
 	@echo "one of them: cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut show NAME"

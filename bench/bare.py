@@ -8,13 +8,14 @@ from bridges.core.fields import Rmf
 from bridges.rmf.choose import open_transport
 from bridges.rmf.definitions import LiftRequest, LiftState
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
+from hal_fakes.wire import Wire
 
 
-def main(domain: int) -> None:
+def main(domain: int, speaks: Wire) -> None:
     """Answer each LiftRequest with a LiftState until SIGTERM."""
     done = threading.Event()
     signal.signal(signal.SIGTERM, lambda number, frame: done.set())
-    transport = open_transport(Rmf(transport="dds", domain_id=domain), "bare", localhost=True)
+    transport = open_transport(Rmf(transport=speaks, domain_id=domain), "bare", localhost=True)
     states = transport.publisher(LIFT_STATES)
 
     def answer(request: LiftRequest) -> None:
@@ -28,4 +29,4 @@ def main(domain: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(int(sys.argv[1]), "zenoh" if sys.argv[2:] == ["zenoh"] else "dds")

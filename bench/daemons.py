@@ -18,19 +18,21 @@ from bench.figures import Row
 from bridges.core.fields import Rmf
 from bridges.rmf.choose import open_transport
 from bridges.rmf.transport import Transport
+from hal_fakes.wire import Wire
 
 Content = dict[str, Any]
 ROOT = Path(__file__).parent.parent
 DOMAIN = 71
 BARE = [sys.executable, "-m", "bench.bare", str(DOMAIN)]
+WIRES: tuple[Wire, ...] = ("dds", "zenoh")
 STOP_S = 5.0
 SETTLE_S = 3.0
 
 
 @contextmanager
-def graph() -> Iterator[Transport]:
+def graph(speaks: Wire = "dds") -> Iterator[Transport]:
     """This process's own place on the daemons' graph."""
-    rmf = Rmf(transport="dds", domain_id=DOMAIN)
+    rmf = Rmf(transport=speaks, domain_id=DOMAIN)
     transport = open_transport(rmf, "bench", localhost=True)
     try:
         yield transport

@@ -6,7 +6,8 @@ from pathlib import Path
 from bench.figures import Tables
 from hal_fakes.rmf.phases import EndLiftSession, RequestLift
 from hal_fakes.rmf.robot import Phase
-from tests.lift_supervisor.world import LiftNode, OurSupervisor, Rider, World
+from tests.lift_supervisor.world import LiftNode, OurSupervisor, Rider
+from tests.serve.virtual_graph import World
 
 DAY_S = 86400.0
 

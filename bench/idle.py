@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.charger_servers import chargers_at, http_chargers
-from bench.daemons import BARE, Content, cost, daemon, shipped
+from bench.daemons import BARE, WIRES, Content, cost, daemon, shipped
 from bench.figures import Rows, Tables, each_more
 
 LIFTS, CAN_CHARGERS, DOORS, HTTP_CHARGERS = (1, 8), (1, 8), (25, 50, 100, 200), (1, 10, 25, 50)
@@ -14,8 +14,11 @@ SLCAN = {"port": "/dev/serial/by-id/simulated", "bitrate": 250000}
 
 
 def measure(scratch: Path) -> Tables:
-    """The bare node and the shipped devices; then one table for each that can be many."""
-    one = {"bare node": cost(BARE, scratch / "bare.log")}
+    """The bare node on each wire, a lift on zenoh and the shipped devices; then one table for each
+    that can be many, all on dds."""
+    one = {f"bare node on {wire}": cost([*BARE, wire], scratch / f"{wire}.log") for wire in WIRES}
+    lift = daemon(shipped("lift_dry_contact"), scratch / "on_zenoh", "zenoh")
+    one["lift_dry_contact on zenoh"] = cost(lift, scratch / "on_zenoh.log")
     for name in ("lift_dry_contact", "door_modbus", "charger_http"):
         one[name] = _cost(scratch, name, shipped(name))
     return {

@@ -15,6 +15,7 @@ from typing import Any
 from bench.daemons import (
     BARE,
     DOMAIN,
+    WIRES,
     Content,
     PlantSocket,
     daemon,
@@ -33,6 +34,7 @@ from drivers.hal.gpio import canonical
 from drivers.lift.dry_contact import Settings, wires
 from hal_fakes.gpio import WiredFactory
 from hal_fakes.plants.lift import build
+from hal_fakes.wire import Wire
 from hal_fakes.wiring import Wiring
 
 ROUNDS = 300
@@ -46,16 +48,20 @@ Times = list[float]
 
 def measure(scratch: Path) -> Tables:
     """Milliseconds, p50 and p99, of each path."""
-    round_trips, callbacks = _bare_round_trips(scratch), _bare_callbacks(scratch)
-    relay, state, off, _ = _daemon_paths(scratch, "dds")
+    latencies: Rows = {}
+    for wire in reversed(WIRES):  # the hazard's figures are those of the last, dds
+        round_trips = _bare_round_trips(scratch, wire)
+        relay, state, off, _ = _daemon_paths(scratch, wire, wire)
+        latencies |= {
+            f"bare round trip on {wire}": compared(round_trips, round_trips),
+            f"LiftRequest to relay edge on {wire}": compared(relay, round_trips),
+            f"input edge to LiftState on {wire}": compared(state, round_trips),
+        }
+    callbacks = _bare_callbacks(scratch)
     scan_s = load(scratch / "quick_dds.yaml").buses["header"].scan_s
     worst = {"worst in scan periods": max(off) / scan_s}
     return {
-        "latency": {
-            "bare round trip": compared(round_trips, round_trips),
-            "LiftRequest to relay edge": compared(relay, round_trips),
-            "input edge to LiftState": compared(state, round_trips),
-        },
+        "latency": latencies,
         "hazard input edge": {
             "to a bare edge callback": compared(callbacks, callbacks),
             "to all outputs off": {**compared(off, callbacks), **worst},
@@ -112,8 +118,8 @@ class Graph:
                 return at
 
 
-def _bare_round_trips(scratch: Path) -> Times:
-    with ready(BARE, scratch / "bare.log"), graph() as transport:
+def _bare_round_trips(scratch: Path, wire: Wire) -> Times:
+    with ready([*BARE, wire], scratch / f"bare_{wire}.log"), graph(wire) as transport:
         far = Graph(transport)
         return _measured(lambda: _round_trip(far))
 
@@ -147,11 +153,16 @@ def _contacts(part: Any) -> list[dict[str, Any]]:
     return [contact for each in parts for contact in _contacts(each)]
 
 
-def _daemon_paths(scratch: Path, transport: str) -> tuple[Times, Times, Times, float]:
-    """Seconds of each request to the relay, edge to RMF and hazard to all off, and memory (MB)."""
+def _daemon_paths(
+    scratch: Path, transport: str, ours: Wire = "dds"
+) -> tuple[Times, Times, Times, float]:
+    """Seconds of each request to the relay, edge to RMF and hazard to all off, and memory (MB).
+
+    `ours`: the wire of this end.
+    """
     directory = scratch / f"quick_{transport}"
     command = daemon(_quick_lift(), directory, transport)
-    with ready(command, directory.with_suffix(".log")) as child, graph() as node:
+    with ready(command, directory.with_suffix(".log")) as child, graph(ours) as node:
         far = Graph(node)
         plant, hand = PlantSocket(directory / "plant.sock"), PlantSocket(directory / "plant.sock")
         plant.say("follow")

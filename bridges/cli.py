@@ -16,7 +16,7 @@ COMMANDS = {
         "validate device YAMLs and print their wiring as a table",
         "check my_lift.yaml --building-map hospital.building.yaml",
     ),
-    "schema": ("print what may stand in a device YAML, as JSON Schema", "schema > rmf-bridge.json"),
+    "schema": ("print the JSON Schema of a device YAML", "schema > rmf-bridge.json"),
     "watch": ("show lifts, doors and chargers live, as RMF sees them", "watch --localhost"),
     "send": (
         "send a request as RMF does, and wait for its effect",
@@ -29,7 +29,7 @@ COMMANDS = {
         "outputs-off my_lift.yaml",
     ),
 }
-"""What each does, and an example."""
+"""What each subcommand does, and an example."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -52,7 +52,7 @@ def main(argv: list[str] | None = None) -> int:
     parsed = parser.parse_args(arguments, argparse.Namespace(ros_args=ros_args, typed=arguments))
     try:
         return int(_module(parsed.command).run(parsed))
-    except BrokenPipeError:  # the reader of a pipe has gone, as `head` does
+    except BrokenPipeError:  # the reader of a pipe has closed it, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
 

@@ -1,4 +1,4 @@
-"""Logs: one event, one line, `event key=value …`, with the priority that journald understands."""
+"""Logs: one line `event key=value …` for each event, with journald's priority."""
 
 import dataclasses
 import logging
@@ -13,14 +13,14 @@ _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
 def pairs(event: str, **values: object) -> str:
-    """One log line: values with spaces or quotes are quoted, so that a line stays one line."""
+    """One log line. Values with spaces, quotes or line breaks are quoted and escaped."""
     return " ".join([event, *(f"{key}={_quoted(plain(value))}" for key, value in values.items())])
 
 
 def plain(value: object) -> str:
-    """A value for a person, without Python's spelling: `agv_request yes, call L3`.
+    """A value for people, not in Python's notation: `agv_request yes, call L3`.
 
-    Of a record only what is set is said; nothing set, or nothing at all, is `-`.
+    Unset fields of a record are left out. None, or a record with nothing set, is `-`.
     """
     match value:
         case None:
@@ -43,10 +43,10 @@ def _listed(parts: Iterator[str]) -> str:
 
 
 def _set(record: object) -> Iterator[tuple[str, object]]:
-    names = getattr(record, "__struct_fields__", None) or [
-        field.name
-        for field in dataclasses.fields(record)  # type: ignore[arg-type]
-    ]
+    if isinstance(record, msgspec.Struct):
+        names = record.__struct_fields__
+    else:
+        names = tuple(field.name for field in dataclasses.fields(record))  # type: ignore[arg-type]
     for name in names:
         part = getattr(record, name)
         if part is not None and part is not False and part not in ("", ()):
@@ -77,8 +77,29 @@ class _Formatter(logging.Formatter):
         return "\n".join(prefix + line for line in text.splitlines())
 
 
+class _OthersOnce(logging.Filter):
+    """Lets each log call in a library through once: with bad frames or datagrams anybody could
+    trigger it endlessly. Our own code already logs each event once."""
+
+    OURS = ("root", "bridges", "drivers", "hal_fakes")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._said: set[tuple[str, int]] = set()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        place = record.pathname, record.lineno
+        if record.name.partition(".")[0] in self.OURS:
+            return True
+        record.exc_info = record.exc_text = None  # a library's traceback helps no operator
+        first = place not in self._said
+        self._said.add(place)
+        return first
+
+
 def start(level: str = "INFO") -> None:
     """Send every log line to stderr."""
     to_stderr = logging.StreamHandler(sys.stderr)
     to_stderr.setFormatter(_Formatter(journal="JOURNAL_STREAM" in os.environ))
+    to_stderr.addFilter(_OthersOnce())
     logging.basicConfig(level=level, handlers=[to_stderr], force=True)

@@ -35,6 +35,8 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     `tables(settings)`: codes, pulses and frames, for `check` (`bridges/core/table.py`).
     `claims(settings)`: (place, path) of what no other device of its bus may use, beside the wires'.
     `warnings(settings)`: (path, text) of what is legal but worth a look.
+    `notes(settings)`: (path, text) of what a site may well want so, and should know.
+    `unwired(settings)`: signals without a wire of which `accept_unsafe` may speak as well.
     `fake`: the module that stands in for the hardware in `run --simulate`, by its name, as nothing real
     imports a fake (`hal_fakes/fake.py`); the plant of its kind, on its wires, where it names none.
     """
@@ -48,6 +50,8 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     tables: Callable[[Settings], Iterable[Table]] = lambda settings: ()
     claims: Callable[[Settings], Iterable[tuple[str, tuple[str, ...]]]] = lambda settings: ()
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
+    notes: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
+    unwired: Callable[[Settings], Iterable[str]] = lambda settings: ()
     fake: str = ""
 
 

@@ -1,30 +1,57 @@
-"""A DDS domain that nobody on this machine uses, for the demo and the tests."""
+"""A ROS domain that nobody on this machine uses, on DDS or zenoh, for the demo and the tests."""
 
-import atexit
 import random
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final
 
-DOMAINS: Final = range(10, 100)
-"""Above 101 a domain's ports reach into those that Linux hands out to clients."""
+from bridges.rmf.zenoh_config import LOOPBACK_PORT
+
+DOMAINS: Final = range(10, 70)
+"""`bench/` has those from 70 on; above 101 the ports reach into those that Linux hands to clients."""
 CLAIM: Final = "\0rmf-bridges-test-domain-{}"
+
+
+_kept: Final[list[socket.socket]] = []
+"""What this process has claimed until it ends."""
 
 
 def free_domain() -> int:
     """One in which no participant of this machine is, claimed until this process ends.
+
+    Raises OSError when there is none.
+    """
+    domain, claim = _claimed()
+    _kept.append(claim)
+    return domain
+
+
+@contextmanager
+def domain_for_a_while() -> Iterator[int]:
+    """The same, claimed until the end of the block."""
+    domain, claim = _claimed()
+    with claim:
+        yield domain
+
+
+def _claimed() -> tuple[int, socket.socket]:
+    """A free domain and the claim on it, which lasts until it is closed.
 
     Raises OSError when there is none. Of a domain d the ports are 7400 + 250 d: multicast discovery
     there, the first participant's unicast ports 10 and 11 above it (DDSI-RTPS 2.5, 9.6.2.3).
     """
     for domain in random.sample(DOMAINS, len(DOMAINS)):
         base = 7400 + 250 * domain
-        if all(_is_free(base + offset) for offset in (0, 10, 11)) and _claimed(domain):
-            return domain
+        dds = all(_is_free(base + offset) for offset in (0, 10, 11))
+        zenoh = _is_free(LOOPBACK_PORT + domain, socket.SOCK_STREAM)
+        if dds and zenoh and (claim := _claim(domain)):
+            return domain, claim
     raise OSError(f"every DDS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use on this machine")
 
 
-def _is_free(port: int) -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+def _is_free(port: int, kind: socket.SocketKind = socket.SOCK_DGRAM) -> bool:
+    with socket.socket(socket.AF_INET, kind) as probe:
         try:
             probe.bind(("", port))
         except OSError:
@@ -32,12 +59,11 @@ def _is_free(port: int) -> bool:
     return True
 
 
-def _claimed(domain: int) -> bool:
+def _claim(domain: int) -> socket.socket | None:
     claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
         claim.bind(CLAIM.format(domain))
     except OSError:
         claim.close()
-        return False
-    atexit.register(claim.close)
-    return True
+        return None
+    return claim

@@ -73,25 +73,22 @@ FarSide: TypeAlias = Inside[Any, Any] | Outside[Any, Any]
 
 def plants_on(config: Config, bus: str) -> dict[str, Plant]:
     """A new plant for each device on this bus."""
-    fake = _fake(config)
     return {
-        name: fake.plant(name, config.devices[name], config.wires(name))
+        name: _fake(config, name).plant(name, config.devices[name], config.wires(name))
         for name in config.devices_on(bus)
     }
 
 
 def stations_on(config: Config, bus: str, plants: Mapping[str, Plant]) -> list[Any]:
     """What stands on this bus, with the devices' plants behind it."""
-    station = _fake(config).station
+    return [_station(config, bus, name, plants[name]) for name in config.devices_on(bus)]
+
+
+def _station(config: Config, bus: str, name: str, plant: Plant) -> object:
+    station = _fake(config, name).station
     if station is None:
-        canonical = config.bus_type(bus).canonical
-        return [
-            Wiring(plants[name], config.wires(name), canonical) for name in config.devices_on(bus)
-        ]
-    return [
-        station(plants[name], config.devices[name], config.buses[bus])
-        for name in config.devices_on(bus)
-    ]
+        return Wiring(plant, config.wires(name), config.bus_type(bus).canonical)
+    return station(plant, config.devices[name], config.buses[bus])
 
 
 def far_side(config: Config, bus: str) -> FarSide:
@@ -103,7 +100,7 @@ def far_side(config: Config, bus: str) -> FarSide:
     return found
 
 
-def _fake(config: Config) -> Fake[Any]:
-    name = config.driver_type.fake or f"hal_fakes.plants.{config.kind}"
+def _fake(config: Config, device: str) -> Fake[Any]:
+    name = config.driver_type(device).fake or f"hal_fakes.plants.{config.kind}"
     found: Fake[Any] = import_module(name).FAKE
     return found

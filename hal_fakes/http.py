@@ -53,6 +53,9 @@ class Station(Protocol):
     def obey(self, signal: str, asserted: bool) -> None:
         """Somebody has asked for it."""
 
+    def tick(self) -> None:
+        """Called often: what ends by itself, ends."""
+
 
 class HttpServer:
     """The running server. `replace`: what must stand in the bus's settings instead.
@@ -63,7 +66,7 @@ class HttpServer:
     def __init__(self, stations: Sequence[Station], path: str, timeout_s: float) -> None:
         self._server = _Listener(stations, path, timeout_s)
         host, port = self._server.server_address[:2]
-        self.replace = {"api_base": f"{host!s}:{port}{path}"}
+        self.replace = {"api_base": f"{host!s}:{port}{path}", "token_file": None}
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(LOOK_S,), name="http", daemon=True
         )
@@ -88,9 +91,15 @@ class _Listener(ThreadingHTTPServer):
             for (method, below), does in s.commands.items()
         }
         self.timeout_s = timeout_s
+        self._stations = stations
         self._callers: set[socket.socket] = set()
         self._lock = threading.Lock()
         super().__init__(("127.0.0.1", 0), _Call)
+
+    def service_actions(self) -> None:
+        """The server's own pause between requests."""
+        for station in self._stations:
+            station.tick()
 
     def get_request(self) -> tuple[socket.socket, Any]:
         caller, address = super().get_request()
@@ -123,6 +132,9 @@ class _Call(BaseHTTPRequestHandler):
     server: _Listener
 
     def do_GET(self) -> None:
+        if ("GET", self.path) in self.server.commands:
+            self.do_POST()
+            return
         station = self.server.get.get(self.path)
         if station is None:
             self._answer(404, b"{}")

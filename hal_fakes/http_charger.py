@@ -11,6 +11,7 @@ from typing import Any, Final, cast
 
 from bridges.charger.signals import Activity
 from drivers.charger.http import Settings
+from drivers.json_fields import put, value_of
 from hal_fakes.fake import Fake
 from hal_fakes.plants.charger import ROBOTS_FAULTS, ChargerPlant, Reading
 from hal_fakes.plants.plant import Plant
@@ -52,6 +53,9 @@ class HttpCharger:
         """Somebody has asked for it."""
         self.plant.drive(signal, asserted, time.monotonic())
 
+    def tick(self) -> None:
+        """Nothing ends by itself."""
+
     def answer(self) -> bytes:
         """The answer to `GET state_path` now."""
         return self.body(self.reading())
@@ -70,18 +74,16 @@ class HttpCharger:
     def _answer(self, code: int | str, reading: Reading) -> dict[str, Any]:
         """Everything where the YAML says that it is."""
         fields, answer = self._settings.fields, dict[str, Any]()
-        _put(answer, fields.state, self._words.get(code, code))
-        _put(answer, fields.error_text, reading.error_text)
+        put(answer, fields.state, self._words.get(code, code))
+        put(answer, fields.error_text, reading.error_text)
         if fields.receiver_id:
-            _put(answer, fields.receiver_id, reading.receiver or None)
+            put(answer, fields.receiver_id, reading.receiver or None)
         if where := fields.in_range:
-            yes = where.when[0] if where.when else True
-            no = next(n for n in range(256) if n not in where.when) if where.when else False
-            _put(answer, where.field, yes if reading.in_range else no)
+            put(answer, where.field, value_of(where, bool(reading.in_range)))
         percent = None if reading.battery is None else 100 * reading.battery
         for name, value in (("battery_percent", percent), *_numbers(reading)):
             if number := getattr(fields, name):
-                _put(answer, number.field, None if value is None else value / number.scale)
+                put(answer, number.field, None if value is None else value / number.scale)
         return answer
 
     def _code(self, reading: Reading) -> int:
@@ -111,14 +113,6 @@ def _commands(settings: Settings) -> Iterator[tuple[tuple[str, str], tuple[str, 
 def _numbers(reading: Reading) -> list[tuple[str, float | None]]:
     names = ("volts", "amps", "time_to_full_s")
     return [(name, getattr(reading, name)) for name in names]
-
-
-def _put(answer: dict[str, Any], field: str, value: Any) -> None:
-    """A value at its place; list items have no place here."""
-    *above, last = field.split(".")
-    for name in above:
-        answer = answer.setdefault(name, {})
-    answer[last] = value
 
 
 FAKE = Fake[Settings](

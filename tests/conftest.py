@@ -1,8 +1,47 @@
-from collections.abc import Sequence
+import signal
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import pytest
 
+from bridges.rmf.choose import missing_of_dds
+from hal_fakes.domain import domain_for_a_while
+
+ON_WIRES = ("commands", "drivers", "hal_fakes", "rmf", "serve", "site")
+"""The folders whose tests have threads, processes and sockets. In the others time is virtual."""
+WIRES_HANG_AFTER_S = 900
+"""No test that passes takes so long, however busy the machine is."""
+
+signal.signal(
+    signal.SIGHUP, signal.SIG_DFL
+)  # nohup, or a CI's shell, has daemons inherit another one
+
 _deselected: list[str] = []
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """A DDS domain for this test, in which nobody else on this machine is."""
+    with domain_for_a_while() as free:
+        yield free
+
+
+@pytest.fixture(scope="module")
+def module_domain() -> Iterator[int]:
+    """One that the tests of a file share."""
+    with domain_for_a_while() as free:
+        yield free
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What takes long is begun first; what hangs on a wire ends. Without cyclonedds, as on arm64, the
+    tests of the dds transport cannot be run."""
+    if missing_of_dds():
+        items[:] = [item for item in items if not item.get_closest_marker("dds")]
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+    for item in items:
+        if item.path.relative_to(Path(__file__).parent).parts[0] in ON_WIRES:
+            item.add_marker(pytest.mark.timeout(WIRES_HANG_AFTER_S))
 
 
 def pytest_deselected(items: Sequence[pytest.Item]) -> None:
@@ -14,6 +53,8 @@ def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
     """Say so: a green run without ROS has not seen the ros2 transport."""
+    if missing := missing_of_dds():
+        terminalreporter.write_line(f"not run: the tests of the dds transport, as {missing}")
     if _deselected and config.getoption("markexpr") == "not ros":
         files = sorted({nodeid.partition("::")[0] for nodeid in _deselected})
         terminalreporter.write_line(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import pytest
 
+from bridges.core.decision import OperatorReset
 from bridges.door.signals import DoorOutputs
 from bridges.lift.signals import LiftOutputs, Side
 from bridges.log import _Formatter, pairs, plain
@@ -32,6 +33,7 @@ class Asked:
             Asked("you", agv=True, floors=("L1", "L2")),
             "session_id you, agv yes, at 0.0, floors L1, L2",
         ),
+        (OperatorReset(), "-"),
         (LiftMode.MODE_AGV, "MODE_AGV"),
         ({"lift_requests": 3, "door_requests": 1}, "lift_requests 3, door_requests 1"),
         ({"a"}, "a"),

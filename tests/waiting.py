@@ -1,11 +1,25 @@
 """Waiting for what happens outside this thread: in a real process, on a real socket, on DDS."""
 
+import re
 import threading
 import time
 from collections.abc import Callable
+from typing import TypeVar
 
-PATIENCE_S = 20.0
-"""Long enough for a busy machine; a test that passes never waits for it."""
+from drivers import DriverError
+
+T = TypeVar("T")
+
+PATIENCE_S = 120.0
+"""Long enough for a very busy machine; a test that passes never waits for it."""
+
+TOO_LATE = re.compile(
+    r" within [\d.]+ s\b|what came first is no echo|is half a frame|is no frame: a collision"
+)
+"""What a bus says of an answer that is late, or that meets the next one on a serial line."""
+
+LEASE_S = 9.5
+"""Less than DDS takes to miss who has gone without a farewell (10 s)."""
 
 
 def wait_until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
@@ -15,3 +29,23 @@ def wait_until(condition: Callable[[], object], what: str, patience_s: float = P
     while not condition():
         assert time.monotonic() < deadline, f"never happened: {what}"
         pause.wait(0.005)
+
+
+def at_last(step: Callable[[], T], what: str, between: Callable[[], object] = lambda: None) -> T:
+    """What a step on a wire gives; tried again when an answer comes late, as on a busy machine.
+
+    `between`: done before it is tried again. Every other DriverError is raised.
+    """
+    done: list[T] = []
+
+    def tried() -> bool:
+        try:
+            done.append(step())
+        except DriverError as error:
+            if not TOO_LATE.search(str(error)):
+                raise
+            between()
+        return bool(done)
+
+    wait_until(tried, what)
+    return done[0]

@@ -37,10 +37,10 @@ from bridges.rmf.topics import (
     CHARGER_CANCELS,
     CHARGER_REQUESTS,
     CHARGING_ASSIGNMENTS,
-    Topic,
+    AnyTopic,
 )
 
-Messages = tuple[tuple[Topic[Any], d.Message], ...]
+Messages = tuple[tuple[AnyTopic, d.Message], ...]
 TITLES: Final = {
     "ROBOT_FAULTY": "A robot cannot be charged",
     "STATION_OUT_OF_SERVICE": "A charger is out of service",
@@ -135,7 +135,7 @@ def messages(
     """What is to be sent now; nothing while it may not speak."""
     if not memory.may_speak:
         return memory, ()
-    found: list[tuple[Topic[Any], d.Message]] = []
+    found: list[tuple[AnyTopic, d.Message]] = []
     for name, grant in memory.grants.items():
         if now >= _due_at(memory, name, grant):
             found.append(_to_station(name, grant))
@@ -165,7 +165,7 @@ def _due_at(memory: Memory, name: str, grant: Grant) -> float:
     return due_at(grant.sent_at, new=False, again=shows_it and not lets_go)
 
 
-def _to_station(name: str, grant: Grant) -> tuple[Topic[Any], d.Message]:
+def _to_station(name: str, grant: Grant) -> tuple[AnyTopic, d.Message]:
     if grant.over:
         return CHARGER_CANCELS, d.ChargerCancel(name, grant.request_id)
     who, timeout = grant.robot, duration(grant.start_timeout_s)

@@ -1,6 +1,7 @@
 """What `watch` shows: rows made from messages and a time. Pure.
 
-RMF's states have no place for faults, queues and simulations: our daemons tell those on `/diagnostics`.
+RMF's states have no field for faults, queues and simulations. Our daemons publish those on
+`/diagnostics`.
 """
 
 import re
@@ -22,10 +23,10 @@ SECONDS: Final = re.compile(r"\d+(\.\d+)? s\b")
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One device, the chargers' coordinator, or a robot with the place that it is assigned to.
+    """One device, the charger coordinator, or a robot with its assigned place.
 
-    `waiting`: the supervisor's or coordinator's queue. `age`: that of the reading. `mark`: why not to
-    trust the row. `simulated`: no hardware is behind it. `faults`: what the daemons that serve it tell.
+    `waiting`: the supervisor's or coordinator's queue. `age`: age of the reading. `mark`: why not to
+    trust the row. `simulated`: no hardware is behind it. `faults`: those that its daemons report.
     """
 
     kind: str
@@ -40,11 +41,11 @@ class Row:
 
     @property
     def wrong(self) -> bool:
-        """It deserves a look."""
+        """Whether the row needs attention."""
         return bool(self.mark or self.faults)
 
     def cells(self) -> tuple[str, ...]:
-        """As in a table, under HEADINGS."""
+        """The row's texts, in the order of HEADINGS."""
         marks = " ".join(
             word for word in ("SIMULATED" if self.simulated else "", self.mark) if word
         )
@@ -52,43 +53,43 @@ class Row:
         return (*state, self.waiting, self.age, marks, self.faults)
 
     def news(self) -> tuple[object, ...]:
-        """What is worth a line when it changes: seconds that run are not."""
+        """The parts whose change is worth a line: running seconds are left out."""
         told = (self.state, self.held_by, self.waiting, self.mark, self.faults)
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """A daemon's last word about one device; `at`: when it came (monotonic s)."""
+    """A daemon's latest diagnostic status of one device, and when it arrived (monotonic s)."""
 
     at: float
     kind: str
     status: d.DiagnosticStatus
 
     def value(self, key: str) -> str:
-        """One of its values; "" and "-" are none."""
+        """The value of this key; "" if it is missing or "-"."""
         found = next((pair.value for pair in self.status.values if pair.key == key), "")
         return "" if found == "-" else found
 
     @property
     def of_daemon(self) -> bool:
-        """It is about the daemon itself, not about a device."""
+        """Whether it is about the daemon itself, not about a device."""
         return self.status.name == f"{self.status.hardware_id}: daemon"
 
     @property
     def device(self) -> tuple[str, str]:
-        """The kind and name of the device; a supervisor's are those of its lift or door."""
+        """Kind and name of the device; for a supervisor those of its lift or door."""
         return self.kind.removesuffix("_supervisor"), self.status.hardware_id
 
     def faults(self) -> Iterator[str]:
-        """`OVERLOAD (since 3 s)` for each."""
+        """One text for each fault, such as `OVERLOAD (since 3 s)`."""
         for code in diagnostics.faults(self.status):
             detail = self.value(code)
             yield f"{code} ({detail})" if detail else code
 
 
 class Board:
-    """The latest of each device."""
+    """The latest state and diagnosis of each device."""
 
     def __init__(self) -> None:
         self._latest: dict[tuple[str, str], Heard] = {}
@@ -97,7 +98,7 @@ class Board:
         self._diagnoses: dict[str, Diagnosis] = {}
 
     def take(self, heard: Heard) -> None:
-        """One message."""
+        """Take one message that was heard."""
         match heard.message:
             case d.SupervisorHeartbeat():
                 self._requesters = {
@@ -116,13 +117,13 @@ class Board:
                 self._latest[key] = heard
 
     def rows(self, now: float, wall: float) -> list[Row]:
-        """By kind and name. `now` is monotonic, `wall` the clock that stamps are compared with."""
+        """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
         devices = sorted(self._latest.items(), key=_order)
         rows = [self._device(kind, name, heard, now, wall) for (kind, name), heard in devices]
         return [*rows, *self._coordinators(now), *self._robots()]
 
     def _diagnose(self, status: d.DiagnosticStatus, at: float) -> None:
-        """Of ours, by `<node>: <device>`. Others write diagnostics too, and do not say our `kind`."""
+        """Keep a status of our daemons under `<node>: <device>`. Other nodes' have no `kind`."""
         kind = next((pair.value for pair in status.values if pair.key == "kind"), "")
         diagnosis = Diagnosis(at, kind, status)
         if (
@@ -215,7 +216,7 @@ def _mark(heard: Heard, now: float, wall: float) -> str:
 
 
 def table(rows: Iterable[Row]) -> list[str]:
-    """The rows in columns, under a heading; a queue or faults have a column where there are any."""
+    """The rows in columns, under headings; columns for queues, marks and faults only if needed."""
     shown = [row.cells() for row in rows]
     if not shown:
         return ["nothing heard yet"]
@@ -231,13 +232,13 @@ def table(rows: Iterable[Row]) -> list[str]:
 
 
 def changes(before: list[Row], after: list[Row]) -> list[Row]:
-    """The rows that say something else than they did, ages and running seconds apart."""
+    """The rows that have changed, not counting ages and running seconds."""
     known = {(row.kind, row.name): row.news() for row in before}
     return [row for row in after if known.get((row.kind, row.name)) != row.news()]
 
 
 def change_line(row: Row, wall: float) -> str:
-    """A changed row as one line, to be read in a pipe."""
+    """A changed row as one line, for a pipe."""
     clock = time.strftime("%H:%M:%S", time.localtime(wall)) + f".{int(wall * 1000) % 1000:03d}"
     kind, name, state, held_by, waiting, age, marks, faults = row.cells()
     parts = [clock, f"{kind:<7}", f"{name:<12}", f"{state:<38}", held_by]
@@ -247,9 +248,8 @@ def change_line(row: Row, wall: float) -> str:
 
 
 def repaint(rows: list[Row], lines_before: int, columns: int, lines: int) -> tuple[str, int]:
-    """What brings a terminal that shows `lines_before` lines of the table to these rows.
-
-    Returns it with the number of lines then shown. No line wraps and nothing scrolls away.
+    """The text that redraws a terminal showing `lines_before` lines of the table, and the new number
+    of lines. No line wraps and nothing scrolls away.
     """
     shown = table(rows)
     if len(shown) >= lines:

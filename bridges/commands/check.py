@@ -99,8 +99,8 @@ def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Probl
     if problems:
         return problems, []
     if not names:
-        return [], [f"nothing in this file stands on {building.file}"]
-    return [], [f"named as on {building.file}: {names}"]
+        return [], [f"this file uses no names that {building.file} could confirm"]
+    return [], [f"same names as in {building.file}: {names}"]
 
 
 def _with(file: Told, together: Found) -> Told:

@@ -1,7 +1,7 @@
-"""When `send` sends, when it is over, and what it says when nothing has come of it.
+"""When `send` sends, when it ends, and what it says when the request has no effect.
 
-Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as RMF does
-it. Only a state heard after the first request counts: the one before may show the same for another
+Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as RMF does.
+Only a state heard after the first request counts: an earlier one may show the same for another
 reason. What each request asks for, and what fulfils it, is in `requests/`.
 """
 
@@ -15,12 +15,12 @@ from bridges.rmf import words
 
 REPEAT_S: Final = 1.0
 PATIENCE_S: Final = 2.0
-"""States come at 1 Hz: whoever has not been heard for two periods is mentioned."""
+"""States come at 1 Hz: after two silent periods `send` gives a hint."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One look: a request to send now, something worth saying once, or the end."""
+    """The next step: a request to send now, a hint to print once, or the outcome."""
 
     send: words.Requested | None = None
     hint: str = ""
@@ -46,7 +46,7 @@ def _may_send(request: Request, seen: Seen, now: float) -> bool:
 
 
 def _hint(request: Request, seen: Seen, now: float) -> str:
-    """What a person can do at once: nobody has to wait for the timeout to read it."""
+    """What the user can do, said early: nobody has to wait for the timeout to read it."""
     if now < seen.began_at + PATIENCE_S:
         return ""
     if seen.first_sent_at is None and seen.listeners == 0:
@@ -60,7 +60,7 @@ def _hint(request: Request, seen: Seen, now: float) -> str:
 
 
 def _reason(request: Request, seen: Seen, now: float) -> str:
-    """Why the time ran out, and where to look next."""
+    """Why the request timed out, and where to look next."""
     if seen.first_sent_at is None and seen.listeners == 0:
         return _said(request.nobody())
     if not seen.states:

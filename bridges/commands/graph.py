@@ -1,4 +1,4 @@
-"""What `watch` and `send` share: the options that name a graph, joining, hearing and leaving it."""
+"""What `watch` and `send` share: options that name a graph, joining it, listening and leaving."""
 
 import argparse
 import shlex
@@ -8,39 +8,48 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
+import msgspec
+
 from bridges.core.fields import Rmf
 from bridges.rmf import words
-from bridges.rmf.topics import Topic
-from bridges.rmf.transport import Transport
+from bridges.rmf.topics import AnyTopic
+from bridges.rmf.transport import Transport, TransportError
 
 SILENT_AFTER_S = 3.0
-"""States come at 1 Hz: three missed ones, or a reading three seconds old, deserve a mark."""
+"""States come at 1 Hz: three missed ones, or a reading three seconds old, get a mark."""
+TRANSPORTS = ("auto", "ros2", "dds", "zenoh")
 
 
 def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options that say which graph: `--domain-id`, `--transport`, `--localhost`."""
+    """The options that say which graph: `--config`, `--domain-id`, `--transport`, `--localhost`."""
     parser.add_argument(
-        "--domain-id", type=_domain, metavar="N", help="DDS domain (default: ROS_DOMAIN_ID, else 0)"
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="a device YAML, for its `rmf:` section: routers, certificates, domain",
+    )
+    parser.add_argument(
+        "--domain-id", type=_domain, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID, else 0)"
     )
     parser.add_argument(
         "--transport",
-        choices=("auto", "ros2", "dds"),
-        default="auto",
-        help="ros2 is rclpy, dds needs no ROS; auto takes rclpy where it imports (default)",
+        choices=TRANSPORTS,
+        help="ros2 is rclpy, dds and zenoh need no ROS; auto takes the first that is here (default)",
     )
     parser.add_argument(
         "--localhost",
         action="store_true",
-        help="stay on the loopback interface, where `run --simulate` is",
+        help="use only the loopback interface, as `run --simulate` does",
     )
 
 
 def _domain(text: str) -> int:
     if not text.isascii() or not text.isdigit() or int(text) > 232:
-        raise argparse.ArgumentTypeError(f"'{text}' is no DDS domain: 0 to 232")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a DDS domain id: write 0 to 232")
     return int(text)
 
 
@@ -48,19 +57,35 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
     """Join the graph that the options name. Raises TransportError."""
     from bridges.rmf.choose import open_transport
 
-    rmf = Rmf(
-        transport=args.transport,
-        domain_id=args.domain_id,
-        network="localhost" if args.localhost else "subnet",
-    )
+    rmf = overridden(_configured(args.config), args)
     return open_transport(rmf, node_name, localhost=args.localhost, ros_args=args.ros_args)
+
+
+def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
+    """A YAML's `rmf:` section, with what the command line says instead."""
+    if args.domain_id is not None:
+        rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
+    if args.transport is not None:
+        rmf = msgspec.structs.replace(rmf, transport=args.transport)
+    return rmf
+
+
+def _configured(file: Path | None) -> Rmf:
+    if file is None:
+        return Rmf()
+    from bridges.settings.load import SettingsError, load
+
+    try:
+        return load(file).rmf
+    except SettingsError as error:
+        raise TransportError("\n".join(map(str, error.problems))) from None
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
     """SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt.
 
-    Without that a killed command leaves a ghost of its node on the graph for over 10 s.
+    Otherwise the node of a killed command would stay on the graph for over 10 s.
     """
     signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = {number: signal.signal(number, signal.default_int_handler) for number in signals}
@@ -72,23 +97,23 @@ def interruptible() -> Iterator[None]:
 
 
 def complain(command: str, text: object) -> None:
-    """One line to standard error, in the command's name; no text can move the cursor."""
+    """One line to standard error, under the command's name, without control characters."""
     sys.stderr.write(words.printable(f"rmf-bridge {command}: {text}") + "\n")
 
 
 @dataclass(frozen=True, slots=True)
 class CommandLine:
-    """The command as it was typed, so that what it proposes can be copied: with the same options.
+    """The command line as typed, so that a proposed command has the same options and can be copied.
 
-    `typed`: every word after `rmf-bridge`. `options`: those that another command needs to act on the
-    same graph.
+    `typed`: every word after `rmf-bridge`. `options`: what another command needs to act on the same
+    graph.
     """
 
     typed: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
 
     def again_with(self, option: str) -> str:
-        """The same command with one option more."""
+        """The same command with one more option."""
         return shlex.join(("rmf-bridge", *self.typed, option))
 
     def other(self, *command: str) -> str:
@@ -117,12 +142,12 @@ class Heard:
 
 
 class Inbox:
-    """Messages of several topics, in the order in which they came."""
+    """Messages of several topics, in order of arrival."""
 
     def __init__(
         self,
         transport: Transport,
-        *topics: Topic[Any],
+        *topics: AnyTopic,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._waiting: SimpleQueue[Heard] = SimpleQueue()
@@ -134,7 +159,7 @@ class Inbox:
         self._waiting.put(Heard(message, self._clock()))
 
     def listen(self, timeout_s: float) -> list[Heard]:
-        """Everything that has arrived, in order; waits for the first, `timeout_s` at the most."""
+        """Everything that has arrived, in order; waits up to `timeout_s` for the first."""
         heard = []
         try:
             heard.append(self._waiting.get(timeout=max(0.0, timeout_s)))

@@ -1,8 +1,8 @@
 """`rmf-bridge release LIFT`: an operator ends the session of whoever holds a lift.
 
-It is `send lift LIFT --end` under the name that an operator looks for: the holder's END, to the lift
-supervisor, until the lift shows that it has been obeyed. A robot that goes on asking gets the lift back
-after those who wait.
+It is `send lift LIFT --end` under the name that an operator looks for: it sends the holder's
+END_SESSION to the lift supervisor until the lift shows that the session is over. A robot that keeps
+requesting the lift goes to the end of the queue.
 """
 
 import argparse
@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The lift, and the options that every sender has."""
     parser.add_argument("name", metavar="LIFT", help="the lift, as RMF names it")
     parser.add_argument(
-        "--session", default="", metavar="ID", help="only this session (default: whoever has it)"
+        "--session", default="", metavar="ID", help="end only this session (default: any)"
     )
     parser.set_defaults(kind="lift", end=True, floor=None, granted_only=False)
     send.add_shared_arguments(parser, direct=True)

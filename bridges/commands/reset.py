@@ -2,11 +2,14 @@
 
 import argparse
 import os
-import signal
 import sys
 from pathlib import Path
 
 from bridges.serve import directory as runtime
+from bridges.serve.places import Places, act_as_owner
+from bridges.serve.signals import RESET
+
+EX_UNAVAILABLE = 69
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -16,12 +19,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when the daemon was told, 1 when none is running."""
-    directory = runtime.directory(args.file, args.runtime_dir)
-    pid = runtime.running_pid(directory)
-    if pid is None:
-        print(f"no daemon is running for {args.file} (looked in {directory})", file=sys.stderr)
+    """0 when the daemon was told, 1 when none runs, 69 if this user may not see or signal it."""
+    try:
+        places = runtime.find(args.file.absolute(), args.runtime_dir)
+        act_as_owner(places)
+        return _reset(args.file, places)
+    except (runtime.Unknown, PermissionError) as error:
+        print(error, file=sys.stderr)
+        return EX_UNAVAILABLE
+
+
+def _reset(file: Path, places: Places) -> int:
+    found = runtime.holder(places)
+    if found is None or not found.serves or found.pid <= 1:
+        why = f"{found}, which is not a daemon" if found else "no process holds it"
+        print(f"no daemon serves {file}: {places.runtime}: {why}", file=sys.stderr)
         return 1
-    os.kill(pid, signal.SIGUSR1)
-    print(f"reset sent; see {directory / runtime.STATUS} or the log for what remains")
+    try:
+        os.kill(found.pid, RESET)
+    except ProcessLookupError:
+        print(f"the daemon of {file} has just ended", file=sys.stderr)
+        return 1
+    print(f"reset sent; see {places.runtime / runtime.STATUS} or the log for what remains")
     return 0

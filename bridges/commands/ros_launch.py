@@ -1,15 +1,14 @@
 """What `ros2 launch rmf_bridges <kind>.launch.py config:=FILE` starts: the daemon, as a ROS node.
 
-As under systemd, a daemon that has died any death is followed by `rmf-bridge outputs-off`. The launch
-files stand in `ros/launch/`, one for each kind; imported by them alone, with ROS's `launch`.
+After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/serve/guard.py`). Only
+the launch files in `ros/launch/`, one for each kind, import this module; it needs ROS's `launch`.
 """
 
 from pathlib import Path
 from typing import Any
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, RegisterEventHandler
-from launch.event_handlers import OnProcessExit
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
@@ -19,7 +18,7 @@ __all__ = ["LaunchDescription", "daemon"]
 
 
 def daemon(kind: str) -> LaunchDescription:
-    """The launch description for one kind. A file of another kind, or a wrong one, starts nothing."""
+    """The launch description for one kind. A file of another kind, or with errors, starts nothing."""
     return LaunchDescription(
         [
             DeclareLaunchArgument("config", description=f"the YAML of the {kind}"),
@@ -37,16 +36,12 @@ def daemon(kind: str) -> LaunchDescription:
 def _actions(kind: str, context: Any) -> list[Any]:
     file = str(Path(LaunchConfiguration("config").perform(context)).absolute())
     simulate = LaunchConfiguration("simulate").perform(context) == "true"
-    has_outputs = _has_outputs(kind, file)
-    node = _rmf_bridge("run", file, *(["--simulate"] if simulate else []))
-    if simulate or not has_outputs:
-        return [node]
-    off = OnProcessExit(target_action=node, on_exit=[_rmf_bridge("outputs-off", file)])
-    return [node, RegisterEventHandler(off)]
+    _check(kind, file)
+    return [_rmf_bridge("run", file, *(["--simulate"] if simulate else []))]
 
 
-def _has_outputs(kind: str, file: str) -> bool:
-    """Whether the file stands for hardware. Raises RuntimeError for a file that cannot be served."""
+def _check(kind: str, file: str) -> None:
+    """Raises RuntimeError for a file that cannot be served."""
     try:
         config = load(file)
     except SettingsError as error:
@@ -55,7 +50,6 @@ def _has_outputs(kind: str, file: str) -> bool:
         raise RuntimeError(
             f"{file} is for a {config.kind}: ros2 launch rmf_bridges {config.kind}.launch.py"
         )
-    return bool(config.buses)
 
 
 def _rmf_bridge(*arguments: str) -> Any:

@@ -7,12 +7,12 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import msgspec
-
 from bridges import log
+from bridges.commands.graph import TRANSPORTS, overridden
 from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
+from bridges.serve import places, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
 
@@ -30,34 +30,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--expose", action="store_true", help="with --simulate: let the network see the fake device"
     )
-    parser.add_argument("--domain-id", type=int, metavar="N", help="instead of the YAML's")
+    parser.add_argument("--domain-id", type=int, metavar="N", help="overrides the YAML's domain_id")
+    parser.add_argument("--transport", choices=TRANSPORTS, help="overrides the YAML's transport")
     parser.add_argument(
-        "--runtime-dir", metavar="DIR", help="default: as systemd says, or the user's"
+        "--runtime-dir", metavar="DIR", help="default: systemd's, else one of the user's"
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Validate, claim, serve. 78 for a configuration that cannot be right."""
+    """Validate, claim, serve. Returns 78 for an invalid configuration."""
     log.start()
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: --simulate is refused where RMF_BRIDGE_SERVICE=1")
         return EX_USAGE
     if args.expose and not args.simulate:
-        logging.error("--expose goes with --simulate: a real device is on the network already")
+        logging.error("--expose needs --simulate: a real device is on the network anyway")
         return EX_USAGE
     try:
-        config = _overridden(load(args.file), args)
+        config = load(args.file)
+        config = replace(config, rmf=overridden(config.rmf, args))
     except SettingsError as error:
         for problem in error.problems:
             logging.error(str(problem))
         return EX_CONFIG
+    end = signals.End()  # before the lock names our pid, which others then signal
+    signals.ignore_reset()
     try:
-        held = runtime.RuntimeDirectory(runtime.directory(args.file, args.runtime_dir))
-    except (runtime.AlreadyRunning, OSError) as error:
+        held = _held(args)
+    except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
         logging.error(str(error))
         return EX_UNAVAILABLE
     try:
-        return _serve(config, held, args)
+        return _serve(config, held, end, args)
     except (TransportError, HalError) as error:
         logging.error(str(error))
         return EX_UNAVAILABLE
@@ -65,31 +69,49 @@ def run(args: argparse.Namespace) -> int:
         held.close()
 
 
-def _overridden(config: Config, args: argparse.Namespace) -> Config:
-    rmf = config.rmf
-    if args.domain_id is not None:
-        rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
-    return replace(config, rmf=rmf)
+def _held(args: argparse.Namespace) -> runtime.RuntimeDirectory:
+    """Our directories, locked. A simulation never takes a service's.
+
+    Raises AlreadyRunning, Unknown or PermissionError.
+    """
+    file = args.file.absolute()
+    if args.simulate:
+        found = places.as_told(args.runtime_dir) or places.by_hand(file)
+    else:
+        found = runtime.find(file, args.runtime_dir)
+    places.own(found)
+    return runtime.RuntimeDirectory(found, file, serves=True)
 
 
-def _serve(config: Config, held: runtime.RuntimeDirectory, args: argparse.Namespace) -> int:
+def _outputs_off(args: argparse.Namespace) -> list[str]:
+    """The command that switches off what this daemon may leave on."""
+    given = ["--runtime-dir", os.path.abspath(args.runtime_dir)] if args.runtime_dir else []
+    file = str(args.file.absolute())
+    return [sys.executable, "-m", "bridges.cli", "outputs-off", file, *given]
+
+
+def _serve(
+    config: Config, held: runtime.RuntimeDirectory, end: signals.End, args: argparse.Namespace
+) -> int:
     if command := ros_setup.sourcing(config.rmf, os.environ, sys.orig_argv):
         os.execvpe(command[0], command, ros_setup.sourced(config.rmf, os.environ))
     if not args.simulate:
         from bridges.serve.daemon import Daemon
 
-        os.chdir(held.path)  # lgpio leaves a FIFO where it is imported
-        return Daemon(config, held, ros_args=args.ros_args).serve()
+        outputs_off = _outputs_off(args)
+        places.work_somewhere(held.places)  # lgpio leaves a FIFO in the working directory
+        return Daemon(config, held, end, ros_args=args.ros_args, outputs_off=outputs_off).serve()
     from hal_fakes.simulate import Simulation
 
-    logging.warning("SIMULATED: no hardware moves, and nothing that RMF is told is true")
+    logging.warning("SIMULATED: no hardware moves, and RMF is told simulated states")
     simulation = Simulation(config, held.path)
-    from bridges.serve.daemon import Daemon  # the far sides start meanwhile
+    from bridges.serve.daemon import Daemon  # imported while the fakes start
 
     try:
         return Daemon(
             config,
             held,
+            end,
             open_bus=simulation.open_bus,
             localhost=not args.expose,
             simulated=True,

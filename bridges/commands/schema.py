@@ -1,4 +1,4 @@
-"""`rmf-bridge schema`: what may stand in a device YAML, for editors and for the documentation."""
+"""`rmf-bridge schema`: the schema of a device YAML, for editors and for the documentation."""
 
 import argparse
 import json
@@ -9,7 +9,7 @@ from bridges.settings import reference
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `schema`."""
     parser.add_argument(
-        "--markdown", action="store_true", help="as the page docs/configuration.md, not JSON Schema"
+        "--markdown", action="store_true", help="print docs/configuration.md, not JSON Schema"
     )
 
 

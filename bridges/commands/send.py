@@ -78,7 +78,7 @@ def _seconds(text: str) -> float:
     with suppress(ValueError):
         if 0 <= float(text) <= 86400:
             return float(text)
-    raise argparse.ArgumentTypeError(f"'{text}' is no number of seconds from 0 to 86400")
+    raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds from 0 to 86400")
 
 
 def _lift_arguments(parser: argparse.ArgumentParser) -> None:
@@ -88,7 +88,7 @@ def _lift_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--end",
         action="store_true",
-        help="end the session that --session names, else that of whoever holds the lift",
+        help="end the session that --session names (default: that of whoever holds the lift)",
     )
     parser.add_argument(
         "--granted-only", action="store_true", help="wait for the session, not for the car"
@@ -127,7 +127,7 @@ def _charger_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def request_of(args: argparse.Namespace) -> Request:
-    """What the command line asks for. A contradiction in it ends in exit code 2."""
+    """The request that the command line asks for. A contradiction in it ends with exit code 2."""
     match args.kind:
         case "lift":
             return _lift_request(args)
@@ -142,11 +142,11 @@ def request_of(args: argparse.Namespace) -> Request:
 
 def _lift_request(args: argparse.Namespace) -> Request:
     if args.end == (args.floor is not None):
-        args.usage("either a FLOOR, or --end")
+        args.usage("give either a FLOOR or --end")
     line = command_line(args)
     if args.end:
         if args.granted_only:
-            args.usage("--granted-only goes with a FLOOR")
+            args.usage("--granted-only needs a FLOOR")
         return LiftEnd(args.name, args.session, direct=args.direct, line=line)
     if not args.session:
         args.usage("whose session is it? --session FLEET/ROBOT, or any name")
@@ -178,7 +178,7 @@ def run(args: argparse.Namespace) -> int:
         complain("send", error)
         return 1
     except KeyboardInterrupt:
-        complain("send", "interrupted; the last request stands")
+        complain("send", "interrupted; the last request remains in effect")
         return 130
 
 
@@ -192,7 +192,7 @@ def send(transport: Transport, request: Request, timeout_s: float, out: TextIO) 
 
 
 class _Exchange:
-    """The clock, the wire and the screen around `exchange.step`."""
+    """Calls `exchange.step` with the clock, the transport and the terminal."""
 
     def __init__(
         self, transport: Transport, request: Request, timeout_s: float, out: TextIO
@@ -205,7 +205,7 @@ class _Exchange:
         self.described = ""
 
     def look(self) -> int | None:
-        """Take what was heard, and do what follows from it; an exit code when it is over."""
+        """Take what was heard and do the next step; returns an exit code at the end."""
         for heard in self.inbox.listen(LOOK_EVERY_S):
             self._take(heard)
         now = time.monotonic()

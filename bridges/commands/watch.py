@@ -1,7 +1,7 @@
 """`rmf-bridge watch`: the lifts, doors and chargers of the RMF graph, live, one row each.
 
-What the rows say is in `board.py`. On a terminal the table is redrawn in place; a pipe gets one line
-for each change. Ctrl-C is how one leaves it, so it exits 0.
+`board.py` makes the rows. On a terminal the table is redrawn in place; a pipe gets one line for each
+change. Ctrl-C is the normal end, so it exits 0.
 """
 
 import argparse
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=3.0,
         metavar="SECONDS",
-        help="listen for SECONDS (3), print the table and exit: 0, or 1 when nothing was heard",
+        help="listen for SECONDS (default 3), print the table, exit 0, or 1 if nothing was heard",
     )
 
 
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def listen_on(transport: Transport) -> Inbox:
-    """Everything that `watch` shows."""
+    """An inbox for every topic that `watch` shows."""
     return Inbox(
         transport,
         topics.LIFT_STATES,
@@ -69,14 +69,14 @@ def listen_on(transport: Transport) -> Inbox:
 
 
 def show_once(inbox: Inbox, seconds: float, out: TextIO) -> int:
-    """Listen for so long, print the table: 0, or 1 when nothing was heard."""
+    """Listen for `seconds` and print the table. Returns 0, or 1 if nothing was heard."""
     board, until = Board(), time.monotonic() + seconds
     while (left_s := until - time.monotonic()) > 0:
         for heard in inbox.listen(left_s):
             board.take(heard)
     rows = board.rows(time.monotonic(), time.time())
     if not rows:
-        complain("watch", "no lift, door or charger state heard: same domain, same network?")
+        complain("watch", "no lift, door or charger state heard: check the domain and network")
         return 1
     out.write("\n".join(table(rows)) + "\n")
     out.flush()
@@ -84,7 +84,7 @@ def show_once(inbox: Inbox, seconds: float, out: TextIO) -> int:
 
 
 def show(inbox: Inbox, out: TextIO, *, live: bool) -> None:
-    """Until interrupted."""
+    """Show the rows until interrupted."""
     board, rows, drawn = Board(), list[Row](), 0
     next_at = 0.0
     while True:

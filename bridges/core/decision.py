@@ -49,6 +49,11 @@ class IoFailed(msgspec.Struct, frozen=True):
     reason: str
 
 
+class Suspended(IoFailed, frozen=True):
+    """Nobody has read anything for a while: the process was stopped, or the machine slept. What was
+    believed is as stale as after a long time without a reading."""
+
+
 class WriteFailed(IoFailed, frozen=True):
     """The inputs were read, but not every output could be written. The next scan tries again."""
 
@@ -81,7 +86,8 @@ class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
 
     `outputs`: the whole set, to be written as it is. `wake_at`: decide again by then at the latest
     (monotonic seconds; `inf` when only an event can change anything). `refused`: why the event was
-    not obeyed, "" when it was. `publish`: messages beside the state, each to go out once.
+    not obeyed, as a short fixed kind to count by or as `kind: detail`; "" when it was. `publish`:
+    messages beside the state, each to go out once.
     """
 
     memory: M

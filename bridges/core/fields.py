@@ -28,7 +28,7 @@ Name = Annotated[
         min_length=1,
         max_length=128,
         pattern=r"^[^\x00-\x20\x7f-\x9f]([^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\x9f])?$(?!\n)",
-        extra={"pattern": "text without control characters, or spaces at its ends,"},
+        extra={"pattern": "text without control characters, or spaces at its ends"},
     ),
 ]
 """A name that RMF uses: any text, quoted in YAML where YAML would read something else."""
@@ -138,11 +138,17 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     """What every lift, door and charger has, whatever its driver.
 
     `bus`: the name of the bus that it stands on; not needed where the file has one.
+    `driver`: where it is reached otherwise than the file's others; the file's `driver` when absent.
     `accept_unsafe`: signal -> why its unsafe wiring is accepted; `check` prints it.
     """
 
     bus: Name | None = None
+    driver: Name | None = None
     accept_unsafe: dict[Name, Name] = msgspec.field(default_factory=dict)
+
+    def off_after(self) -> tuple[float, tuple[str, ...]] | None:
+        """After how long (s) without a command what it drives is off by itself, and the setting."""
+        return None
 
     def stale_after(self) -> float | None:
         """After how long (s) without a reading it is out of service; None where that is not a time."""

@@ -5,7 +5,7 @@ that it learns of from messages, with one core memory for each. `bridges/<kind>/
 `KIND`; `bridges/serve/graph.py` serves it.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Union
 
@@ -41,7 +41,9 @@ class GraphKind(Generic[S, L, M, E, R]):
     RequestRefused; `wall` is our clock (s since the epoch).
     `publishes`: what it sends. `sole`: those of them that one node alone may send; while another
     does, ours is passive.
-    `device_name`: which subject a message is about.
+    `device_name`: which subject a message is about. `shown_by`: the topic by which a subject shows
+    itself, None where all is about one; only requests speak of what is made up. `reserved(settings)`:
+    the subjects that the YAML names.
     `quiet_s(settings)`: how long it listens, alone, before it speaks.
     `limits(settings)`: what the core is to know of them.
     `initial(subject, started_at)`: a subject's memory; `started_at` is the daemon's start.
@@ -81,6 +83,8 @@ class GraphKind(Generic[S, L, M, E, R]):
     warnings: Callable[[S], Iterable[tuple[tuple[str, ...], str]]] | None = None
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
     speaks_of: Callable[[S], Iterable[Place]] = lambda settings: ()
+    shown_by: Topic[Message] | None = None
+    reserved: Callable[[S], Collection[str]] = lambda settings: ()
 
 
 AnyGraphKind = GraphKind[Any, Any, Any, Any, Any]

@@ -28,12 +28,14 @@ from bridges.core.decision import (
     IoFailed,
     RivalSeen,
     Sampled,
+    Suspended,
     WriteFailed,
 )
 from bridges.core.durations import NEVER, RIVAL_QUIET_S
 from bridges.door.memory import (
     DoorLimits,
     Memory,
+    Senses,
     opening_ends_at,
     rivalled,
     too_long_at,
@@ -73,6 +75,8 @@ def _hear(memory: Memory, event: Event, now: float, limits: DoorLimits) -> tuple
         case Sampled(sample):
             senses = take(memory.senses, sample, now, limits)
             return replace(memory, senses=senses, io_failure=""), ""
+        case Suspended(reason):
+            return replace(memory, senses=Senses(), io_failure=reason), ""
         case WriteFailed(reason):
             senses = replace(memory.senses, linked_since=None)
             return replace(memory, senses=senses, io_failure=reason), ""

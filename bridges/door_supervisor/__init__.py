@@ -38,6 +38,8 @@ KIND: GraphKind[
     stamped=messages.stamped,
     summary=messages.summary,
     idle=core.idle,
+    shown_by=DOOR_STATES,
+    reserved=lambda settings: settings.doors or (),
     together=report.heartbeat,
     persist=keep.persist,
     restore=keep.restore,

@@ -21,7 +21,7 @@ from bridges.rmf.definitions import (
     SupervisorHeartbeat,
     Time,
 )
-from bridges.rmf.topics import DOOR_SUPERVISOR_HEARTBEAT, Topic
+from bridges.rmf.topics import DOOR_SUPERVISOR_HEARTBEAT, AnyTopic
 
 
 class DoorHoldReport(msgspec.Struct, frozen=True):
@@ -58,7 +58,7 @@ def _faults(memory: Memory, now: float, limits: Limits) -> Iterator[Fault]:
         yield Fault("DOOR_SILENT", "no DoorState comes")
 
 
-def heartbeat(memories: Mapping[str, Memory]) -> tuple[Topic[Any], SupervisorHeartbeat]:
+def heartbeat(memories: Mapping[str, Memory]) -> tuple[AnyTopic, SupervisorHeartbeat]:
     """All doors that somebody holds, and by whom, in the order of names."""
     doors = tuple(
         DoorSessions(name, tuple(map(_session, by_name(memory))))

@@ -9,7 +9,8 @@ from bridges.core.kind import Place
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the door supervisor may decide by itself: nothing but when to complain.
 
-    `doors`: the doors that it serves; every door that it hears of when absent, as RMF's own does.
+    `doors`: the doors that it serves, whatever names anybody makes up; every door that it hears of when
+    absent, as RMF's own does.
     `quiet_start_s`: how long it only listens, so that a restart closes nothing.
     `open_alarm_s`: a fault is shown when one requester has held a door open for so long. The door
     stays open: its robot may stand in the doorway.

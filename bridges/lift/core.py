@@ -32,13 +32,14 @@ from bridges.core.decision import (
     OperatorReset,
     RivalSeen,
     Sampled,
+    Suspended,
     WriteFailed,
 )
 from bridges.core.durations import NEVER, RIVAL_QUIET_S
 from bridges.lift import drive
 from bridges.lift.memory import Grace, LiftLimits, Memory, Session
-from bridges.lift.report import LiftReport, report
-from bridges.lift.sensing import HAZARDS, View, gap, look, take, trust
+from bridges.lift.report import NOT_FRESH, LiftReport, report
+from bridges.lift.sensing import HAZARDS, View, gap, look, take, trust, unsure
 from bridges.lift.signals import Event, Hazard, LiftOutputs, LiftSample, Requested
 from bridges.rmf.definitions import Bool, EmergencySignal, Message
 from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
@@ -98,7 +99,7 @@ def obstacles(memory: Memory, view: View, now: float, limits: LiftLimits) -> tup
     if memory.rival_at is not None:
         found.append(Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes this lift's states"))
     if not view.fresh:
-        found.append(Fault("INPUTS_NOT_FRESH", memory.io_fault or view.blind))
+        found.append(Fault(NOT_FRESH, memory.io_fault or view.blind))
     if now >= _unwritten_at(memory, limits):
         found.append(Fault("OUTPUTS_NOT_WRITTEN", memory.io_fault))
     return tuple(found)
@@ -117,7 +118,7 @@ def _drive(
     session, grace, relays = memory.session, memory.grace, memory.relays
     outputs = LiftOutputs()
     if session and drive.serves(session, allowed, now, limits):
-        session = drive.advance(session, view, bool(relays.agv.on), now, limits)
+        session = drive.advance(session, view, relays, now, limits)
         outputs = drive.wanted(session, view, now, limits)
     elif session:
         session = drive.paused(session)
@@ -135,6 +136,8 @@ def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple
     match event:
         case Sampled(sample):
             return _read(memory, sample, now, limits), ""
+        case Suspended(reason):
+            return replace(memory, senses=unsure(memory.senses, now), io_fault=reason), ""
         case WriteFailed(reason):
             since = now if memory.unwritten_since is None else memory.unwritten_since
             return replace(memory, io_fault=reason, unwritten_since=since, write_failed=True), ""
@@ -163,12 +166,12 @@ def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) ->
 def _ask(memory: Memory, request: Requested, now: float, limits: LiftLimits) -> tuple[Memory, str]:
     held, grace = memory.session, memory.grace
     if held and held.id != request.session_id:
-        return memory, f"held by {held.id}"
+        return memory, f"held by another session: {held.id}"
     if held:
         return replace(memory, session=_refresh(held, request, now)), ""
     if grace and now < grace.until:
         if grace.session.id != request.session_id:
-            return memory, f"released by {grace.session.id} a moment ago"
+            return memory, f"released a moment ago: by {grace.session.id}"
         return replace(memory, session=_grant(request, now, grace.session.boarded), grace=None), ""
     why_not = obstacles(memory, look(memory.senses, now, limits), now, limits)
     if why_not:
@@ -192,7 +195,7 @@ def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tup
     if held is None:
         return memory, ""
     if held.id != session_id:
-        return memory, f"held by {held.id}"
+        return memory, f"held by another session: {held.id}"
     grace = None
     if memory.relays.agv.on or held.boarded:
         grace = Grace(held, now + limits.t.release_grace_s)
@@ -242,6 +245,8 @@ def _alarms(
 def _faults(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
     session = memory.session
     found = [*obstacles(memory, view, now, limits)]
+    if view.settling and not memory.io_fault:
+        found = [fault for fault in found if fault.code != NOT_FRESH]
     if session and session.fault:
         found.append(session.fault)
     if Hazard.OVERLOAD in view.hazards:

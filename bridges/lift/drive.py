@@ -6,15 +6,17 @@ Rules:
   In the grace after END, AGV mode and the door's hold stay on if they were on; the hold ends
   `dead_time_s` before AGV mode.
 - AGV mode comes first, then the call to the destination, then, once the car stands there, the door.
-- A call is given only in AGV mode, away from the destination, and without overload. A door command
-  is given only while the car stands at the destination's landing. The two are never on together, and
-  neither comes on within `dead_time_s` of the last one.
+  Where AGV mode is the result of a call (`by_call`), the call comes first, also where the car stands.
+- A call is given only in AGV mode (but for `by_call`), away from the destination, and without
+  overload. A door command is given only in AGV mode, while the car stands at the destination's
+  landing. The two are never on together, and neither comes on within `dead_time_s` of the last one.
 - A call is held until the car stands at its destination, or pulsed. It is given again after every
   interruption, and when the car had arrived and is seen at another floor. While the floor code is
   just changing no new call is given: the car may be there.
 - AGV mode, the floor and the open door are each waited for with a timeout. After it the outputs go
   off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches.
-  AGV mode that ends during the ride is such a fault too. An overload stops the waiting time.
+  AGV mode that ends during the ride is such a fault too; with `by_call` it may end between two
+  destinations, when neither a call nor the hold is on. An overload stops the waiting time.
 - Switching off is immediate. Switching on waits for `min_off_s` and for the relay's cycles of the
   last minute (`Channel` in `memory.py`).
 """
@@ -57,17 +59,18 @@ def paused(session: Session) -> Session:
 
 
 def advance(
-    session: Session, view: View, requested: bool, now: float, limits: LiftLimits
+    session: Session, view: View, relays: Relays, now: float, limits: LiftLimits
 ) -> Session:
     """The session's progress after what is seen: arrivals, waits and retries.
 
-    `requested`: our AGV request was on until now.
+    `relays`: as they were until now.
     """
     if session.retry_at is not None:
         if now < session.retry_at:
             return session
         session = replace(session, retry_at=None)
-    if session.agv_seen and not agv_ok(view):
+    requested = _requested(session, relays, limits)
+    if requested and session.agv_seen and not agv_ok(view):
         return _trip(session, Fault("AGV_MODE_LOST", "AGV mode ended during the ride"), now)
     session = replace(session, agv_seen=requested and view.agv is True)
     session = _arrive(session, view, limits)
@@ -87,10 +90,10 @@ def wanted(session: Session, view: View, now: float, limits: LiftLimits) -> Lift
     """The outputs for a session that is served."""
     if session.retry_at is not None:
         return LiftOutputs()
-    if not agv_ok(view):
+    if not (agv_ok(view) or limits.by_call):
         return LiftOutputs(agv_request=True)
     stop = limits.stops[session.destination]
-    if at_destination(session, view, limits):
+    if agv_ok(view) and at_destination(session, view, limits):
         return LiftOutputs(agv_request=True, hold_door=stop.side)
     may_call = not session.arrived and now < _pulse_ends_at(session, limits)
     is_new_call = session.call_at is None
@@ -124,8 +127,20 @@ def next_at(session: Session, limits: LiftLimits) -> tuple[float, ...]:
     )
 
 
+def _requested(session: Session, relays: Relays, limits: LiftLimits) -> bool:
+    """Has anything of ours asked for AGV mode until now?"""
+    if limits.by_call:
+        return session.call_at is not None or relays.hold.on is not None
+    return bool(relays.agv.on)
+
+
 def _arrive(session: Session, view: View, limits: LiftLimits) -> Session:
-    """Standing at the destination ends the call. A car that then is seen elsewhere is called again."""
+    """Standing at the destination ends the call. A car that then is seen elsewhere is called again.
+
+    A call that has yet to bring AGV mode is not ended by a car that stands there already.
+    """
+    if limits.by_call and not agv_ok(view):
+        return replace(session, arrived=False)
     if at_destination(session, view, limits):
         return replace(session, arrived=True)
     elsewhere = view.level not in (None, limits.stops[session.destination].level)

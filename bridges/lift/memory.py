@@ -22,7 +22,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """A lift's fixed facts as its core needs them.
 
     `stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations.
-    `debounce`: s by signal.
+    `debounce`: s by signal. `by_call`: AGV mode is the result of a call.
     """
 
     stops: Mapping[str, Stop]
@@ -30,11 +30,19 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     debounce: Mapping[str, float] = {}
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
+    by_call: bool = False
 
     @classmethod
     def of(cls, settings: LiftSettings, debounce: Mapping[str, float]) -> "LiftLimits":
         """From the YAML and the wiring's debounce (s) by signal."""
-        return cls(settings.stops(), settings.limits, debounce, settings.fire_reset, settings.alarm)
+        return cls(
+            settings.stops(),
+            settings.limits,
+            debounce,
+            settings.fire_reset,
+            settings.alarm,
+            by_call=settings.agv_mode == "by_call",
+        )
 
     def debounce_s(self, signal: str) -> float:
         """How long a change of this signal must last."""

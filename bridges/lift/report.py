@@ -10,8 +10,9 @@ from bridges.lift.sensing import View
 from bridges.lift.signals import Hazard, LiftOutputs, Motion
 from bridges.rmf.definitions import LiftDoor, LiftMode, LiftMotion
 
-OFFLINE = frozenset({"INPUTS_NOT_FRESH", "OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})
-"""With one of these faults the lift is shown OFFLINE."""
+NOT_FRESH = "INPUTS_NOT_FRESH"
+OFFLINE = frozenset({"OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})
+"""With one of these faults, or without inputs to believe, the lift is shown OFFLINE."""
 
 
 class LiftReport(msgspec.Struct, frozen=True):
@@ -94,7 +95,7 @@ def _mode(view: View, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:
     codes = {fault.code for fault in faults}
     if codes & {"FIRE", "FIRE_LATCHED"}:
         return LiftMode.MODE_FIRE
-    if codes & OFFLINE:
+    if codes & OFFLINE or not view.fresh:
         return LiftMode.MODE_OFFLINE
     if view.hazards & {Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY}:
         return LiftMode.MODE_EMERGENCY

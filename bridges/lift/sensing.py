@@ -3,7 +3,8 @@
 Rules:
 - A change counts when it has lasted for its signal's debounce. The end of a hazard counts when it has
   lasted for `hazard_clear_s`. No input is believed before every input has settled once, nor while
-  one of them keeps changing for longer than `RESTLESS_S`.
+  one of them keeps changing for longer than `RESTLESS_S`. That they settle for the first time is no
+  fault.
 - After `stale_after_s` without a reading, what was believed is forgotten: the lift may be anywhere.
   A shorter gap changes nothing, but the debounce of a change that had begun starts again.
 - A floor code is believed only if the car can have come to that floor. It cannot if the code skips
@@ -50,12 +51,14 @@ class DoorSeen(msgspec.Struct, frozen=True):
 class View(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
-    `blind`: why no input can be believed, "" when all are fresh. `level`: the landing, None when
+    `blind`: why no input can be believed, "" when all are fresh; `settling`: only because they are
+    read for the first time. `level`: the landing, None when
     unknown; `level_settles`: the code is just changing. `agv`: None where not wired. `changes_at`:
     when the view may change without a new reading (s).
     """
 
     blind: str
+    settling: bool
     level: str | None
     level_settles: bool
     stopped: bool
@@ -82,7 +85,7 @@ class View(msgspec.Struct, frozen=True):
 def take(senses: Senses, sample: LiftSample, now: float, limits: LiftLimits) -> Senses:
     """Add one reading."""
     if now >= stale_at(senses, limits):
-        senses = Senses(position=replace(senses.position, moved_at=now))
+        senses = unsure(senses, now)
     hold = limits.debounce_s
     code = settle(senses.code, (sample.level, sample.code_fault), now, hold("floor"))
     return Senses(
@@ -115,6 +118,11 @@ def gap(senses: Senses, now: float) -> Senses:
     )
 
 
+def unsure(senses: Senses, now: float) -> Senses:
+    """After a long time without a reading: nothing is believed but where the car was."""
+    return Senses(position=replace(senses.position, moved_at=now))
+
+
 def trust(senses: Senses) -> Senses:
     """An operator says that the floor code is right."""
     position = senses.position
@@ -138,6 +146,7 @@ def look(senses: Senses, now: float, limits: LiftLimits) -> View:
         due += [wait.due_at, wait.torn_at]
     return View(
         blind=_blind(senses, unsettled, now, limits),
+        settling=_settling(unsettled, now),
         level=code[0] if code and code[0] == senses.position.trusted else None,
         level_settles=senses.code is not None and senses.code.candidate != senses.code.value,
         stopped=_stands(senses.motion),
@@ -225,7 +234,7 @@ def _door(seen: Settled[Door | None] | None, now: float, limits: LiftLimits) -> 
 
 
 class Unsettled(msgspec.Struct, frozen=True):
-    """An input that is changing or has never settled.
+    """An input that is changing or has never settled (`new`).
 
     `due_at`: when it settles if it does not change again. `torn_at`: when it counts as restless. In s.
     """
@@ -233,6 +242,7 @@ class Unsettled(msgspec.Struct, frozen=True):
     name: str
     due_at: float
     torn_at: float
+    new: bool = False
 
 
 def _unsettled(senses: Senses, limits: LiftLimits) -> Iterator[Unsettled]:
@@ -255,9 +265,10 @@ def _unsettled(senses: Senses, limits: LiftLimits) -> Iterator[Unsettled]:
 
 
 def _wait(name: str, seen: Settled[Any] | None, hold_s: float, most_s: float) -> Unsettled:
-    if seen is None or seen.steady_at is None or seen.torn_since is None:
-        return Unsettled(name, seen.due_at(hold_s) if seen else AGES_AGO, AGES_AGO)
-    return Unsettled(name, seen.due_at(hold_s), seen.torn_since + most_s + RESTLESS_S)
+    if seen is None or seen.torn_since is None:
+        return Unsettled(name, AGES_AGO, AGES_AGO)
+    torn_at = seen.torn_since + most_s + RESTLESS_S
+    return Unsettled(name, seen.due_at(hold_s), torn_at, new=seen.steady_at is None)
 
 
 def _blind(senses: Senses, unsettled: Sequence[Unsettled], now: float, limits: LiftLimits) -> str:
@@ -265,8 +276,14 @@ def _blind(senses: Senses, unsettled: Sequence[Unsettled], now: float, limits: L
         return "not read yet"
     if now >= stale_at(senses, limits):
         return f"no reading for {limits.t.stale_after_s:g} s"
-    torn = [wait.name for wait in unsettled if now >= wait.torn_at]
+    torn = [wait.name for wait in unsettled if wait.new or now >= wait.torn_at]
     return f"not steady: {', '.join(torn)}" if torn else ""
+
+
+def _settling(unsettled: Sequence[Unsettled], now: float) -> bool:
+    """Is each input read for the first time, and has had no time to settle?"""
+    first = any(wait.new for wait in unsettled)
+    return first and not any(now >= wait.torn_at for wait in unsettled)
 
 
 def _faults(senses: Senses) -> tuple[Fault, ...]:
@@ -281,6 +298,8 @@ def _faults(senses: Senses) -> tuple[Fault, ...]:
     for name, seen in zip(("door", "rear door"), senses.doors, strict=True):
         if seen and seen.value is Door.BOTH:
             found.append(Fault("DOOR_CONTACTS_CONTRADICT", f"{name} reads open and closed"))
+        if seen and seen.value is Door.UNKNOWN:
+            found.append(Fault("DOOR_CODE_ILLEGAL", f"the {name}'s number means nothing"))
     if senses.motion and senses.motion.value is Motion.CONTRADICTORY:
         found.append(Fault("MOTION_CONTRADICTORY", "the motion lines cannot all be true"))
     return tuple(found)

@@ -61,6 +61,8 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
 
     `floors`: as RMF's map names them, from the lowest up; a mapping where a floor has another name
     than its landing, or `side: rear`.
+    `agv_mode`: how it comes: `requested` by an output that is held, or `by_call`: a call brings it,
+    and it stays while the call is served and the door is held.
     `limits`: durations and counts, where the defaults do not suit.
     `fire_reset`: whether the lift is RMF's again when the alarm clears (`auto`), or only after
     `rmf-bridge reset` (`manual`).
@@ -68,6 +70,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     """
 
     floors: list[Name] | dict[Name, Floor]
+    agv_mode: Literal["requested", "by_call"] = "requested"
     limits: Durations = Durations()
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
@@ -87,3 +90,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
         if isinstance(self.floors, list):
             return {name: Stop(name) for name in self.floors}
         return {name: Stop(f.level or name, f.side) for name, f in self.floors.items()}
+
+    def levels(self) -> list[str]:
+        """The landings, from the lowest up."""
+        return list(dict.fromkeys(stop.level for stop in self.stops().values()))

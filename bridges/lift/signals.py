@@ -11,7 +11,8 @@ class Door(Enum):
     """What the door contacts say at one instant.
 
     With two contacts: OPEN, CLOSED, BETWEEN (neither) or BOTH (a fault). With one that proves open:
-    OPEN or NOT_OPEN. With one that proves closed: CLOSED or NOT_CLOSED.
+    OPEN or NOT_OPEN. With one that proves closed: CLOSED or NOT_CLOSED. Where the door is a number,
+    one that means nothing is UNKNOWN (a fault).
     """
 
     OPEN = "open"
@@ -20,6 +21,7 @@ class Door(Enum):
     BOTH = "both"
     NOT_OPEN = "not open"
     NOT_CLOSED = "not closed"
+    UNKNOWN = "unknown"
 
 
 class Motion(Enum):

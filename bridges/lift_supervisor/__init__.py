@@ -34,4 +34,6 @@ KIND: GraphKind[
     summary=messages.summary,
     idle=core.idle,
     speaks_of=speaks_of,
+    shown_by=LIFT_STATES,
+    reserved=lambda settings: settings.lifts or (),
 )

@@ -54,10 +54,13 @@ def initial(lift: str, started_at: float) -> Memory:
 def idle(memory: Memory, now: float) -> bool:
     """Nobody wants this lift, and nothing has been heard of it in a while.
 
-    A session that is still to be ended is found again in the lift's states, if they come back.
+    A session that is still to be ended is found again in the lift's states, if they come back. Who
+    only waits for a lift that has been silent for long asks again when it is back.
     """
     heard_at = max(memory.heard_at, memory.shown_at)
-    return not memory.claims and now >= heard_at + FORGOTTEN_S
+    has_it = memory.session_shown or (memory.turn and memory.turn.seen)
+    long_s = NEVER if has_it else 10 * FORGOTTEN_S
+    return now >= heard_at + (long_s if memory.claims else FORGOTTEN_S)
 
 
 def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
@@ -68,7 +71,7 @@ def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
     message = wanted(memory)
     due = now >= _due_at(memory, message)
     if due:
-        memory = replace(memory, sent=message, sent_at=now, prompted=False)
+        memory = replace(memory, sent=message, last_sent=message, sent_at=now, prompted=False)
     may_come = tuple(alarms(memory, now, limits))
     return Decision(
         memory,
@@ -267,7 +270,8 @@ def _due_at(memory: Memory, message: LiftRequest | None) -> float:
     if message is None:
         return NEVER
     new = memory.sent is None or (message != memory.sent and message.request_type != END)
-    return due_at(memory.sent_at, new=new, again=memory.prompted)
+    said = memory.sent is None and message == memory.last_sent  # in another turn, the same words
+    return due_at(memory.sent_at, new=new and not said, again=memory.prompted or said)
 
 
 def _wake_at(memory: Memory, due: list[float], now: float, limits: Limits) -> float:

@@ -62,7 +62,7 @@ class Memory(msgspec.Struct, frozen=True):
     `claims`: in the order of first requests, the holder's among them. `heard_at`: when an adapter was
     last heard; `requesters`: what of each. `shown`: the latest state, which came at `shown_at`;
     `session_since`: since when its session is shown; `flowing_since`: since when states come without
-    a gap. `sent`: the last request of this turn; `prompted`: it is worth repeating.
+    a gap. `sent`: the last request of this turn, `last_sent` of any; `prompted`: it is worth repeating.
     """
 
     lift: str
@@ -77,6 +77,7 @@ class Memory(msgspec.Struct, frozen=True):
     heard_at: float = AGES_AGO
     requesters: Requesters = {}
     sent: LiftRequest | None = None
+    last_sent: LiftRequest | None = None
     sent_at: float = AGES_AGO
     prompted: bool = False
 

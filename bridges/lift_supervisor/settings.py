@@ -9,7 +9,8 @@ from bridges.core.kind import Place
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the lift supervisor may decide by itself.
 
-    `lifts`: the lifts that it serves; every lift that it hears of when absent, as RMF's own does.
+    `lifts`: the lifts that it serves, whatever names anybody makes up; every lift that it hears of when
+    absent, as RMF's own does.
     `quiet_start_s`: how long it only listens, so that a restart ends no ride; and how long a session
     must be shown by a lift, with nobody asking for it, before it is ended.
     `silent_after_s`: a requester without the lift that has been silent for so long has gone; fleet

@@ -11,13 +11,16 @@ The steps for each type are made once, from the annotations in `definitions.py`.
 import struct
 import typing
 from collections.abc import Callable
-from dataclasses import fields
 from functools import cache
 from typing import Any, TypeVar
 
+from bridges.rmf.definitions import field_types
+
 T = TypeVar("T")
-Put = Callable[[bytearray, Any], None]
-Get = Callable[[bytes, int], tuple[Any, int]]
+Value = Any
+"""A field's value: a number, a text, a truth, a tuple of them, or a struct of `definitions.py`."""
+Put = Callable[[bytearray, Value], None]
+Get = Callable[[bytes, int], tuple[Value, int]]
 
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 BIG_ENDIAN = b"\x00\x00\x00\x00"
@@ -30,19 +33,18 @@ class CdrError(ValueError):
     """These bytes are not a message of this type, or this message cannot be put into bytes."""
 
 
-def encode(message_type: type, message: Any) -> bytes:
+def encode(message_type: type, message: object) -> bytes:
     """The message as little endian CDR with its header.
 
     What no string on the wire can hold (a NUL, half a surrogate pair) goes out as `?`: an odd text
     from a device must not silence the state that carries it. Raises CdrError for a number out of
     range, or a value of another type.
     """
-    kind: Any = message_type
     out = bytearray(LITTLE_ENDIAN)
     try:
-        _put(kind)(out, message)
+        _put(message_type)(out, message)
     except (struct.error, OverflowError, TypeError, AttributeError, ValueError) as error:
-        raise CdrError(f"{message!r} cannot be sent as {kind.__name__}: {error}") from error
+        raise CdrError(f"{message!r} cannot be sent as {message_type.__name__}: {error}") from error
     return bytes(out)
 
 
@@ -51,33 +53,28 @@ def decode(message_type: type[T], sample: bytes) -> T:
 
     Up to three bytes may follow the last field: RTPS pads payloads to a multiple of four.
     """
-    kind: Any = message_type
     order = _ORDERS.get(sample[:2])
     if order is None:
         raise CdrError(f"not plain CDR: the sample begins with {sample[:4].hex(' ') or 'nothing'}")
     try:
-        message, end = _get(kind, order)(sample, 4)
+        message, end = _get(typing.cast(type, message_type), order)(sample, 4)
     except (struct.error, IndexError) as error:
         raise CdrError(f"cut short: {error}") from error
     except UnicodeDecodeError as error:
         raise CdrError(f"a string is not UTF-8: {error}") from error
     if not 0 <= len(sample) - end <= 3:
-        raise CdrError(f"{len(sample)} bytes, where {kind.__name__} takes {end}")
+        raise CdrError(f"{len(sample)} bytes, where {message_type.__name__} takes {end}")
     return typing.cast(T, message)
 
 
 _ORDERS = {LITTLE_ENDIAN[:2]: "<", BIG_ENDIAN[:2]: ">"}
 
 
-def _members(kind: Any) -> list[tuple[str, Any]]:
-    return [(field.name, field.type) for field in fields(kind)]
-
-
 @cache
-def _put(kind: Any) -> Put:
+def _put(kind: type) -> Put:
     """How a value of this type is appended."""
     if typing.get_origin(kind) is typing.Annotated:
-        name = kind.__metadata__[0]
+        name = typing.get_args(kind)[1]
         return _put_byte if name in BYTES else _putting_number(CODES[name])
     if kind is str:
         return _put_text
@@ -85,7 +82,7 @@ def _put(kind: Any) -> Put:
         return _put_bool
     if typing.get_origin(kind) is tuple:
         return _putting_sequence(_put(typing.get_args(kind)[0]))
-    return _putting_struct([(name, _put(member)) for name, member in _members(kind)])
+    return _putting_struct([(name, _put(member)) for name, member in field_types(kind).items()])
 
 
 def _put_byte(out: bytearray, value: int) -> None:
@@ -120,7 +117,7 @@ def _put_text(out: bytearray, value: str) -> None:
 
 
 def _putting_sequence(put_element: Put) -> Put:
-    def put(out: bytearray, value: tuple[Any, ...]) -> None:
+    def put(out: bytearray, value: tuple[Value, ...]) -> None:
         _put_length(out, len(value))
         for element in value:
             put_element(out, element)
@@ -129,7 +126,7 @@ def _putting_sequence(put_element: Put) -> Put:
 
 
 def _putting_struct(members: list[tuple[str, Put]]) -> Put:
-    def put(out: bytearray, value: Any) -> None:
+    def put(out: bytearray, value: object) -> None:
         for name, put_member in members:
             put_member(out, getattr(value, name))
 
@@ -137,10 +134,10 @@ def _putting_struct(members: list[tuple[str, Put]]) -> Put:
 
 
 @cache
-def _get(kind: Any, order: str) -> Get:
+def _get(kind: type, order: str) -> Get:
     """How a value of this type is read at a position: the value, and where the next one begins."""
     if typing.get_origin(kind) is typing.Annotated:
-        name = kind.__metadata__[0]
+        name = typing.get_args(kind)[1]
         return _get_byte if name in BYTES else _getting_number(order + CODES[name])
     if kind is str:
         return _getting_text(order)
@@ -148,7 +145,7 @@ def _get(kind: Any, order: str) -> Get:
         return _get_bool
     if typing.get_origin(kind) is tuple:
         return _getting_sequence(_get(typing.get_args(kind)[0], order), order)
-    return _getting_struct(kind, [_get(member, order) for _, member in _members(kind)])
+    return _getting_struct(kind, [_get(member, order) for member in field_types(kind).values()])
 
 
 def _get_byte(sample: bytes, at: int) -> tuple[int, int]:
@@ -188,7 +185,7 @@ def _getting_text(order: str) -> Get:
 def _getting_sequence(get_element: Get, order: str) -> Get:
     get_length = _getting_number(order + "I")
 
-    def get(sample: bytes, at: int) -> tuple[tuple[Any, ...], int]:
+    def get(sample: bytes, at: int) -> tuple[tuple[Value, ...], int]:
         length, at = get_length(sample, at)
         if length > len(sample) - at:  # each element takes a byte at least
             raise CdrError(f"a sequence of {length} in {len(sample)} bytes")
@@ -202,7 +199,7 @@ def _getting_sequence(get_element: Get, order: str) -> Get:
 
 
 def _getting_struct(kind: type, members: list[Get]) -> Get:
-    def get(sample: bytes, at: int) -> tuple[Any, int]:
+    def get(sample: bytes, at: int) -> tuple[object, int]:
         values = []
         for get_member in members:
             value, at = get_member(sample, at)

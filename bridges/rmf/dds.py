@@ -5,12 +5,12 @@ Names, types and QoS are those that rmw_cyclonedds and rmw_fastrtps use: topic `
 
 One thread reads for all subscriptions. Whatever arrives, it goes on: a sample that is not a message
 is dropped, counted, and logged once for its topic. (Cyclone's C library refuses samples that do not
-fit the type before they come here, and says so on stderr.) A thread that has died all the same
-shows at the next publish.
+fit the type before they come here, and says so on stderr.) When reading itself fails, it joins anew.
 
 cyclonedds is imported here, in dds_ends.py, idl.py and graph.py, and these only by choose.py.
 """
 
+import ctypes
 import logging
 import math
 import os
@@ -18,19 +18,20 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 from weakref import WeakValueDictionary
 
 from cyclonedds import core
 from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.internal import dds_infinity
+from cyclonedds.internal import DDS, dds_infinity
+from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.log import pairs
-from bridges.rmf import network
-from bridges.rmf.dds_ends import DdsPublisher, DdsSubscription
+from bridges.rmf import network, notices
+from bridges.rmf.dds_ends import AnyPublisher, AnySubscription, DdsPublisher, DdsSubscription
 from bridges.rmf.definitions import Message
 from bridges.rmf.graph import NodeOnGraph
 from bridges.rmf.idl import sample_type
@@ -41,6 +42,7 @@ from bridges.rmf.transport import TransportError
 log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=Message)
+E = TypeVar("E", bound=core.Entity)
 
 CANNOT_JOIN: Final = (
     "is a network interface up, and does CYCLONEDDS_URI, if set, name one that exists? "
@@ -50,8 +52,11 @@ LOOK_EVERY_S: Final = 1.0
 LOOK_EVERY_NS: Final = 1_000_000_000
 """How often to look whether the network has changed."""
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
+ERRORS: Final = 1 | 2
+"""Cyclone's fatal errors and errors. Its warnings are a line for each malformed datagram, which anybody
+can send; its binding has no call for the mask, and its configuration does not reach them."""
 
-_domains: WeakValueDictionary[tuple[int, str], Any] = WeakValueDictionary()
+_domains: WeakValueDictionary[tuple[int, str], Domain] = WeakValueDictionary()
 _domains_lock = threading.Lock()
 
 
@@ -68,10 +73,11 @@ class DdsTransport:
         self.dropped: dict[str, int] = {}
         self._lock = threading.Lock()
         self._closed = False
-        self._entities: list[Any] = []
-        self._topics: dict[str, Any] = {}
-        self._ends: tuple[DdsPublisher[Any] | DdsSubscription[Any], ...] = ()
-        self._subscriptions: tuple[DdsSubscription[Any], ...] = ()
+        self._failed = False
+        self._entities: list[core.Entity] = []
+        self._topics: dict[str, DdsTopic] = {}
+        self._ends: tuple[AnyPublisher | AnySubscription, ...] = ()
+        self._subscriptions: tuple[AnySubscription, ...] = ()
         self._domain_id = domain_id
         self._loopback = loopback
         self._stop = threading.Event()
@@ -108,6 +114,11 @@ class DdsTransport:
             self._subscriptions += (subscription,)
         return subscription
 
+    @property
+    def lives(self) -> bool:
+        """Its thread reads; a network that is gone is another matter."""
+        return not self._closed and self._thread.is_alive()
+
     def wall(self) -> float:
         """The wall clock (s since the epoch)."""
         return time.time()
@@ -141,7 +152,7 @@ class DdsTransport:
     def _follow_network(self) -> None:
         """Join anew when the addresses are others than those with which we joined."""
         now = time.monotonic()
-        if self._loopback or now < self._look_at:
+        if now < self._look_at or (self._loopback and self._joined):
             return
         self._look_at = now + LOOK_EVERY_S
         found = network.addresses()
@@ -168,14 +179,14 @@ class DdsTransport:
                 if was_joined:
                     log.warning(pairs("not_joined", node=self.name, reason=error))
 
-    def _topic(self, topic: Topic[M]) -> Any:
+    def _topic(self, topic: Topic[M]) -> DdsTopic:
         name = f"rt/{topic.name}"
         if name not in self._topics:
             kind = sample_type(topic.type)
             self._topics[name] = self._keep(DdsTopic(self._participant, name, kind))
         return self._topics[name]
 
-    def _attach(self, end: "DdsPublisher[Any] | DdsSubscription[Any]") -> None:
+    def _attach(self, end: AnyPublisher | AnySubscription) -> None:
         """Give an end its place in DDS."""
         entity = self._keep(end.create(self._participant, self._topic(end.topic)))
         entity.set_status_mask(end.watched)
@@ -188,21 +199,37 @@ class DdsTransport:
             self._node.add_reader(entity)
 
     def _read(self) -> None:
-        try:
-            while not self._closed:
-                self._follow_network()
-                if not self._joined:
-                    self._stop.wait(LOOK_EVERY_S)
-                    continue
-                self._waitset.wait(dds_infinity if self._loopback else LOOK_EVERY_NS)
-                taken = [subscription.take() for subscription in self._subscriptions]
-                if not any(taken):
-                    for end in self._ends:
-                        end.log_misfits()
-        except DDSException as error:
-            log.error(pairs("reader_lost", node=self.name, reason=error))
+        failures = 0
+        while not self._closed and failures < notices.FAILURES:
+            try:
+                self._read_once()
+                failures = 0
+            except Exception as error:  # noqa: BLE001 - logged by _recover
+                failures += 1
+                self._recover(error)
 
-    def _withdraw(self, publisher: "DdsPublisher[Any]", writer: Any) -> None:
+    def _read_once(self) -> None:
+        self._follow_network()
+        if not self._joined:
+            self._stop.wait(LOOK_EVERY_S)
+            return
+        self._waitset.wait(dds_infinity if self._loopback else LOOK_EVERY_NS)
+        taken = [subscription.take() for subscription in self._subscriptions]
+        if not any(taken):
+            for end in self._ends:
+                end.log_misfits()
+
+    def _recover(self, error: Exception) -> None:
+        """Reading failed, which nobody foresaw: say it once, and join anew after a while."""
+        if self._closed:
+            return
+        if not self._failed:
+            log.error(pairs("reader_failed", node=self.name, reason=error), exc_info=error)
+        self._failed = True
+        self._stop.wait(LOOK_EVERY_S)
+        self._join_anew()
+
+    def _withdraw(self, publisher: AnyPublisher, writer: DataWriter) -> None:
         """Take one writer off the graph; after close there is none left to take."""
         with self._lock:
             if self._closed or publisher not in self._ends:
@@ -215,7 +242,7 @@ class DdsTransport:
             self._entities = [entity for entity in self._entities if entity is not writer]
             writer.__del__()
 
-    def _keep(self, entity: Any) -> Any:
+    def _keep(self, entity: E) -> E:
         self._entities.append(entity)
         return entity
 
@@ -234,12 +261,13 @@ class DdsTransport:
             raise TransportError(f"{text}: {error}") from error
 
 
-def _shared_domain(domain_id: int, configuration: str) -> Any:
+def _shared_domain(domain_id: int, configuration: str) -> Domain:
     """The domain of this process with this configuration, shared by its participants; there can be
     no second one beside it."""
     key = domain_id, configuration
     with _domains_lock:
         domain = _domains.get(key)
         if domain is None:
+            DDS._dll_handle.dds_set_log_mask(ctypes.c_uint32(ERRORS))
             domain = _domains[key] = Domain(domain_id, configuration)
         return domain

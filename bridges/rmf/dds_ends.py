@@ -9,14 +9,16 @@ from collections.abc import Callable
 from typing import Any, Final, Generic, TypeVar
 
 from cyclonedds.core import DDSException, DDSStatus
+from cyclonedds.domain import DomainParticipant
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.rmf import notices, topics
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
-from bridges.rmf.idl import sample_type
+from bridges.rmf.idl import SampleType, sample_type
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
@@ -37,19 +39,19 @@ class DdsPublisher(Generic[M]):
         self,
         topic: Topic[M],
         reader_thread: threading.Thread,
-        withdraw: Callable[["DdsPublisher[Any]", Any], None],
+        withdraw: Callable[["AnyPublisher", DataWriter], None],
     ) -> None:
         self.topic = topic
         self._withdraw = withdraw
-        self._writer: Any = None
+        self._writer: DataWriter = None
         self._reader_thread = reader_thread
         self._sample = sample_type(topic.type)
         depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
-        self._retained: deque[Any] = deque(maxlen=depth)
+        self._retained: deque[SampleType] = deque(maxlen=depth)
 
     watched = DDSStatus.OfferedIncompatibleQos
 
-    def create(self, participant: Any, topic: Any) -> Any:
+    def create(self, participant: DomainParticipant, topic: DdsTopic) -> DataWriter:
         """The writer, in place of any that was."""
         qos = _writer_qos(self.topic.publish, self.topic.type)
         self._writer = DataWriter(participant, topic, qos=qos)
@@ -104,13 +106,13 @@ class DdsSubscription(Generic[M]):
     ) -> None:
         self.topic = topic
         self._others_only = others_only
-        self._reader: Any = None
+        self._reader: DataReader = None
         self._received = received
         self._dropped = dropped
 
     watched = DDSStatus.RequestedIncompatibleQos
 
-    def create(self, participant: Any, topic: Any) -> Any:
+    def create(self, participant: DomainParticipant, topic: DdsTopic) -> DataReader:
         """The reader, in place of any that was."""
         qos = _reader_qos(self.topic.subscribe, self.topic.type, others_only=self._others_only)
         self._reader = DataReader(participant, topic, qos=qos)
@@ -134,7 +136,7 @@ class DdsSubscription(Generic[M]):
             if not samples:
                 return taken > 0
             if samples[0].sample_info.valid_data:
-                self._received(samples[0].message)
+                notices.hand_on(self._dropped, self.topic, self._received, samples[0].message)
         return True
 
     def log_misfits(self) -> None:
@@ -144,12 +146,16 @@ class DdsSubscription(Generic[M]):
             _log_misfit(self.topic, notices.NOT_HEARD, status)
 
 
-def _log_misfit(topic: Topic[M], text: str, status: Any) -> None:
+AnyPublisher = DdsPublisher[Any]
+AnySubscription = DdsSubscription[Any]
+
+
+def _log_misfit(topic: Topic[M], text: str, status: SampleType) -> None:
     policy = POLICIES.get(status.last_policy_id, f"QoS policy {status.last_policy_id}")
     notices.misfit(topic, text, policy)
 
 
-def _writer_qos(qos: topics.Qos, message_type: type) -> Any:
+def _writer_qos(qos: topics.Qos, message_type: type) -> Qos:
     if qos.durability == "volatile":
         return Qos(Policy.Durability.Volatile, *_policies(qos, message_type))
     # What a late joiner gets is the durability service's history, which is 1 deep by default.
@@ -157,14 +163,14 @@ def _writer_qos(qos: topics.Qos, message_type: type) -> Any:
     return Qos(Policy.Durability.TransientLocal, retained, *_policies(qos, message_type))
 
 
-def _reader_qos(qos: topics.Qos, message_type: type, *, others_only: bool) -> Any:
+def _reader_qos(qos: topics.Qos, message_type: type, *, others_only: bool) -> Qos:
     durability = Policy.Durability
     wanted = durability.Volatile if qos.durability == "volatile" else durability.TransientLocal
     ignored = Policy.IgnoreLocal.Participant if others_only else Policy.IgnoreLocal.Nothing
     return Qos(wanted, ignored, *_policies(qos, message_type))
 
 
-def _policies(qos: topics.Qos, message_type: type) -> list[Any]:
+def _policies(qos: topics.Qos, message_type: type) -> list[object]:
     return [
         Policy.Reliability.Reliable(WRITE_BLOCKS_NS),
         Policy.History.KeepLast(qos.depth),

@@ -8,9 +8,9 @@ Jazzy.
 A `T[]` of ROS is a tuple here, so that a message is a value: hashable, comparable, immutable.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
-from typing import Annotated, Final
+from typing import Annotated, Final, cast
 
 uint8 = Annotated[int, "uint8"]
 byte = Annotated[int, "byte"]
@@ -404,3 +404,8 @@ PACKAGES: Final[dict[type, str]] = {
     DiagnosticArray: "diagnostic_msgs",
 }
 """The ROS package that defines each type."""
+
+
+def field_types(message_type: type) -> dict[str, type]:
+    """Field -> type, in the message's order: as annotated, so a number is an `Annotated`."""
+    return {field.name: cast(type, field.type) for field in fields(message_type)}

@@ -7,12 +7,15 @@ Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publi
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
+from cyclonedds.core import Entity
+from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct, annotations
 from cyclonedds.idl.types import array, bounded_str, sequence, uint8
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 PACKAGE: Final = "rmw_dds_common.msg.dds_."
@@ -45,34 +48,34 @@ class ParticipantEntitiesInfo(IdlStruct, typename=PACKAGE + "ParticipantEntities
 class NodeOnGraph:
     """The one node of a participant, announced afresh whenever it has a new endpoint."""
 
-    def __init__(self, participant: Any, node_name: str) -> None:
+    def __init__(self, participant: DomainParticipant, node_name: str) -> None:
         self._node = NodeEntitiesInfo("/", node_name, [], [])
         self._info = ParticipantEntitiesInfo(_gid(participant), [self._node])
         self.topic = Topic(participant, "ros_discovery_info", ParticipantEntitiesInfo)
         self.writer = DataWriter(participant, self.topic, qos=_qos())
         self.writer.write(self._info)
 
-    def add_reader(self, reader: Any) -> None:
+    def add_reader(self, reader: DataReader) -> None:
         """Say that this reader is the node's."""
         self._node.reader_gid_seq.append(_gid(reader))
         self.writer.write(self._info)
 
-    def add_writer(self, writer: Any) -> None:
+    def add_writer(self, writer: DataWriter) -> None:
         """Say that this writer is the node's."""
         self._node.writer_gid_seq.append(_gid(writer))
         self.writer.write(self._info)
 
-    def drop_writer(self, writer: Any) -> None:
+    def drop_writer(self, writer: DataWriter) -> None:
         """Say that this writer is no longer there."""
         self._node.writer_gid_seq.remove(_gid(writer))
         self.writer.write(self._info)
 
 
-def _gid(entity: Any) -> Gid:
+def _gid(entity: Entity) -> Gid:
     return Gid(list(entity.guid.bytes))
 
 
-def _qos() -> Any:
+def _qos() -> Qos:
     return Qos(
         Policy.Reliability.Reliable(100_000_000),
         Policy.Durability.TransientLocal,

@@ -7,19 +7,21 @@ with `cdr.py`, so a message never takes a second Python form on its way (and is 
 
 import types
 import typing
-from dataclasses import fields
 from typing import Any
 
 from cyclonedds.idl import IdlStruct, annotations
 from cyclonedds.idl import types as idl_types
 
 from bridges.rmf import cdr
-from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.definitions import PACKAGES, Message, field_types
 
-_made: dict[type, Any] = {}
+SampleType = Any
+"""A class that is made here for cyclonedds, which has no types of its own."""
+
+_made: dict[type, SampleType] = {}
 
 
-def sample_type(message_type: type) -> Any:
+def sample_type(message_type: type) -> SampleType:
     """The one class that stands for a message type in cyclonedds, named as ROS names it in DDS.
 
     An instance carries one `message`; cyclonedds sets `sample_info` on those that it has read.
@@ -29,10 +31,10 @@ def sample_type(message_type: type) -> Any:
     return _made[message_type]
 
 
-def _make(message_type: type) -> Any:
-    def body(namespace: dict[str, Any]) -> None:
+def _make(message_type: type) -> SampleType:
+    def body(namespace: dict[str, object]) -> None:
         namespace["__annotations__"] = {
-            field.name: _idl(field.type) for field in fields(message_type)
+            name: _idl(kind) for name, kind in field_types(message_type).items()
         }
         namespace.update(_calls(message_type))
 
@@ -42,19 +44,19 @@ def _make(message_type: type) -> Any:
     return annotations.final(made)  # ROS types are final: an appendable one does not match
 
 
-def _calls(message_type: type) -> dict[str, Any]:
+def _calls(message_type: type) -> dict[str, object]:
     """What cyclonedds calls. Each sample begins with its encoding, so `options` say nothing new."""
 
-    def __init__(self: Any, message: Any) -> None:
+    def __init__(self: SampleType, message: Message) -> None:
         self.message = message
 
-    def serialize(self: Any, **options: object) -> bytes:
+    def serialize(self: SampleType, **options: object) -> bytes:
         return cdr.encode(message_type, self.message)
 
-    def deserialize(cls: Any, sample: bytes, /, **options: object) -> Any:
+    def deserialize(cls: SampleType, sample: bytes, /, **options: object) -> SampleType:
         return cls(cdr.decode(message_type, sample))
 
-    def deserialize_key(cls: Any, sample: bytes, /, **options: object) -> None:
+    def deserialize_key(cls: SampleType, sample: bytes, /, **options: object) -> None:
         """Called for what is no message but the news that a writer has gone; RMF has no keys."""
 
     return {
@@ -65,9 +67,9 @@ def _calls(message_type: type) -> dict[str, Any]:
     }
 
 
-def _idl(kind: Any) -> Any:
+def _idl(kind: type) -> object:
     if typing.get_origin(kind) is typing.Annotated:
-        return getattr(idl_types, kind.__metadata__[0])
+        return getattr(idl_types, typing.get_args(kind)[1])
     if typing.get_origin(kind) is tuple:
         return idl_types.sequence[_idl(typing.get_args(kind)[0])]
     return kind if kind in (str, bool) else sample_type(kind)

@@ -53,6 +53,11 @@ class MemoryTransport:
         subscription.catch_up()
         return subscription
 
+    @property
+    def lives(self) -> bool:
+        """Until it is closed."""
+        return not self._closed
+
     def wall(self) -> float:
         """The wall clock (s since the epoch)."""
         return time.time()

@@ -1,25 +1,45 @@
 """What a transport says of its peers, in the same words on each wire: once, and not each time."""
 
 import logging
-from typing import Any
+from collections.abc import Callable
+from typing import TypeVar
 
 from bridges.log import pairs
 from bridges.rmf.cdr import CdrError
-from bridges.rmf.topics import Topic
+from bridges.rmf.definitions import Message
+from bridges.rmf.topics import AnyTopic, Topic
 
 log = logging.getLogger(__name__)
 
+M = TypeVar("M", bound=Message)
+
+FAILURES = 5
+"""A transport whose reading fails so often in a row ends its thread, and with it the daemon."""
 NOT_HEARD = "a publisher is not heard"
 NOT_SERVED = "a subscription is not served"
 
 
-def drop(dropped: dict[str, int], topic: Topic[Any], error: CdrError) -> None:
+def drop(dropped: dict[str, int], topic: AnyTopic, error: CdrError) -> None:
     """Count a sample that is no message, and log the first of its topic."""
     dropped[topic.name] = dropped.get(topic.name, 0) + 1
     if dropped[topic.name] == 1:
         log.warning(pairs("sample_dropped", topic=topic.name, reason=error, further="only counted"))
 
 
-def misfit(topic: Topic[Any], text: str, policy: str) -> None:
+def hand_on(
+    dropped: dict[str, int], topic: Topic[M], received: Callable[[M], None], message: M
+) -> None:
+    """Give a message to whoever subscribed. A defect there costs this message, never the thread."""
+    try:
+        received(message)
+    except Exception as error:
+        dropped[topic.name] = dropped.get(topic.name, 0) + 1
+        if dropped[topic.name] == 1:
+            why = f"a defect: {type(error).__name__}: {error}"
+            text = pairs("sample_dropped", topic=topic.name, reason=why, further="only counted")
+            log.error(text, exc_info=True)
+
+
+def misfit(topic: AnyTopic, text: str, policy: str) -> None:
     """Say which policy keeps a peer apart from our end of a topic."""
     log.warning(pairs("misfit", topic=topic.name, reason=f"{text}: its {policy} does not fit ours"))

@@ -10,10 +10,8 @@ Source: ros2/rosidl, rosidl_generator_type_description, and type_description_int
 import hashlib
 import json
 import typing
-from dataclasses import fields
-from typing import Any
 
-from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.definitions import PACKAGES, field_types
 
 NESTED = 1
 TYPE_IDS = {
@@ -43,16 +41,17 @@ def _type_name(message_type: type) -> str:
     return f"{PACKAGES[message_type]}/msg/{message_type.__name__}"
 
 
-def _description(message_type: type) -> dict[str, Any]:
+def _description(message_type: type) -> dict[str, object]:
     return {
         "type_name": _type_name(message_type),
         "fields": [
-            {"name": field.name, "type": _field_type(field.type)} for field in fields(message_type)
+            {"name": name, "type": _field_type(kind)}
+            for name, kind in field_types(message_type).items()
         ],
     }
 
 
-def _field_type(kind: Any) -> dict[str, Any]:
+def _field_type(kind: type) -> dict[str, object]:
     element = _element(kind)
     nested = element in PACKAGES
     sequence = typing.get_origin(kind) is tuple
@@ -64,13 +63,13 @@ def _field_type(kind: Any) -> dict[str, Any]:
     }
 
 
-def _element(kind: Any) -> Any:
+def _element(kind: type) -> type:
     """What a sequence holds, or the type itself; a number by its ROS name."""
     if typing.get_origin(kind) is tuple:
         kind = typing.get_args(kind)[0]
-    return kind.__metadata__[0] if typing.get_origin(kind) is typing.Annotated else kind
+    return typing.get_args(kind)[1] if typing.get_origin(kind) is typing.Annotated else kind
 
 
 def _nested_in(message_type: type) -> set[type]:
-    direct = {_element(field.type) for field in fields(message_type)} & PACKAGES.keys()
+    direct = {_element(kind) for kind in field_types(message_type).values()} & PACKAGES.keys()
     return direct.union(*(_nested_in(nested) for nested in direct))

@@ -8,6 +8,7 @@ Source: rclpy 7.1 (ROS 2 Jazzy); its public API, with RCLError and InvalidHandle
 rclpy is imported here alone, the message packages in ros_types.py, and both only by choose.py.
 """
 
+import logging
 import os
 import threading
 import time
@@ -29,12 +30,15 @@ from rclpy.qos import (
     qos_policy_name_from_kind,
 )
 
+from bridges.log import pairs
 from bridges.rmf import cdr, notices, topics
 from bridges.rmf.definitions import Message
 from bridges.rmf.loopback import LOOPBACK
 from bridges.rmf.ros_types import ros_type
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
+
+log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=Message)
 
@@ -49,6 +53,8 @@ its own words as well, does not even leave the loopback interface."""
 UNHEARD: Final = 256
 """Own messages that may be on their way back to us: more than twice any topic's depth."""
 
+AGAIN_S: Final = 1.0
+"""After a failure of rclpy's own, its executor is asked again."""
 YIELD_S: Final = 50e-6
 """rclpy's executor goes on for a while in Python after a callback; whom the message has woken need
 not wait for that."""
@@ -74,6 +80,7 @@ class Ros2Transport:
         self.dropped: dict[str, int] = {}
         self._lock = threading.Lock()
         self._closed = False
+        self._pause = threading.Event()
         self._publishers: list[_Publisher[Any]] = []
         self._deaf: list[_Subscription[Any]] = []
         self._context = Context()
@@ -114,6 +121,7 @@ class Ros2Transport:
             if self._closed:
                 return
             self._closed = True
+        self._pause.set()
         self._leaving.trigger()
         if threading.current_thread() is not self._thread:
             self._thread.join()
@@ -156,8 +164,17 @@ class Ros2Transport:
         self._leaving = self.node.create_guard_condition(lambda: None)
 
     def _spin(self) -> None:
-        while not self._closed:
-            self._executor.spin_once()
+        """What rclpy raises ends nothing, unless it comes again and again or the context is gone."""
+        failures = 0
+        while not self._closed and self._context.ok() and failures < notices.FAILURES:
+            try:
+                self._executor.spin_once()
+                failures = 0
+            except Exception as error:
+                failures += 1
+                if failures == 1:
+                    log.exception(pairs("reader_failed", node=self.name, reason=error))
+                self._pause.wait(AGAIN_S)
 
     @contextmanager
     def _reporting(self, text: str) -> Iterator[None]:
@@ -263,7 +280,7 @@ class _Subscription(Generic[M]):
         if message in self.said:
             self.said.remove(message)
             return
-        self._received(message)
+        notices.hand_on(self._transport.dropped, self.topic, self._received, message)
         time.sleep(YIELD_S)
 
 

@@ -6,10 +6,9 @@ their fields is compared with our table, as bytes of another definition would be
 
 import importlib
 import typing
-from dataclasses import fields
 from typing import Any
 
-from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.definitions import PACKAGES, field_types
 from bridges.rmf.transport import TransportError
 
 NAMES = {str: "string", bool: "boolean", "byte": "octet", "float32": "float", "float64": "double"}
@@ -50,12 +49,12 @@ def how_to_install(package: str) -> str:
 
 def fields_of(message_type: type) -> dict[str, str]:
     """Field -> type, in the words of `get_fields_and_field_types()`."""
-    return {field.name: _name(field.type) for field in fields(message_type)}
+    return {name: _name(kind) for name, kind in field_types(message_type).items()}
 
 
-def _name(kind: Any) -> str:
+def _name(kind: type) -> str:
     if typing.get_origin(kind) is typing.Annotated:
-        name = str(kind.__metadata__[0])
+        name = str(typing.get_args(kind)[1])
         return NAMES.get(name, name)
     if typing.get_origin(kind) is tuple:
         return f"sequence<{_name(typing.get_args(kind)[0])}>"
@@ -63,6 +62,6 @@ def _name(kind: Any) -> str:
 
 
 def _nested_in(message_type: type) -> set[type]:
-    kinds: list[Any] = [field.type for field in fields(message_type)]
+    kinds = field_types(message_type).values()
     sequences = {typing.get_args(kind)[0] for kind in kinds if typing.get_origin(kind) is tuple}
     return PACKAGES.keys() & {*kinds, *sequences}

@@ -39,6 +39,10 @@ class Topic(Generic[M_co]):
         return replace(self, name=name)
 
 
+AnyTopic = Topic[d.Message]
+"""A topic of whichever type."""
+
+
 LIFT_STATES = Topic("lift_states", d.LiftState)
 # Subscribed VOLATILE: TRANSIENT_LOCAL would replay up to 100 old requests at our restart.
 LIFT_REQUESTS = Topic("lift_requests", d.LiftRequest, publish=RETAINED, subscribe=VOLATILE)

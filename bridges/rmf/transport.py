@@ -40,8 +40,8 @@ class Subscription(Protocol):
 class Transport(Protocol):
     """One node on the RMF graph. `received` is called on the transport's own thread.
 
-    A callback must only append to an inbox and must not raise. Samples that do not decode are
-    dropped, counted in `dropped` by topic name, and logged once for each topic.
+    A callback must only append to an inbox and must not raise. Samples that do not decode, or whose
+    callback raises, are dropped, counted in `dropped` by topic name, and logged once for each topic.
     """
 
     name: str
@@ -57,6 +57,10 @@ class Transport(Protocol):
 
         `others_only`: what this same transport publishes on the topic is not delivered to it.
         """
+
+    @property
+    def lives(self) -> bool:
+        """It hears what comes. Without a network, a router or a peer it lives all the same."""
 
     def wall(self) -> float:
         """RMF's time, for stamps (s since the epoch): the wall clock, unless ROS simulates time."""

@@ -10,12 +10,13 @@ zenoh is imported here and there alone, and only by choose.py.
 """
 
 import atexit
+import ctypes
 import json
 import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import count
 from queue import Empty, SimpleQueue
@@ -26,7 +27,7 @@ from zenoh.handlers import Callback
 
 from bridges.core.fields import Zenoh
 from bridges.log import pairs
-from bridges.rmf import network, zenoh_config
+from bridges.rmf import addresses, notices, zenoh_config
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
@@ -61,6 +62,7 @@ class ZenohTransport:
         self._loopback = loopback
         self._lock = threading.Lock()
         self._closed = False
+        self._failed = False
         self._ends: Ends = ()
         self._deaf: set[str] = set()
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
@@ -70,6 +72,7 @@ class ZenohTransport:
         self._look_at = time.monotonic() + LOOK_EVERY_S
         self._wants_router = not loopback and zenoh_config.mode(self._settings) == "client"
         self._trouble = ""
+        self._closing: list[threading.Thread] = []
         self._neighbours: dict[str, zenoh.WhatAmI] = {}
         self._join()
         if self._session is None and not self._wants_router:
@@ -81,7 +84,9 @@ class ZenohTransport:
 
     def publisher(self, topic: Topic[M]) -> ZenohPublisher[M]:
         """Declare a publisher with `topic.publish` QoS."""
-        publisher = ZenohPublisher(topic, self._orders.put, self._withdraw, self._lives, self._deaf)
+        publisher = ZenohPublisher(
+            topic, self._orders.put, self._withdraw, lambda: self.lives, self._deaf
+        )
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             self._attach(publisher)
             self._ends += (publisher,)
@@ -108,6 +113,11 @@ class ZenohTransport:
         """The wall clock (s since the epoch)."""
         return time.time()
 
+    @property
+    def lives(self) -> bool:
+        """Its thread hears; whether a router answers is another matter."""
+        return not self._closed and self._thread.is_alive()
+
     def close(self) -> None:
         """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
         with self._lock:
@@ -120,12 +130,14 @@ class ZenohTransport:
             self._thread.join()
         with self._lock:
             self._leave()
+        for closing in self._closing:
+            closing.join()
 
     # --- the session ---------------------------------------------------------------------------
 
     def _join(self) -> None:
         """Open a session, if one can be opened: a client has none before its router answers."""
-        self._addresses = network.addresses()
+        self._addresses = addresses.addresses()
         if self._loopback:
             ways = zenoh_config.on_loopback(self._domain_id)
         else:
@@ -133,7 +145,7 @@ class ZenohTransport:
         try:
             session = _opened(ways)
         except zenoh.ZError as error:
-            self._trouble = str(error)
+            self._trouble = str(error).partition(" at /")[0]  # it names a line of its source
             return
         way, name = WAYS[self._settings.keys], str(session.zid())
         self._keys: Keys = way(self._domain_id, name, self.name)
@@ -144,6 +156,7 @@ class ZenohTransport:
             Callback(partial(self._neighbour, self._neighbours), indirect=False), history=True
         )
         self._session = session
+        _give_back()
 
     def _attach(self, end: ZenohPublisher[Any] | ZenohSubscription[Any]) -> None:
         """Give an end its place in the session, when there is one."""
@@ -154,9 +167,7 @@ class ZenohTransport:
             self._deaf.add(self._keys.token("MS", end.topic, number))
         end.create(self._session, self._keys, number)
 
-    def _neighbour(
-        self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent
-    ) -> None:
+    def _neighbour(self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent) -> None:
         """A router or peer is there, or has gone. On zenoh's thread, which holds what asking the
         session about its neighbours would wait for: so we keep count of them."""
         if event.kind == zenoh.SampleKind.PUT:
@@ -172,20 +183,26 @@ class ZenohTransport:
                 publisher.leave()
 
     def _leave(self) -> None:
-        """Close the session; the ends keep nothing of it."""
+        """Give up the session. It is closed beside us: by a link that is dead that takes 10 s.
+
+        What was declared in it is kept until then: to forget it sooner may block us.
+        """
         session, self._session = self._session, None
-        if session:
-            session.close()  # type: ignore[no-untyped-call]
-        for end in self._ends:  # not before: a declaration that is only forgotten may block us
-            end.place = None
+        held = [end.give_up() for end in self._ends]
         self._deaf.clear()
         self._neighbours = {}
+        if session:
+            held += [self._presence, self._events]
+            closing = threading.Thread(target=_close, args=(session, held), daemon=True)
+            closing.start()
+            self._closing.append(closing)
 
     def _join_anew(self) -> None:
         with self._lock:
             if self._closed:
                 return
             self._leave()
+            self._closing = [closing for closing in self._closing if closing.is_alive()]
             try:
                 self._join()
                 for end in self._ends:
@@ -196,17 +213,29 @@ class ZenohTransport:
 
     # --- our thread ----------------------------------------------------------------------------
 
-    def _lives(self) -> bool:
-        return not self._closed and self._thread.is_alive()
-
     def _listen(self) -> None:
-        while not self._closed:
+        failures = 0
+        while not self._closed and failures < notices.FAILURES:
             try:
                 order = self._orders.get(timeout=None if self._loopback else LOOK_EVERY_S)
             except Empty:
                 order = _nothing
-            order()
-            self._follow_network()
+            try:
+                order()
+                self._follow_network()
+                failures = 0
+            except Exception as error:  # noqa: BLE001 - logged by _recover
+                failures += 1
+                self._recover(error)
+
+    def _recover(self, error: Exception) -> None:
+        """Something failed that nobody foresaw: say it once, and have a new session."""
+        if not self._failed:
+            log.exception(pairs("reader_failed", node=self.name, reason=error))
+        self._failed = True
+        if not self._loopback:
+            self._look_at = time.monotonic() + LOOK_EVERY_S
+            self._join_anew()
 
     def _follow_network(self) -> None:
         """Join anew when the addresses are others than those with which we joined."""
@@ -215,7 +244,7 @@ class ZenohTransport:
             return
         self._look_at = now + LOOK_EVERY_S
         self._look()
-        found = network.addresses()
+        found = addresses.addresses()
         if found != self._addresses and self._reaches_out():
             log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
             self._join_anew()
@@ -244,7 +273,9 @@ class ZenohTransport:
         if linked:
             log.info(pairs("linked", node=self.name, connect=where))
         else:
-            log.warning(pairs("not_linked", node=self.name, connect=where, reason=NOBODY, last=self._trouble))
+            log.warning(
+                pairs("not_linked", node=self.name, connect=where, reason=self._trouble or NOBODY)
+            )
 
     @contextmanager
     def _reporting(self, text: str) -> Iterator[None]:
@@ -268,6 +299,18 @@ def _opened(ways: list[dict[str, Any]]) -> zenoh.Session:
         if further:
             return _opened(further)
         raise
+
+
+def _close(session: zenoh.Session, held: list[Any]) -> None:
+    with suppress(zenoh.ZError):  # by a dead link nobody hears the farewell
+        session.close()  # type: ignore[no-untyped-call]
+    held.clear()
+
+
+def _give_back() -> None:
+    """Opening a session leaves 2.5 MB of freed memory to this process: give it back to the machine."""
+    with suppress(AttributeError):  # a C library other than glibc has no such call
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _nothing() -> None:

@@ -24,6 +24,7 @@ COMMON: Final[dict[str, Any]] = {
     # A message that comes while retained ones are fetched waits for them. A node that hangs must not
     # hold a fire alarm for longer than this (ms); rmw_zenoh itself would wait for ever.
     "queries_default_timeout": 3000,
+    "transport/shared_memory/enabled": False,
     "connect/timeout_ms": -1,
     "connect/exit_on_failure": False,
     "connect/retry": RETRY,

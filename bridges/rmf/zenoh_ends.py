@@ -121,6 +121,12 @@ class _End:
             place.leave()
             self._end.undeclare()
 
+    def give_up(self) -> object:
+        """Give up the place in a session that ends: what was declared in it."""
+        held = self.place, self._end
+        self.place = self._end = None
+        return held
+
     def name_stranger(self, token: str, policy: str) -> None:
         """Name a peer that does not fit, once."""
         if token not in self._named:
@@ -156,7 +162,7 @@ class ZenohPublisher(_End, Generic[M]):
         place.appear()
         self.place, self._sent = place, 0
         for sample in list(self._retained):
-            self._put(place, sample)
+            self._put(self._end, place, sample)
 
     def publish(self, message: M) -> None:
         """Send. Raises TransportError when it was not sent, CdrError for what no sample can hold."""
@@ -164,11 +170,11 @@ class ZenohPublisher(_End, Generic[M]):
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
         sample = cdr.encode(self.topic.type, message)
         self._retained.append(sample)
-        place = self.place
-        if place is None:
+        place, end = self.place, self._end  # another thread may give them up meanwhile
+        if place is None or end is None:
             raise TransportError(f"topic {self.topic.name}: not sent: this end has no session")
         try:
-            self._put(place, sample)
+            self._put(end, place, sample)
         except zenoh.ZError as error:
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
@@ -200,10 +206,10 @@ class ZenohPublisher(_End, Generic[M]):
             publisher_detection=True,
         )
 
-    def _put(self, place: Place, sample: bytes) -> None:
+    def _put(self, end: Any, place: Place, sample: bytes) -> None:
         self._sent += 1
         attached = zenoh_keys.attachment(self._sent, time.time_ns(), place.gid)
-        self._end.put(sample, attachment=attached)
+        end.put(sample, attachment=attached)
 
 
 class ZenohSubscription(_End, Generic[M]):
@@ -268,7 +274,7 @@ class ZenohSubscription(_End, Generic[M]):
                 notices.drop(self._dropped, self.topic, error)
                 continue
             if message is not None:
-                self._received(message)
+                notices.hand_on(self._dropped, self.topic, self._received, message)
         if self._waiting:
             self._ring()
 

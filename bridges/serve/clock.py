@@ -1,5 +1,6 @@
 """Where the runtime's time comes from, and when what is told each second is told next."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -27,6 +28,11 @@ class Clock:
         if read_at is None:
             return Time()
         return stamps.stamp(self.wall() - (self.monotonic() - read_at))
+
+
+def machine_s() -> float:
+    """Seconds since the machine's start, its sleep among them."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 class Pace:

@@ -1,14 +1,13 @@
 """The daemon: one YAML in service. Opens the transport, starts the service's loops, tells systemd how
-it is, and on SIGTERM or SIGINT switches every output off and leaves RMF's graph.
+it is, and on SIGTERM, or whatever signal else would end it, switches every output off and leaves
+RMF's graph.
 """
 
 import logging
 import os
-import signal
-import threading
 import time
-from collections.abc import Sequence
-from types import FrameType
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -20,17 +19,22 @@ from bridges.rmf.definitions import DiagnosticArray
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import DIAGNOSTICS
 from bridges.rmf.transport import Publisher, TransportError
+from bridges.serve import guard, record, signals
 from bridges.serve.diagnostics import diagnosis
-from bridges.serve.directory import KeptFile, RuntimeDirectory, state_file
+from bridges.serve.directory import KEPT, KeptFile, Once, RuntimeDirectory, state_file
+from bridges.serve.guard import Guard
 from bridges.serve.notify import notify, watchdog_s
+from bridges.serve.predecessor import Predecessor
 from bridges.serve.service import OpenBus, named_by, service
 from bridges.settings.load import Config
-from drivers import DriverError
 
 log = logging.getLogger(__name__)
 
 STOP_WITHIN_S = 5.0
 STATUS_EVERY_S = 1.0
+ALIVE = "WATCHDOG=1"
+STARTING = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=30000000"
+"""Many units that do not answer make a long start, and no hung one."""
 
 
 class Daemon:
@@ -40,27 +44,39 @@ class Daemon:
         self,
         config: Config,
         runtime: RuntimeDirectory,
+        end: signals.End,
         *,
         open_bus: OpenBus | None = None,
         localhost: bool = False,
         simulated: bool = False,
         ros_args: Sequence[str] = (),
+        outputs_off: Sequence[str] = (),
     ) -> None:
-        """Raises TransportError or HalError when it cannot be."""
+        """`outputs_off`: the command that switches off after a death of ours.
+
+        Raises TransportError or HalError when it cannot be.
+        """
         self._config = config
         self._runtime = runtime
+        self._end = end
         self._simulated = simulated
-        self._stop = threading.Event()
-        for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, self._on_signal)
+        self._once = Once()
+        self._guard: Guard | None = None
+        self._predecessor: Predecessor | None = None
+        ours, unsafe = record.of(config), frozenset[str]()
+        if config.buses and not simulated:
+            self._predecessor = Predecessor(runtime.records, ours, outputs_off)
+            unsafe = self._predecessor.make_safe(end.wait)
         node_name = f"rmf_bridge_{config.path.stem}"
         self._transport = open_transport(
             config.rmf, node_name, localhost=localhost, ros_args=ros_args
         )
         if config.buses and not simulated:
-            runtime.claim(config.text)  # before anything is: `outputs-off` goes by it
-        kept = None if simulated else KeptFile(state_file(config.path))
-        self._service = service(config, self._transport, open_bus or config.open_bus, kept)
+            runtime.claim(ours)  # before anything is: `outputs-off` goes by it
+            self._guard = Guard(outputs_off) if guard.needed() else None
+        kept = None if simulated else KeptFile(state_file(config.path), runtime.path / KEPT)
+        open_bus = open_bus or config.open_bus
+        self._service = service(config, self._transport, open_bus, kept, unsafe)
         self._loops = self._service.loops
         self._diagnostics: Publisher[DiagnosticArray] | None = None
         if config.rmf.diagnostics:
@@ -68,7 +84,7 @@ class Daemon:
 
     def serve(self) -> int:
         """Run until a signal, and return the exit code: 0 when every output is off and verified."""
-        signal.signal(signal.SIGUSR1, self._on_reset)
+        signals.on_reset(self._service.reset)
         self._service.subscribe()
         for loop in self._loops:
             loop.start()
@@ -84,36 +100,51 @@ class Daemon:
         period_s = min(STATUS_EVERY_S, (watchdog_s() or 10.0) / 3)
         told_ready = False
         fed = [-1] * len(self._loops)
-        while not self._stop.wait(0.02 if not told_ready else period_s):
-            if not all(loop.alive for loop in self._loops):
-                raise SystemExit(70)  # a defect of ours, logged by its thread; systemd restarts us
+        while not self._end.wait(0.02 if not told_ready else period_s):
+            self._require_life()
             if not told_ready and all(loop.ready for loop in self._loops):
-                notify("READY=1")
+                self._convenience("sd_notify", partial(notify, "READY=1"))
                 log.info(pairs("ready", file=self._config.path))
                 told_ready = True
-            scans = [loop.scans for loop in self._loops]
-            if all(now > before for now, before in zip(scans, fed, strict=True)):
-                notify("WATCHDOG=1")
-                fed = scans
+            finished = [loop.finished for loop in self._loops]
+            if all(now > before for now, before in zip(finished, fed, strict=True)):
+                self._convenience("sd_notify", partial(notify, ALIVE if told_ready else STARTING))
+                fed = finished
+            if self._predecessor is not None:
+                self._predecessor.tick(time.monotonic())
             if told_ready:
-                self._tell()
+                self._convenience("status", self._tell)
+
+    def _require_life(self) -> None:
+        """What has died cannot be restarted in here; systemd starts us again."""
+        if not self._transport.lives:
+            log.critical(pairs("died", transport=self._transport.name))
+        elif all(loop.alive for loop in self._loops):
+            return
+        raise SystemExit(70)
 
     def _shut_down(self) -> bool:
-        notify("STOPPING=1")
+        self._convenience("sd_notify", partial(notify, "STOPPING=1"))
         deadline = time.monotonic() + STOP_WITHIN_S
         safe = [loop.stop(max(0.1, deadline - time.monotonic())) for loop in self._loops]
-        self._transport.close()
+        self._convenience("transport", self._transport.close)
+        if self._predecessor is not None:
+            self._predecessor.close()
         if all(safe):
             self._runtime.released()
+            if self._guard is not None:
+                self._guard.dismiss()
         log.info(pairs("stopped", outputs_off=all(safe)))
         return all(safe)
 
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        self._stop.set()
-
-    def _on_reset(self, number: int, frame: FrameType | None) -> None:
-        """`rmf-bridge reset`: an operator says that it is safe to go on."""
-        self._service.reset()
+    def _convenience(self, what: str, do: Callable[[], None]) -> None:
+        """Whatever goes wrong with it is no reason to end; it is said once, and tried again."""
+        try:
+            do()
+        except Exception as error:  # noqa: BLE001 - logged by Once
+            self._once.failed(what, error)
+        else:
+            self._once.works(what)
 
     def _about(self) -> dict[str, Any]:
         about = {"version": __version__, "node": self._transport.name, "pid": os.getpid()}
@@ -126,6 +157,7 @@ class Daemon:
             "file": str(self._config.path),
             **self._about(),
             "samples_dropped": dict(self._transport.dropped),
+            "predecessor_not_off": self._predecessor.left() if self._predecessor else [],
             **self._service.status(),
         }
         devices = self._service.devices()
@@ -138,42 +170,3 @@ class Daemon:
             self._diagnostics.publish(found)
         except TransportError as error:  # the states, more urgent, say so as an error
             log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))
-
-
-def outputs_off(config: Config, timeout_s: float) -> bool:
-    """Switch off every output that a file names, from a fresh process; True when verified.
-
-    Bounded: a bus that does not answer is given up after `timeout_s` (s) in all.
-    """
-    results: dict[str, bool] = {}
-    threads = [
-        threading.Thread(target=_bus_off, args=(config, name, results), daemon=True)
-        for name in config.buses
-    ]
-    deadline = time.monotonic() + timeout_s
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(max(0.0, deadline - time.monotonic()))
-    return len(results) == len(config.devices) and all(results.values())
-
-
-def _bus_off(config: Config, bus_name: str, results: dict[str, bool]) -> None:
-    bus = config.open_bus(bus_name)
-    for name, device in config.devices.items():
-        if config.bus_of(name) == bus_name:
-            results[name] = _device_off(name, config.driver_type.create(name, device, bus))
-    bus.close()
-
-
-def _device_off(name: str, driver: Any) -> bool:
-    try:
-        driver.open()
-        driver.make_safe()
-    except DriverError as error:
-        log.error(pairs("outputs_not_off", device=name, reason=error))
-        return False
-    finally:
-        driver.close()
-    log.info(pairs("outputs_off", device=name))
-    return True

@@ -18,6 +18,7 @@ from bridges.core.decision import (
     RequestRefused,
     RivalSeen,
     Sampled,
+    Suspended,
     WriteFailed,
     X,
 )
@@ -27,25 +28,12 @@ from bridges.log import pairs, plain
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.serve.clock import Clock, Pace
+from bridges.serve.contained import Contained
 from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Publish, Status, Subject
 from drivers import Driver, DriverError
 
 log = logging.getLogger(__name__)
-
-
-def _core(kind: Kind[S, L, M, X, E, O, R], limits: L) -> Core[M, DeviceEvent[X, E], O, R]:
-    """A fault's detail is often a bus's own words, which change with each attempt: its code counts."""
-
-    def code(fault: Fault) -> str:
-        return fault.code
-
-    return Core(
-        "device",
-        lambda memory, event, now: kind.decide(memory, event, now, limits),
-        lambda report, now: kind.summary(report),
-        code,
-    )
 
 
 class Node(Generic[S, L, M, X, E, O, R]):
@@ -65,17 +53,23 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self.wake_at = AGES_AGO
         self._kind = kind
         self._settings = settings
-        self._driver = driver
+        self._driver = Contained(name, driver, clock)
         self._publish = publish
         self._clock = clock
         self._refusals = Refusals()
         memory = kind.initial(limits, clock.monotonic())
-        core = _core(kind, limits)
+        core: Core[M, DeviceEvent[X, E], O, R] = Core(
+            "device",
+            lambda memory, event, now: kind.decide(memory, event, now, limits),
+            lambda report, now: kind.summary(report),
+            self._identity,
+        )
         self.subject = Subject(name, memory, core, publish, self._refusals, clock)
         self._pace = Pace()
         self._open = False
         self._has_read = False
         self._io_fault = ""
+        self._bus_words: set[str] = set()
         self._failing = False
         self._logged_outputs: O | None = None
 
@@ -94,9 +88,14 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._refusals.add(refusal.kind, refusal.detail, device=self.name)
             return None
 
+    def was_suspended(self, for_s: float) -> None:
+        """Nothing was scanned for so long (s): whatever was believed may be past."""
+        self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
+
     def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:
         """Read, decide with each event, write, publish."""
         self._failing = False
+        self._bus_words.clear()
         self._decide(self._read())
         for event in events:
             if isinstance(event, OperatorReset):  # a device that has failed is claimed anew
@@ -191,7 +190,13 @@ class Node(Generic[S, L, M, X, E, O, R]):
             log.error(pairs("device_lost", device=self.name, reason=error))
         self._failing = True
         self._io_fault = str(error) or type(error).__name__
+        self._bus_words.add(self._io_fault)
         return self._io_fault
+
+    def _identity(self, fault: Fault) -> object:
+        """With another detail it is another fault, but for a bus's own words: they change with each
+        attempt."""
+        return fault.code if fault.detail in ("", *self._bus_words) else fault
 
 
 AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]

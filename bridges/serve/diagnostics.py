@@ -7,7 +7,7 @@ LiftState, DoorState and their like have no place for any of this.
 
     OK      the input is read, and nothing is wrong
     WARN    the daemon: it is a simulation, or leaves its work to another node
-    ERROR   the device has faults
+    ERROR   the device has faults; the daemon: it cannot keep what a restart must not forget
     STALE   its input has not been read yet
 """
 
@@ -52,6 +52,8 @@ def _daemon(node: str, kind: str, status: Status) -> DiagnosticStatus:
         word for key, word in (("simulated", SIMULATED), ("passive", PASSIVE)) if status.get(key)
     ]
     level = DiagnosticLevel.WARN if odd else DiagnosticLevel.OK
+    if found := status.get("faults"):
+        level, odd = DiagnosticLevel.ERROR, [fault["code"] for fault in found]
     values = _values({"kind": kind, **status})
     return DiagnosticStatus(level, f"{node}: daemon", ", ".join(odd) or "OK", node, values)
 

@@ -1,117 +1,296 @@
-"""The runtime directory of one device: what is claimed, how it is doing, and who is running.
+"""A daemon's directories while it runs: that it runs, and how it is doing.
 
-`claimed.yaml`  the device YAML as the running daemon read it, written before the first output is
-                claimed, so that `outputs-off` knows them after any death, whatever the YAML says now
+`lock`          held by the daemon, or by `outputs-off`: who that is, for which YAML, and whether it
+                serves
 `status.json`   the state of every device, for people and scripts
-`lock`          held by the running daemon; its process id
+`claimed-….json`   see `bridges/serve/record.py`
+
+None of them is vital: what cannot be written is said once and tried again each second, also where a
+directory has been removed; and the device is served.
 """
 
 import fcntl
+import logging
 import os
+import time
+from contextlib import suppress
 from pathlib import Path
 
-CLAIMED = "claimed.yaml"
+import msgspec
+
+from bridges.log import pairs
+from bridges.serve.files import replace, show
+from bridges.serve.places import Places, as_told, by_hand, everywhere, named, owner_of, state_base
+from bridges.serve.record import Record, Records, paths, read
+
+log = logging.getLogger(__name__)
+
 STATUS = "status.json"
+KEPT = "kept.json"
 LOCK = "lock"
+WAIT_S = 7.0
+"""Longer than `outputs-off` takes: who starts meanwhile waits for it."""
+LOOK_EVERY_S = 0.05
 
 
 class AlreadyRunning(Exception):
-    """Another daemon holds this runtime directory."""
+    """Another daemon serves this YAML, or has these directories."""
 
 
-def directory(file: Path, given: str | None) -> Path:
-    """Where it is: as given, else as systemd says, else under the user's runtime directory."""
-    if given or (given := os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]):
-        return Path(given).absolute()
-    base = os.environ.get("XDG_RUNTIME_DIR") or f"/tmp/rmf-bridge-{os.getuid()}"
-    return Path(base) / "rmf-bridge" / file.stem
+class Unknown(Exception):
+    """This user cannot see whether a daemon runs. The text says what to do."""
+
+
+class Holder(msgspec.Struct, frozen=True):
+    """Who holds a lock: its process id, the YAML's path, and whether it serves."""
+
+    pid: int
+    file: str
+    serves: bool
+
+    def __str__(self) -> str:
+        return f"process {self.pid}, for {self.file}" if self.pid else "a running process"
+
+
+NOBODY_KNOWN = Holder(0, "", False)
+"""A lock is held, and who holds it could not write that down."""
+
+
+def find(file: Path, given: str | None) -> Places:
+    """The directories of this file's daemon, by the one rule (`bridges/serve/places.py`).
+
+    Raises Unknown where the service's directory cannot be looked into.
+    """
+    told = as_told(given)
+    if told:
+        return told
+    return next((p for p in everywhere(file) if _is_about(p, file)), by_hand(file))
+
+
+def _is_about(places: Places, file: Path) -> bool:
+    found = {_written(folder / LOCK).file for folder in places.folders}
+    found |= {record.file for path in paths(places) if (record := read(path))}
+    return named(file) in found
+
+
+def holder(places: Places) -> Holder | None:
+    """Who runs in these directories now. Raises Unknown."""
+    for folder in places.folders:
+        try:
+            lock = _open(folder / LOCK, os.O_RDONLY)
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError as error:
+            raise Unknown(_what_to_do(folder, error)) from None
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return _written(folder / LOCK)
+        finally:
+            os.close(lock)
+    return None
+
+
+def _written(path: Path) -> Holder:
+    """What a lock says, whoever holds it. Raises Unknown."""
+    try:
+        lock = _open(path, os.O_RDONLY)
+    except (FileNotFoundError, NotADirectoryError):
+        return NOBODY_KNOWN
+    except OSError as error:
+        raise Unknown(_what_to_do(path.parent, error)) from None
+    try:
+        return msgspec.json.decode(os.read(lock, 65536), type=Holder)
+    except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
+        return NOBODY_KNOWN
+    finally:
+        os.close(lock)
+
+
+def _open(path: Path, flags: int) -> int:
+    """No symbolic link is followed, and no FIFO waited for."""
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o640)
+
+
+def _what_to_do(folder: Path, error: OSError) -> str:
+    owner = owner_of(folder)
+    return (
+        f"whether a daemon runs there cannot be seen: {folder}: {error.strerror}. It belongs to"
+        f" {owner}: use sudo, or name another directory with --runtime-dir"
+    )
 
 
 def state_file(file: Path) -> Path:
     """What outlives a daemon and a reboot: where systemd says, else the user's state directory."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
-    base = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
-    return Path(given or Path(base) / "rmf-bridge" / file.stem).absolute() / "kept.json"
+    return Path(given or state_base() / file.stem).absolute() / KEPT
 
 
 class KeptFile:
-    """One file that is replaced whole and is on the disk before `write` returns."""
+    """A file that is replaced whole and is on the disk before `write` returns.
 
-    def __init__(self, path: Path) -> None:
+    `instead`: where it is kept as long as the first place cannot be written. What stands there is
+    newer than what stands in the first place.
+    """
+
+    def __init__(self, path: Path, instead: Path | None = None) -> None:
         self._path = path
+        self._instead = instead
+        self._once = Once()
 
     def read(self) -> bytes | None:
         """What was kept; None when nothing was. Raises OSError."""
-        try:
-            return self._path.read_bytes()
-        except FileNotFoundError:
-            return None
+        for path in filter(None, (self._instead, self._path)):
+            with suppress(FileNotFoundError, NotADirectoryError):
+                return path.read_bytes()
+        return None
 
     def write(self, kept: bytes) -> None:
-        """Replace it. Raises OSError, and then the old one stands."""
-        self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        new = self._path.with_suffix(".new")
-        with new.open("wb") as out:
-            out.write(kept)
-            out.flush()
-            os.fsync(out.fileno())
-        new.replace(self._path)
+        """Replace it. Raises OSError where neither place can be written; then the old one stands."""
+        try:
+            replace(self._path, kept)
+            if self._instead is not None:
+                self._instead.unlink(missing_ok=True)
+        except OSError as error:
+            self._once.failed(str(self._path), error)
+            if self._instead is None:
+                raise
+            replace(self._instead, kept)
+        else:
+            self._once.works(str(self._path))
 
 
-def running_pid(path: Path) -> int | None:
-    """The process id of the daemon that holds a runtime directory; None when none does."""
-    try:
-        with (path / LOCK).open("r+") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return int((path / LOCK).read_text() or 0) or None
-    except FileNotFoundError:
-        return None
-    return None
+class Once:
+    """One line when something goes wrong that is no reason to end, and one when it works again."""
+
+    def __init__(self) -> None:
+        self._wrong: dict[str, str] = {}
+
+    def failed(self, what: str, error: Exception) -> None:
+        """It did not work; it is tried again."""
+        if what not in self._wrong:
+            log.warning(pairs("not_written", what=what, reason=error))
+        self._wrong[what] = str(error)
+
+    def works(self, what: str) -> None:
+        """It did."""
+        if self._wrong.pop(what, None) is not None:
+            log.info(pairs("written_again", what=what))
 
 
 class RuntimeDirectory:
-    """Held by one daemon at a time, for as long as the object lives."""
+    """What one process has in its directories, for as long as the object lives.
 
-    def __init__(self, path: Path) -> None:
-        """Create and lock it. Raises AlreadyRunning, or OSError where it cannot be written."""
-        path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if path.stat().st_uid != os.getuid():
-            raise PermissionError(f"{path} belongs to another user")
-        self.path = path
-        self._lock = (path / LOCK).open("a+")
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._lock.close()
-            raise AlreadyRunning(f"{path} is in use by a running daemon") from None
-        self._lock.truncate(0)
-        self._lock.write(str(os.getpid()))
-        self._lock.flush()
+    `serves`: whether it is a daemon, which a reset may be sent to.
+    """
 
-    def claim(self, yaml: bytes) -> None:
-        """Write down which outputs this daemon is about to claim."""
-        self._replace(CLAIMED, yaml)
+    def __init__(self, places: Places, file: Path, *, serves: bool, wait_s: float = WAIT_S) -> None:
+        """Raises AlreadyRunning, after waiting for one that only switches off."""
+        self.places = places
+        self.path = places.runtime
+        self.records = Records(places, file)
+        self._holder = Holder(os.getpid(), named(file), serves)
+        self._locks: dict[Path, int] = {}
+        self._record: Record | None = None
+        self._once = Once()
+        deadline = time.monotonic() + wait_s
+        for folder in places.folders:
+            self._lock_by(folder, deadline)
 
-    def claimed(self) -> Path | None:
-        """What a daemon had claimed and not released."""
-        path = self.path / CLAIMED
-        return path if path.exists() else None
+    def claim(self, record: Record) -> None:
+        """Write down which outputs this daemon is about to claim; where that fails, tried again."""
+        self._record = record
+        self._write_record()
 
     def released(self) -> None:
         """Every output is off and let go."""
-        (self.path / CLAIMED).unlink(missing_ok=True)
+        record, self._record = self._record, None
+        if record is not None:
+            try:
+                self.records.release(record)
+            except OSError as error:
+                self._once.failed("record", error)
 
     def write_status(self, json: bytes) -> None:
-        """Replace the status file in one step."""
-        self._replace(STATUS, json)
+        """Replace the status file in one step; and whatever could not be written before, or is gone."""
+        for folder in self.places.folders:
+            self._lock(folder)
+        self._write_record()
+        try:
+            show(self.path / STATUS, json)
+        except OSError as error:
+            self._once.failed(STATUS, error)
+        else:
+            self._once.works(STATUS)
 
     def close(self) -> None:
         """Let another daemon have it. The status of a daemon that is gone is nobody's truth."""
-        (self.path / STATUS).unlink(missing_ok=True)
-        self._lock.close()
+        with suppress(OSError):
+            (self.path / STATUS).unlink(missing_ok=True)
+        for lock in self._locks.values():
+            os.close(lock)
+        self._locks.clear()
 
-    def _replace(self, name: str, content: bytes) -> None:
-        new = self.path / f".{name}.new"
-        new.write_bytes(content)
-        new.replace(self.path / name)
+    def _lock_by(self, folder: Path, deadline: float) -> None:
+        """Lock it; while `outputs-off` has it, wait."""
+        while not self._lock(folder):
+            found = _written(folder / LOCK)
+            if found.serves or time.monotonic() >= deadline:
+                self.close()
+                raise AlreadyRunning(f"{folder} is in use by {found}")
+            time.sleep(LOOK_EVERY_S)
+
+    def _lock(self, folder: Path) -> bool:
+        """Hold the lock that stands there; False while another process does."""
+        try:
+            return self._has(folder) or self._take(folder)
+        except OSError as error:
+            self._once.failed(f"{folder}/{LOCK}", error)
+            return True
+
+    def _has(self, folder: Path) -> bool:
+        """Is the file that stands there the one that we hold?"""
+        lock = self._locks.get(folder)
+        try:
+            return lock is not None and os.path.samestat(os.fstat(lock), os.lstat(folder / LOCK))
+        except (FileNotFoundError, NotADirectoryError):
+            return False
+
+    def _take(self, folder: Path) -> bool:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        lock = self._opened(folder / LOCK)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(lock)
+            return False
+        if old := self._locks.pop(folder, None):
+            os.close(old)
+        self._locks[folder] = lock
+        self._sign(lock)
+        self._once.works(f"{folder}/{LOCK}")
+        return True
+
+    def _opened(self, path: Path) -> int:
+        """To be written, or where that is not allowed to be held at least."""
+        try:
+            return _open(path, os.O_RDWR | os.O_CREAT)
+        except OSError:
+            return _open(path, os.O_RDONLY)
+
+    def _sign(self, lock: int) -> None:
+        """Write down who holds it; on a full disk rather nothing than who held it before."""
+        content = msgspec.json.encode(self._holder)
+        with suppress(OSError):
+            os.ftruncate(lock, 0)
+            os.pwrite(lock, content, 0)
+
+    def _write_record(self) -> None:
+        if self._record is None:
+            return
+        try:
+            self.records.write(self._record)
+        except OSError as error:
+            self._once.failed("record", error)
+        else:
+            self._once.works("record")

@@ -4,12 +4,14 @@ A round takes what was heard, wakes whose time has come and sends what they say.
 virtual time; the daemon has a thread for it (`bridges/serve/serving.py`).
 """
 
+import logging
 from collections.abc import Callable, Mapping
 from typing import Any, Generic
 
 from bridges.core.decision import Fault, M, OperatorReset, R, RequestRefused
 from bridges.core.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
 from bridges.core.kind import E, L, S
+from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import Topic
@@ -24,6 +26,13 @@ from bridges.serve.subject import Core, Status, Subject
 
 MAX_SUBJECTS = 1000
 """More lifts or doors than any site has: somebody makes names up."""
+MAX_UNSHOWN = 100
+"""Names that only requests speak of: no lift or door has shown itself by them."""
+
+
+DEFECT = "a defect"
+
+log = logging.getLogger(__name__)
 
 
 def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> Core[M, GraphEvent[E], None, R]:
@@ -71,6 +80,9 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
         self._reset = False
+        self._unsaid: list[tuple[Topic[Message], Message]] = []
+        self._shown: set[str] = set()
+        self._reserved = frozenset(kind.reserved(settings))
         for name, memory in self._keeper.restore(settings, self._started_at).items():
             self._add(name, memory)
 
@@ -88,6 +100,11 @@ class GraphNode(Generic[S, L, M, E, R]):
         self.inbox.wake()
 
     @property
+    def finished(self) -> int:
+        """Nothing within a round."""
+        return 0
+
+    @property
     def ready(self) -> bool:
         """It listens. (A passive node is in order: the other one speaks.)"""
         return True
@@ -96,7 +113,7 @@ class GraphNode(Generic[S, L, M, E, R]):
     def wake_at(self) -> float:
         """When the next round is due if nothing is heard."""
         due = (subject.wake_at for subject in self.subjects.values())
-        return min(self.presence.look_at, self._keeper.tell_at, *due)
+        return min(self.presence.look_at, self._keeper.wake_at, *due)
 
     def round(self) -> None:
         """Take what was heard, wake whose time has come, send what they say."""
@@ -109,8 +126,10 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide_all(OperatorReset())
         self._wake()
         memories = {name: subject.memory for name, subject in self.subjects.items()}
-        self._keeper.keep(memories)
-        self._keeper.tell(memories, self._clock.monotonic(), self.presence.may_speak)
+        now = self._clock.monotonic()
+        self._keeper.keep(self._real(memories), now)
+        self._say()
+        self._keeper.tell(memories, now, self.presence.may_speak)
 
     def end(self) -> bool:
         """It has no outputs."""
@@ -127,6 +146,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
             "refused": self.refused,
+            "faults": [{"code": f.code, "detail": f.detail} for f in self._keeper.faults],
         }
 
     def devices(self) -> Mapping[str, Status]:
@@ -158,27 +178,47 @@ class GraphNode(Generic[S, L, M, E, R]):
                 self._decide(subject, Woken())
             if self._kind.idle(subject.memory, now):
                 del self.subjects[subject.name]
+                self._shown.discard(subject.name)
 
     def _receive(self, name: str, topic: Topic[Message], message: Message) -> None:
         try:
             event = self._kind.requests[topic](message, self._settings, self._clock.wall())
-            subject = self._subject(name)
+            subject = self._subject(name, shows_itself=self._kind.shown_by in (None, topic))
+            self._decide(subject, event)
         except RequestRefused as refusal:
             self._refusals.add(refusal.kind, refusal.detail)
-            return
-        self._decide(subject, event)
+        except Exception as error:  # pure cores: what was known before still stands
+            if not self._refusals.counts().get(DEFECT):
+                log.exception(pairs("defect", kind=self._kind.name, subject=name, reason=error))
+            self._refusals.add(DEFECT, f"{type(error).__name__} about {name}")
 
-    def _subject(self, name: str) -> Subject[M, GraphEvent[E], None, R]:
+    def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
         """What this message is about; it may be new to us."""
-        if name in self.subjects:
-            return self.subjects[name]
-        if len(self.subjects) == MAX_SUBJECTS:
+        if name not in self.subjects and not self._has_room(name, shows_itself):
             raise RequestRefused("too many names", name)
-        return self._add(name, self._kind.initial(name, self._started_at))
+        if shows_itself:
+            self._shown.add(name)
+        found = self.subjects.get(name)
+        return found or self._add(name, self._kind.initial(name, self._started_at))
+
+    def _has_room(self, name: str, shows_itself: bool) -> bool:
+        """Names that are made up take no place from what the YAML names, nor from what shows itself."""
+        if name in self._reserved:
+            return True
+        if shows_itself:
+            return len(self._shown) < MAX_SUBJECTS
+        return len(self.subjects) - len(self._shown) < MAX_UNSHOWN
+
+    def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
+        """In a flood of names that nobody has shown, they are not kept: it would come back with us."""
+        if len(memories) - len(self._shown) < MAX_UNSHOWN:
+            return memories
+        real = self._shown | self._reserved
+        return {name: memory for name, memory in memories.items() if name in real}
 
     def _add(self, name: str, memory: M) -> Subject[M, GraphEvent[E], None, R]:
-        publish, refusals, clock = self._publish, self._refusals, self._clock
-        subject = Subject(name, memory, self._core, publish, refusals, clock)
+        refusals, clock = self._refusals, self._clock
+        subject = Subject(name, memory, self._core, self._will_say, refusals, clock)
         self.subjects[name] = subject
         self._decide(subject, MaySpeak(self.presence.may_speak))
         return subject
@@ -189,6 +229,15 @@ class GraphNode(Generic[S, L, M, E, R]):
     def _decide_all(self, event: GraphEvent[E]) -> None:
         for subject in self.subjects.values():
             self._decide(subject, event)
+
+    def _will_say(self, topic: Topic[Message], message: Message) -> None:
+        """Not before the round has kept what it rests on."""
+        self._unsaid.append((topic, message))
+
+    def _say(self) -> None:
+        unsaid, self._unsaid = self._unsaid, []
+        for topic, message in unsaid:
+            self._publish(topic, message)
 
     def _publish(self, topic: Topic[Message], message: Message) -> None:
         """With the stamp of its sending."""

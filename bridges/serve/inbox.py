@@ -15,8 +15,8 @@ class Inbox(Generic[T]):
     """Every thread may put; the thread that serves takes.
 
     A request is a level, not a pulse: of several with the same `key` only the last one is kept, so that
-    a flood of repeats costs a scan no more than one of them. What is kept stays in the order in which it
-    came.
+    a flood of repeats costs a scan no more than one of them. What is kept stays in the order in which
+    it came.
     """
 
     def __init__(self) -> None:

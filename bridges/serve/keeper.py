@@ -1,14 +1,15 @@
 """What a kind without hardware keeps for its next start, and what it tells of all its subjects at once.
 
-What is kept is kept before it is told: others act on what they are told.
+What is kept is kept before it is told: others act on what they are told. Where it cannot be kept the
+kind serves all the same, with the fault NOT_KEPT, and it is tried again each second.
 """
 
 import logging
 from collections.abc import Mapping
-from typing import Generic, Protocol
+from typing import Final, Generic, Protocol
 
-from bridges.core.decision import M, R
-from bridges.core.durations import NEVER
+from bridges.core.decision import Fault, M, R
+from bridges.core.durations import AGES_AGO, NEVER
 from bridges.core.graph_kind import GraphKind
 from bridges.core.kind import E, L, S
 from bridges.log import pairs
@@ -16,6 +17,9 @@ from bridges.serve.clock import Pace
 from bridges.serve.subject import Publish
 
 log = logging.getLogger(__name__)
+
+AGAIN_S: Final = 1.0
+NOT_KEPT: Final = "NOT_KEPT"
 
 
 class Kept(Protocol):
@@ -36,6 +40,8 @@ class Keeper(Generic[S, L, M, E, R]):
         self._kept = kept
         self._publish = publish
         self._bytes: bytes | None = None
+        self._again_at = AGES_AGO
+        self._fault: Fault | None = None
         self._pace = Pace()
 
     def restore(self, settings: S, now: float) -> Mapping[str, M]:
@@ -51,18 +57,46 @@ class Keeper(Generic[S, L, M, E, R]):
         self._bytes = kept
         return found
 
-    def keep(self, memories: Mapping[str, M]) -> None:
+    @property
+    def wake_at(self) -> float:
+        """When to tell next, or to try again to keep."""
+        return min(self.tell_at, self._again_at if self._fault else NEVER)
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """That what was told last is not kept."""
+        return (self._fault,) if self._fault else ()
+
+    def keep(self, memories: Mapping[str, M], now: float) -> None:
         """Write down what must outlive us, if it has changed."""
-        if self._kept is None or self._kind.persist is None:
+        if (
+            self._kept is None
+            or self._kind.persist is None
+            or (self._fault and now < self._again_at)
+        ):
             return
         kept = self._kind.persist(memories)
         if kept == self._bytes:
+            self._keeps()
             return
-        self._bytes = kept
         try:
             self._kept.write(kept)
         except OSError as error:
-            log.error(pairs("not_kept", kind=self._kind.name, reason=error))
+            self._again_at = now + AGAIN_S
+            self._fails(Fault(NOT_KEPT, f"a restart would forget what was told last: {error}"))
+        else:
+            self._bytes = kept
+            self._keeps()
+
+    def _fails(self, fault: Fault) -> None:
+        if self._fault is None:
+            log.error(pairs("fault", kind=self._kind.name, code=fault.code, detail=fault.detail))
+        self._fault = fault
+
+    def _keeps(self) -> None:
+        if self._fault is not None:
+            log.info(pairs("fault_over", kind=self._kind.name, code=NOT_KEPT))
+        self._fault = None
 
     def tell(self, memories: Mapping[str, M], now: float, may_speak: bool) -> None:
         """Tell of all subjects together, when that is due."""

@@ -6,7 +6,10 @@ from collections.abc import Mapping
 
 
 def notify(state: str, environ: Mapping[str, str] = os.environ) -> None:
-    """Tell systemd; nothing happens where NOTIFY_SOCKET is not set. A full socket loses the word."""
+    """Tell systemd; nothing happens where NOTIFY_SOCKET is not set. A full socket loses the word.
+
+    Raises OSError where it cannot be told: no descriptor is left, or nobody may write there.
+    """
     path = environ.get("NOTIFY_SOCKET", "")
     if not path:
         return

@@ -4,9 +4,8 @@ Either has threads, subscribes for them, and says how they are.
 """
 
 import logging
-import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Protocol
 
@@ -17,12 +16,13 @@ from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import M_co, Topic
 from bridges.rmf.transport import Transport
-from bridges.serve.clock import Clock
+from bridges.serve.clock import Clock, machine_s
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
 from bridges.serve.keeper import Kept
 from bridges.serve.loop import Loop
 from bridges.serve.outlet import Named, Outlet
+from bridges.serve.predecessor import SafeFirst
 from bridges.serve.serving import Serving
 from bridges.serve.subject import Status
 from bridges.settings.load import Config
@@ -60,18 +60,23 @@ def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
 
 
 def service(
-    config: Config, transport: Transport, open_bus: OpenBus, kept: Kept | None = None
+    config: Config,
+    transport: Transport,
+    open_bus: OpenBus,
+    kept: Kept | None = None,
+    unsafe: Collection[str] = (),
 ) -> Service:
     """What serves this YAML. Raises HalError when a bus cannot be opened.
 
-    `kept`: where a kind that has to remembers across restarts; None to forget.
+    `kept`: where a kind that has to remembers across restarts; None to forget. `unsafe`: devices that
+    a dead daemon may have left on.
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
-    clock = Clock(time.monotonic, transport.wall)  # durations by the machine's, stamps by RMF's
+    clock = Clock(machine_s, transport.wall)  # durations by the machine's, stamps by RMF's
     if isinstance(kind, GraphKind):
         return GraphService(GraphNode(kind, config.section, transport, clock, named, kept), clock)
-    return Devices(config, kind, transport, open_bus, named, clock)
+    return Devices(config, kind, transport, open_bus, named, clock, unsafe)
 
 
 class GraphService:
@@ -96,10 +101,11 @@ class Devices:
         open_bus: OpenBus,
         named: Named,
         clock: Clock,
+        unsafe: Collection[str] = (),
     ) -> None:
         self._config = config
+        self._unsafe = unsafe
         self._kind = kind
-        self._driver = config.driver_type
         self._transport = transport
         self._clock = clock
         self._named = named
@@ -145,8 +151,11 @@ class Devices:
 
     def _node(self, name: str, bus: Bus) -> AnyNode:
         device = self._config.devices[name]
-        limits = self._kind.limits(device, self._driver.debounce(device))
-        driver = self._driver.create(name, device, bus)
+        driver_type = self._config.driver_type(name)
+        limits = self._kind.limits(device, driver_type.debounce(device))
+        driver = driver_type.create(name, device, bus)
+        if name in self._unsafe:
+            driver = SafeFirst(name, driver)
         return Node(name, self._kind, device, limits, driver, self._outlet.publish, self._clock)
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:

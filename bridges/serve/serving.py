@@ -1,9 +1,14 @@
 """A thread that serves: rounds, one after the other, until it is stopped."""
 
+import logging
 import threading
 from typing import Protocol
 
+from bridges.log import pairs
 from bridges.serve.clock import Clock
+from bridges.serve.contained import LeftOn
+
+log = logging.getLogger(__name__)
 
 LEAST_GAP_S = 0.001
 """Time alone never asks for rounds faster than this."""
@@ -39,6 +44,10 @@ class Rounds(Protocol):
         """When the next round is due if nothing is heard (monotonic s)."""
 
     @property
+    def finished(self) -> int:
+        """Counts what it has finished, within a round too."""
+
+    @property
     def ready(self) -> bool:
         """It does what it is for."""
 
@@ -50,10 +59,10 @@ class Rounds(Protocol):
 
 
 class Serving:
-    """One thread of a service, as the daemon sees it. `scans` counts finished rounds."""
+    """One thread of a service, as the daemon sees it."""
 
     def __init__(self, serves: Rounds, clock: Clock) -> None:
-        self.scans = 0
+        self._rounds = 0
         self._serves = serves
         self._clock = clock
         self._safe = False
@@ -75,9 +84,14 @@ class Serving:
         return self._thread.is_alive()
 
     @property
+    def finished(self) -> int:
+        """Grows as long as it gets on with its work."""
+        return self._rounds + self._serves.finished
+
+    @property
     def ready(self) -> bool:
         """It has been through its first round, and does what it is for."""
-        return self.scans > 0 and self._serves.ready
+        return self._rounds > 0 and self._serves.ready
 
     def _run(self) -> None:
         serves = self._serves
@@ -86,6 +100,10 @@ class Serving:
                 wait_s = serves.wake_at - self._clock.monotonic()
                 serves.inbox.wait(max(wait_s, LEAST_GAP_S))
                 serves.round()
-                self.scans += 1
+                self._rounds += 1
+        except LeftOn as error:
+            log.critical(pairs("died", thread=serves.name, reason=error))
+        except Exception as error:  # a defect of ours: the daemon ends, and is started again
+            log.critical(pairs("died", thread=serves.name, reason=error), exc_info=True)
         finally:
             self._safe = serves.end()

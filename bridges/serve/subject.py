@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from bridges.core.decision import Decision, Fault, M, O, R
 from bridges.core.durations import NEVER
-from bridges.log import pairs
+from bridges.log import pairs, plain
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.serve.clock import Clock
@@ -73,7 +73,9 @@ class Subject(Generic[M, V, O, R]):
         for topic, message in decision.publish:
             self._publish(topic, message)
         if decision.refused:
-            self._refusals.add(decision.refused, event, **self._whose)
+            kind, _, detail = decision.refused.partition(": ")
+            asked = plain(event)
+            self._refusals.add(kind, f"{detail}; {asked}" if detail else asked, **self._whose)
         return decision
 
     def log(self, report: R) -> None:

@@ -1,1 +1,1 @@
-"""A device YAML, read and judged: every problem at once, each at its line and column."""
+"""Reads and validates a device YAML: all problems at once, each with its line and column."""

@@ -120,7 +120,7 @@ def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]
     canonical = config.bus_type(bus).canonical
     for wire in config.wires(device):
         yield canonical(wire.point), (*wire.path, "point")
-    yield from config.driver_type.claims(config.devices[device])
+    yield from config.driver_type(device).claims(config.devices[device])
 
 
 def _shared(pair: tuple[Claim, Claim], claims: Sequence[Claim]) -> Problem:

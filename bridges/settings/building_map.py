@@ -1,6 +1,6 @@
-"""RMF's map of a building, as far as its names must be ours: levels, lifts, doors, waypoints.
+"""The names on RMF's map of a building that our files must match: levels, lifts, doors, waypoints.
 
-Two files hold it, and either is taken:
+Two kinds of file hold it, and either is accepted:
 
     *.building.yaml   traffic-editor's: `levels: {L1: {vertices: [[x, y, z, name, {is_charger: [4,
                       true]}]], doors: [[from, to, {name: [1, D1]}]]}}`, where a parameter is [its
@@ -23,10 +23,10 @@ from bridges.settings.nodes import Page, Sort, compose, read
 MAP = Sort("building map or navigation graph", "levels: ...", 4 * 1024 * 1024, 400_000)
 
 FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
-"""What a name on the map can be of."""
+"""What a name on the map can name."""
 
 Lines = dict[str, int]
-"""Name -> the line where it first stands."""
+"""Name -> the line of its first occurrence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ def load_map(file: str) -> BuildingMap:
 
 
 class _Reading:
-    """One file on its way to its names; what has another form than RMF's goes to the page."""
+    """Collects the names of one file; deviations from RMF's format go to the page."""
 
     def __init__(self, page: Page) -> None:
         self.named: dict[str, Lines] = {w: {} for w in (FLOOR, LIFT, DOOR, CHARGER, WAYPOINT)}
@@ -58,9 +58,9 @@ class _Reading:
         self._page = page
 
     def all(self, root: MappingNode) -> None:
-        """Levels first: they tell the two forms apart, vertex by vertex."""
+        """Read levels, lifts and doors, in either form."""
         if _below(root, "levels") is None:
-            self._page.note(root, f"this is no {MAP.name}: it has no 'levels:'")
+            self._page.note(root, f"this is not a {MAP.name}: it has no 'levels:'")
         for level, node in self._entries(root, "levels"):
             self._add(FLOOR, level)
             for vertex in self._items(node, "vertices", "a vertex"):
@@ -91,7 +91,7 @@ class _Reading:
             self._add_stop(lift, level)
 
     def _add(self, what: str, name: ScalarNode | None) -> None:
-        """An unnamed vertex is named ""; so is a door that nobody has named."""
+        """Unnamed vertices and doors have the name ""; they are left out."""
         if name is not None and name.value:
             self.named[what].setdefault(name.value, _line(name))
 
@@ -99,32 +99,32 @@ class _Reading:
         self.stops.setdefault(lift.value, {}).setdefault(level.value, _line(level))
 
     def _entries(self, node: Node, key: str) -> Iterator[tuple[ScalarNode, Node]]:
-        """The entries of a mapping below `key`; none where nothing is."""
+        """The entries of the mapping below `key`; none if it is missing or empty."""
         section = _below(node, key)
         if section is None or _is_empty(section):
             return
         if not isinstance(section, MappingNode):
-            self._page.note(section, f"'{key}' is not a mapping (name: ...), as RMF has it")
+            self._page.note(section, f"'{key}' must be a mapping (name: ...), as RMF has it")
             return
         for name, value in section.value:
             if isinstance(name, ScalarNode):
                 yield name, value
             else:
-                self._page.note(name, f"a name in '{key}' is not a text")
+                self._page.note(name, f"a name in '{key}' must be text")
 
     def _items(self, node: Node, key: str, what: str) -> Iterator[SequenceNode]:
-        """The lists in a list below `key`; none where nothing is."""
+        """The lists in the list below `key`; none if it is missing or empty."""
         section = _below(node, key)
         if section is None or _is_empty(section):
             return
         if not isinstance(section, SequenceNode):
-            self._page.note(section, f"'{key}' is not a list, as RMF has it")
+            self._page.note(section, f"'{key}' must be a list, as RMF has it")
             return
         for item in section.value:
             if isinstance(item, SequenceNode):
                 yield item
             else:
-                self._page.note(item, f"{what} is not a list ([x, y, ...]), as RMF has it")
+                self._page.note(item, f"{what} must be a list ([x, y, ...]), as RMF has it")
 
 
 def _below(node: Node, key: str) -> Node | None:
@@ -136,7 +136,7 @@ def _below(node: Node, key: str) -> Node | None:
 
 
 def _param(item: SequenceNode, key: str) -> ScalarNode | None:
-    """A parameter of a vertex or an edge, whose last item holds them: `V`, or `[type, V]`."""
+    """A parameter of a vertex or an edge, from its last item: `V`, or `[type, V]`."""
     found = _below(item.value[-1], key) if item.value else None
     if isinstance(found, SequenceNode) and len(found.value) == 2:
         found = found.value[1]

@@ -12,13 +12,13 @@ import msgspec
 import yaml
 from msgspec import inspect as mi
 
-import drivers.profiles
+import drivers
 from bridges.settings import names as named
 from bridges.settings.leaves import choices
 from bridges.settings.load import load
 from drivers.profiles import Profile
 
-CONFIG = Path(drivers.profiles.FOLDER).parents[1] / "config"
+CONFIG = Path(drivers.__file__).parents[1] / "config"
 LONGEST = 72
 
 WRITTEN: dict[str, Any] = {

@@ -1,8 +1,7 @@
-"""One YAML scalar to one text, number, truth or choice: what is written there is read here, whether its
-type allows it is msgspec's to judge, and how to say what not is said here again.
+"""Converts one YAML scalar to a text, number, boolean or choice, and words the error if it is none.
 
-A text is a text only if YAML could not take it for something else, a number only if it is written
-so that nobody can misread it (`scalars.py`).
+msgspec decides whether the type allows the value. A text must not be readable as anything else in
+YAML, and a number must be written unambiguously (`scalars.py`).
 """
 
 from collections.abc import Callable, Mapping
@@ -35,11 +34,11 @@ Extra = Mapping[str, Any]
 
 
 class Wrong(Exception):
-    """A scalar that is not what is wanted. The text follows the value's name: "is ...": no dot."""
+    """A scalar of the wrong kind. The text continues after the value's name: "is ...", no full stop."""
 
 
 def looks(node: Node) -> str:
-    """What stands there, as a person would say it."""
+    """What the node is, in words."""
     if isinstance(node, SequenceNode):
         return "a list"
     if not isinstance(node, ScalarNode):
@@ -54,7 +53,7 @@ def looks(node: Node) -> str:
 
 
 def wanted_text(wanted: Type, extra: Extra | None = None) -> str:
-    """What a type asks for, with bounds and unit."""
+    """What a type requires, with bounds and unit."""
     if isinstance(wanted, Metadata):
         return wanted_text(wanted.type, wanted.extra)
     if isinstance(wanted, UnionType):
@@ -79,7 +78,7 @@ _NOUNS: dict[type[Type], str] = {
 
 
 def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
-    """The scalar as the first of these types that it can be. Raises Wrong."""
+    """The scalar converted to the first of these types that fits. Raises Wrong."""
     *others, last = sorted(types, key=_rank)
     for wanted in others:
         try:
@@ -89,7 +88,7 @@ def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
     if isinstance(last, Metadata):
         return leaf([last.type], node, last.extra or {})
     if is_plain(node) and not node.value:
-        raise Wrong(f"has no value: {wanted_text(last, extra)} is wanted")
+        raise Wrong(f"has no value: write {wanted_text(last, extra)}")
     value = _read(last, node, extra)
     try:
         return msgspec.convert(value, _annotation(last))
@@ -98,12 +97,12 @@ def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
 
 
 def _rank(wanted: Type) -> int:
-    """Text last: it fits nearly everything."""
+    """Sort key that tries text last: it fits nearly everything."""
     return isinstance(wanted.type if isinstance(wanted, Metadata) else wanted, StrType)
 
 
 def _annotation(wanted: Type) -> Any:
-    """The type that msgspec described, with its bounds: what `convert` judges by."""
+    """The type that msgspec described, with its bounds, for `convert`."""
     if isinstance(wanted, EnumType):
         return wanted.cls
     if isinstance(wanted, LiteralType):
@@ -115,8 +114,8 @@ _PLAIN: dict[type[Type], type] = {StrType: str, IntType: int, FloatType: float, 
 
 
 def _read(wanted: Type, node: ScalarNode, extra: Extra) -> object:
-    """The value that is written there, if nobody can take it for another. Raises Wrong."""
-    if isinstance(wanted, LiteralType | EnumType):  # as written: YAML's readings do not matter
+    """The value, if it is unambiguous. Raises Wrong."""
+    if isinstance(wanted, LiteralType | EnumType):  # as written: how YAML reads it does not matter
         return choices(wanted).get(node.value, node.value)
     if isinstance(wanted, StrType):
         _check_text(node, extra)
@@ -135,20 +134,20 @@ _READINGS: dict[type[Type], Callable[[str], object]] = {
 
 
 def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
-    """Why `convert` did not take a value; `length`: because of its length."""
+    """Why `convert` refused a value; `length`: because of its length."""
     written = shown(node.value)
     if isinstance(wanted, LiteralType | EnumType):
         near = nearest(node.value, choices(wanted))
         meant = f" (did you mean '{near}'?)" if near else ""
-        return f"is '{written}': {wanted_text(wanted)} is wanted{meant}"
+        return f"is '{written}': write {wanted_text(wanted)}{meant}"
     if not isinstance(wanted, StrType):
-        return f"is {written}: {wanted_text(wanted, extra)} is wanted"
+        return f"is {written}: write {wanted_text(wanted, extra)}"
     if length:
         least, most = wanted.min_length or 0, wanted.max_length
         span = f"at least {least}" if most is None else f"{least} to {most}"
         return f"has {len(node.value)} characters: {span} are allowed"
     form = extra.get("pattern", "text of another form")
-    return f"is '{written}': {form} is wanted"
+    return f"is '{written}': write {form}"
 
 
 def _check_text(node: ScalarNode, extra: Extra) -> None:
@@ -164,12 +163,12 @@ def _check_text(node: ScalarNode, extra: Extra) -> None:
 
 
 def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> Wrong:
-    """What is written is not read as a number or truth: the way to write what may be meant."""
+    """The error for a text that is not a plain number or boolean, with the way to write it."""
     text, asked = shown(node.value), wanted_text(wanted, extra)
     whole = isinstance(wanted, IntType)
     if not is_plain(node):
         read = _READINGS[type(wanted)](node.value) is not None
-        return Wrong(f'is the text "{text}": {asked} is wanted{", without quotes" if read else ""}')
+        return Wrong(f'is the text "{text}": write {asked}{", without quotes" if read else ""}')
     meant = "" if isinstance(wanted, BoolType) else number_meant(node.value, whole)
     if meant:
         return Wrong(f"is written {text}: write {meant}; {asked} is wanted")
@@ -177,10 +176,10 @@ def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> Wrong:
         return Wrong(f"is written {text}: write the number alone; {asked} is wanted")
     reading = reads_as(node.value) or ""
     if isinstance(wanted, BoolType) and reading in ("true", "false"):
-        return Wrong(f"is written {text}, which not every YAML reads alike: write {reading}")
+        return Wrong(f"is written {text}, which YAML versions read differently: write {reading}")
     if reading.startswith("the number") and number(node.value) is None:
         return Wrong(f"is written {text}, which YAML may read as {reading}: write {asked} plainly")
-    return Wrong(f"is {looks(node)}: {asked} is wanted")
+    return Wrong(f"is {looks(node)}: write {asked}")
 
 
 def _span(wanted: IntType | FloatType, extra: Extra) -> str:
@@ -203,11 +202,11 @@ def _span(wanted: IntType | FloatType, extra: Extra) -> str:
 
 
 def _digits(bound: float) -> str:
-    """As a person writes it: 1000000, 0.05."""
+    """The bound as a person writes it: 1000000, 0.05."""
     return str(int(bound)) if bound == int(bound) else f"{bound:g}"
 
 
 def choices(wanted: LiteralType | EnumType) -> dict[str, object]:
-    """What may be written -> what it stands for."""
+    """The allowed texts -> their values."""
     values = wanted.values if isinstance(wanted, LiteralType) else [m.value for m in wanted.cls]
     return {str(value): value for value in values}

@@ -1,15 +1,15 @@
 """A device YAML becomes a Config, or a SettingsError that names every problem with its place.
 
     kind: lift              a folder of bridges/ that holds a KIND
-    driver: dry_contact     a file of drivers/
+    driver: dry_contact     a file of drivers/<kind>/; a device may name another as its own `driver:`
     rmf: {...}              bridges.core.fields.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
     lifts: {name: {...}}    the kind's own key; what each holds is the driver's `settings`
 
-A kind that lives on RMF's graph alone has `kind`, `rmf` and one section of its own.
+A kind without hardware has only `kind`, `rmf` and one section of its own.
 
-Structs say what may stand in a section (`yaml_values`); what concerns several sections is checked
-here and in `wiring`. The daemon takes nothing else from the file, and checks nothing again.
+Structs define what a section may contain (`values.py`); this file and `wiring.py` check what concerns
+several sections. The daemon takes nothing else from the file, and checks nothing again.
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ from bridges.settings.nodes import (
     read,
     unknown,
 )
-from bridges.settings.plausible import milliseconds, stale_readings
+from bridges.settings.plausible import milliseconds, out_of_step
 from bridges.settings.values import BROKEN, Entry, Spot, Values, below, is_none, locate
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
 from drivers.driver_type import AnyDriver
@@ -48,9 +48,13 @@ MAPPING = "a mapping (key: value)"
 
 
 def load(path: Path | str) -> Config:
-    """Read a device YAML. Raises SettingsError with every problem of it that can be seen."""
+    """Read a device YAML. Raises SettingsError with every problem found."""
+    return understood(path, read(str(path)))
+
+
+def understood(path: Path | str, text: bytes) -> Config:
+    """The Config of a device YAML's text, which is or was at this path. Raises SettingsError."""
     page = Page(str(path))
-    text = read(page.file)
     root = compose(page, text)
     reading = _Reading(page, root)
     reading.all()
@@ -69,7 +73,7 @@ class _Bus:
 
 
 class _Reading:
-    """One file on its way to a Config, section by section; problems go to its page."""
+    """Reads one file section by section; problems go to its page."""
 
     def __init__(self, page: Page, root: MappingNode) -> None:
         self._page = page
@@ -80,11 +84,13 @@ class _Reading:
         self._kind_name = ""
         self._driver: AnyDriver | None = None
         self._driver_name = ""
+        self._own_drivers: dict[str, AnyDriver | None] = {}
         self._rmf = Rmf()
         self._buses: dict[str, _Bus] = {}
         self._devices: dict[str, Any] = {}
         self._uses: list[Use] = []
         self._warnings: list[Problem] = []
+        self._notes: list[Problem] = []
 
     def config(self, path: Path, text: bytes) -> Config:
         """What was read, if no problem was noted."""
@@ -98,16 +104,19 @@ class _Reading:
             devices=self._devices,
             bus_types={name: bus.type or "" for name, bus in self._buses.items()},
             warnings=tuple(sorted(self._warnings)),
+            notes=tuple(sorted(self._notes)),
             section=self._section,
         )
 
     def all(self) -> None:
-        """Every section, as far as those before it allow."""
+        """Read every section, as far as the earlier ones allow."""
         entries = self._values.entries(self._top)
         self._read_kind(below(self._top.node, "kind"))
         if not isinstance(self._kind, GraphKind):
             self._read_driver(below(self._top.node, "driver"))
         sections = self._values.known(entries, self._top, self._keys(), self._elsewhere())
+        if self._kind and self._kind.devices_key in sections:
+            self._read_own_drivers(sections[self._kind.devices_key].value)
         if "rmf" in sections:
             self._read_rmf(sections["rmf"].spot())
         if "buses" in sections:
@@ -154,6 +163,18 @@ class _Reading:
             self._driver_name = name
             self._driver = named.driver_called(self._kind_name, name)
 
+    def _read_own_drivers(self, devices: Node) -> None:
+        """The devices that name a driver of their own; None where there is none of that name."""
+        for key, value in devices.value if isinstance(devices, MappingNode) else ():
+            own = below(value, "driver")
+            if own and isinstance(key, ScalarNode) and not is_none(own.value):
+                name = self._word(own, named.driver_names(self._kind_name))
+                driver = named.driver_called(self._kind_name, name) if name else None
+                self._own_drivers[key.value] = driver
+
+    def _driver_of(self, device: str) -> AnyDriver | None:
+        return self._own_drivers.get(device, self._driver)
+
     def _read_rmf(self, spot: Spot) -> None:
         self._rmf = self._values.make(Rmf, spot)
         for name in () if self._rmf is BROKEN else self._rmf.topics:
@@ -178,7 +199,7 @@ class _Reading:
         return self._section is BROKEN or bool(self._page.problems)
 
     def _word(self, entry: Entry | None, words: list[str]) -> str | None:
-        """One of these words; None where it is none of them, or not there."""
+        """One of these words; None if the entry is missing or another word."""
         if entry is None:
             return None
         word = self._values.make(LiteralType(tuple(words)), entry.spot())
@@ -216,7 +237,7 @@ class _Reading:
         return _Bus(entry, name, hal, settings)
 
     def _note_untyped(self, bus: Entry, allowed: list[str]) -> None:
-        """That a bus has no type, or none that is spelt so; its other keys mean nothing yet."""
+        """Note that a bus has no `type`, or misspells the key; its other keys mean nothing yet."""
         entries = {e.name: e for e in self._values.entries(bus.spot())}
         near = nearest("type", entries)
         if near is None:
@@ -229,29 +250,40 @@ class _Reading:
         if isinstance(entry.value, ScalarNode) and word in set(named.bus_types()).difference(
             allowed
         ):
-            text = f"'type' is '{word}', but the driver '{self._driver_name}' stands on"
+            text = f"'type' is '{word}', but the driver '{self._driver_name}' needs a bus of type"
             self._page.note(entry.value, f"{text} {either(allowed)}")
             return None
         return self._word(entry, allowed)
 
     def _allowed_types(self) -> list[str]:
-        """The bus types that the driver can stand on; all while the driver is not known."""
-        types = named.bus_types()
-        return [t for t in types if t in self._driver.buses] if self._driver else types
+        """The bus types that the drivers can use; all of them while a driver is not known."""
+        types, drivers = named.bus_types(), [self._driver, *self._own_drivers.values()]
+        return [t for t in types if not all(d and t not in d.buses for d in drivers)]
 
     def _read_devices(self, spot: Spot) -> None:
         entries = self._names(spot, (self._kind.name if self._kind else ""))
         buses = [self._bus_name(entry) for entry in entries]
         for entry, bus in zip(entries, buses, strict=True):
-            if self._driver:
-                self._devices[entry.name] = self._device(entry, bus, self._driver)
+            driver = self._driver_of(entry.name)
+            if driver and self._can_stand(entry, bus, driver):
+                self._devices[entry.name] = self._device(entry, bus, driver)
         for name in self._buses:
             if entries and name not in buses and None not in buses:
-                text = f"no device stands on the bus '{name}': delete it, or name it in a 'bus:'"
+                text = f"no device uses the bus '{name}': delete it, or name it in a 'bus:'"
                 self._page.note(self._buses[name].entry.key, text)
 
+    def _can_stand(self, device: Entry, bus: str | None, driver: AnyDriver) -> bool:
+        """Can the device's own driver use its bus? The file's driver was checked with the bus."""
+        kind = self._buses[bus].type if bus else None
+        if kind is None or kind in driver.buses:
+            return True
+        on = f"the bus '{bus}' is '{kind}', but the driver of '{device.name}' needs"
+        where = below(device.value, "bus") or below(device.value, "driver") or device
+        self._page.note(where.where(), f"{on} {either(driver.buses)}")
+        return False
+
     def _bus_name(self, device: Entry) -> str | None:
-        """The bus of a device; None where that cannot be told."""
+        """The bus of a device; None if it cannot be determined."""
         entry = below(device.value, "bus")
         if entry is None or is_none(entry.value):
             if len(self._buses) > 1 and isinstance(device.value, MappingNode):
@@ -265,7 +297,7 @@ class _Reading:
         return None
 
     def _device(self, entry: Entry, bus: str | None, driver: AnyDriver) -> Any:
-        """A device's settings, with all that can be said about its wires."""
+        """A device's settings; checks its wires too."""
         spot = Spot(entry.value, entry.key, entry.spot().label)
         hal = self._buses[bus].hal if bus else None
         wiring = Wiring(self._page, entry.name, bus or "", hal)
@@ -279,31 +311,36 @@ class _Reading:
             self._check_pace(settings, spot, bus)
         if len(self._page.problems) == before:
             self._collect_warnings(settings, spot, driver)
+            for node, text in wiring.warnings(driver.wires(settings), spot):
+                self._warn(node, f"{spot.label}: {text}")
             for path, text in milliseconds(values.structs):
                 self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
         self._uses += wiring.uses
         return settings
 
     def _check_signals(self, settings: Any, spot: Spot, wiring: Wiring, driver: AnyDriver) -> None:
-        """The wires of a device whose settings are all there and of the right sort."""
+        """Check the wires of a device whose settings are complete and valid."""
         wires = list(driver.wires(settings))
         wiring.wires(wires, spot)
         wiring.claims(driver.claims(settings), spot)
-        signals = [wire.signal for wire in wires]
+        signals = [*(wire.signal for wire in wires), *driver.unwired(settings)]
         note_unknown_signals(self._page, settings.accept_unsafe, signals, spot)
 
     def _check_pace(self, settings: DeviceSettings, spot: Spot, bus: str | None) -> None:
         read = self._buses[bus].settings if bus else BROKEN
-        for path, text in () if read is BROKEN else stale_readings(settings, read):
+        for path, text in () if read is BROKEN else out_of_step(settings, read):
             self._page.note(locate(spot, path).where(), text)
 
     def _collect_warnings(self, settings: Any, spot: Spot, driver: AnyDriver) -> None:
-        """What is to be known of a device that is in order."""
+        """Collect the warnings about a valid device."""
         for signal, reason in settings.accept_unsafe.items():
             key = locate(spot, ("accept_unsafe", signal)).key
             self._warn(key, f"{spot.label}: unsafe wiring of '{signal}' is accepted: {reason}")
         for path, text in driver.warnings(settings):
             self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
+        for path, text in driver.notes(settings):
+            node = locate(spot, path).where()
+            self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
     def _warn(self, node: Node, text: str) -> None:
         self._warnings.append(self._page.problem(node, f"warning: {text}"))

@@ -1,7 +1,7 @@
-"""Whether a device YAML and RMF's map of the building mean the same by their names.
+"""Compares the names in a device YAML with those on RMF's map of the building.
 
-RMF finds a lift, a floor, a door or a charger by its name alone; a name that differs is not an error
-to anybody, only a robot that waits for ever.
+RMF finds a lift, floor, door or charger by its name alone. A name that differs causes no error, only a
+robot that waits forever.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from bridges.settings.values import Spot, locate
 
 
 def places(config: Config) -> list[Place]:
-    """Everything in a file that RMF's map has to know, by its path from the file's top."""
+    """Every name in a file that RMF's map must have, with its path in the file."""
     kind = named.kind_called(config.kind)
     if isinstance(kind, GraphKind):
         found = kind.on_map(config.section)
@@ -32,7 +32,7 @@ def places(config: Config) -> list[Place]:
 
 
 def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
-    """Every name of the file that the map does not have so, and every stop that the file lacks."""
+    """Every name of the file that is missing on the map, and every stop that the file lacks."""
     page = Page(str(config.path))
     root = compose(page, config.text)
     top = Spot(root, root, "the file")
@@ -51,7 +51,7 @@ def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
 
 
 def _missing(building: BuildingMap, what: str, name: str, lift: str) -> str:
-    """ "" when the map has it; else that it has not, and what was probably meant."""
+    """ "" if the map has the name, else the problem, with a suggestion."""
     stops = building.stops.get(lift)
     known = building.named[what] if stops is None else stops
     if name in known:
@@ -63,7 +63,9 @@ def _missing(building: BuildingMap, what: str, name: str, lift: str) -> str:
             return f"{has}, though the level is there (line {building.named[FLOOR][name]})"
     elif what == CHARGER and name in building.named[WAYPOINT]:
         line = building.named[WAYPOINT][name]
-        return f"{where}:{line}: the waypoint '{shown(name)}' is no charger: is_charger is not true"
+        return (
+            f"{where}:{line}: the waypoint '{shown(name)}' is not a charger: set is_charger: true"
+        )
     else:
         has = f"{where} has no {what} '{shown(name)}'"
     near = nearest(name, known)
@@ -84,6 +86,6 @@ def _not_served(building: BuildingMap, lift: str, ours: set[str]) -> Iterator[st
         if floor not in ours:
             where = Path(building.file).name
             yield (
-                f"on {where} (line {line}) '{shown(lift)}' stops at '{shown(floor)}' too: a robot"
-                " sent there would be refused for ever. Add the floor, or take the stop off the map"
+                f"on {where} (line {line}) '{shown(lift)}' also stops at '{shown(floor)}': a robot"
+                " sent there would always be refused. Add the floor, or remove the stop from the map"
             )

@@ -1,7 +1,7 @@
-"""What the names in a YAML stand for: kinds, drivers and bus types are files, found by name.
+"""Finds kinds, drivers and bus types: they are files, found by the names in a YAML.
 
-Only the name of a file that exists is ever imported. There is no table of them to edit, and no other
-file imports a kind, a driver or a bus by its name.
+Only names of existing files are imported. There is no table to edit, and no other file imports a kind,
+a driver or a bus by its name.
 """
 
 import importlib
@@ -40,7 +40,7 @@ def _found(
 ) -> list[str]:
     """Names of the files that hold such a record.
 
-    They are searched, not imported: others beside them need a vendor's library.
+    The files are searched, not imported: some need a vendor's library.
     """
     found = (path for root in package.__path__ for path in Path(root).glob(pattern))
     holds = re.compile(rf"^{record}(:| =)", re.MULTILINE).search

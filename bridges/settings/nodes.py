@@ -1,7 +1,7 @@
-"""YAML text as nodes that know their line and column; what is no YAML, or not for us, ends here.
+"""Parses YAML text to nodes with line and column; refuses invalid YAML and features we do not accept.
 
-Only the pure Python loader of PyYAML is used: its texts say more, and libyaml's composer recurses
-in C without a limit, so that a deeply nested file ends the interpreter instead of raising.
+It uses PyYAML's pure Python loader: its messages say more, and libyaml's composer recurses in C without
+a limit, so a deeply nested file would crash the interpreter instead of raising.
 """
 
 import difflib
@@ -22,7 +22,7 @@ MAX_DEPTH = 32
 
 @dataclass(frozen=True, slots=True)
 class Sort:
-    """One sort of file: what it is called, how it begins, and how much of it anybody writes."""
+    """One sort of file: its name, how it begins, and its maximum size."""
 
     name: str
     begins: str
@@ -35,7 +35,7 @@ DEVICE = Sort("device YAML", "kind: ...", 256 * 1024, 20_000)
 
 @dataclass(frozen=True, slots=True, order=True)
 class Problem:
-    """One thing to put right (or to know), and where: line and column count from 1."""
+    """One problem or warning and its place; line and column count from 1."""
 
     file: str
     line: int
@@ -47,7 +47,7 @@ class Problem:
 
 
 class SettingsError(Exception):
-    """A file that cannot be right: `problems` holds every one that was found, in file order."""
+    """An invalid file: `problems` holds every problem found, in file order."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(sorted(set(problems)))
@@ -55,14 +55,14 @@ class SettingsError(Exception):
 
 
 class Page:
-    """One file and what has been found in it so far."""
+    """One file and the problems found in it so far."""
 
     def __init__(self, file: str) -> None:
         self.file = file
         self.problems: list[Problem] = []
 
     def problem(self, where: Node | Mark | None, text: str) -> Problem:
-        """A problem at the start of a node. The text may quote from the file whatever it holds."""
+        """A problem at the start of a node. The text may quote anything from the file."""
         mark = where.start_mark if isinstance(where, Node) else where
         if mark is None:
             return Problem(self.file, 1, 1, printable(text))
@@ -79,12 +79,12 @@ class Page:
 
 
 def printable(text: str) -> str:
-    """A text on one line, with what cannot be seen written as escapes."""
+    """The text on one line, with invisible characters escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def shown(text: str) -> str:
-    """A value for an error text, not long."""
+    """A value for an error text, shortened to 40 characters."""
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
@@ -95,28 +95,28 @@ def either(names: Iterable[str]) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that was probably meant."""
+    """The known name that was probably meant; None if none is similar."""
     return next(iter(difflib.get_close_matches(name, list(known), n=1)), None)
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:
-    """That this name is none of the known ones, with the nearest, and all of them."""
+    """The error text for an unknown name, with the nearest known one and all of them."""
     names = list(dict.fromkeys(known))
     near = nearest(name, names)
     meant = f"did you mean '{shown(near)}'? " if near else ""
-    there = f"known here: {', '.join(map(shown, names))}" if names else "none is known here"
+    there = f"known here: {', '.join(map(shown, names))}" if names else "there is none"
     return f"unknown {what} '{shown(name)}': {meant}{there}"
 
 
 class _Refused(MarkedYAMLError):
-    """YAML, but none that is taken here."""
+    """Valid YAML that we do not accept."""
 
     def __init__(self, mark: Mark, text: str) -> None:
         super().__init__(None, None, text, mark)
 
 
 class _Composer(yaml.SafeLoader):
-    """Nodes with limits; tags are refused, and aliases only repeat what is complete."""
+    """Composes nodes within limits; refuses tags and recursive aliases."""
 
     def __init__(self, text: str, page: Page, max_values: int) -> None:
         super().__init__(text)
@@ -129,14 +129,14 @@ class _Composer(yaml.SafeLoader):
         event = self.peek_event()  # type: ignore[no-untyped-call]
         mark = cast(Mark, event.start_mark)
         if getattr(event, "tag", None) is not None:
-            self._page.note(mark, "tags ('!...') are not read: delete it; a text may need quotes")
+            self._page.note(mark, "a tag ('!...') is not accepted: delete it, or quote the text")
         with self._deeper(mark):
             node = super().compose_node(parent, index)
         if isinstance(event, AliasEvent) and id(node) not in self._sizes:
-            raise _Refused(mark, "an alias ('*name') inside the very value that it repeats")
+            raise _Refused(mark, "an alias ('*name') inside the value that it repeats")
         self._sizes[id(node)] = size = 1 + sum(self._sizes[id(n)] for n in _children(node))
         if size > self._max_values:
-            raise _Refused(mark, f"more than {self._max_values} values, with aliases written out")
+            raise _Refused(mark, f"more than {self._max_values} values, counting repeated aliases")
         if isinstance(node, ScalarNode) and is_plain(node) and (odd := slips.odd_space(node.value)):
             self._page.note(node, odd)
             node.value = slips.cleaned(node.value)
@@ -160,7 +160,7 @@ def _children(node: Node | None) -> Iterator[Node]:
 
 
 def read(file: str, sort: Sort = DEVICE) -> bytes:
-    """The file's bytes. Raises SettingsError if it cannot be read or is too long for its sort."""
+    """The file's bytes. Raises SettingsError if it is unreadable or too long."""
     try:
         with open(file, "rb") as source:
             text = source.read(sort.max_bytes + 1)
@@ -168,18 +168,18 @@ def read(file: str, sort: Sort = DEVICE) -> bytes:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SettingsError([Problem(file, 1, 1, f"cannot be read: {reason}")]) from None
     if len(text) > sort.max_bytes:
-        reason = f"longer than {sort.max_bytes // 1024} KiB: this is no {sort.name}"
+        reason = f"longer than {sort.max_bytes // 1024} KiB: this is not a {sort.name}"
         raise SettingsError([Problem(file, 1, 1, reason)])
     return text
 
 
 def compose(page: Page, text: bytes, sort: Sort = DEVICE) -> MappingNode:
-    """The mapping that a file is. Raises SettingsError where it is none."""
+    """The file's top-level mapping. Raises SettingsError if it has none."""
     root = _root(page, _decoded(page, text), sort)
     if not isinstance(root, MappingNode):
         found = "empty" if root is None else "not a mapping"
         page.problems.append(
-            Problem(page.file, 1, 1, f"the file is {found}: it begins with '{sort.begins}'")
+            Problem(page.file, 1, 1, f"the file is {found}: begin it with '{sort.begins}'")
         )
         raise SettingsError(page.problems)
     return root
@@ -200,14 +200,14 @@ def _root(page: Page, text: str, sort: Sort) -> Node | None:
         composer = _Composer(text, page, sort.max_values)
         return composer.get_single_node()
     except ReaderError as error:
-        reason = f"the character U+{error.character:04X} may not stand in YAML: delete it"
+        reason = f"the character U+{error.character:04X} is not allowed in YAML: delete it"
         raise SettingsError([_problem_after(page, text[: error.position], reason)]) from None
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         told = str(error.problem) if isinstance(error, _Refused) else slips.reason(error, text)
         raise SettingsError([*page.problems, page.problem(mark, told)]) from None
     except (ValueError, OverflowError):
-        # PyYAML lets these out for numbers that no character or version has, as in "\U00110000".
+        # PyYAML raises these for numbers that no character or version has, as in "\U00110000".
         assert composer is not None
         reason = "not YAML: a number too large, in an escape ('\\U...') or a directive ('%YAML')"
         raise SettingsError([page.problem(composer.get_mark(), reason)]) from None
@@ -219,5 +219,5 @@ def _problem_after(page: Page, before: str, text: str) -> Problem:
 
 
 def is_plain(node: ScalarNode) -> bool:
-    """Whether a scalar is written without quotes, so that its looks decide what it is."""
+    """Whether a scalar is written without quotes, so that its text decides its type."""
     return node.style is None

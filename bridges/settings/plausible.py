@@ -1,4 +1,4 @@
-"""What a type allows and nobody means: durations that are milliseconds, readings that come too late."""
+"""Valid but implausible settings: durations in milliseconds, readings that are stale on arrival."""
 
 from collections.abc import Iterable, Iterator
 from typing import Final
@@ -8,12 +8,14 @@ from msgspec import inspect
 from bridges.core.fields import DeviceSettings
 from drivers.hal import Remark
 
+RENEWED: Final = 3
+"""An output that switches off by itself must be renewed once in this many scans."""
 LONG_S: Final = 1000.0
-"""What is this long is often meant in milliseconds."""
+"""A duration this long was often meant in milliseconds."""
 
 
 def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Iterator[Remark]:
-    """Durations so long that they are looked at again, as (path, text), but for the defaults."""
+    """A remark (path, text) on each suspiciously long duration that is not a default."""
     for path, struct in structs:
         info = inspect.type_info(type(struct))
         assert isinstance(info, inspect.StructType)
@@ -34,9 +36,24 @@ def _clock(seconds: float) -> str:
     return f"{hours:.1f} hours" if hours >= 1 else f"{seconds / 60:.0f} minutes"
 
 
-def stale_readings(device: DeviceSettings, bus: object) -> Iterator[Remark]:
-    """That a reading is stale before the next one comes."""
-    scan_s, stale_s = getattr(bus, "scan_s", 0.0), device.stale_after()
+def out_of_step(device: DeviceSettings, bus: object) -> Iterator[Remark]:
+    """Problems with the pace of the device's bus: readings and commands that come too late."""
+    scan_s = getattr(bus, "scan_s", 0.0)
+    yield from _stale_readings(device, scan_s)
+    if renewed := device.off_after():
+        off_s, path = renewed
+        lost_s = RENEWED * scan_s + getattr(bus, "timeout_s", 0.0)
+        if off_s < lost_s:
+            text = f"{path[-1]} is {off_s:g}, but it is renewed every {scan_s:g} s (scan_s)"
+            yield (
+                path,
+                f"{text}: write at least {lost_s:g}, so that one lost reply does not drop the output",
+            )
+
+
+def _stale_readings(device: DeviceSettings, scan_s: float) -> Iterator[Remark]:
+    """A problem if a reading becomes stale before the next one."""
+    stale_s = device.stale_after()
     if stale_s is not None and scan_s >= stale_s:
-        text = f"stale_after_s is {stale_s:g}, and its bus is read every {scan_s:g} s (scan_s)"
-        yield ("limits", "stale_after_s"), f"{text}: it would never be in service; read more often"
+        text = f"stale_after_s is {stale_s:g}, but its bus is read every {scan_s:g} s (scan_s)"
+        yield ("limits", "stale_after_s"), f"{text}: readings would always be stale; lower scan_s"

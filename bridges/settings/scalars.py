@@ -1,8 +1,7 @@
-"""What YAML makes of a text without quotes, and the numbers and truths that we take from one.
+"""How YAML reads a text without quotes, and which numbers and booleans we accept.
 
-YAML 1.1 (PyYAML), YAML 1.2 and a person read `017`, `1:30`, `no` or `1e3` each in their own way. A
-name that any of them would take for something else must be quoted; a number must be written so that
-all of them read the same.
+YAML 1.1 (PyYAML), YAML 1.2 and people read `017`, `1:30`, `no` or `1e3` differently. A name that any
+of them would take for something else must be quoted; a number must be one that all read alike.
 """
 
 import math
@@ -50,7 +49,7 @@ def is_null_word(text: str) -> bool:
 
 
 def reads_as(text: str) -> str | None:
-    """What YAML 1.1 or 1.2 makes of a plain text that is not that text; None where it is.
+    """How YAML 1.1 or 1.2 reads a plain text; None if both read it as that text.
 
     >>> reads_as("017"), reads_as("no"), reads_as("L1")
     ('the number 15', 'false', None)
@@ -60,7 +59,7 @@ def reads_as(text: str) -> str | None:
     if text.lower() in _YES + _NO and text in (text.lower(), text.capitalize(), text.upper()):
         return "true" if text.lower() in _YES else "false"
     if text in ("=", "<<"):
-        return "a mark of its own"
+        return "a special mark"
     if _DATE.fullmatch(text):
         return "a date"
     return _reads_as_number(text)
@@ -85,14 +84,14 @@ def _short(value: object) -> str:
 
 
 def whole_number(text: str) -> int | None:
-    """The number of `12`, `-3` or `0x2000`; None where YAML's versions or a person may differ."""
+    """The number of `12`, `-3` or `0x2000`; None for an ambiguous spelling."""
     if not _INT.fullmatch(text) or len(text) > 20:
         return None
     return int(text, 16 if "x" in text else 10)
 
 
 def number(text: str) -> float | None:
-    """The number of `5`, `0.05` or `1e3`; None where there is doubt, and for infinity."""
+    """The number of `5`, `0.05` or `1e3`; None for an ambiguous spelling or infinity."""
     if not _FLOAT.fullmatch(text):
         return None
     value = float(text)

@@ -17,7 +17,7 @@ FIXES = {
     "but found another document": (
         "a second document ('---') starts here: a file describes one daemon, so split it"
     ),
-    "found duplicate anchor": "an anchor ('&name') with a name that is taken already",
+    "found duplicate anchor": "an anchor ('&name') whose name is already used",
     "expected <block end>, but found '}'": "a '}' without a '{' before it",
     "expected <block end>, but found ']'": "a ']' without a '[' before it",
     "expected <block end>, but found '<scalar>'": (

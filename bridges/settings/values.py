@@ -1,7 +1,7 @@
-"""YAML nodes to msgspec structs: every independent problem at once, each at its line and column.
+"""Converts YAML nodes to msgspec structs; reports all independent problems with line and column.
 
-`msgspec.convert` stops at the first problem and knows no lines, so the walk is ours; the structs,
-with their bounds and units, stay the one description of what may stand in a file.
+`msgspec.convert` stops at the first problem and knows no lines, so this module walks the nodes itself.
+The structs, with their bounds and units, remain the only description of a file's contents.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -29,7 +29,7 @@ VERBS = ("is", "has", "needs", "must", "says")
 """A problem that begins with one of these is said of the key that it points to."""
 
 BROKEN = object()
-"""In place of a value that could not be made."""
+"""Stands for a value that could not be made."""
 
 _LISTS = (ListType, VarTupleType)
 _MAPPINGS = (DictType, StructType)
@@ -37,10 +37,10 @@ _MAPPINGS = (DictType, StructType)
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A value on its way into a struct.
+    """A node that is to become a value.
 
-    `at`: where a text about the whole value points (its key). `label`: what it is called there.
-    `path`: where it is below the struct that was asked for.
+    `at`: the node that an error about the whole value points to (its key). `label`: the value's name
+    in errors. `path`: its path below the top struct.
     """
 
     node: Node
@@ -62,7 +62,7 @@ class Entry:
         return Spot(self.value, self.key, f"'{shown(self.name)}'", (*path, self.name))
 
     def where(self) -> Node:
-        """Where a text about the value points: to what fits on its line, else to its key."""
+        """The node that an error about the value points to: a scalar itself, else the key."""
         node = self.value
         if isinstance(node, ScalarNode) and (node.value or not is_plain(node)):
             return node
@@ -81,7 +81,7 @@ def below(node: Node, part: str) -> Entry | None:
 
 
 def locate(spot: Spot, path: Iterable[object]) -> Entry:
-    """The entry at `path` below a value, or the nearest above it that exists."""
+    """The entry at `path` below a value, or its nearest existing parent."""
     found = Entry("", spot.at, spot.node)
     for part in path:
         entry = below(found.value, str(part))
@@ -92,7 +92,7 @@ def locate(spot: Spot, path: Iterable[object]) -> Entry:
 
 
 def is_none(node: Node) -> bool:
-    """Whether `null` or `~` is written; an empty place is a forgotten value and not meant here."""
+    """Whether `null` or `~` is written. An empty value does not count: it was probably forgotten."""
     return isinstance(node, ScalarNode) and is_plain(node) and is_null_word(node.value)
 
 
@@ -105,14 +105,14 @@ def _node_of(wanted: Type) -> type[Node]:
 
 
 Check = Callable[[str, Spot], str | None]
-"""Judges a text where it stands: None, or what is wrong with it."""
+"""Checks a text at its place: returns None, or the problem."""
 
 
 class Values:
-    """Makes values of one file's nodes, and notes on its page what is wrong with them.
+    """Converts one file's nodes to values, and notes problems on its page.
 
-    `checks`: for texts whose type says `Meta(extra={"check": name})`. Such a text is taken as it is
-    written; only its check knows what it may be. `structs`: every struct that was made.
+    `checks`: for texts whose type has `Meta(extra={"check": name})`. Such a text is taken as written;
+    only its check judges it. `structs`: every struct that was made.
     """
 
     def __init__(self, page: Page, checks: Mapping[str, Check] | None = None) -> None:
@@ -121,7 +121,7 @@ class Values:
         self.structs: list[tuple[tuple[str, ...], object]] = []
 
     def make(self, cls: Any, spot: Spot, besides: tuple[str, ...] = ()) -> Any:
-        """A `cls` (a type, or msgspec's description of one) of a node, or BROKEN.
+        """Convert a node to a `cls` (a type, or msgspec's description of one); BROKEN if it fails.
 
         `besides`: keys of it that are read elsewhere.
         """
@@ -131,16 +131,16 @@ class Values:
         return self._value(wanted, spot)
 
     def entries(self, spot: Spot) -> list[Entry]:
-        """A mapping's entries without those that cannot be right: doubles, merges, odd keys."""
+        """A mapping's valid entries; notes duplicate, merge and non-text keys."""
         if not isinstance(spot.node, MappingNode):
             self._mismatch(spot, "a mapping (key: value)")
             return []
         seen: dict[str, Entry] = {}
         for key, value in spot.node.value:
             if not isinstance(key, ScalarNode):
-                self._page.note(key, f"a key is one word or text, and this is {looks(key)}")
+                self._page.note(key, f"a key must be text, but this is {looks(key)}")
             elif key.value == "<<" and is_plain(key):
-                self._page.note(key, "merge keys ('<<') are not read: write the keys out")
+                self._page.note(key, "merge keys ('<<') are not accepted: write the keys out")
             elif key.value in seen:
                 self._double(key, seen[key.value].key)
             else:
@@ -154,9 +154,9 @@ class Values:
         fields: Mapping[str, str | None],
         elsewhere: Mapping[str, str] | None = None,
     ) -> dict[str, Entry]:
-        """The entries that `fields` names: key -> what is wanted, or None where it may be absent.
+        """The entries that `fields` names: key -> what its value must be, or None if it is optional.
 
-        An unknown key that is nearly a missing one stands for it, so that one slip is one problem.
+        An unknown key that resembles a missing one is taken for it: one slip is one problem.
         `elsewhere`: key -> below what it belongs, where it is no key of this mapping.
         """
         found = {e.name: e for e in entries}
@@ -184,7 +184,7 @@ class Values:
         return self._leaf([wanted], spot, extra or {})
 
     def _union(self, wanted: UnionType, spot: Spot, extra: Extra | None) -> object:
-        """The one member that a node of this sort can be; of several leaves, the first that fits."""
+        """The member that this kind of node can be; of several scalar types, the first that fits."""
         members = [t for t in wanted.types if not isinstance(t, NoneType)]
         if len(members) < len(wanted.types) and is_none(spot.node):
             return None
@@ -276,7 +276,7 @@ class Values:
     def _miscounted(self, wanted: ListType | VarTupleType | DictType, spot: Spot, n: int) -> bool:
         least, most = wanted.min_length or 0, wanted.max_length
         if n < least:
-            self._page.note(spot.at, f"{spot.label} has {n} entries: at least {least} are wanted")
+            self._page.note(spot.at, f"{spot.label} has {n} entries: at least {least} are needed")
         elif most is not None and n > most:
             self._page.note(spot.at, f"{spot.label} has {n} entries: at most {most} are allowed")
         else:
@@ -286,14 +286,14 @@ class Values:
     def _double(self, key: Node, first: Node) -> None:
         name = shown(key.value)
         line = first.start_mark.line + 1
-        self._page.note(key, f"the key '{name}' is on line {line} already: delete one of the two")
+        self._page.note(key, f"the key '{name}' is already on line {line}: delete one of the two")
 
     def _mismatch(self, spot: Spot, wanted: str) -> None:
         where = Entry("", spot.at, spot.node).where()
         if isinstance(spot.node, ScalarNode) and is_plain(spot.node) and is_null(spot.node.value):
-            self._page.note(where, f"{spot.label} has no value: {wanted} is wanted")
+            self._page.note(where, f"{spot.label} has no value: write {wanted}")
         else:
-            self._page.note(where, f"{spot.label} is {looks(spot.node)}: {wanted} is wanted")
+            self._page.note(where, f"{spot.label} is {looks(spot.node)}: write {wanted}")
 
 
 def sections_of(wanted: StructType) -> dict[str, str]:

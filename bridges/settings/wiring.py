@@ -1,6 +1,6 @@
-"""Checks across the wires of a file: points that do not exist, points used twice, unlikely wires.
+"""Checks the wires of a file against each other: invalid points, points used twice, unsafe wires.
 
-What a point may be called and which wires cannot be are the bus's knowledge (`canonical` and
+The bus type knows how its points are spelled and which wires are impossible (`canonical` and
 `wire_problems` of its `BUS` in `drivers/hal/`).
 """
 
@@ -17,7 +17,7 @@ from drivers.hal.points import Input, Output, Wire
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """That a device's signal stands on a point of a bus: in its one spelling, and as written."""
+    """A point of a bus that a device uses: `point` in its canonical spelling, and as `written`."""
 
     bus: str
     point: str
@@ -27,7 +27,7 @@ class Use:
 
 
 class Wiring:
-    """The points of one device as they are met while its settings are read, and then as wires."""
+    """Collects and checks a device's points: first while its settings are read, then as wires."""
 
     def __init__(self, page: Page, device: str, bus: str, hal: AnyBus | None) -> None:
         self._page = page
@@ -51,7 +51,7 @@ class Wiring:
         return None
 
     def wires(self, wires: Iterable[Wire], spot: Spot) -> None:
-        """Judge a driver's table; it replaces the points that were met on the way to it."""
+        """Check a driver's wires; they replace the points collected while reading the settings."""
         self.uses.clear()
         for wire in wires:
             places = [("point", wire.point)]
@@ -62,7 +62,7 @@ class Wiring:
                 self._judge(wire, spot)
 
     def _stands(self, wire: Wire, key: str, text: str, spot: Spot) -> bool:
-        """Note that this wire is on this point, or what is wrong with the point."""
+        """Record that this wire uses this point; False if the point is invalid."""
         entry = locate(spot, wire.path)
         point = below(entry.value, key)
         node = point.value if point else entry.where()
@@ -71,14 +71,20 @@ class Wiring:
             self._page.note(node, reason)
         return reason is None
 
+    def warnings(self, wires: Iterable[Wire], spot: Spot) -> Iterable[tuple[Node, str]]:
+        """What is legal about these wires but worth a look, and where it stands."""
+        for wire in wires:
+            for text in self._hal.wire_warnings(wire) if self._hal else ():
+                yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
+
     def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
-        """What the device has for itself where there are no wires: (place, path in its YAML)."""
+        """Record what a device without wires claims for itself: (place, path in its YAML)."""
         for text, path in places:
             user = f"{self._device} {'.'.join(path)}"
             self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
 
     def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
-        """Judge the wires of a device that is otherwise not in order, so that no table exists."""
+        """Check the wires of a device whose other settings are invalid, so that it has no table."""
         for path, struct in structs:
             if isinstance(struct, Input):
                 pull, debounce_s = struct.pull, struct.debounce_s
@@ -102,12 +108,12 @@ def note_conflicts(page: Page, uses: Iterable[Use]) -> None:
         if other is not use:
             line = other.node.start_mark.line + 1
             point = use.point if use.written == use.point else f"{use.written} ({use.point})"
-            taken = f"{point} is taken by {other.user} on line {line}"
+            taken = f"{point} is used by {other.user} on line {line}"
             page.note(use.node, f"{taken}: {use.user} needs a point of its own")
 
 
 def note_unknown_signals(page: Page, accepted: Iterable[str], signals: list[str], s: Spot) -> None:
-    """`accept_unsafe` may only speak of signals that there are."""
+    """`accept_unsafe` may only name existing signals."""
     for signal in accepted:
         if signal not in signals:
             page.note(locate(s, ("accept_unsafe", signal)).key, unknown("signal", signal, signals))

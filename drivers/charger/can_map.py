@@ -21,7 +21,7 @@ Signal = Annotated[
     str,
     msgspec.Meta(
         pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}\.[A-Za-z_][A-Za-z0-9_]{0,63}$",
-        extra={"pattern": "Frame.Signal, by their names in the DBC file,"},
+        extra={"pattern": "Frame.Signal, by their names in the DBC file"},
     ),
 ]
 Mask = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers import DriverError
+from drivers.profiles import texts
 
-FOLDER: Final = Path(__file__).parents[1] / "profiles"
 EXTENDED: Final = 1 << 31
 SIZE_MAX: Final = 4 << 20
 
@@ -88,13 +88,24 @@ class Dbc:
 
 def path(name: str) -> Path:
     """Where a DBC file is: an absolute path as it is, else a file of drivers/profiles/."""
-    return FOLDER / name
+    return texts.FOLDER / name
 
 
-@functools.cache
 def load(name: str) -> Dbc:
     """A file by its name (`path`). Raises ValueError, with what is wrong."""
     file = path(name)
+    return _understood(file, texts.text(file, lambda: _read(file)))
+
+
+@functools.cache
+def _understood(file: Path, text: bytes) -> Dbc:
+    try:
+        return Dbc(text.decode("cp1252"))
+    except (ValueError, UnicodeDecodeError) as error:
+        raise ValueError(f"{file} {error}") from None
+
+
+def _read(file: Path) -> bytes:
     try:
         with file.open("rb") as opened:
             text = opened.read(SIZE_MAX + 1)
@@ -102,7 +113,4 @@ def load(name: str) -> Dbc:
         raise ValueError(f"{file} cannot be read: {error.strerror}") from None
     if len(text) > SIZE_MAX:
         raise ValueError(f"{file} is larger than {SIZE_MAX >> 20} MiB")
-    try:
-        return Dbc(text.decode("cp1252"))
-    except (ValueError, UnicodeDecodeError) as error:
-        raise ValueError(f"{file} {error}") from None
+    return text

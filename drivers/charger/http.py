@@ -11,7 +11,7 @@ mean; one that is in no list is an error, and none is ever passed on as if it we
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, Final, Protocol
+from typing import Annotated, Any, Final
 
 import msgspec
 
@@ -24,23 +24,16 @@ from bridges.charger.signals import (
     FaultSide,
     Measured,
 )
-from drivers.charger import json_fields
-from drivers.charger.json_fields import Field
+from drivers import json_fields
 from drivers.charger.state_codes import CODE_MAX, Code, Codes
 from drivers.driver_type import DriverType
 from drivers.hal import http
+from drivers.http_call import Call, Calls, send, told
+from drivers.json_fields import Field, Flag
 
 UNKNOWN: Final[tuple[Activity, FaultSide]] = (Activity.UNKNOWN, "")
 WORD_MAX: Final = 64
 Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
-Path = Annotated[
-    str,
-    msgspec.Meta(
-        pattern=r"^/[A-Za-z0-9._~/-]*$",
-        max_length=256,
-        extra={"pattern": "a path that begins with / (/api/state), without a query,"},
-    ),
-]
 
 
 class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -54,15 +47,8 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     scale: float = 1.0
 
 
-class InRange(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Whether the robot's coil is where it can be charged.
-
-    `field`: where it is in the answer.
-    `when`: the values that say so; without them it must be true or false.
-    """
-
-    field: Field
-    when: list[Code] = []
+InRange = Flag
+"""Whether the robot's coil is where it can be charged."""
 
 
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -88,26 +74,6 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     time_to_full_s: Number | None = None
 
 
-class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One command to the station.
-
-    `path`: below the bus's `api_base`.
-    `method`: how it is sent.
-    `body`: JSON that is sent along, in quotes; nothing when absent.
-    """
-
-    path: Path
-    method: http.Method = "POST"
-    body: Annotated[str, msgspec.Meta(max_length=1024)] | None = None
-
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """A body that is no JSON."""
-        try:
-            msgspec.json.decode(self.body or "{}")
-        except msgspec.DecodeError as error:
-            yield ("body",), f"is no JSON: {error}"
-
-
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One station. The paths follow the bus's `api_base`.
 
@@ -123,9 +89,9 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
     codes: Codes
     state_words: dict[Word, Code] = msgspec.field(default_factory=dict)
-    state_path: Path = "/state"
+    state_path: http.Path = "/state"
     fields: Fields = Fields()
-    clear_error_path: Path = "/clear_error"
+    clear_error_path: http.Path = "/clear_error"
     start: Call | None = None
     stop: Call | None = None
     range_check: Call | None = None
@@ -148,18 +114,6 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
             yield ("on_death",), "this station cannot be stopped: leave this out"
 
 
-class Calls(Protocol):
-    """What this driver needs of an HTTP bus."""
-
-    def get_json(self, path: str) -> dict[str, Any]:
-        """One JSON object. Raises HalError."""
-
-    def send(
-        self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
-    ) -> None:
-        """Once; `safe` where it takes power away. Raises HalError."""
-
-
 def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
     """The driver of one station."""
     return HttpCharger(settings, bus)
@@ -176,8 +130,7 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
     rows = [("state", f"GET {api.url(settings.state_path)} every {bus_settings.scan_s:g} s")]
     for what in ("start", "stop", "range_check"):
         if call := getattr(settings, what):
-            body = f" {call.body}" if call.body else ""
-            rows.append((what.replace("_", " "), f"{call.method} {api.url(call.path)}{body}"))
+            rows.append((what.replace("_", " "), told(call, api)))
     clear = f"POST {api.url(settings.clear_error_path)}, {_how_often(settings)}"
     rows.append(("clear error", clear))
     for name in fields.__struct_fields__ if fields != Fields() else ():
@@ -195,7 +148,7 @@ def _place(place: str | Number | InRange) -> str:
     if isinstance(place, Number):
         return place.field if place.scale == 1.0 else f"{place.field} x {place.scale:g}"
     if isinstance(place, InRange):
-        return f"{place.field} is {', '.join(map(str, place.when)) or 'true'}"
+        return json_fields.place_text(place)
     return place
 
 
@@ -272,7 +225,7 @@ class HttpCharger:
             self._bus.send(self._settings.clear_error_path)
         if outputs.range_checks != self._checked:
             self._checked = outputs.range_checks
-            self._send(self._settings.range_check)
+            send(self._bus, self._settings.range_check)
         if outputs.power:
             self._start_if_needed()
         self._power = outputs.power
@@ -280,7 +233,7 @@ class HttpCharger:
     def make_safe(self) -> None:
         """No power; a station that may go on charging without us is left as it is."""
         if self._settings.on_death == "stop":
-            self._send(self._settings.stop, safe=True)
+            send(self._bus, self._settings.stop, safe=True)
 
     def close(self) -> None:
         """Nothing to let go."""
@@ -289,17 +242,13 @@ class HttpCharger:
         given, self._power = self._power, None
         on = self._activity in (Activity.HANDSHAKE, Activity.CHARGING)
         if on or (given is not False and self._activity in AT_FAULT):
-            self._send(self._settings.stop, safe=True)
+            send(self._bus, self._settings.stop, safe=True)
 
     def _start_if_needed(self) -> None:
         given, self._power = self._power, None
         waits = self._activity is Activity.IDLE
         if waits or (not given and self._activity is Activity.HANDSHAKE):
-            self._send(self._settings.start)
-
-    def _send(self, call: Call | None, safe: bool = False) -> None:
-        if call:
-            self._bus.send(call.path, call.method, call.body, safe)
+            send(self._bus, self._settings.start)
 
 
 def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> int | str:
@@ -335,16 +284,7 @@ def _number(answer: Mapping[str, Any], number: Number | None) -> float | None:
 
 def _in_range(answer: Mapping[str, Any], place: InRange | None) -> bool | None:
     """Null is not in range."""
-    if place is None:
-        return None
-    value = json_fields.needed(answer, place.field)
-    if value is None:
-        return False
-    if place.when:
-        return not isinstance(value, bool | float) and value in place.when
-    if not isinstance(value, bool):
-        raise json_fields.wrong(place.field, value, "true or false")
-    return value
+    return None if place is None else json_fields.flag(answer, place)
 
 
 DRIVER = DriverType(

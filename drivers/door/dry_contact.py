@@ -16,6 +16,7 @@ import msgspec
 from bridges.core.table import Table
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire
 from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, slow_alarms, unaccepted
@@ -219,5 +220,6 @@ DRIVER = DriverType(
     wires=wires,
     debounce=debounce,
     tables=tables,
+    describe=lambda settings, bus: (CLOSING,),
     warnings=warnings,
 )

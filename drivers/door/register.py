@@ -11,6 +11,7 @@ from typing import Final
 from bridges.core.fields import Name
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
+from drivers.door.closing import CLOSING
 from drivers.door.register_map import DoorMap, Errors, Flag, Parts, Problems, Status
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
@@ -100,6 +101,7 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
         meanings["errors"] = ", ".join(f"bit {b} {t}" for b, t in found.errors.bits.items())
     for part, point in points(settings).items():
         yield part, f"{point}: {meanings[part]}".removesuffix(": ")
+    yield CLOSING
 
 
 def warnings(settings: Settings) -> Problems:

@@ -35,7 +35,12 @@ class Where(NamedTuple):
 
 
 class Bus:
-    """What every bus has; the rest depends on its type (`points.PointsBus`, HTTP calls…)."""
+    """What every bus has; the rest depends on its type (`points.PointsBus`, HTTP calls…).
+
+    `calls`: how many calls have ended, well or not; systemd's watchdog is fed by it.
+    """
+
+    calls = 0
 
     def on_edge(self, wake: Callable[[], None]) -> None:
         """Call `wake` (from any thread) when an input may have changed; nothing where polled."""
@@ -64,7 +69,8 @@ class BusType(Generic[Settings]):
     A bus with points also has
     `canonical(point)`: one spelling; ValueError says what to write instead;
     `describe(point)`: every spelling, for the table that an electrician reads;
-    `wire_problems(wire)`: what cannot be right about this wire on this bus.
+    `wire_problems(wire)`: what cannot be right about this wire on this bus;
+    `wire_warnings(wire)`: what is legal about it but worth a look.
     """
 
     settings: type[Settings]
@@ -76,6 +82,7 @@ class BusType(Generic[Settings]):
     canonical: Callable[[str], str] = str
     describe: Callable[[str], str] = str
     wire_problems: Callable[[Wire], Iterable[str]] = lambda wire: ()
+    wire_warnings: Callable[[Wire], Iterable[str]] = lambda wire: ()
 
 
 AnyBus: TypeAlias = BusType[Any]

@@ -11,7 +11,10 @@ import socket
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import ssl
 
 Resolve = Callable[..., list[Any]]
 
@@ -52,6 +55,25 @@ class DeadlineSocket(socket.socket):
         """As socket.sendall, whose timeout is already one for all of it."""
         self.settimeout(self.deadline.left())
         super().sendall(*args, **kwargs)
+
+
+def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
+    """Sockets of TLS whose every wait ends by the deadline.
+
+    Such a socket takes a plain one over and keeps of it only the timeout, so it looks for itself.
+    """
+    import ssl
+
+    class DeadlineTls(ssl.SSLSocket):
+        def recv_into(self, *args: Any, **kwargs: Any) -> int:
+            self.settimeout(deadline.left())
+            return super().recv_into(*args, **kwargs)
+
+        def send(self, *args: Any, **kwargs: Any) -> int:
+            self.settimeout(deadline.left())
+            return super().send(*args, **kwargs)
+
+    return DeadlineTls
 
 
 class Dialler:
@@ -95,6 +117,7 @@ class Dialler:
             sock.settimeout(timeout_s)
             sock.connect(where)
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            sock.settimeout(self.deadline.left())  # for a handshake of TLS
         except OSError:
             sock.close()
             raise

@@ -1,27 +1,30 @@
-"""HTTP: one controller that answers requests, through requests.
+"""HTTP: one controller that answers requests, through requests; with TLS where its address says https.
 
 Every call has one deadline from the lookup of the name to the last byte of the body
 (`drivers/hal/deadline.py`). The body is capped; proxies, redirects and compression are off. A kept
-connection that the server has closed is dialled again for a GET; a command is sent on a new connection,
-and once, whatever becomes of it.
+connection that the server has closed is dialled again for a reading; a command, whatever its method, is
+sent on a new connection, and once, whatever becomes of it.
 """
 
 import http.client
-import json
-import re
+import os
 import socket
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 
 from bridges import secret_file
-from bridges.core.fields import Name, Period
+from bridges.core.fields import AbsolutePath, Name, Period
 from drivers.hal import Bus, BusType, HalError, Where
 from drivers.hal.backoff import Backoff
-from drivers.hal.deadline import Dialler, Resolve
+from drivers.hal.deadline import Dialler, Resolve, tls_socket
+from drivers.hal.http_address import Base, Path, base
+from drivers.hal.http_json import json_object, shown
+
+__all__ = ["Base", "HttpBus", "Method", "Path", "Settings", "base"]
 
 if TYPE_CHECKING:
     from requests.adapters import HTTPAdapter
@@ -30,48 +33,22 @@ BODY_MAX = 64 * 1024
 HEADERS = {"Accept": "application/json", "Accept-Encoding": "identity", "User-Agent": "rmf-bridges"}
 JSON = {"Content-Type": "application/json"}
 
-Method = Literal["POST", "PUT"]
+Method = Literal["POST", "PUT", "GET"]
+"""How a command is sent. Some makes take them as a GET, with a query."""
+Header = Annotated[
+    str,
+    msgspec.Meta(
+        pattern=r"^[A-Za-z][A-Za-z0-9-]{0,63}$(?!\n)",
+        extra={"pattern": "the name of an HTTP header (X-API-Key)"},
+    ),
+]
 Timeout = Annotated[float, msgspec.Meta(ge=0.1, le=30, extra={"unit": "s"})]
 
-_BASE = re.compile(
-    r"(?:http://)?"
-    r"(?P<host>[A-Za-z0-9_](?:[A-Za-z0-9_.-]{0,251}[A-Za-z0-9])?|\[[0-9A-Fa-f:.]+\])"
-    r"(?::(?P<port>[0-9]{1,5}))?"
-    r"(?P<path>(?:/[A-Za-z0-9._~-]+)*)/?"
-)
 _HINTS = {
     3: "redirects are not followed: put the final address in api_base",
-    4: "check api_base, the path, and token_file where the charger wants one",
+    4: "check api_base, the path, and token_file where the controller wants one",
     5: "the controller's own software fails: look at its log",
 }
-
-
-class Base(NamedTuple):
-    """An `api_base` in parts. `path` is "" or begins with a slash and does not end with one."""
-
-    host: str
-    port: int
-    path: str
-
-    def url(self, path: str) -> str:
-        """The address of one resource of the API."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"http://{host}{'' if self.port == 80 else f':{self.port}'}{self.path}{path}"
-
-
-def base(text: str) -> Base:
-    """The parts of an `api_base`. Raises ValueError with what to write instead."""
-    if text.lower().startswith("https:"):
-        raise ValueError("https is not supported: write the address of the plain HTTP API")
-    if "@" in text:
-        raise ValueError("no user or password here: put a bearer token in a file, as token_file")
-    found = _BASE.fullmatch(text)
-    if not found:
-        raise ValueError(f"{text!r} is no address of an API: write 192.168.1.60:8080/api, say")
-    port = int(found["port"] or 80)
-    if not 1 <= port <= 65535:
-        raise ValueError(f"port {port} does not exist: ports are 1 to 65535")
-    return Base(found["host"].strip("[]"), port, found["path"])
 
 
 class Settings(
@@ -87,27 +64,38 @@ class Settings(
     `api_base`: host, port and path that every path begins with (`192.168.1.60:8080/api`).
     `timeout_s`: for a whole call, from the lookup of the name to the last byte.
     `scan_s`: how often the controller is read.
-    `token_file`: a file that holds a bearer token, readable by the daemon alone.
+    `token_file`: a file that holds a bearer token or API key, readable by the daemon alone.
+    `token_header`: the header that takes it (`X-API-Key`); `Authorization: Bearer …` when absent.
+    `ca_file`: with https, a PEM file with who has signed the controller's certificate, or with that
+    certificate itself; the public authorities when absent.
     """
 
     api_base: Name
     timeout_s: Timeout = 1.0
     scan_s: Period = 1.0
     token_file: Name | None = None
+    token_header: Header | None = None
+    ca_file: AbsolutePath | None = None
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """What cannot be right about the address."""
+        """What cannot be right about the address, or has no effect."""
         try:
-            base(self.api_base)
+            tls = base(self.api_base).scheme == "https"
         except ValueError as error:
             yield ("api_base",), str(error)
+            return
+        if self.ca_file and not tls:
+            yield ("ca_file",), "is for https: write api_base: https://…, or leave this out"
+        if self.token_header and not self.token_file:
+            yield ("token_header",), "needs token_file: the file with what the header says"
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
     """What is legal but worth a look: (path, text)."""
-    if settings.token_file:
+    if settings.token_file and base(settings.api_base).scheme == "http":
         text = (
-            "the token goes over the network unencrypted: keep chargers on a network of their own"
+            "the token goes over the network unencrypted: write https://… where the controller has"
+            " it, or keep such controllers on a network of their own"
         )
         yield ("token_file",), text
 
@@ -137,14 +125,14 @@ class HttpBus(Bus):
         self._settings = settings
         self._base = base(settings.api_base)
         self._dialler = Dialler(self._base.host, self._base.port, resolve)
-        self._adapter = _adapter(self._dialler)
+        self._adapter = _adapter(self._dialler, self._base.scheme)
         self._backoff, self._safe_backoff = (Backoff(clock, lambda: 0.0) for _ in range(2))
 
     def get_json(self, path: str) -> dict[str, Any]:
         """GET `api_base` + `path`, which must answer 200 with one JSON object."""
         url = self._base.url(path)
         with self._attempt(self._backoff):
-            return _json_object(url, *self._get(url))
+            return json_object(url, *self._get(url))
 
     def send(
         self, path: str, method: Method = "POST", body: str | None = None, safe: bool = False
@@ -182,30 +170,35 @@ class HttpBus(Bus):
             self._adapter.close()
             backoff.failed(str(error))
             raise
+        finally:
+            self.calls += 1
         backoff.mended()
 
     def _get(self, url: str) -> tuple[str, bytes]:
         dialled = self._dialler.dialled
         try:
-            return self._call("GET", url)
+            return self._call("GET", url, reads=True)
         except _HungUp:
             if self._dialler.dialled > dialled:
                 raise
         self._adapter.close()  # it was a kept connection: once more, in the time that is left
-        return self._call("GET", url)
+        return self._call("GET", url, reads=True)
 
-    def _call(self, method: str, url: str, sent: str | None = None) -> tuple[str, bytes]:
+    def _call(
+        self, method: str, url: str, sent: str | None = None, reads: bool = False
+    ) -> tuple[str, bytes]:
         """Content type and body of a good answer; what answers a command is not looked at."""
         import requests
         import urllib3
 
         self._dialler.failure = None
+        verify = self._settings.ca_file or True
         headers = HEADERS | self._authorization() | (JSON if sent else {})
         request = requests.Request(method, url, headers, data=sent and sent.encode()).prepare()
         try:
-            with self._adapter.send(request, stream=True) as answer:
-                _check_status(url, method, answer.status_code)
-                if method != "GET":
+            with self._adapter.send(request, stream=True, verify=verify) as answer:
+                _check_status(url, reads, answer.status_code)
+                if not reads:
                     return "", b""
                 body = _capped(answer.raw)
         except (
@@ -230,7 +223,8 @@ class HttpBus(Bus):
             token = secret_file.one_line("token_file", file, "token")
         except secret_file.SecretError as error:
             raise HalError(str(error)) from None
-        return {"Authorization": f"Bearer {token}"}
+        header = self._settings.token_header
+        return {header: token} if header else {"Authorization": f"Bearer {token}"}
 
     def _explained(self, url: str, error: BaseException) -> HalError:
         failure = self._dialler.failure
@@ -248,6 +242,8 @@ class HttpBus(Bus):
             )
         if failure is not None:
             return HalError(f"{where} cannot be reached: {failure.strerror or failure}")
+        if reason := _tls_failure(error, self._settings.ca_file):
+            return HalError(f"TLS with {where} fails: {reason}: check ca_file and api_base")
         return _HungUp(f"{url}: no whole HTTP answer ({_cause(error)}): is it an HTTP server?")
 
 
@@ -255,30 +251,55 @@ class _HungUp(HalError):
     """A connection was there and ended without an answer."""
 
 
-def _adapter(dialler: Dialler) -> "HTTPAdapter":
+def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     """requests' way to the wire, on the dialler's connections.
 
     Without a Session: it would read the whole body of a redirect that it is told not to follow, keep
     cookies, and look at the environment for proxies and passwords.
     """
     from requests.adapters import HTTPAdapter
-    from urllib3 import HTTPConnectionPool
-    from urllib3.connection import HTTPConnection
+    from urllib3 import HTTPConnectionPool, HTTPSConnectionPool
+    from urllib3.connection import HTTPConnection, HTTPSConnection
+    from urllib3.util.ssl_ import create_urllib3_context
 
-    class Connection(HTTPConnection):
+    class Dialled:
         def _new_conn(self) -> socket.socket:
             return dialler.dial()
+
+    class Connection(Dialled, HTTPConnection):
+        """Without TLS."""
+
+    class TlsConnection(Dialled, HTTPSConnection):
+        """With it."""
 
     class Pool(HTTPConnectionPool):
         ConnectionCls = Connection
 
+    class TlsPool(HTTPSConnectionPool):
+        ConnectionCls = TlsConnection
+
     adapter = HTTPAdapter(pool_connections=1, pool_maxsize=1, max_retries=0)
-    adapter.poolmanager.pool_classes_by_scheme = {"http": Pool}
+    adapter.poolmanager.pool_classes_by_scheme = {"http": Pool, "https": TlsPool}
+    if scheme == "https":
+        context = create_urllib3_context()  # it trusts nobody yet: `verify` of a call adds whom
+        context.sslsocket_class = tls_socket(dialler.deadline)
+        adapter.poolmanager.connection_pool_kw["ssl_context"] = context
     return adapter
 
 
-def _check_status(url: str, method: str, status: int) -> None:
-    if status == 200 or (method != "GET" and 200 <= status < 300):
+def _tls_failure(error: BaseException | None, ca_file: str | None) -> str:
+    """Why there is no trusted connection; "" where that is not the reason."""
+    import ssl
+
+    if ca_file and not os.path.isfile(ca_file):
+        return f"{ca_file} is no file"
+    while error is not None and not isinstance(error, ssl.SSLError):
+        error = error.__cause__ or error.__context__
+    return shown(getattr(error, "verify_message", None) or str(error)) if error else ""
+
+
+def _check_status(url: str, reads: bool, status: int) -> None:
+    if status == 200 or (not reads and 200 <= status < 300):
         return
     hint = _HINTS.get(status // 100, "200 is expected")
     raise HalError(f"{url} answered status {status}: {hint}")
@@ -298,39 +319,7 @@ def _cause(error: BaseException) -> str:
     """The first failure below all that requests and urllib3 have wrapped around it."""
     while (below := error.__cause__ or error.__context__) is not None:
         error = below
-    return _shown(str(error) or type(error).__name__)
-
-
-def _shown(text: str) -> str:
-    return "".join(c if c.isprintable() else "?" for c in text[:80])
-
-
-def _json_object(url: str, content_type: str, body: bytes) -> dict[str, Any]:
-    sort = content_type.partition(";")[0].strip().lower()
-    if sort != "application/json" and not sort.endswith("+json"):
-        what = _shown(sort) or "no content type"
-        raise HalError(f"{url} answered {what} instead of JSON: is api_base the API's address?")
-    try:
-        found = json.loads(
-            body.decode(), parse_constant=_no_number, object_pairs_hook=_without_doubles
-        )
-    except (ValueError, RecursionError) as error:
-        raise HalError(f"{url} answered JSON that is none: {_shown(str(error))}") from None
-    if not isinstance(found, dict):
-        raise HalError(f"{url} answered JSON that is no object: {_shown(repr(found))}")
-    return found
-
-
-def _no_number(word: str) -> Any:
-    raise ValueError(f"{word} is no JSON")
-
-
-def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """An object that says two things under one name says nothing."""
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        raise ValueError("a name stands twice in one object")
-    return found
+    return shown(str(error) or type(error).__name__)
 
 
 BUS = BusType(

@@ -2,9 +2,11 @@
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
+from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Hazard, Side
 from drivers.hal.points import Wire
 from drivers.lift import codes
+from drivers.lift.broken_lines import floor_warnings, unsafe_codes
 from drivers.lift.table import MOTION, input_rows, wires
 from drivers.lift.wiring import FloorCode, LiftWiring
 from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, slow_alarms, unaccepted
@@ -17,7 +19,7 @@ ALARMS = (Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY)
 
 def problems(wiring: LiftWiring) -> Iterator[Problem]:
     """What keeps the daemon from starting."""
-    yield from _floors(wiring)
+    yield from floors(wiring)
     yield from _floor_code(wiring.floor_code, wiring.levels())
     yield from _calls(wiring)
     yield from _doors(wiring)
@@ -30,16 +32,11 @@ def problems(wiring: LiftWiring) -> Iterator[Problem]:
 def warnings(wiring: LiftWiring) -> Iterator[Problem]:
     """What works and deserves a second look."""
     table = {w.signal: w for w in wires(wiring)}
-    if wiring.inputs.agv_mode is None and not _in_service(wiring, "agv_mode"):
-        yield ("inputs",), "no agv_mode: the lift cannot confirm that it obeys"
-    elif wiring.outputs.agv_mode_request is None:
-        text = (
-            "no agv_mode_request asks for AGV mode, and it is awaited: the lift must grant it alone"
-        )
-        yield ("outputs",), text
+    told = wiring.inputs.agv_mode is not None or _in_service(wiring, "agv_mode")
+    fire = sees_fire(wiring)
+    asks, holds = bool(wiring.outputs.agv_mode_request), bool(wiring.outputs.door_open)
+    yield from missing(wiring, ("inputs",), told, asks, fire, holds)
     yield from slow_alarms(table[hazard] for hazard in Hazard if hazard in table)
-    if Hazard.FIRE not in table and not _in_service(wiring, Hazard.FIRE):
-        yield ("inputs",), "no fire_alarm: a fire recall would not be seen"
     for hazard in ALARMS:
         for _, path, text in _cut(table, hazard, True, f"{hazard} reads clear"):
             yield path, text
@@ -47,12 +44,54 @@ def warnings(wiring: LiftWiring) -> Iterator[Problem]:
         reads_standing = signal == "stopped"
         for _, path, text in _cut(table, signal, not reads_standing, "the car reads standing"):
             yield path, text
-    confused = "; ".join(_confusions(wiring.floor_code, table))
+    confused = floor_warnings(wiring.floor_code, table)
     if confused:
         yield ("floor_code",), f"{confused}: ask for a parity line, or for codes two lines apart"
     needed = {signal for signal, _, _ in unsafe(wiring)}
     for signal in wiring.accept_unsafe.keys() - needed:
         yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
+
+
+def missing(
+    settings: LiftSettings, path: tuple[str, ...], told: bool, asks: bool, fire: bool, holds: bool
+) -> Iterator[Problem]:
+    """What a lift can do without, and hardly should.
+
+    `told`: its AGV mode is. `asks`: for AGV mode. `fire`: is told. `holds`: its door open.
+    """
+    by_call = settings.agv_mode == "by_call"
+    if not told:
+        yield path, "no agv_mode: the lift cannot confirm that it obeys"
+    elif not asks and not by_call:
+        text = (
+            "no agv_mode_request asks for AGV mode, and it is awaited: the lift must grant it alone"
+        )
+        yield (*path[:-1], "outputs") if path == ("inputs",) else path, text
+    if by_call and not holds:
+        text = "no door_open: with by_call nothing keeps AGV mode on while a robot goes through"
+        yield path, text
+    if not fire:
+        yield path, "no fire_alarm: a fire recall would not be seen"
+
+
+def notes(settings: LiftSettings, fire: bool) -> Iterator[Problem]:
+    """What the site decides. `fire`: a fire is told by the lift."""
+    if fire and settings.alarm == "none":
+        text = (
+            "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)"
+        )
+        yield ("alarm",), text
+
+
+def by_call(
+    settings: LiftSettings, told: bool, asks: bool, request: tuple[str, ...]
+) -> Iterator[Problem]:
+    """AGV mode that comes by a call: it must be told, and is not asked for. `request`: where it is."""
+    if settings.agv_mode == "by_call" and not told:
+        text = "by_call needs an agv_mode input: nothing else tells that a call was taken"
+        yield ("agv_mode",), text
+    if settings.agv_mode == "by_call" and asks:
+        yield request, "agv_mode is by_call, so calls ask for AGV mode: delete one of the two"
 
 
 def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
@@ -68,6 +107,7 @@ def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
         yield from _cut(table, f"{prefix}_opened", False, f"the {prefix} reads open")
     if not any(_floor_code(wiring.floor_code, wiring.levels())):
         yield from _dead_code(wiring.floor_code, table)
+    yield from unsafe_codes(wiring, table)
     yield from energised_at_boot(table.values())
 
 
@@ -75,7 +115,8 @@ def _cut(table: Mapping[str, Wire], signal: str, asserted: bool, meaning: str) -
     return cut_must_read(table[signal], asserted, meaning) if signal in table else ()
 
 
-def _floors(wiring: LiftWiring) -> Iterator[Problem]:
+def floors(wiring: LiftSettings) -> Iterator[Problem]:
+    """A lift without floors; a floor or a door of a landing that is named twice."""
     stops = wiring.stops()
     if not stops:
         yield ("floors",), "no floors: name those of RMF's map that this lift serves"
@@ -91,21 +132,21 @@ def _floors(wiring: LiftWiring) -> Iterator[Problem]:
         seen[stop] = name
 
 
-def _named(
-    what: str, section: tuple[str, ...], named: Collection[str], levels: Collection[str]
+def named(
+    what: str, section: tuple[str, ...], given: Collection[str], levels: Collection[str]
 ) -> Iterator[Problem]:
     """Every landing has one, and nothing else has."""
-    for level in named:
+    for level in given:
         if level not in levels:
             yield section, f"{level!r} is no landing of this lift, which has {', '.join(levels)}"
     for level in levels:
-        if level not in named:
+        if level not in given:
             yield section, f"no {what} for {level}"
 
 
 def _floor_code(code: FloorCode, levels: list[str]) -> Iterator[Problem]:
     if code.encoding == "one_hot":
-        yield from _named("line", ("floor_code", "lines"), code.lines, levels)
+        yield from named("line", ("floor_code", "lines"), code.lines, levels)
         if code.bits or code.codes or code.parity:
             yield ("floor_code",), "one_hot has lines, and no bits, codes or parity"
         return
@@ -113,7 +154,7 @@ def _floor_code(code: FloorCode, levels: list[str]) -> Iterator[Problem]:
         yield ("floor_code", "lines"), f"{code.encoding} has bits and codes; lines are for one_hot"
     if not code.bits:
         yield ("floor_code",), "no bits: list the lines, least significant first"
-    yield from _named("code", ("floor_code", "codes"), set(code.codes.values()), levels)
+    yield from named("code", ("floor_code", "codes"), set(code.codes.values()), levels)
     for number in (*code.codes, *code.between_floors):
         try:
             codes.encode(code.encoding, number, len(code.bits))
@@ -132,11 +173,11 @@ def _floor_code(code: FloorCode, levels: list[str]) -> Iterator[Problem]:
 def _calls(wiring: LiftWiring) -> Iterator[Problem]:
     code = wiring.call_code
     if code is None:
-        yield from _named("call", ("calls",), wiring.calls, wiring.levels())
+        yield from named("call", ("calls",), wiring.calls, wiring.levels())
         return
     if wiring.calls:
         yield ("calls",), "calls and call_code are two ways of calling: keep one"
-    yield from _named("code", ("call_code", "codes"), set(code.codes.values()), wiring.levels())
+    yield from named("code", ("call_code", "codes"), set(code.codes.values()), wiring.levels())
     for number in code.codes:
         if number == 0 or number >> len(code.bits):
             why = "0 is no call" if number == 0 else f"{number} does not fit on the bits"
@@ -186,6 +227,8 @@ def _motion(wiring: LiftWiring) -> Iterator[Problem]:
 
 def _agv(wiring: LiftWiring) -> Iterator[Problem]:
     by_line, by_code = wiring.inputs.agv_mode, _in_service(wiring, "agv_mode")
+    told, asks = bool(by_line) or by_code, bool(wiring.outputs.agv_mode_request)
+    yield from by_call(wiring, told, asks, ("outputs", "agv_mode_request"))
     if by_line and by_code:
         yield ("inputs", "agv_mode"), "service shows agv_mode too: keep one"
     for signal, path, line in input_rows(wiring):
@@ -208,6 +251,11 @@ def _service(wiring: LiftWiring) -> Iterator[Problem]:
         yield ("inputs", "service", "codes", str(number)), f"{number} does not fit on the bits"
 
 
+def sees_fire(wiring: LiftWiring) -> bool:
+    """Is a fire told, by a line or by the service code?"""
+    return wiring.inputs.fire_alarm is not None or _in_service(wiring, Hazard.FIRE)
+
+
 def _in_service(wiring: LiftWiring, state: str) -> bool:
     service = wiring.inputs.service
     return service is not None and state in service.codes.values()
@@ -223,15 +271,3 @@ def _dead_code(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
             ("floor_code",),
             f"with the floor code's cable cut, the car reads at {level}",
         )
-
-
-def _confusions(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[str]:
-    """One cut line must not turn a floor's code into another floor's."""
-    for level in dict.fromkeys((*code.codes.values(), *code.lines)):
-        shown = code.show(level)
-        for signal in shown:
-            reads = table[signal].broken_reads()
-            for cut in (False, True) if reads is None else (reads,):
-                other, _ = code.read({**shown, signal: cut})
-                if other not in (None, level):
-                    yield f"with {signal} cut, {level} reads as {other}"

@@ -49,6 +49,11 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
     return lift_checks.warnings(settings)
 
 
+def notes(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+    """What the site decides: (path below the device, text)."""
+    return lift_checks.notes(settings, lift_checks.sees_fire(settings))
+
+
 def debounce(settings: Settings) -> Mapping[str, float]:
     """How long a change must last (s): `floor`, `door`, `rear_door`, `motion`, `agv_mode`, hazards."""
     return lift_table.debounce(settings)
@@ -129,7 +134,7 @@ def decode(
 def _service(inputs: Inputs, shown: Mapping[str, bool]) -> str | None:
     if inputs.service is None:
         return None
-    return inputs.service.codes[_number("service", len(inputs.service.bits), shown)]
+    return inputs.service.means(_number("service", len(inputs.service.bits), shown))
 
 
 def _agv(inputs: Inputs, shown: Mapping[str, bool], service: str | None) -> bool | None:
@@ -179,4 +184,5 @@ DRIVER = DriverType(
     debounce=debounce,
     tables=lift_tables.tables,
     warnings=warnings,
+    notes=notes,
 )

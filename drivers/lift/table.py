@@ -76,8 +76,8 @@ def debounce(wiring: LiftWiring) -> dict[str, float]:
         name = group(signal)
         longest[name] = max(longest.get(name, 0.0), _debounce_s(signal, line))
     service_s = longest.pop("service", 0.0)
-    states = wiring.inputs.service.codes.values() if wiring.inputs.service else ()
-    for state in states:
+    service = wiring.inputs.service
+    for state in map(service.means, service.codes) if service else ():
         if state in (*Hazard, "agv_mode"):
             longest[state] = max(longest.get(state, 0.0), service_s)
     return longest

@@ -7,6 +7,7 @@ import msgspec
 
 from bridges.core.fields import Name
 from bridges.lift.settings import LiftSettings
+from bridges.lift.signals import Hazard
 from drivers.hal.points import Input, Output
 from drivers.lift import codes
 
@@ -63,6 +64,7 @@ ServiceState = Literal[
     "out_of_service",
     "manual_mode",
     "overload",
+    "fault",
 ]
 
 
@@ -70,11 +72,17 @@ class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """The lift's service state as a number on several lines.
 
     `bits`: least significant first.
-    `codes`: number -> state; every number must be listed.
+    `codes`: number -> state; every number must be listed, and `fault` is for one that the controller
+    never shows: a line is broken, and the lift is out of service.
     """
 
     bits: list[LiftInput]
     codes: dict[Number, ServiceState]
+
+    def means(self, number: int) -> str:
+        """The state that a number shows."""
+        state = self.codes[number]
+        return Hazard.OUT_OF_SERVICE if state == "fault" else state
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -224,7 +232,3 @@ class LiftWiring(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=
     outputs: Outputs
     calls: dict[Name, Output] = msgspec.field(default_factory=dict)
     call_code: CallCode | None = None
-
-    def levels(self) -> list[str]:
-        """The landings, from the lowest up."""
-        return list(dict.fromkeys(stop.level for stop in self.stops().values()))

@@ -11,7 +11,7 @@ It is read like a device YAML, and a problem has its file, line and column.
 import functools
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 from msgspec.inspect import LiteralType
@@ -19,8 +19,8 @@ from msgspec.inspect import LiteralType
 from bridges.core.fields import Name
 from bridges.settings.nodes import Page, SettingsError, compose, either, read, unknown
 from bridges.settings.values import BROKEN, Spot, Values
-
-FOLDER: Final = Path(__file__).parent
+from drivers.profiles import texts
+from drivers.profiles.texts import FOLDER
 
 
 class Profile:
@@ -34,8 +34,8 @@ class Profile:
     def names(self, folder: Path = FOLDER) -> list[str]:
         """The profiles of this sort that there are."""
         first = f"for: {self.reader}"
-        files = sorted(folder.glob("*.yaml"))
-        return [f.stem for f in files if first in f.read_text("utf-8").splitlines()]
+        files = sorted({*folder.glob("*.yaml"), *texts.known_in(folder)})
+        return [f.stem for f in files if f.suffix == ".yaml" and first in _lines(f)]
 
     def load(self, name: str, folder: Path = FOLDER) -> Any:
         """What a profile says. Raises SettingsError with every problem of the file."""
@@ -46,13 +46,20 @@ class Profile:
         return bool(self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried")
 
     def _read(self, file: Path) -> dict[str, Any]:
-        return _read(file, self.reader, self.key, self._content)
+        text = texts.text(file, lambda: read(str(file)))
+        return _understood(str(file), text, self.reader, self.key, self._content)
+
+
+def _lines(file: Path) -> list[str]:
+    return (texts.known(file) or file.read_bytes()).decode("utf-8", "replace").splitlines()
 
 
 @functools.cache
-def _read(file: Path, reader: str, key: str, content: type[msgspec.Struct]) -> dict[str, Any]:
-    page = Page(str(file))
-    root = compose(page, read(page.file))
+def _understood(
+    file: str, text: bytes, reader: str, key: str, content: type[msgspec.Struct]
+) -> dict[str, Any]:
+    page = Page(file)
+    root = compose(page, text)
     spot, values = Spot(root, root, "the file"), Values(page)
     types: dict[str, Any] = {
         "for": LiteralType((reader,)),

@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from hal_fakes.plants.plant import Edge
+from hal_fakes.wire import wire
 
 STOP_WITHIN_S = 5.0
 CONNECT_WITHIN_S = 15.0
@@ -34,7 +35,8 @@ class Daemon:
         self.runtime_dir = directory / self.name
         self._plant: socket.socket | None = None
         command = [sys.executable, "-m", "bridges.cli", "run", str(file), "--simulate"]
-        command += ["--runtime-dir", str(self.runtime_dir), "--domain-id", str(domain_id)]
+        command += ["--runtime-dir", str(self.runtime_dir)]
+        command += ["--domain-id", str(domain_id), "--transport", wire()]
         environment = {k: v for k, v in os.environ.items() if k != "RMF_BRIDGE_SERVICE"}
         with self.log.open("wb") as log:
             self._process = subprocess.Popen(

@@ -15,15 +15,14 @@ from pathlib import Path
 from types import FrameType
 from typing import Final
 
-from bridges.core.fields import Rmf
 from bridges.rmf import words
-from bridges.rmf.choose import open_transport
 from bridges.rmf.transport import Transport, TransportError
 from bridges.settings.load import load
 from hal_fakes.demo.daemons import Daemon, Wrong, stop_all
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.world import World
 from hal_fakes.domain import free_domain
+from hal_fakes.wire import join, wire
 
 READY_WITHIN_S: Final = 20.0
 Failure = tuple[str, str, str]
@@ -109,10 +108,9 @@ class Stage:
         """Every daemon started, on a domain and a loopback of their own, and a place beside them."""
         domain = free_domain()
         count = len(self.demo.files)
-        begun = f"{count} daemons on fake hardware, DDS domain {domain}, loopback only"
+        begun = f"{count} daemons on fake hardware, {wire()}, domain {domain}, loopback only"
         self.journal.note("demo", begun, time.monotonic())
-        rmf = Rmf(transport="dds", domain_id=domain, network="localhost")
-        transport = open_transport(rmf, "rmf_demo", localhost=True)
+        transport = join("rmf_demo", domain)
         try:
             for device, file in self.demo.files.items():
                 self._check()

@@ -12,25 +12,25 @@ from typing import Any, Final
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
-from bridges.rmf.topics import Topic
+from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Publisher, Transport
 from hal_fakes.demo.daemons import Daemon, Wrong
 from hal_fakes.demo.journal import SETTLES_S, Journal
 from hal_fakes.plants.plant import Edge
 from hal_fakes.rmf import Party, Said
 
-TO_DAEMONS: Final[tuple[Topic[Any], ...]] = (
+TO_DAEMONS: Final[tuple[AnyTopic, ...]] = (
     topics.LIFT_REQUESTS,
     topics.DOOR_REQUESTS,
     topics.CHARGER_REQUESTS,
     topics.CHARGER_CANCELS,
 )
-STATES: Final[tuple[Topic[Any], ...]] = (
+STATES: Final[tuple[AnyTopic, ...]] = (
     topics.LIFT_STATES,
     topics.DOOR_STATES,
     topics.CHARGER_STATES,
 )
-PUBLISHED: Final[tuple[Topic[Any], ...]] = (
+PUBLISHED: Final[tuple[AnyTopic, ...]] = (
     *TO_DAEMONS[:3],
     topics.ADAPTER_LIFT_REQUESTS,
     topics.ADAPTER_DOOR_REQUESTS,
@@ -62,7 +62,7 @@ class World:
         self._parties: list[Party] = []
         self._check = check
         self._transport = transport
-        self._inbox: SimpleQueue[tuple[float, Topic[Any] | None, Any]] = SimpleQueue()
+        self._inbox: SimpleQueue[tuple[float, AnyTopic | None, Any]] = SimpleQueue()
         self._publishers: dict[str, Publisher[Any]] = {
             topic.name: transport.publisher(topic) for topic in PUBLISHED
         }
@@ -86,7 +86,7 @@ class World:
         """RMF's clock (s since the epoch)."""
         return time.time()
 
-    def listened_to(self, *to: Topic[Any]) -> bool:
+    def listened_to(self, *to: AnyTopic) -> bool:
         """A daemon has matched each of these topics, on which we send requests."""
         return all(self._publishers[topic.name].matched() for topic in to)
 
@@ -177,7 +177,7 @@ class World:
             self._take(at, topic, what)
         self.journal.flush(time.monotonic() - SETTLES_S)
 
-    def _take(self, at: float, topic: Topic[Any] | None, what: Any) -> None:
+    def _take(self, at: float, topic: AnyTopic | None, what: Any) -> None:
         if topic is None:
             self.journal.edge(what)
             return
@@ -186,7 +186,7 @@ class World:
             if topic in party.subscribes:
                 self.say(party.hear(what, time.time()))
 
-    def _journal(self, at: float, topic: Topic[Any], message: Any) -> None:
+    def _journal(self, at: float, topic: AnyTopic, message: Any) -> None:
         if topic in STATES:
             self.journal.state(message, at)
         elif topic in TO_DAEMONS:
@@ -204,13 +204,13 @@ class World:
                 self.places[one.robot_name] = place
                 self.journal.note("place", place, at, one.robot_name)
 
-    def _hear(self, *heard: Topic[Any]) -> None:
+    def _hear(self, *heard: AnyTopic) -> None:
         for topic in heard:
             if topic.name not in self._heard:
                 self._heard.add(topic.name)
                 self._transport.subscribe(topic, self._to_inbox(topic))
 
-    def _to_inbox(self, topic: Topic[Any]) -> Callable[[Any], None]:
+    def _to_inbox(self, topic: AnyTopic) -> Callable[[Any], None]:
         def put(message: Any) -> None:
             self._inbox.put((time.monotonic(), topic, message))
 

@@ -63,6 +63,7 @@ class Units:
     def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
         self._slow_s = slow_s
         self._at: dict[Point, tuple[Wiring, str]] = {}
+        self._bits: dict[Point, list[Point]] = {}
         self._cells: dict[Point, Cells] = {}
         self._dead_men: list[DeadMan] = []
         self._plants: dict[int | None, list[Plant]] = {None: []}
@@ -79,6 +80,9 @@ class Units:
     def _add_wiring(self, wiring: Wiring) -> None:
         points = {parse(name): name for name in (*wiring.inputs, *wiring.outputs)}
         self._at.update({point: (wiring, name) for point, name in points.items()})
+        for point in points:
+            if point.bit is not None:
+                self._bits.setdefault(point.cell, []).append(point)
         self._flashes.update({parse(at): parse(name) for at, name in wiring.flashes.items()})
         for unit in (None, *{point.unit for point in points}):
             self._plants.setdefault(unit, []).append(wiring.plant)
@@ -151,6 +155,8 @@ class Units:
         if point in self._cells:
             taken = self._cells[point].set(point, int(value), now)
             return None if taken else ExcCodes.ILLEGAL_VALUE
+        if point in self._bits:
+            return ExcCodes.ILLEGAL_VALUE
         if any(d.unit == point.unit and d.tripped for d in self._dead_men):
             return ExcCodes.DEVICE_FAILURE
         wiring, name = self._at[point]
@@ -177,7 +183,8 @@ class Units:
         points = Range(unit, table, address, count).points()
         if unit not in self._plants:
             return ExcCodes.GATEWAY_NO_RESPONSE
-        if any(point not in self._at and point not in self._cells for point in points):
+        known = self._at.keys() | self._cells.keys() | self._bits.keys()
+        if not known.issuperset(points):
             return ExcCodes.ILLEGAL_ADDRESS
         return points
 
@@ -194,5 +201,7 @@ class Units:
         now = time.monotonic()
         if point in self._cells:
             return self._cells[point].get(point, now)
+        if point in self._bits:
+            return sum(self._now_at(bit) << (bit.bit or 0) for bit in self._bits[point])
         wiring, name = self._at[point]
         return wiring.levels(now)[name]

@@ -21,17 +21,19 @@ AUTO_CLOSE_S: Final = 1.0
 SLOWNESS: Final = 5.0
 
 
-def build(name: str, settings: DoorSettings, wires: Iterable[Wire]) -> "DoorPlant":
-    """A door with these contacts and this relay."""
+def build(
+    name: str, settings: DoorSettings, wires: Iterable[Wire], parts: Iterable[str] = ()
+) -> "DoorPlant":
+    """A door with these contacts and this relay; `parts` of its controller can fail."""
     every_s = settings.pulse.every_s if settings.pulse else 0.0
-    return DoorPlant(name, wires, auto_close_s=max(AUTO_CLOSE_S, every_s))
+    return DoorPlant(name, wires, auto_close_s=max(AUTO_CLOSE_S, every_s), parts=parts)
 
 
 class DoorPlant(Machine):
     """The door: `position` is 0 when closed and 1 when open.
 
     `open_s`, `close_s`: the time of a whole travel. `auto_close_s`: how long the operator waits
-    before it closes when nothing holds the door any longer.
+    before it closes when nothing holds the door any longer. `parts`: what of its controller can fail.
     """
 
     def __init__(
@@ -42,10 +44,12 @@ class DoorPlant(Machine):
         open_s: float = OPEN_S,
         close_s: float = CLOSE_S,
         auto_close_s: float = AUTO_CLOSE_S,
+        parts: Iterable[str] = (),
     ) -> None:
         wires = list(wires)
         at_module = any(w.point.strip().lower().startswith("unit") for w in wires)
-        super().__init__(name, wires, ("operator", *(("unit", "server") if at_module else ())))
+        of_module = ("unit", "server") if at_module else ()
+        super().__init__(name, wires, ("operator", *parts, *of_module))
         self.position = 0.0
         self._seconds = {1: open_s, -1: close_s}
         self._auto_close_s = auto_close_s

@@ -2,6 +2,8 @@
 
 - AGV mode is granted some time after it is asked for, once people's calls are done, and never under
   a hazard; it goes when the request goes or a hazard comes.
+- With `agv_mode: by_call` a call asks for it, which counts until the door is open there and not held
+  (as open-rmf/mock-lift-io has it, firmware/Mock-Lift/src/main.cpp).
 - In AGV mode a call takes the car to that landing; there the door opens, stays for its dwell time,
   and longer while its open relay is on. The car leaves with its doors closed.
 - Fire: the car goes to the lowest landing and stands there open. Emergency, earthquake: it stops at
@@ -73,6 +75,7 @@ class LiftPlant(Machine):
         self._people: list[int] = []
         self._let_out = False
         self._call: int | None = None
+        self._called_for_agv = False
         self._seen: int | None = None
         self._seen_at = NEVER
         self._grant_at = NEVER
@@ -148,12 +151,13 @@ class LiftPlant(Machine):
             self._seen_at = NEVER
             if self._seen is not None:  # it counts while AGV mode is on, which starts anew with it
                 self._call = self._seen
+                self._called_for_agv = True
 
     def _grant(self) -> None:
         """AGV mode comes after a while, and goes at once."""
         failure = self.failures.get("controller")
         taken = self._hazard(*(h for h in Hazard if h is not Hazard.OVERLOAD))
-        asked = "agv_mode_request" in self._on and not taken and failure != "off"
+        asked = self._asked() and not taken and failure != "off"
         if failure == "stuck":
             self._grant_at = NEVER
         elif self.agv and not asked:
@@ -165,7 +169,20 @@ class LiftPlant(Machine):
             slowness = SLOWNESS if failure == "slow" else 1.0
             self._grant_at = self.now + self._pace.agv_s * slowness
         elif self._grant_at <= self.now:
-            self.agv, self._call, self._grant_at = True, self._called(), NEVER
+            self.agv, self._grant_at = True, NEVER
+            if self._wiring.agv_mode == "requested":
+                self._call = self._called()
+
+    def _asked(self) -> bool:
+        """Does anything of ours ask for AGV mode?"""
+        if self._wiring.agv_mode == "requested":
+            return "agv_mode_request" in self._on
+        held = bool(self._on & {"door_open", "rear_door_open"}) or self._called() is not None
+        served = self._call is None and any(door.opened for door in self.doors.values())
+        taken_away = self._hazard(*(h for h in Hazard if h is not Hazard.OVERLOAD))
+        if taken_away or (served and not held):
+            self._called_for_agv, self._call = False, None
+        return self._called_for_agv
 
     def _goal(self) -> int | None:
         """The landing where the car should be; None: wherever it stops next."""
@@ -187,7 +204,7 @@ class LiftPlant(Machine):
         if self._hazard(Hazard.FIRE):
             return
         if self.car.floor == goal:
-            self._call = None
+            self._call = None if self.agv else self._call
             del self._people[:1]
         sides = self._sides[self._levels[self.car.floor]]
         if len(sides) == 1 or not self.agv:  # with two doors, the open relays choose
@@ -257,7 +274,7 @@ class LiftPlant(Machine):
             return {}
         states = [h.value for h in Hazard if self._hazard(h)]
         states += ["agv_mode"] if self.agv else []
-        states += ["normal", *(s for s in code.codes.values() if s != "agv_mode")]
+        states += ["normal", *(s for s in code.codes.values() if s not in ("agv_mode", "fault"))]
         numbers = {str(state): number for number, state in reversed(code.codes.items())}
         return _bits("service", len(code.bits), next(numbers[s] for s in states if s in numbers))
 

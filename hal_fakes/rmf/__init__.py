@@ -9,13 +9,13 @@ restarted party is a new object.
 """
 
 from collections.abc import Sequence
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import Topic
+from bridges.rmf.topics import AnyTopic
 
-Said = tuple[Topic[Any], d.Message]
+Said = tuple[AnyTopic, d.Message]
 """One message and the topic that it is published on."""
 
 NEVER: Final = float("inf")
@@ -24,7 +24,7 @@ NEVER: Final = float("inf")
 class Party(Protocol):
     """Somebody on RMF's side."""
 
-    subscribes: Sequence[Topic[Any]]
+    subscribes: Sequence[AnyTopic]
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         """A message has arrived on one of the topics subscribed."""

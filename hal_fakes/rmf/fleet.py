@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from bridges.rmf import definitions as d
-from bridges.rmf.topics import CHARGING_ASSIGNMENTS, FLEET_STATES, Topic
+from bridges.rmf.topics import CHARGING_ASSIGNMENTS, FLEET_STATES, AnyTopic
 from hal_fakes.rmf import Said
 
 EVERY_S: Final = 1.0
@@ -42,7 +42,7 @@ class FleetRobot:
 class Fleet:
     """Publishes FleetState at 1 Hz and hears ChargingAssignments."""
 
-    subscribes: Sequence[Topic[Any]] = (CHARGING_ASSIGNMENTS,)
+    subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS,)
 
     def __init__(self, name: str, graph: Graph, robots: Mapping[str, str], drive_s: float) -> None:
         """`robots`: each where it stands. `drive_s`: how long every way takes."""

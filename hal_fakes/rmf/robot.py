@@ -6,7 +6,6 @@ Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/RobotConte
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -53,7 +52,7 @@ class Robot:
     A cancelled phase is `robot.phase = None`.
     """
 
-    subscribes: Sequence[topics.Topic[Any]] = (
+    subscribes: Sequence[topics.AnyTopic] = (
         topics.LIFT_STATES,
         topics.DOOR_STATES,
         topics.DOOR_SUPERVISOR_HEARTBEAT,

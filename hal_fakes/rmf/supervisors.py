@@ -6,7 +6,7 @@ door_supervisor/Node.cpp. Neither remembers anything across a restart.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -17,7 +17,7 @@ from hal_fakes.rmf import NEVER, Said, door_request
 class LiftSupervisor:
     """rmf_lift_supervisor: one slot for each lift, which holds the last request of its holder."""
 
-    subscribes: Sequence[topics.Topic[Any]] = (topics.ADAPTER_LIFT_REQUESTS, topics.LIFT_STATES)
+    subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_LIFT_REQUESTS, topics.LIFT_STATES)
 
     def __init__(self) -> None:
         self.slots: dict[str, d.LiftRequest] = {}
@@ -88,7 +88,7 @@ class DoorSupervisor:
     The heartbeat goes out on each adapter request and at no other time.
     """
 
-    subscribes: Sequence[topics.Topic[Any]] = (topics.ADAPTER_DOOR_REQUESTS, topics.DOOR_STATES)
+    subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_DOOR_REQUESTS, topics.DOOR_STATES)
     REQUESTER_ID: Final = "door_supervisor"
 
     def __init__(self) -> None:

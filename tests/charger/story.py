@@ -9,8 +9,7 @@ from msgspec.structs import replace
 from bridges.charger import core
 from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import Durations as Limits
-from bridges.charger.settings import robot
+from bridges.charger.settings import Durations, robot
 from bridges.charger.signals import (
     Activity,
     Cancelled,
@@ -22,7 +21,7 @@ from bridges.charger.signals import (
 )
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
-DURATIONS = Limits(misses=3, start_timeout_s=60.0, released_s=2.0)
+DURATIONS = Durations(misses=3, start_timeout_s=60.0, released_s=2.0)
 LIMITS = ChargerLimits(DURATIONS, can_stop=False)
 """A station that can only be observed."""
 RECEIVERS = {"rx-1": robot("tiny/AMR01"), "rx-2": robot("tiny/AMR02")}
@@ -34,7 +33,7 @@ FULL = ChargerLimits(DURATIONS, RECEIVERS)
 
 def observed(**durations: Any) -> ChargerLimits:
     """Such a station with these durations, and the defaults."""
-    return ChargerLimits(Limits(**durations), can_stop=False)
+    return ChargerLimits(Durations(**durations), can_stop=False)
 
 
 A = Activity

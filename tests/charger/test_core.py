@@ -73,7 +73,7 @@ def test_time_to_full_and_measurements_are_reported_but_are_no_news() -> None:
     assert reports[0].news() == reports[1].news()
 
 
-def test_measurements_of_a_station_that_is_lost_are_not_shown() -> None:
+def test_measurements_of_a_lost_station_are_not_shown() -> None:
     story = Story().event(measured(CHARGING.sample, volts=48.0)).polls("silent 3")
     assert story.report is not None
     assert story.report.measured == Measured()
@@ -202,7 +202,7 @@ def test_a_cancel_while_charging_takes_the_power_and_shows_charging_until_it_sto
     assert story.faults == ["STILL_CHARGING: req-1: cancelled"]
 
 
-def test_a_cancel_during_the_restart_delay_changes_nothing_but_that_no_power_comes_back() -> None:
+def test_a_cancel_during_the_restart_delay_only_keeps_the_power_off() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 1, released 1")
     before = story.report, story.outputs
     story.event(CANCEL_1)
@@ -285,7 +285,7 @@ def test_an_error_before_charging_ends_the_request_too() -> None:
     ]
 
 
-def test_a_ramp_down_after_an_error_is_no_further_fault() -> None:
+def test_a_ramp_down_after_an_error_is_not_another_fault() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 1, hot 1, stopping 2, idle 1")
     assert story.told[3:] == [
         (2.0, "ERROR", "over temperature"),
@@ -377,7 +377,7 @@ def test_an_unknown_state_is_not_cleared() -> None:
 # ---- not reachable
 
 
-def test_never_read_is_an_error_and_nothing_is_driven() -> None:
+def test_a_station_that_was_never_read_is_in_error_and_nothing_is_driven() -> None:
     story = Story().event(SILENT)
     assert story.report == ChargerReport(
         read_at=None,
@@ -388,7 +388,7 @@ def test_never_read_is_an_error_and_nothing_is_driven() -> None:
     assert story.outputs == ChargerOutputs(power=None)
 
 
-def test_before_anything_was_tried_the_reason_is_that() -> None:
+def test_before_the_first_reading_the_error_says_that_none_was_made() -> None:
     story = Story().event(AMR1)
     assert story.faults == ["CHARGER_UNREACHABLE: not read yet"]
 
@@ -408,7 +408,7 @@ def test_the_third_missed_poll_is_an_error_with_the_last_robot() -> None:
     assert story.outputs == ChargerOutputs(power=None)
 
 
-def test_single_missed_polls_are_not_added_up() -> None:
+def test_missed_polls_count_only_when_they_follow_one_another() -> None:
     story = Story().polls("idle 1").event(AMR1)
     story.polls("silent 2, idle 1, silent 2, idle 1, silent 2")
     assert story.told[-1] == (1.0, "ASSIGNED", "req-1")
@@ -461,7 +461,7 @@ def test_a_restart_while_charging_adopts_the_charge_and_leaves_the_power_alone()
     assert story.outputs == ChargerOutputs(power=False)
 
 
-def test_unrequested_charging_is_not_credited_to_whoever_asks_next() -> None:
+def test_unrequested_charging_is_not_credited_to_the_next_robot_that_asks() -> None:
     story = Story().polls("charging 1").event(AMR2)
     assert story.refused == [(1.0, "charger occupied")]
     assert story.report is not None
@@ -486,7 +486,7 @@ def test_a_second_node_for_the_same_charger_stops_everything_until_it_is_silent_
     ]
 
 
-def test_two_nodes_do_not_both_clear_an_error() -> None:
+def test_of_two_nodes_for_a_charger_neither_clears_an_error() -> None:
     story = Story(observed(clear_errors_per_h=60)).event(RIVAL).polls("hot 4")
     assert story.outputs.clear_errors == 0
     assert [fault.split(":")[0] for fault in story.faults] == [
@@ -502,7 +502,7 @@ def test_the_core_asks_to_be_woken_when_the_rival_is_due_to_be_gone() -> None:
     assert (seen.wake_at, later.wake_at) == (12.0, float("inf"))
 
 
-def test_an_error_without_a_request_keeps_a_free_station_free() -> None:
+def test_a_station_is_free_again_after_an_error_without_a_request() -> None:
     story = Story().polls("hot 2, idle 1").event(AMR1)
     assert story.told == [
         (0.0, "ERROR", "over temperature"),

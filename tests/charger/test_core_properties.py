@@ -10,11 +10,12 @@ from bridges.charger.signals import Event
 from tests.charger import story as s
 from tests.charger.invariants import check
 from tests.charger.walk import MOVES, SITES, World, moved, waited
+from tests.depth import examples
 
 steps = st.lists(st.sampled_from([*MOVES, 0.25, 1.0, 3.0, 10.0, 90.0]), max_size=60)
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(st.sampled_from(list(SITES)), steps)
 def test_what_is_true_of_every_state_stays_true_over_long_histories(
     site: str, history: list[str | float]
@@ -27,7 +28,7 @@ def test_what_is_true_of_every_state_stays_true_over_long_histories(
             world = waited(world, step, limits, check)
 
 
-@settings(derandomize=True, max_examples=200, deadline=None)
+@settings(derandomize=True, max_examples=examples(200), deadline=None)
 @given(
     st.lists(st.tuples(st.sampled_from((s.HOT, s.IDLE, s.SILENT)), st.floats(0, 30)), max_size=200),
     st.integers(0, 60),

@@ -58,7 +58,7 @@ def test_a_malformed_request_is_refused_by_name(changes: dict[str, object], kind
     assert refusal.value.kind == kind
 
 
-def test_what_nobody_asked_for_is_cancelled_by_the_id_under_which_it_is_published() -> None:
+def test_a_charge_that_nobody_asked_for_is_cancelled_by_its_published_id() -> None:
     accept = KIND.requests[CHARGER_CANCELS]
     ours = ChargerCancel("charger_a", "unrequested/charger_a")
     theirs = ChargerCancel("charger_a", "unrequested/charger_b")

@@ -8,6 +8,7 @@ from bridges.charger.pad import Misplaced, misplaced_in
 from bridges.charger.report import Diagnosis, diagnosis, error_text
 from bridges.charger.settings import Robot
 from bridges.charger.signals import Activity, ChargerSample
+from tests.depth import examples
 
 ODD = st.sampled_from([*' ,"/\\\n', "stands here", " is expected", "unknown receiver ", ""])
 NAMES = st.one_of(st.text(), st.lists(st.one_of(ODD, st.text(max_size=3))).map("".join))
@@ -19,9 +20,9 @@ MISPLACED = st.one_of(
 )
 
 
-@settings(max_examples=1000, deadline=None, derandomize=True)
+@settings(max_examples=examples(1000), deadline=None, derandomize=True)
 @given(MISPLACED)
-def test_every_id_survives_the_text(misplaced: Misplaced) -> None:
+def test_every_receiver_id_survives_the_error_text(misplaced: Misplaced) -> None:
     assert misplaced_in(misplaced.text) == misplaced
     assert diagnosis(misplaced.text) is Diagnosis.PAD
 
@@ -45,7 +46,7 @@ def test_plain_ids_are_written_as_they_are_and_others_quoted() -> None:
     "text",
     ["", "station: fan", "wrong docking: AMR01", "unknown receiver a b", "unknown receiver 1, 2"],
 )
-def test_another_text_names_nobody(text: str) -> None:
+def test_a_text_of_another_form_names_no_robot(text: str) -> None:
     assert misplaced_in(text) is None
 
 

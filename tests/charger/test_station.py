@@ -159,7 +159,7 @@ def test_a_robot_already_on_the_pad_is_charged_when_it_asks() -> None:
     assert it.powered == [False, False, False, True, True]
 
 
-def test_start_timeout_of_an_ad_hoc_request_counts_from_its_acceptance() -> None:
+def test_the_start_timeout_of_an_ad_hoc_request_counts_from_its_acceptance() -> None:
     asked = Requested("req-1", "tiny", "AMR01", start_timeout_s=5.0)
     it = story().sees((A.IDLE, ONE, 10)).event(asked).sees((A.IDLE, ONE, 6))
     assert it.told[-1] == (16.0, "RELEASED", "req-1")
@@ -180,7 +180,7 @@ def test_where_the_site_says_so_a_known_robot_is_charged_without_a_request() -> 
     assert it.powered == [False, True, True, True, True] + [False] * 7
 
 
-def test_who_is_served_without_a_request_may_ask_may_be_cancelled_and_may_leave() -> None:
+def test_a_robot_that_is_served_without_a_request_may_ask_be_cancelled_and_leave() -> None:
     serves = replace(FULL, unrequested="serve_known")
     asks = story(serves).sees((A.IDLE, ONE, 1)).event(AMR2).event(AMR1)
     assert (asks.told[-1], asks.refused) == (
@@ -360,7 +360,7 @@ def test_a_fault_of_the_robots_side_leaves_the_station_in_service() -> None:
     assert it.event(AMR2).told[-1] == (7.0, "ASSIGNED", "req-2")
 
 
-def test_an_intruders_own_fault_does_not_end_the_request_that_waits_but_the_stations_does() -> None:
+def test_a_waiting_request_survives_an_intruders_fault_but_not_the_stations() -> None:
     theirs = story().event(AMR1).event(at_fault("handshake timeout", "robot", TWO))
     theirs.sees((A.IDLE, NOBODY, 1))
     assert theirs.told[-1] == (1.0, "ASSIGNED", "req-1")
@@ -369,7 +369,7 @@ def test_an_intruders_own_fault_does_not_end_the_request_that_waits_but_the_stat
     assert ours.told[-2:] == [(1.0, "RELEASED", "req-1"), (3.0, "IDLE", "")]
 
 
-def test_a_side_that_the_stations_own_words_name_is_not_named_twice() -> None:
+def test_the_side_at_fault_is_not_named_twice() -> None:
     it = story().event(at_fault("station: fan stuck", "station"))
     assert it.told[-1] == (1.0, "ERROR", "station: fan stuck")
     assert it.faults == [
@@ -386,7 +386,7 @@ def test_one_clearing_puts_a_station_back_into_service_once() -> None:
     assert it.told[-1] == (6.0, "ERROR", "out of service after: fan stuck")
 
 
-def test_a_clearing_that_did_not_help_does_not_count_later() -> None:
+def test_a_clearing_that_failed_does_not_count_later() -> None:
     it = docked().event(at_fault("fan stuck", "station")).event(RESET)
     for _ in range(40):
         it.event(at_fault("fan stuck", "station"))
@@ -525,7 +525,7 @@ def test_a_station_that_is_lost_shows_the_robot_it_charged_last_and_no_other() -
         assert (it.report.robot, it.report.verified) == (robot, False)
 
 
-def test_receivers_are_whose_the_yaml_says() -> None:
+def test_each_receiver_belongs_to_the_robot_that_the_yaml_names() -> None:
     assert {receiver: str(robot) for receiver, robot in RECEIVERS.items()} == {
         "rx-1": "tiny/AMR01",
         "rx-2": "tiny/AMR02",

@@ -6,7 +6,8 @@ from msgspec.structs import replace
 from bridges.charger.memory import ChargerLimits
 from bridges.charger.signals import Requested
 from tests.charger.invariants import check
-from tests.charger.walk import MOVES, SITES, Step, World, moved, waited, walk
+from tests.charger.walk import SITES, Step, World, moved, walker
+from tests.depth import depth
 
 ASSIGNED = (1.0, "A asks")
 CHARGING = (*ASSIGNED, "A docks", 1.0, "handshake", "charging", 1.0)
@@ -27,19 +28,13 @@ STAGES: dict[str, tuple[str | float, ...]] = {
 
 def path(limits: ChargerLimits, *steps: str | float) -> World:
     """The state that these moves and waits lead to."""
-    world = World()
-    for step in steps:
-        if isinstance(step, str):
-            world = moved(world, MOVES[step], limits, check)
-        else:
-            world = waited(world, step, limits, check)
-    return world
+    return walker(limits).path(World(), *steps, seen=check)
 
 
 def shown(world: World, limits: ChargerLimits) -> tuple[str, str, bool | None]:
     """What one more scan says: state, request, power."""
     steps: list[Step] = []
-    waited(world, 0.5, limits, steps.append)
+    walker(limits).path(world, 0.5, seen=steps.append)
     decision = steps[-1].decision
     state = decision.report.state.name.removeprefix("CHARGER_")
     return state, decision.report.request_id, decision.outputs.power
@@ -63,27 +58,31 @@ def test_the_stages_of_a_charge_are_what_they_are_called() -> None:
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_every_state_within_four_steps_of_the_start(site: str) -> None:
-    assert len(walk([World()], 4, SITES[site], check)) > 5000
+def test_every_state_within_some_steps_of_the_start(site: str) -> None:
+    found = walker(SITES[site]).walk([World()], depth(3, 4), check)
+    assert len(found) > depth(1000, 5000)
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_every_state_within_two_steps_of_each_stage_of_a_charge(site: str) -> None:
+def test_every_state_within_some_steps_of_each_stage_of_a_charge(site: str) -> None:
     limits = SITES[site]
     roots = [path(limits, *steps) for steps in STAGES.values()]
-    assert len(walk(roots, 2, limits, check)) > 1000
+    found = walker(limits).walk(roots, depth(1, 2), check)
+    assert len(found) > depth(100, 1000)
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_every_state_within_three_steps_of_a_stage_at_a_verified_station(stage: str) -> None:
+def test_every_state_within_some_steps_of_a_stage_at_a_verified_station(stage: str) -> None:
     limits = SITES["refuses"]
-    assert len(walk([path(limits, *STAGES[stage])], 3, limits, check)) > 1000
+    found = walker(limits).walk([path(limits, *STAGES[stage])], depth(2, 3), check)
+    assert len(found) > depth(100, 1000)
 
 
 @pytest.mark.parametrize("site", SITES)
 def test_from_every_state_a_sound_station_comes_back_and_charges_who_asks(site: str) -> None:
     limits = SITES[site]
-    for world in walk([path(limits, *steps) for steps in STAGES.values()], 1, limits, check):
+    roots = [path(limits, *steps) for steps in STAGES.values()]
+    for world in walker(limits).walk(roots, 1, check):
         sound = _mended(world, limits)
         assert shown(sound, limits)[:2] == ("IDLE", "")
         assert shown(_charged(sound, limits), limits)[:2] == ("CHARGING", "req-new")
@@ -92,16 +91,14 @@ def test_from_every_state_a_sound_station_comes_back_and_charges_who_asks(site: 
 def _mended(world: World, limits: ChargerLimits) -> World:
     """The pad is clear, all answers, nothing is wrong, and an operator resets what is latched."""
     world = replace(world, readable=True, writable=True)
-    for step in ("idle", "the pad is clear", "in range", "A cancels", "B cancels"):
-        world = moved(world, MOVES[step], limits, check)
-    world = waited(world, 32.0, limits, check)
-    return waited(moved(world, MOVES["reset"], limits, check), 4.0, limits, check)
+    steps = ("idle", "the pad is clear", "in range", "A cancels", "B cancels", 32.0, "reset", 4.0)
+    return walker(limits).path(world, *steps, seen=check)
 
 
 def _charged(world: World, limits: ChargerLimits) -> World:
     """The first robot asks, comes and is charged."""
     asked = Requested("req-new", "tiny", "A")
     world = moved(world, lambda before: (before, [asked]), limits, check)
-    world = waited(moved(world, MOVES["A docks"], limits, check), 2.0, limits, check)
+    world = walker(limits).path(world, "A docks", 2.0, seen=check)
     assert shown(world, limits) == ("ASSIGNED", "req-new", True)
-    return moved(world, MOVES["charging"], limits, check)
+    return walker(limits).path(world, "charging", seen=check)

@@ -5,7 +5,7 @@ that tells what has happened in other words. Ages beyond every limit are made eq
 out, so that states that cannot behave differently are one.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -14,8 +14,7 @@ from msgspec.structs import replace
 from bridges.charger.core import decide
 from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.report import ChargerReport
-from bridges.charger.settings import Durations as Limits
-from bridges.charger.settings import Robot, robot
+from bridges.charger.settings import Durations, Robot, robot
 from bridges.charger.signals import (
     Activity,
     Cancelled,
@@ -26,8 +25,9 @@ from bridges.charger.signals import (
     Requested,
 )
 from bridges.core.decision import Decision, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from tests.walk import Walker
 
-LIMITS = Limits(
+LIMITS = Durations(
     misses=2, start_timeout_s=8.0, stop_timeout_s=4.0, released_s=2.0, peer_internal_timeout_s=16.0
 )
 RECEIVERS = {"1": robot("tiny/A"), "2": robot("tiny/B")}
@@ -40,7 +40,7 @@ SITES = {
     "refuses": ChargerLimits(LIMITS, RECEIVERS),
     "serves": ChargerLimits(LIMITS, RECEIVERS, "serve_known"),
     "clears by itself": ChargerLimits(
-        Limits(misses=2, start_timeout_s=8.0, clear_errors_per_h=60), RECEIVERS
+        Durations(misses=2, start_timeout_s=8.0, clear_errors_per_h=60), RECEIVERS
     ),
 }
 
@@ -285,24 +285,11 @@ def _at(at: Any, now: float, oldest_s: float = OLDEST_S) -> Any:
     return None if at is None else max(at - now, -oldest_s)
 
 
-def neighbours(world: World, limits: ChargerLimits, seen: Seen) -> Iterator[World]:
-    """Every state one step away."""
-    for move in MOVES.values():
-        yield moved(world, move, limits, seen)
-    for seconds in WAITS:
-        yield waited(world, seconds, limits, seen)
-
-
-def walk(roots: list[World], depth: int, limits: ChargerLimits, seen: Seen) -> list[World]:
-    """Breadth first from the roots; every state within `depth` steps, once."""
-    found = set(roots)
-    edge = list(found)
-    for _ in range(depth):
-        fresh = []
-        for world in edge:
-            for neighbour in neighbours(world, limits, seen):
-                if neighbour not in found:
-                    found.add(neighbour)
-                    fresh.append(neighbour)
-        edge = fresh
-    return list(found)
+def walker(limits: ChargerLimits) -> Walker[World, Move]:
+    """The charger's, with these limits."""
+    return Walker(
+        MOVES,
+        WAITS,
+        lambda world, move, seen: moved(world, move, limits, seen),
+        lambda world, seconds, seen: waited(world, seconds, limits, seen),
+    )

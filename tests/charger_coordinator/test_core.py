@@ -89,7 +89,7 @@ def busy(station: str) -> StateHeard:
 # ---- who wants to be charged
 
 
-def test_a_robot_that_passes_by_with_the_mode_of_its_last_charging_wants_nothing() -> None:
+def test_a_robot_that_passes_with_the_mode_of_its_last_charge_does_not_ask_for_another() -> None:
     site_ = Alone()
     site_.seen[ONE] = Sighting(ONE, True, None, 40.0, "work")
     site_.run(5)
@@ -165,7 +165,7 @@ def test_a_station_at_which_another_robot_stands_is_not_free_though_it_says_so()
     assert site_.run(1) == [(11.0, "charger_a: AMR01")]
 
 
-def test_where_a_robot_was_long_ago_keeps_no_station() -> None:
+def test_an_old_position_of_a_robot_keeps_no_station() -> None:
     site_ = Alone()
     site_.shows[B] = busy(B)
     site_.hears(FleetSeen((Sighting(TWO, False, "charger_a", 90.0, ""),)))
@@ -174,7 +174,7 @@ def test_where_a_robot_was_long_ago_keeps_no_station() -> None:
     assert site_.run(1) == [(30.0, "charger_a: AMR01")]
 
 
-def test_a_station_that_takes_no_request_is_passed_over_and_the_wish_goes_to_the_end() -> None:
+def test_a_station_that_takes_no_request_is_passed_over_and_its_request_is_queued_last() -> None:
     site_ = Alone()
     site_.shows[B] = busy(B)
     site_.wants(ONE)
@@ -232,7 +232,7 @@ def test_a_robot_with_one_station_is_tried_there_twice_and_no_more() -> None:
     assert site_.run(1) != []
 
 
-def test_who_did_not_come_has_not_failed_and_who_stood_there_has() -> None:
+def test_a_robot_that_did_not_come_has_not_failed_but_one_that_stood_there_has() -> None:
     for place, strikes in ((None, {}), ("charger_a", {ONE: (A,)})):
         site_ = Alone()
         site_.wants(ONE)
@@ -255,7 +255,9 @@ def test_a_fault_of_the_stations_side_does_not_count_against_the_robot() -> None
     assert site_.faults == ["STATION_OUT_OF_SERVICE: charger_a: station: fan"]
 
 
-def test_who_did_not_come_keeps_its_wish_only_while_it_stands_at_a_place_of_ours() -> None:
+def test_a_robot_that_did_not_come_keeps_its_request_only_while_it_stands_at_one_of_our_places() -> (
+    None
+):
     for place, queue in ((None, [TWO]), ("wait_1", [TWO, ONE])):
         site_ = Alone()
         site_.shows[B] = busy(B)
@@ -294,7 +296,7 @@ def test_a_station_whose_pad_another_robot_does_not_leave_is_given_up_after_the_
     assert site_.memory.strikes == {}
 
 
-def test_what_could_not_be_said_beside_a_rival_is_said_anew_and_not_given_up() -> None:
+def test_a_request_that_a_rival_held_back_is_sent_afterwards() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
@@ -377,7 +379,7 @@ def test_a_restart_remembers_who_was_charging_and_whom_a_station_is_to_let_go() 
     }
 
 
-def test_what_the_yaml_no_longer_has_is_not_restored() -> None:
+def test_names_that_the_yaml_no_longer_has_are_not_restored() -> None:
     site_ = Alone()
     for who in (ONE, TWO, THREE):
         site_.wants(who)

@@ -47,7 +47,7 @@ def test_a_robot_stands_at_the_nearest_place_of_its_level(
 
 
 @pytest.mark.parametrize("mode", range(12))
-def test_of_the_modes_of_a_robot_two_say_that_it_charges(mode: int) -> None:
+def test_two_robot_modes_mean_that_it_charges(mode: int) -> None:
     assert robot(0.0, 2.0, mode=mode).charges == (mode in (1, 7))
 
 
@@ -59,12 +59,12 @@ def test_robots_that_the_yaml_does_not_name_are_passed_over() -> None:
 STATE = d.ChargerState(d.Time(), 3, "charger_a", "", "id", "tiny", "AMR01")
 
 
-def test_a_chargers_state_is_what_it_shows() -> None:
+def test_a_charger_state_is_read_field_by_field() -> None:
     shown = StateHeard("charger_a", CHARGING, "id", ONE)
     assert messages.accept_state(STATE, SETTINGS, 0.0) == shown
 
 
-def test_anothers_assignments_count_where_they_are_to_a_charger_of_ours() -> None:
+def test_assignments_by_others_count_if_they_are_to_one_of_our_chargers() -> None:
     message = d.ChargingAssignments(
         "tiny",
         (
@@ -96,7 +96,9 @@ def test_anothers_assignments_count_where_they_are_to_a_charger_of_ours() -> Non
         (messages.accept_withdrawal, d.ChargerCancel(), "empty request_id"),
     ],
 )
-def test_what_is_not_ours_is_refused_by_name(accept: Any, message: Any, kind: str) -> None:
+def test_messages_about_other_chargers_and_robots_are_refused_by_name(
+    accept: Any, message: Any, kind: str
+) -> None:
     with pytest.raises(RequestRefused) as refused:
         accept(message, SETTINGS, 0.0)
     assert refused.value.kind == kind
@@ -115,7 +117,9 @@ def test_what_is_not_ours_is_refused_by_name(accept: Any, message: Any, kind: st
         ),
     ],
 )
-def test_endless_texts_are_not_kept(accept: Any, message: Any, kind: str) -> None:
+def test_messages_with_texts_that_are_too_long_are_dropped(
+    accept: Any, message: Any, kind: str
+) -> None:
     with pytest.raises(RequestRefused) as refused:
         accept(message, SETTINGS, 0.0)
     assert refused.value.kind == f"impossible {kind}"

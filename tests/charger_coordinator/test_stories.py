@@ -22,7 +22,7 @@ def yard(**changes: object) -> Yard:
     return found
 
 
-def test_scheduled_a_robot_is_called_from_its_place_charged_and_sent_on() -> None:
+def test_a_scheduled_robot_is_called_from_its_place_charged_and_sent_on() -> None:
     site = yard()
     site.fleet.charge("AMR01", site.now)
     assert site.run(30.0) == [
@@ -39,7 +39,7 @@ def test_scheduled_a_robot_is_called_from_its_place_charged_and_sent_on() -> Non
     assert site.assignments == 3, "each change once: every message restarts tasks, and is logged"
 
 
-def test_ad_hoc_an_operator_has_the_robot_charged_that_stands_on_the_pad() -> None:
+def test_an_operator_has_the_robot_on_the_pad_charged_ad_hoc() -> None:
     site = yard()
     robot = site.fleet.robots["AMR01"]
     robot.place = robot.dedicated = "charger_a"
@@ -55,7 +55,7 @@ def test_ad_hoc_an_operator_has_the_robot_charged_that_stands_on_the_pad() -> No
     ]
 
 
-def test_stacked_the_second_goes_to_the_other_station_the_third_waits_and_is_called() -> None:
+def test_stacked_robots_go_to_both_stations_and_the_third_waits_until_it_is_called() -> None:
     site = yard()
     site.fleet.charge("AMR01", site.now)
     site.run(6.0)
@@ -88,7 +88,7 @@ def test_stacked_the_second_goes_to_the_other_station_the_third_waits_and_is_cal
     ]
 
 
-def test_wrong_station_refuses_names_robot_and_place_and_the_right_one_waits() -> None:
+def test_a_robot_at_the_wrong_station_is_refused_and_named_and_the_right_one_waits() -> None:
     site = yard()
     site.fleet.charge("AMR01", site.now)
     site.run(8.5)
@@ -107,7 +107,7 @@ def test_wrong_station_refuses_names_robot_and_place_and_the_right_one_waits() -
     assert site.faults == []
 
 
-def test_wrong_station_when_its_time_is_up_a_robot_may_stay_where_it_is() -> None:
+def test_a_robot_at_the_wrong_station_may_stay_once_the_request_has_timed_out() -> None:
     site = yard()
     site.fleet.charge("AMR01", site.now)
     site.run(8.5)
@@ -123,9 +123,7 @@ def test_wrong_station_when_its_time_is_up_a_robot_may_stay_where_it_is() -> Non
     ]
 
 
-def test_failure_of_a_station_it_is_out_of_service_until_cleared_and_the_robot_goes_elsewhere() -> (
-    None
-):
+def test_a_failed_station_is_out_of_service_until_cleared_and_its_robot_goes_elsewhere() -> None:
     site = yard()
     a = site.chargers["charger_a"]
     a.broken = True
@@ -160,7 +158,7 @@ def test_failure_of_a_station_it_is_out_of_service_until_cleared_and_the_robot_g
     assert site.faults == []
 
 
-def test_failure_of_a_robot_a_second_station_tells_and_there_is_no_third_try() -> None:
+def test_a_robot_that_fails_at_a_second_station_is_not_tried_a_third_time() -> None:
     site = yard()
     for station in site.chargers.values():
         station.refuses = {"RX-1"}
@@ -236,7 +234,7 @@ def test_a_coordinator_that_has_lost_its_memory_takes_over_what_the_stations_sho
     }
 
 
-def test_beside_a_charging_schedule_nothing_is_said_and_its_choice_is_remembered() -> None:
+def test_beside_a_charging_schedule_nothing_is_sent_and_its_choice_is_remembered() -> None:
     site = yard()
     schedule = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
     dedicated = d.ChargingAssignment("AMR01", "dock_b", int(d.ChargingMode.MODE_CHARGE))
@@ -308,7 +306,7 @@ def test_a_station_whose_daemon_takes_no_request_is_passed_over() -> None:
 # ---- operators
 
 
-def test_an_operators_wish_is_withdrawn_by_its_id_and_its_repeats_start_nothing() -> None:
+def test_an_operators_request_is_withdrawn_by_its_id_and_its_repeats_start_nothing() -> None:
     site = yard()
     site.wants("AMR01", "charger_b")
     site.wants("AMR01", "charger_b")

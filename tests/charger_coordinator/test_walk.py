@@ -1,7 +1,8 @@
 """Every history to a depth, and drawn ones: what must hold whatever fleets, stations and time do.
 
-The walk: all 9^4 = 6561 histories of four moves, a second and more apart, of two robots and two
-stations that do as RMF's charger messages say. Whoever speaks then is heard to the end.
+The walk: all 9^4 = 6561 histories of four moves (of three but for `make deep`), a second and more
+apart, of two robots and two stations that do as RMF's charger messages say. Whoever speaks then is
+heard to the end.
 """
 
 from copy import copy
@@ -35,6 +36,8 @@ from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf import definitions as d
 from tests.charger_coordinator.yard import settings
+from tests.depth import depth, examples
+from tests.walk import histories
 
 SETTINGS = settings()
 SITE = Site.of(SETTINGS)
@@ -211,29 +214,24 @@ MOVES: list[Any] = [
 ]
 
 
-def test_every_history_of_four_moves_ends_well() -> None:
+def after(ledger: Ledger, move: Any) -> Ledger:
+    """The same a move later."""
+    ledger = ledger.copy()
+    move(ledger)
+    ledger.passes()
+    return ledger
+
+
+def test_every_history_of_so_many_moves_ends_well() -> None:
     ledger = Ledger()
     ledger.wants[ONE] = True
     ledger.passes()
     ledger.passes()
-    assert walk(ledger, 4) == 9**4
+    for end, _ in histories(ledger, MOVES, depth(3, 4), after):
+        end.ends_well()
 
 
-def walk(ledger: Ledger, depth: int) -> int:
-    """Every way to go on from here; how many there were."""
-    if depth == 0:
-        ledger.ends_well()
-        return 1
-    ends = 0
-    for move in MOVES:
-        after = ledger.copy()
-        move(after)
-        after.passes()
-        ends += walk(after, depth - 1)
-    return ends
-
-
-@hypothesis_settings(max_examples=150, deadline=None, derandomize=True, database=None)
+@hypothesis_settings(max_examples=examples(150), deadline=None, derandomize=True, database=None)
 @given(st.lists(st.integers(0, len(MOVES) - 1), max_size=25))
 def test_every_long_history_ends_well(history: list[int]) -> None:
     ledger = Ledger()
@@ -294,9 +292,9 @@ EVENTS = st.one_of(
 HISTORIES = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 2.0, 11.0, 31.0]), EVENTS), max_size=40)
 
 
-@hypothesis_settings(max_examples=400, deadline=None, derandomize=True, database=None)
+@hypothesis_settings(max_examples=examples(400), deadline=None, derandomize=True, database=None)
 @given(HISTORIES)
-def test_whatever_is_heard_no_two_robots_share_and_nothing_is_said_out_of_turn(
+def test_in_every_history_no_two_robots_share_a_station_and_requests_go_out_in_turn(
     history: list[tuple[float, Any]],
 ) -> None:
     memory, now, speaks = core.initial("site", 0.0), 0.0, False
@@ -322,9 +320,9 @@ def test_whatever_is_heard_no_two_robots_share_and_nothing_is_said_out_of_turn(
         assert keep.persist(keep.restore(kept, SETTINGS, now)) == kept
 
 
-@hypothesis_settings(max_examples=200, deadline=None, derandomize=True, database=None)
+@hypothesis_settings(max_examples=examples(200), deadline=None, derandomize=True, database=None)
 @given(st.binary(max_size=60))
-def test_no_file_is_taken_by_halves(kept: bytes) -> None:
+def test_a_damaged_file_is_refused_as_a_whole(kept: bytes) -> None:
     try:
         keep.restore(kept, SETTINGS, 0.0)
     except ValueError:

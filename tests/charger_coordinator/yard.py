@@ -7,10 +7,8 @@ from typing import Any
 from bridges.charger import core as charger
 from bridges.charger import messages as charger_messages
 from bridges.charger.memory import ChargerLimits
-from bridges.charger.settings import ChargerSettings, Robot
-from bridges.charger.settings import Durations as Limits
-from bridges.charger.signals import Activity, ChargerSample, Measured
-from bridges.charger.signals import FaultSide as Side
+from bridges.charger.settings import ChargerSettings, Durations, Robot
+from bridges.charger.signals import Activity, ChargerSample, FaultSide, Measured
 from bridges.charger_coordinator import KIND
 from bridges.charger_coordinator.settings import (
     Fleet as FleetSettings,
@@ -24,6 +22,7 @@ from bridges.rmf.stamps import duration
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from hal_fakes.rmf.fleet import Fleet
+from tests.serve.virtual_graph import Disk
 
 STEP_S = 0.25
 GRAPH = {
@@ -35,7 +34,7 @@ GRAPH = {
     "ward": ("L1", 50.0, 0.0),
 }
 PLACES = {"charger_a": "charger_a", "charger_b": "dock_b"}
-NO_ERROR: tuple[Side, str] = ("", "")
+NO_ERROR: tuple[FaultSide, str] = ("", "")
 RECEIVERS = {f"RX-{i}": Robot("tiny", f"AMR0{i}") for i in (1, 2, 3)}
 
 
@@ -72,14 +71,14 @@ class Charger:
     def __init__(self, name: str, knows: bool = True) -> None:
         receivers = RECEIVERS if knows else {}
         self.name = name
-        self.limits = ChargerLimits(Limits(misses=3, released_s=1.0), receivers)
+        self.limits = ChargerLimits(Durations(misses=3, released_s=1.0), receivers)
         self.memory = charger.initial(self.limits, 0.0)
         self.pad = ""
         self.percent = 0.0
         self.broken = self.unplugged = self.dead = False
         self.refuses: set[str] = set()
         self.activity = Activity.IDLE
-        self.error: tuple[Side, str] | None = None
+        self.error: tuple[FaultSide, str] | None = None
         self._since = 0.0
         self._power = False
         self._clears = 0
@@ -133,19 +132,6 @@ class Charger:
 
 
 @dataclass
-class Kept:
-    """The state directory."""
-
-    kept: bytes | None = None
-
-    def read(self) -> bytes | None:
-        return self.kept
-
-    def write(self, kept: bytes) -> None:
-        self.kept = kept
-
-
-@dataclass
 class Yard:
     """All of them. `story`: (s, what) of everything worth telling, in order; `fills`: % per second."""
 
@@ -157,7 +143,7 @@ class Yard:
     story: list[tuple[float, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.network, self.kept = MemoryNetwork(), Kept()
+        self.network, self.kept = MemoryNetwork(), Disk()
         self.rmf = MemoryTransport(self.network, "rmf")
         self.chargers = {name: Charger(name, self.knows) for name in PLACES}
         homes = {f"AMR0{i}": f"wait_{i}" for i in (1, 2, 3)}

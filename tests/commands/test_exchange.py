@@ -112,8 +112,8 @@ def test_nothing_is_sent_while_nobody_listens_and_a_supervisor_is_missed() -> No
     request = LiftRide("Lift1", "L3", ME, line=CommandLine(typed, ("--localhost",)))
     told = tell(request, every_second(LIFT), listeners=0, timeout_s=5.0)
     missed = (
-        "no lift supervisor runs in this domain: nobody subscribes to adapter_lift_requests;"
-        " to ask the lift's daemon itself:"
+        "no lift supervisor runs in this domain: no node subscribes to adapter_lift_requests;"
+        " to ask the lift's own daemon:"
         " rmf-bridge send lift Lift1 L3 --session 'my robot' --localhost --direct"
     )
     assert told == Told([], [missed], Failed(missed), 5.0)
@@ -145,7 +145,7 @@ def test_requests_go_to_the_supervisors_unless_direct(
 # --- lifts -------------------------------------------------------------------------------------
 
 
-def test_an_arrival_seen_before_the_request_is_not_our_effect() -> None:
+def test_an_arrival_seen_before_the_request_does_not_count() -> None:
     told = tell(RIDE, [(0.5, ARRIVED)], listen_from=1.0, timeout_s=3.0)
     assert isinstance(told.outcome, Failed)
 
@@ -160,7 +160,7 @@ def test_an_arrival_seen_before_the_request_is_not_our_effect() -> None:
         replace(ARRIVED, door_state=1),
     ],
 )
-def test_three_of_the_four_fields_are_not_an_arrival(nearly: d.LiftState) -> None:
+def test_a_state_that_fits_in_three_of_four_fields_is_not_an_arrival(nearly: d.LiftState) -> None:
     assert isinstance(tell(RIDE, every_second(nearly)).outcome, Failed)
 
 
@@ -233,8 +233,8 @@ def test_a_simulation_that_is_not_heard_is_looked_for_on_loopback() -> None:
     typed = ("send", "lift", "Lift1", "L3", "--session", "me", "--direct")
     request = LiftRide("Lift1", "L3", "me", direct=True, line=CommandLine(typed, ("--direct",)))
     assert tell(request, listeners=0).hints == [
-        "no lift daemon runs in this domain: nobody subscribes to lift_requests;"
-        " for a simulation, which is on the loopback interface:"
+        "no lift daemon runs in this domain: no node subscribes to lift_requests;"
+        " for a simulation on the loopback interface:"
         " rmf-bridge send lift Lift1 L3 --session me --direct --localhost"
     ]
 
@@ -248,13 +248,13 @@ def test_a_name_that_nobody_has_is_compared_with_those_heard() -> None:
     assert (told.hints, told.outcome) == ([text], Failed(text))
 
 
-def test_a_graph_without_any_state_is_called_that() -> None:
-    text = "nothing is heard on lift_states: no daemon of it runs in this domain and network"
+def test_a_graph_without_any_state_is_said_to_be_empty() -> None:
+    text = "nothing is heard on lift_states: no lift daemon runs in this domain and network"
     told = tell(RIDE)
     assert (told.hints, told.outcome) == ([text], Failed(text))
 
 
-def test_a_daemon_that_falls_silent_is_the_reason() -> None:
+def test_a_daemon_that_falls_silent_is_named_as_the_reason() -> None:
     told = tell(RIDE, every_second(GRANTED, until=3.0))
     assert told.outcome == Failed("Lift1 fell silent 8 s ago: is its daemon still running?")
 
@@ -304,7 +304,7 @@ def test_through_the_supervisor_an_open_door_counts_once_the_heartbeat_lists_us(
     assert (told.outcome, told.at) == (Done("ward is open"), 3.3)
     alone = tell(request, every_second(moved(2)))
     assert alone.outcome == Failed(
-        "ward is there, but no heartbeat of a door supervisor confirms it (last state: open)"
+        "ward is open, but no heartbeat of a door supervisor confirms it (last state: open)"
     )
 
 
@@ -319,8 +319,8 @@ def test_through_the_supervisor_a_closed_door_is_not_ours_while_the_heartbeat_li
     ("opened", "mode", "reason"),
     [
         (True, 0, "ward did not open"),
-        (True, 3, "the daemon does not reach the controller of ward"),
-        (True, 4, "the contacts of ward contradict each other, or it took too long"),
+        (True, 3, "the daemon cannot reach the controller of ward"),
+        (True, 4, "the contacts of ward contradict each other, or the door took too long"),
         (False, 2, "ward is held open by fleet/other"),
     ],
 )
@@ -356,7 +356,7 @@ def test_a_charger_that_shows_our_request_has_taken_it(state: int) -> None:
     [
         (
             CHARGER,
-            "a did not take the request: its daemon's log says why (last state: idle)",
+            "a did not accept the request: its daemon's log says why (last state: idle)",
         ),
         (
             replace(CHARGER, state=3, request_id="r0"),
@@ -411,7 +411,7 @@ def test_a_robot_that_waits_is_said_to_wait_and_how_to_withdraw_it() -> None:
     waits = tell(QUEUE, every_second(OTHERS), timeout_s=5.0)
     text = (
         "no charger serves fleet/robot yet: it waits in the charger coordinator's queue"
-        " (`rmf-bridge watch` shows it), or was refused (the coordinator's log says why);"
+        " (see `rmf-bridge watch`), or the request was refused (see the coordinator's log);"
         " to withdraw the request: rmf-bridge send charger any --queue --cancel r1 --localhost"
     )
     assert (waits.hints, waits.outcome) == ([text], Failed(text))

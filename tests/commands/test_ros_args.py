@@ -21,5 +21,5 @@ from bridges.cli import split_ros_args
         ("run -- lift.yaml", "run -- lift.yaml", ""),
     ],
 )
-def test_what_stands_behind_ros_args_is_for_ros(argv: str, ours: str, ros: str) -> None:
+def test_arguments_after_ros_args_are_left_to_ros(argv: str, ours: str, ros: str) -> None:
     assert split_ros_args(argv.split()) == (ours.split(), ros.split())

@@ -2,28 +2,37 @@
 
 import argparse
 import io
+import re
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
+from msgspec.structs import replace as replace_struct
 
+from bridges.cli import main
 from bridges.commands import send, watch
+from bridges.commands.graph import add_graph_arguments, overridden
 from bridges.commands.requests import Request
 from bridges.commands.requests.charger import Charge, ChargeCancel
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
+from bridges.core.fields import Rmf
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
+from bridges.rmf.choose import open_transport
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
-from hal_fakes.domain import free_domain
-from tests.waiting import wait_until
+from bridges.settings.load import load
+from hal_fakes.wire import Wire, wire
+from tests.rmf.zenoh_programs import Router
+from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 
 M = TypeVar("M", bound=d.Message)
 ME = "fleet/robot"
@@ -201,11 +210,16 @@ def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
 # --- as processes ------------------------------------------------------------------------------
 
 
-@contextmanager
-def on_dds(domain: int) -> Iterator[Transport]:
-    from bridges.rmf.dds import DdsTransport
+@pytest.fixture(params=sorted({wire(), "zenoh"}))
+def speaks(request: pytest.FixtureRequest) -> Wire:
+    """The transport of both."""
+    speaks: Wire = request.param
+    return speaks
 
-    node = DdsTransport("device", domain, loopback=True)
+
+@contextmanager
+def device(speaks: Wire, domain: int) -> Iterator[Transport]:
+    node = open_transport(Rmf(transport=speaks, domain_id=domain), "device", localhost=True)
     try:
         yield node
     finally:
@@ -213,9 +227,9 @@ def on_dds(domain: int) -> Iterator[Transport]:
 
 
 @contextmanager
-def command(line: str, domain: int) -> Iterator[subprocess.Popen[str]]:
+def command(line: str, speaks: Wire, domain: int) -> Iterator[subprocess.Popen[str]]:
     words = [sys.executable, "-m", "bridges.cli", *line.split()]
-    words += ["--domain-id", str(domain), "--localhost", "--transport", "dds"]
+    words += ["--domain-id", str(domain), "--localhost", "--transport", speaks]
     process = subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True
     )
@@ -226,18 +240,19 @@ def command(line: str, domain: int) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
-def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic() -> None:
-    domain = free_domain()
-    with on_dds(domain) as node:
+def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(
+    speaks: Wire, domain: int
+) -> None:
+    with device(speaks, domain) as node:
         states = node.publisher(topics.LIFT_STATES)
         requests: list[d.LiftRequest] = []
         node.subscribe(topics.ADAPTER_LIFT_REQUESTS, requests.append)
-        with command("send lift Lift1 L3 --session fleet/robot", domain) as process:
+        with command("send lift Lift1 L3 --session fleet/robot", speaks, domain) as process:
             wait_until(lambda: states.matched() > 0, "send listens to lift_states")
             states.publish(LIFT)
             wait_until(lambda: requests, "the request arrives")
             states.publish(obeyed(LIFT, requests[0]))
-            out, error = process.communicate(timeout=20)
+            out, error = process.communicate(timeout=PATIENCE_S)
         assert (process.returncode, error) == (0, "")
         assert "done" in out
         assert replace(requests[0], request_time=d.Time()) == d.LiftRequest(
@@ -247,25 +262,64 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_watch_prints_changes_and_leaves_the_graph_at_once_when_told_to(
+    speaks: Wire,
+    domain: int,
     number: signal.Signals,
 ) -> None:
-    domain = free_domain()
-    with on_dds(domain) as node, command("watch", domain) as process:
+    with device(speaks, domain) as node, command("watch", speaks, domain) as process:
         states = node.publisher(topics.DOOR_STATES)
         wait_until(lambda: states.matched() > 0, "watch listens to door_states")
         states.publish(DOOR)
         assert process.stdout is not None
         assert process.stdout.readline().split()[1:4] == ["door", "ward", "closed"]
         process.send_signal(number)
-        assert process.wait(timeout=20) == 0
-        wait_until(lambda: states.matched() == 0, "watch has left the graph", patience_s=5)
+        assert process.wait(timeout=PATIENCE_S) == 0
+        wait_until(lambda: states.matched() == 0, "watch has left the graph", patience_s=LEASE_S)
 
 
-def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_door() -> None:
-    domain = free_domain()
-    with on_dds(domain) as node, command("send door ward open --direct", domain) as process:
+def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_door(
+    speaks: Wire,
+    domain: int,
+) -> None:
+    with (
+        device(speaks, domain) as node,
+        command("send door ward open --direct", speaks, domain) as process,
+    ):
         heard = node.subscribe(topics.DOOR_REQUESTS, lambda _: None)
         wait_until(lambda: heard.matched() > 0, "send is there")
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=20) == 130
-        wait_until(lambda: heard.matched() == 0, "send has left the graph", patience_s=5)
+        assert process.wait(timeout=PATIENCE_S) == 130
+        wait_until(lambda: heard.matched() == 0, "send has left the graph", patience_s=LEASE_S)
+
+
+def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
+    """Its router, its domain and its keys, by `--config`; what is beside it wins."""
+    router = Router()
+    file = tmp_path / "lift.yaml"
+    shipped = (Path(__file__).parents[2] / "config" / "lift_supervisor.yaml").read_text()
+    section = f"rmf: {{transport: zenoh, domain_id: 9, zenoh: {{connect: [{router.endpoint}]}}}}"
+    file.write_text(re.sub(r"^rmf:.*\n(?: .*\n)*", section + "\n", shipped, flags=re.MULTILINE))
+    router.start()
+    node = open_transport(load(file).rmf, "device")
+    try:
+        states = node.publisher(topics.DOOR_STATES)
+        words = [sys.executable, "-m", "bridges.cli", "watch", "--config", str(file)]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+            wait_until(lambda: states.matched() > 0, "watch listens to door_states")
+            states.publish(DOOR)
+            assert process.stdout is not None
+            assert process.stdout.readline().split()[1:4] == ["door", "ward", "closed"]
+            process.terminate()
+        options = argparse.ArgumentParser()
+        add_graph_arguments(options)
+        told = options.parse_args(["--config", str(file), "--domain-id", "3"])
+        assert overridden(load(file).rmf, told) == replace_struct(load(file).rmf, domain_id=3)
+    finally:
+        node.close()
+        router.leave()
+
+
+def test_a_file_that_is_none_is_said_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bad.yaml").write_text("kind: nothing\n")
+    assert main(["watch", "--config", str(tmp_path / "bad.yaml")]) == 1
+    assert "bad.yaml:1:7: " in capsys.readouterr().err

@@ -152,7 +152,7 @@ def test_the_table_is_aligned_under_its_heading() -> None:
     ]
 
 
-def test_an_empty_graph_is_called_that_and_its_line_goes_with_the_first_row() -> None:
+def test_an_empty_graph_is_said_to_be_empty_until_the_first_row_comes() -> None:
     assert repaint([], 0, columns=80, lines=24) == ("\r\x1b[Knothing heard yet\n\x1b[J", 1)
     text, shown = repaint(board(DOOR).rows(100.0, WALL), 1, columns=80, lines=24)
     assert text.startswith("\x1b[1A\r\x1b[Kkind")
@@ -227,7 +227,7 @@ def test_a_simulation_is_marked_and_a_simulated_supervisor_does_not_make_its_lif
     assert not row.simulated
 
 
-def test_seconds_that_run_are_no_news_and_a_word_is() -> None:
+def test_running_seconds_are_no_change_but_a_new_word_is() -> None:
     def said(detail: str) -> list[Row]:
         status = {"faults": [{"code": "OVERLOAD", "detail": detail}], "waiting": "fleet/b (3 s)"}
         told = diagnosis("node", "lift_supervisor", {}, {"Lift1": status}, d.Time())

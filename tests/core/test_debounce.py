@@ -33,12 +33,12 @@ def test_without_debounce_the_first_sample_counts() -> None:
     assert believed([(0.0, True), (0.0, False)], hold_s=0.0) == [True, False]
 
 
-def test_none_is_a_value_like_any_other() -> None:
+def test_none_is_debounced_like_any_other_value() -> None:
     samples = [(0.0, None), (0.06, None), (0.1, "up"), (0.16, "up"), (0.2, None), (0.26, None)]
     assert believed(samples) == ["?", None, None, "up", "up", None]
 
 
-def test_it_says_when_what_is_seen_will_count() -> None:
+def test_it_says_when_the_value_that_is_seen_will_count() -> None:
     first = settle(None, 1, 10.0, HOLD_S)
     assert first.due_at(HOLD_S) == 10.0 + HOLD_S
     steady = settle(first, 1, 10.0 + HOLD_S, HOLD_S)
@@ -46,7 +46,7 @@ def test_it_says_when_what_is_seen_will_count() -> None:
     assert settle(steady, 2, 20.0, HOLD_S).due_at(HOLD_S) == 20.0 + HOLD_S
 
 
-def test_it_says_since_when_nothing_has_lasted() -> None:
+def test_it_says_since_when_no_value_has_lasted() -> None:
     seen = settle(None, 0, 0.0, HOLD_S)
     torn = []
     for i, value in enumerate([0, 0, 1, 0, 1, 1, 1]):
@@ -67,7 +67,7 @@ def test_after_a_gap_what_was_believed_stands_and_what_was_half_seen_starts_agai
 
 @settings(derandomize=True)
 @given(st.lists(st.tuples(st.floats(0.001, 0.1), st.booleans()), min_size=1, max_size=60))
-def test_what_is_believed_was_seen_all_through_its_time(steps: list[tuple[float, bool]]) -> None:
+def test_a_believed_value_was_seen_throughout_its_debounce(steps: list[tuple[float, bool]]) -> None:
     now, seen, samples = 0.0, None, list[tuple[float, bool]]()
     for gap_s, value in steps:
         now += gap_s

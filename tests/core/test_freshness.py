@@ -26,7 +26,7 @@ class Clocked:
         return counts
 
 
-def test_what_was_sent_after_our_start_counts_at_once() -> None:
+def test_a_request_sent_after_our_start_counts_at_once() -> None:
     requester = Clocked()
     assert [requester.at(0.0), requester.at(0.0, sent=0.1), requester.at(9.0, sent=1.0)] == [
         True,
@@ -35,7 +35,7 @@ def test_what_was_sent_after_our_start_counts_at_once() -> None:
     ]
 
 
-def test_what_is_not_newer_than_all_that_counted_does_not() -> None:
+def test_a_request_that_is_not_newer_than_the_last_one_that_counted_does_not_count() -> None:
     requester = Clocked()
     assert requester.at(2.0)
     assert not requester.at(2.0)
@@ -50,25 +50,25 @@ def test_a_hundred_replayed_requests_do_not_count_but_a_live_repeat_does() -> No
     assert [requester.at(1.0), requester.at(1.2), requester.at(1.3)] == [False, True, True]
 
 
-def test_one_that_counted_has_a_clock_that_we_know_and_may_be_silent_for_long() -> None:
+def test_a_requester_that_has_counted_once_is_known_and_may_be_silent_for_long() -> None:
     requester = Clocked(skew=-3600.0)
     assert [requester.at(0.0), requester.at(1.0), requester.at(900.0)] == [False, True, True]
 
 
-def test_with_synchronised_clocks_old_is_old_even_of_one_that_we_know() -> None:
+def test_with_synchronised_clocks_an_old_request_is_stale_even_from_a_known_requester() -> None:
     requester = Clocked(Rules(most_s=10.0, known_clocks=False))
     assert requester.at(0.0, sent=-9.0)
     assert not requester.at(100.0, sent=89.0)
     assert requester.at(100.5)
 
 
-def test_what_comes_from_the_future_counts_unless_the_rules_say_how_far_it_may_be() -> None:
+def test_a_request_from_the_future_counts_unless_a_limit_is_set() -> None:
     assert Clocked(skew=300.0).at(0.0)
     assert Clocked(Rules(5.0, future_s=2.0), skew=1.9).at(0.0)
     assert not Clocked(Rules(5.0, future_s=2.0), skew=2.1).at(0.0)
 
 
-def test_an_end_is_held_against_earlier_ends_alone() -> None:
+def test_an_end_is_compared_with_earlier_ends_only() -> None:
     """An operator ends a robot's session by another clock than the robot's."""
     requester = Clocked()
     assert requester.at(100.0)
@@ -78,7 +78,7 @@ def test_an_end_is_held_against_earlier_ends_alone() -> None:
     assert requester.at(101.0)
 
 
-def test_an_end_outdates_what_was_asked_before_it() -> None:
+def test_an_end_makes_earlier_requests_stale() -> None:
     requester = Clocked()
     assert requester.at(10.0, ends=True)
     assert not requester.at(10.1, sent=9.0)
@@ -129,7 +129,7 @@ def test_echoes_far_apart_never_add_up() -> None:
     assert [requester.at(t, sent=t / 10) for t in (61.0, 64.1, 67.2)] == [False] * 3
 
 
-def test_who_sends_no_stamp_counts_when_it_repeats_itself() -> None:
+def test_a_requester_without_stamps_counts_when_it_repeats_itself() -> None:
     requester, counted = Requester(), []
     for now in (50.0, 50.5, 51.0, 52.0, 53.0):
         requester, counts = requester.hears(0.0, STAMP + now, now, STARTED, ends=False)

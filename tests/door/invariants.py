@@ -7,9 +7,8 @@ from typing import Any
 
 from bridges.core.decision import Sampled, WriteFailed
 from bridges.door.core import decide
-from bridges.door.memory import DoorLimits
-from bridges.door.memory import Memory as DoorMemory
-from bridges.door.signals import OpenRequested as OpenDoor
+from bridges.door.memory import DoorLimits, Memory
+from bridges.door.signals import OpenRequested
 from bridges.rmf.definitions import DoorModeValue
 from tests.door.walk import UNLIKE, Step, World, burns, fresh, reading, sighted
 
@@ -85,7 +84,7 @@ def hazards_are_as_read(step: Step) -> None:
     if "DOOR_OBSTRUCTED" in _codes(step):
         assert not _told_otherwise(step, "obstruction", clear_s)
         assert not step.ledger.wanted
-    refused = isinstance(step.event, OpenDoor) and burns(step.decision)
+    refused = isinstance(step.event, OpenRequested) and burns(step.decision)
     assert bool(step.decision.refused) == (refused and step.limits.on_fire == "release")
 
 
@@ -98,7 +97,7 @@ def nothing_changes_before_wake_at(world: World, limits: DoorLimits) -> None:
     assert later.report.news() == now.report.news()
 
 
-def _scan(world: World, memory: DoorMemory, now: float, limits: DoorLimits) -> Any:
+def _scan(world: World, memory: Memory, now: float, limits: DoorLimits) -> Any:
     decision = decide(memory, reading(world), now, limits)
     if world.writable:
         return decision

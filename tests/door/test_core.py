@@ -2,6 +2,7 @@
 
 import math
 
+import pytest
 from msgspec.structs import replace
 
 from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen
@@ -39,13 +40,13 @@ def test_an_open_before_the_first_reading_is_kept_and_held_with_it() -> None:
     assert core.told == [(0.0, "OFFLINE", False), (1.0, "UNKNOWN", True), (1.0625, "CLOSED", True)]
 
 
-def test_a_door_is_nowhere_before_its_contacts_have_settled() -> None:
+def test_a_doors_position_is_unknown_before_its_contacts_have_settled() -> None:
     core = CoreAlone()
     core.sees(OPEN, until=0.3)
     assert core.told == [(0.0, "UNKNOWN", False), (0.0625, "OPEN", False)]
 
 
-def test_open_holds_and_the_contacts_say_how_far_the_door_is() -> None:
+def test_an_open_request_holds_the_door_and_its_contacts_show_how_far_it_is() -> None:
     core = CoreAlone()
     core.sees(CLOSED, until=1.0)
     core.hears(OPENS)
@@ -60,7 +61,7 @@ def test_open_holds_and_the_contacts_say_how_far_the_door_is() -> None:
     ]
 
 
-def test_a_thousand_opens_are_one_open() -> None:
+def test_a_thousand_open_requests_switch_the_relay_once() -> None:
     once, often = CoreAlone(), CoreAlone()
     for core, times in ((once, 1), (often, 1000)):
         core.sees(CLOSED, until=1.0)
@@ -71,7 +72,7 @@ def test_a_thousand_opens_are_one_open() -> None:
     assert often.memory == once.memory
 
 
-def test_close_lets_go_after_its_grace_and_repeats_do_not_prolong_it() -> None:
+def test_a_close_request_releases_the_hold_after_its_grace_and_repeats_do_not_prolong_it() -> None:
     core = CoreAlone()
     core.hears(OPENS)
     for second in range(6):
@@ -103,7 +104,7 @@ def test_the_grace_begins_anew_with_the_close_after_that() -> None:
     assert core.told[-1] == (4.5, "OPEN", False)
 
 
-def test_without_grace_close_lets_go_at_once() -> None:
+def test_without_grace_a_close_request_releases_the_hold_at_once() -> None:
     core = CoreAlone(limits(close_grace_s=0.0))
     core.hears(OPENS)
     core.sees(OPEN, until=1.0)
@@ -137,14 +138,14 @@ def test_an_obstruction_holds_the_door_again_until_it_has_been_away_for_a_second
     ]
 
 
-def test_somebody_before_an_idle_door_does_not_open_it() -> None:
+def test_an_obstruction_at_an_idle_door_does_not_open_it() -> None:
     core = CoreAlone()
     core.sees(replace(CLOSED, obstruction=True), until=10.0)
     core.sees(replace(OPEN, obstruction=True), until=20.0)
     assert [hold for _, _, hold in core.told] == [False, False, False]
 
 
-def test_both_contacts_at_once_are_unknown_and_a_fault_while_it_lasts() -> None:
+def test_open_and_closed_at_once_is_unknown_and_a_fault_while_it_lasts() -> None:
     core = CoreAlone()
     core.sees(BOTH, until=1.0)
     assert core.faults() == ("DOOR_CONTACTS_CONTRADICT: the door reads opened and closed",)
@@ -167,7 +168,7 @@ def test_a_door_between_its_limits_for_too_long_is_unknown() -> None:
     assert (core.told[-1], core.faults()) == ((10.0625, "OPEN", False), ())
 
 
-def test_a_door_that_turns_round_has_its_whole_travel_again() -> None:
+def test_a_door_that_reverses_gets_its_whole_travel_time_again() -> None:
     core = CoreAlone(limits(travel_s=5.0))
     core.sees(CLOSED, until=1.0)
     core.sees(BETWEEN, until=4.0)
@@ -196,7 +197,9 @@ def test_a_door_that_does_not_open_is_a_fault_and_stays_held() -> None:
     assert core.faults() == ()
 
 
-def test_an_old_reading_is_offline_with_the_hold_off_and_the_latch_kept() -> None:
+def test_a_door_whose_reading_is_too_old_is_offline_with_the_hold_off_and_remembers_the_request() -> (
+    None
+):
     core = CoreAlone()
     core.hears(OPENS)
     core.sees(OPEN, until=1.0)
@@ -238,7 +241,30 @@ def test_a_contact_half_seen_before_a_gap_must_be_seen_again() -> None:
     ]
 
 
-def test_a_door_read_once_before_a_gap_is_still_nowhere() -> None:
+@pytest.mark.parametrize(
+    ("contact", "before", "after"),
+    [
+        ("closed", BETWEEN, CLOSED),
+        ("obstruction", replace(OPEN, obstruction=False), replace(OPEN, obstruction=True)),
+        ("fire", replace(OPEN, fire=False), replace(OPEN, fire=True)),
+    ],
+)
+def test_every_contact_half_seen_before_a_gap_must_be_seen_again(
+    contact: str, before: DoorSample, after: DoorSample
+) -> None:
+    core = CoreAlone(DoorLimits(debounce={contact: 0.5}))
+    core.sees(before, until=2.0)
+    core.sees(after, until=2.375)
+    core.hears(IoFailed("no reply"))
+    seen = []
+    for at in (2.5, 2.75, 2.875):
+        core.sees(after, until=at)
+        value = getattr(core.memory.senses, contact).value
+        seen.append(value == getattr(after, contact))
+    assert seen == [False, False, True]
+
+
+def test_the_position_of_a_door_that_was_read_once_before_a_gap_is_still_unknown() -> None:
     core = CoreAlone()
     core.hears(IoFailed("no reply"))
     core.sees(OPEN, until=0.0)
@@ -248,7 +274,7 @@ def test_a_door_read_once_before_a_gap_is_still_nowhere() -> None:
     assert core.told == [(0.0, "OFFLINE", False), (0.0, "UNKNOWN", False)]
 
 
-def test_a_scan_that_never_came_is_a_lost_connection_too() -> None:
+def test_a_missing_scan_is_a_lost_connection() -> None:
     core = CoreAlone()
     core.sees(OPEN, until=1.0)
     core.now = 3.0
@@ -275,7 +301,7 @@ def test_a_rival_takes_the_door_offline_and_the_hold_off_until_five_quiet_second
     ]
 
 
-def test_a_fire_releases_forgets_the_latch_and_refuses_open() -> None:
+def test_a_fire_releases_the_door_forgets_the_request_and_refuses_to_open() -> None:
     core = CoreAlone()
     quiet, fire = replace(OPEN, fire=False), replace(OPEN, fire=True)
     core.hears(OPENS)
@@ -310,14 +336,14 @@ def test_a_fire_holds_open_against_close_where_the_site_says_so() -> None:
     ]
 
 
-def test_a_fire_at_the_first_sight_of_it_already_forbids_the_hold() -> None:
+def test_the_first_reading_of_a_fire_already_forbids_the_hold() -> None:
     core = CoreAlone()
     core.hears(OPENS)
     core.sees(replace(OPEN, fire=True), until=1.0)
     assert core.told == [(0.0, "OFFLINE", False), (0.0, "UNKNOWN", False)]
 
 
-def test_nothing_but_the_fire_lets_a_fire_door_close_on_an_obstruction() -> None:
+def test_only_a_fire_lets_a_fire_door_close_on_an_obstruction() -> None:
     core = CoreAlone()
     core.hears(OPENS)
     core.sees(replace(OPEN, fire=False, obstruction=False), until=1.0)
@@ -325,7 +351,7 @@ def test_nothing_but_the_fire_lets_a_fire_door_close_on_an_obstruction() -> None
     assert core.told[-1] == (1.0625, "UNKNOWN", False)
 
 
-def test_an_operator_that_closes_by_itself_is_triggered_again_and_again_by_one_clock() -> None:
+def test_an_operator_that_closes_by_itself_is_triggered_at_a_steady_pace() -> None:
     core = CoreAlone(DoorLimits(debounce=DEBOUNCED, pulse=Pulse(on_s=0.5, every_s=3.0)))
     core.sees(CLOSED, until=1.0)
     for second in range(6):
@@ -351,7 +377,7 @@ def test_between_two_pulses_the_door_is_still_held() -> None:
     assert (decided.outputs, decided.report.hold) == (DoorOutputs(between_pulses=True), True)
 
 
-def test_without_contacts_a_door_is_open_by_the_clock_and_says_that_it_guesses() -> None:
+def test_without_contacts_a_door_is_estimated_by_its_travel_time_and_marked_so() -> None:
     core = CoreAlone(DoorLimits(t=Durations(open_delay_s=4.0, travel_s=6.0), estimated=True))
     core.sees(DoorSample(), until=10.0)
     core.hears(OPENS)
@@ -369,7 +395,7 @@ def test_without_contacts_a_door_is_open_by_the_clock_and_says_that_it_guesses()
     assert (opened.report.estimated, opened.report.faults) == (True, ())
 
 
-def test_a_guess_begins_again_after_a_reading_that_failed() -> None:
+def test_an_estimate_begins_again_after_a_failed_reading() -> None:
     core = CoreAlone(DoorLimits(t=Durations(open_delay_s=4.0), estimated=True))
     core.hears(OPENS)
     core.sees(DoorSample(), until=5.0)
@@ -386,14 +412,14 @@ def test_a_guess_begins_again_after_a_reading_that_failed() -> None:
     ]
 
 
-def test_a_guess_without_a_delay_is_never_open() -> None:
+def test_without_open_delay_s_a_door_is_never_estimated_open() -> None:
     core = CoreAlone(DoorLimits(estimated=True))
     core.hears(OPENS)
     core.sees(DoorSample(), until=100.0)
     assert "OPEN" not in [mode for _, mode, _ in core.told]
 
 
-def test_with_one_contact_only_the_other_end_is_a_guess() -> None:
+def test_with_one_contact_only_the_other_end_is_estimated() -> None:
     core = CoreAlone(DoorLimits(t=Durations(open_delay_s=2.0), debounce=DEBOUNCED, estimated=True))
     closed = core.sees(DoorSample(closed=True), until=1.0)
     core.hears(OPENS)
@@ -407,7 +433,7 @@ def test_with_one_contact_only_the_other_end_is_a_guess() -> None:
     assert (closed.report.estimated, opened.report.estimated) == (False, True)
 
 
-def test_without_leave_to_guess_a_missing_contact_proves_nothing() -> None:
+def test_a_missing_contact_proves_nothing_unless_estimates_are_allowed() -> None:
     core = CoreAlone(DoorLimits())
     core.hears(OPENS)
     core.sees(DoorSample(), until=100.0)
@@ -424,7 +450,7 @@ def test_a_door_held_for_very_long_is_reported_and_stays_held() -> None:
     assert core.told[-1] == (0.0625, "OPEN", True)
 
 
-def test_the_age_of_a_reading_is_no_news() -> None:
+def test_an_older_reading_alone_is_no_news() -> None:
     core = CoreAlone()
     before, after = core.sees(OPEN, until=1.0).report, core.sees(OPEN, until=2.0).report
     assert (before.read_at, after.read_at) == (1.0, 2.0)

@@ -33,13 +33,13 @@ def test_no_other_mode_can_be_asked(mode: int) -> None:
     )
 
 
-def test_a_requester_has_a_longest_name() -> None:
+def test_a_requester_id_has_a_greatest_length() -> None:
     with pytest.raises(RequestRefused) as caught:
         messages.accept(DoorRequest(requester_id="x" * 257, door_name="ward_door"), SETTINGS)
     assert caught.value.kind == "impossible requester_id"
 
 
-def test_a_request_that_nobody_has_filled_in_closes_no_door() -> None:
+def test_an_empty_request_closes_no_door() -> None:
     with pytest.raises(RequestRefused) as caught:
         messages.accept(DoorRequest(door_name="ward_door"), SETTINGS)
     assert caught.value.kind == "no requester"
@@ -53,14 +53,14 @@ def test_the_state_is_the_reports_mode_with_the_stamp_of_its_reading(mode: DoorM
     )
 
 
-def test_the_summary_marks_what_is_only_guessed() -> None:
+def test_the_summary_marks_what_is_only_estimated() -> None:
     seen = DoorReport(mode=DoorModeValue.MODE_OPEN, hold=True, faults=(Fault("X"),))
     guessed = DoorReport(mode=DoorModeValue.MODE_CLOSED, estimated=True)
     assert messages.summary(seen) == {"mode": "OPEN", "hold": "on"}
     assert messages.summary(guessed) == {"mode": "CLOSED", "hold": "off", "feedback": "estimated"}
 
 
-def test_the_kind_obeys_the_supervisors_topic_and_knows_its_doors() -> None:
+def test_a_door_listens_to_the_supervisors_topic_and_takes_its_own_requests_only() -> None:
     assert list(KIND.requests) == [topics.DOOR_REQUESTS]
     assert KIND.device_name(request(2)) == "ward_door"
     assert KIND.device_name(DoorState(door_name="ward_door")) == "ward_door"

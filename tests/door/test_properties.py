@@ -13,6 +13,7 @@ from bridges.door.memory import DoorLimits, Memory
 from bridges.door.settings import Durations, Pulse
 from bridges.door.signals import CloseRequested, DoorSample, Event, OpenRequested
 from bridges.rmf.definitions import DoorModeValue
+from tests.depth import examples
 from tests.door.virtual import DEBOUNCED, Decided
 
 CONTACT = st.sampled_from([None, False, True])
@@ -96,7 +97,7 @@ def history(steps: list[tuple[float, Event]], limits: DoorLimits) -> Any:
         yield now, ledger, decided
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_the_hold_is_on_for_a_reason_and_off_without_one(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -109,7 +110,7 @@ def test_the_hold_is_on_for_a_reason_and_off_without_one(
         assert not (obstructed and ledger.wanted)
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_open_is_said_of_fresh_contacts_only(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -123,7 +124,7 @@ def test_open_is_said_of_fresh_contacts_only(
             assert decided.report.mode == DoorModeValue.MODE_OFFLINE
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_the_relay_follows_the_hold_and_nothing_else(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -134,7 +135,7 @@ def test_the_relay_follows_the_hold_and_nothing_else(
             assert decided.outputs.hold_open == decided.report.hold
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_the_stamp_is_the_time_of_the_last_reading(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -143,7 +144,7 @@ def test_the_stamp_is_the_time_of_the_last_reading(
         assert decided.report.read_at == ledger.read_at
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
 def test_a_decision_repeated_is_the_same_decision(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -159,9 +160,9 @@ def test_a_decision_repeated_is_the_same_decision(
         memory = once.memory
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
-def test_nothing_is_decided_otherwise_before_the_time_it_asked_to_be_woken(
+def test_the_decision_stays_the_same_until_the_time_the_core_asked_to_be_woken(
     steps: list[tuple[float, Event]], limits: DoorLimits
 ) -> None:
     memory, now = initial(limits, 0.0), 0.0

@@ -191,7 +191,7 @@ def test_a_cut_wire_of_each_contact_never_reads_as_open() -> None:
         assert "OPEN" not in [mode for _, mode in door.told], signal
 
 
-def test_a_lost_module_is_offline_and_gets_its_hold_back_from_the_latch() -> None:
+def test_a_door_whose_module_is_lost_is_offline_and_is_held_again_when_it_is_back() -> None:
     door = Door()
     door.run(1.0)
     door.opens()
@@ -211,7 +211,7 @@ def test_a_lost_module_is_offline_and_gets_its_hold_back_from_the_latch() -> Non
     assert door.relay == [(1.0, True)]
 
 
-def test_a_module_that_lost_power_gets_its_hold_back_too() -> None:
+def test_a_module_that_lost_its_power_gets_its_hold_back() -> None:
     door = Door()
     door.run(1.0)
     door.opens()

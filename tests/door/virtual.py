@@ -7,12 +7,9 @@ import msgspec
 
 from bridges.core.decision import Decision, IoFailed, Sampled, WriteFailed
 from bridges.door.core import decide, initial
-from bridges.door.memory import DoorLimits
-from bridges.door.memory import Memory as DoorMemory
+from bridges.door.memory import DoorLimits, Memory
 from bridges.door.report import DoorReport
-from bridges.door.signals import CloseRequested as CloseDoor
-from bridges.door.signals import DoorOutputs, DoorSample, Event
-from bridges.door.signals import OpenRequested as OpenDoor
+from bridges.door.signals import CloseRequested, DoorOutputs, DoorSample, Event, OpenRequested
 from bridges.rmf.definitions import DoorModeValue
 from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires
@@ -31,7 +28,7 @@ BOTH = DoorSample(opened=True, closed=True)
 
 DEBOUNCED = dict.fromkeys(("opened", "closed", "obstruction", "fire"), DEBOUNCE_S)
 
-Decided = Decision[DoorMemory, DoorOutputs, DoorReport]
+Decided = Decision[Memory, DoorOutputs, DoorReport]
 
 
 def word(mode: DoorModeValue) -> str:
@@ -194,11 +191,11 @@ class Door:
 
     def opens(self, requester: str = "door_supervisor") -> None:
         """An OPEN arrives."""
-        self.scan(OpenDoor(requester))
+        self.scan(OpenRequested(requester))
 
     def closes(self, requester: str = "door_supervisor") -> None:
         """A CLOSE arrives."""
-        self.scan(CloseDoor(requester))
+        self.scan(CloseRequested(requester))
 
     @property
     def relay(self) -> list[tuple[float, bool]]:

@@ -5,7 +5,7 @@ that tells the rules in other words. Ages that are beyond every limit are made e
 that cannot behave differently are one. All durations are sums of powers of two: no time is rounded.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -15,13 +15,11 @@ from bridges.core.debounce import Settled
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from bridges.core.durations import RIVAL_QUIET_S
 from bridges.door.core import decide, initial
-from bridges.door.memory import DoorLimits
-from bridges.door.memory import Memory as DoorMemory
-from bridges.door.settings import Durations as Limits
-from bridges.door.signals import CloseRequested as CloseDoor
-from bridges.door.signals import DoorSample, Event
-from bridges.door.signals import OpenRequested as OpenDoor
+from bridges.door.memory import DoorLimits, Memory
+from bridges.door.settings import Durations
+from bridges.door.signals import CloseRequested, DoorSample, Event, OpenRequested
 from tests.door.virtual import Decided
+from tests.walk import Walker
 
 LONG_S = 32.0
 """Without a wake_at, a scan each so many seconds is enough here; below `stale_after_s`."""
@@ -32,7 +30,7 @@ DURATIONS: dict[str, float] = {"stale_after_s": 60.0, "max_hold_s": 30.0}
 
 def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:
     """The default durations, but for these."""
-    return DoorLimits(t=Limits(**{**DURATIONS, **(durations or {})}), **facts)
+    return DoorLimits(t=Durations(**{**DURATIONS, **(durations or {})}), **facts)
 
 
 class Ledger(msgspec.Struct, frozen=True):
@@ -62,7 +60,7 @@ UNLIKE = ("opened", "obstruction", "fire")
 class World(msgspec.Struct, frozen=True):
     """Memory and ledger at time 0, and the building: whether it can be read, and written to."""
 
-    memory: DoorMemory
+    memory: Memory
     sample: DoorSample
     ledger: Ledger = Ledger()
     readable: bool = True
@@ -126,10 +124,10 @@ def reading(world: World) -> Event:
 
 
 MOVES: dict[str, Move] = {
-    "A opens": _event(OpenDoor("A")),
-    "B opens": _event(OpenDoor("B")),
-    "A closes": _event(CloseDoor("A")),
-    "B closes": _event(CloseDoor("B")),
+    "A opens": _event(OpenRequested("A")),
+    "B opens": _event(OpenRequested("B")),
+    "A closes": _event(CloseRequested("A")),
+    "B closes": _event(CloseRequested("B")),
     "at open": _ends(True, False),
     "at closed": _ends(False, True),
     "between": _ends(False, False),
@@ -154,7 +152,7 @@ Seen = Callable[["Step"], None]
 class Step(msgspec.Struct, frozen=True):
     """One decision, at time `now` after the state began. `ledger`: with this step in it."""
 
-    before: DoorMemory
+    before: Memory
     event: Event
     decision: Decided
     world: World
@@ -257,11 +255,11 @@ def _asked(
 ) -> tuple[bool, float | None]:
     """What RMF wants: until a CLOSE has had its grace."""
     wanted, ends_at = ledger.wanted, ledger.ends_at
-    if ends_at is not None and now >= ends_at and not isinstance(event, OpenDoor):
+    if ends_at is not None and now >= ends_at and not isinstance(event, OpenRequested):
         wanted, ends_at = False, None
-    if isinstance(event, OpenDoor) and not refused:
+    if isinstance(event, OpenRequested) and not refused:
         return True, None
-    if isinstance(event, CloseDoor) and wanted and ends_at is None:
+    if isinstance(event, CloseRequested) and wanted and ends_at is None:
         return True, now + limits.t.close_grace_s
     return wanted, ends_at
 
@@ -285,7 +283,7 @@ def _unlike(
 # ---- states with their times relative to now
 
 
-def shifted(memory: DoorMemory, by: float, limits: DoorLimits) -> DoorMemory:
+def shifted(memory: Memory, by: float, limits: DoorLimits) -> Memory:
     """The same memory with every time moved by so much, and old ones cut off."""
     t, senses = limits.t, memory.senses
     return replace(
@@ -346,14 +344,6 @@ def _settled(seen: Settled[Any] | None, by: float) -> Any:
     )
 
 
-def neighbours(world: World, limits: DoorLimits, seen: Seen) -> Iterator[World]:
-    """Every state one step away."""
-    for move in MOVES.values():
-        yield moved(world, move, limits, seen)
-    for seconds in TIMES:
-        yield waited(world, seconds, limits, seen)
-
-
 def alike(world: World, limits: DoorLimits) -> World:
     """Equal for states that cannot behave differently."""
     return replace(
@@ -363,17 +353,11 @@ def alike(world: World, limits: DoorLimits) -> World:
     )
 
 
-def walk(roots: list[World], depth: int, limits: DoorLimits, seen: Seen) -> list[World]:
-    """Breadth first from the roots; every state within `depth` steps, once."""
-    found = {alike(root, limits) for root in roots}
-    edge = list(found)
-    for _ in range(depth):
-        fresh: list[World] = []
-        for world in edge:
-            for neighbour in neighbours(world, limits, seen):
-                state = alike(neighbour, limits)
-                if state not in found:
-                    found.add(state)
-                    fresh.append(state)
-        edge = fresh
-    return list(found)
+def walker(limits: DoorLimits) -> Walker[World, Move]:
+    """The door's, with these limits."""
+    return Walker(
+        MOVES,
+        TIMES,
+        lambda world, move, seen: alike(moved(world, move, limits, seen), limits),
+        lambda world, seconds, seen: alike(waited(world, seconds, limits, seen), limits),
+    )

@@ -6,9 +6,7 @@ from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.door_supervisor import core
 from bridges.door_supervisor.core import Decided
 from bridges.door_supervisor.memory import Limits, Memory
-from bridges.door_supervisor.signals import CloseRequested as Closes
-from bridges.door_supervisor.signals import OpenRequested as Opens
-from bridges.door_supervisor.signals import StateHeard as Shown
+from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
 from bridges.rmf.definitions import DoorModeValue, DoorRequest
 
 SECOND_NS = 10**9
@@ -54,21 +52,21 @@ class Alone:
 
     def opens(self, who: str = "a", *, aged: float = 0.0) -> None:
         """A requester's OPEN, sent `aged` s ago by its own clock."""
-        self.hears(Opens(who, self.stamp(aged)))
+        self.hears(OpenRequested(who, self.stamp(aged)))
 
     def closes(self, who: str = "a", *, aged: float = 0.0) -> None:
         """Its CLOSE."""
-        self.hears(Closes(who, self.stamp(aged)))
+        self.hears(CloseRequested(who, self.stamp(aged)))
 
     def stamp(self, aged: float) -> int:
         return round((self.now + self.skew - aged) * SECOND_NS)
 
     def shows(self, mode: str, until: float | None = None) -> None:
         """A DoorState; with `until`, one each second from now until then."""
-        self.hears(Shown(DoorModeValue[f"MODE_{mode}"]))
+        self.hears(StateHeard(DoorModeValue[f"MODE_{mode}"]))
         while until is not None and self.now + 1.0 <= until:
             self.until(self.now + 1.0)
-            self.hears(Shown(DoorModeValue[f"MODE_{mode}"]))
+            self.hears(StateHeard(DoorModeValue[f"MODE_{mode}"]))
         if until is not None:
             self.until(until)
 

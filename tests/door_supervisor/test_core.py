@@ -43,7 +43,7 @@ def test_a_requesters_repeats_are_passed_on_at_1_hz_at_the_most() -> None:
 
 
 @pytest.mark.parametrize("mode", ["CLOSED", "MOVING"])
-def test_a_held_door_that_is_not_open_is_reminded_at_each_state(mode: str) -> None:
+def test_open_is_repeated_at_each_state_of_a_held_door_that_is_not_open(mode: str) -> None:
     desk = Alone()
     desk.opens()
     desk.shows(mode, until=8.0)
@@ -51,7 +51,7 @@ def test_a_held_door_that_is_not_open_is_reminded_at_each_state(mode: str) -> No
 
 
 @pytest.mark.parametrize("mode", ["OPEN", "MOVING"])
-def test_a_door_that_nobody_holds_is_reminded_until_it_is_closed(mode: str) -> None:
+def test_close_is_repeated_until_a_door_without_holders_is_closed(mode: str) -> None:
     desk = Alone()
     desk.shows(mode, until=2.0)
     desk.shows("CLOSED", until=5.0)
@@ -67,7 +67,7 @@ def test_states_at_10_hz_cause_reminders_at_1_hz() -> None:
 
 
 @pytest.mark.parametrize("mode", ["OFFLINE", "UNKNOWN"])
-def test_a_door_that_cannot_be_seen_is_not_reminded(mode: str) -> None:
+def test_no_request_is_repeated_to_a_door_that_is_not_seen(mode: str) -> None:
     desk = Alone()
     desk.shows(mode, until=3.0)
     desk.opens()
@@ -103,7 +103,7 @@ def test_open_is_repeated_for_5_s_because_the_first_may_be_lost_and_a_close_be_u
     ]
 
 
-def test_a_door_that_still_says_open_does_not_keep_back_the_word_for_a_new_holder() -> None:
+def test_a_new_holders_open_is_sent_although_the_door_still_shows_open() -> None:
     desk = Alone()
     desk.opens("a")
     desk.until(10.0)
@@ -115,7 +115,7 @@ def test_a_door_that_still_says_open_does_not_keep_back_the_word_for_a_new_holde
     assert desk.sent == [(0.0, "OPEN"), (10.0, "CLOSED"), (10.1, "OPEN")]
 
 
-def test_a_change_of_mind_within_a_tenth_of_a_second_is_never_told() -> None:
+def test_requests_that_change_quickly_are_sent_at_10_hz_at_most_and_end_in_the_last() -> None:
     desk = Alone()
     for hundredth in range(100):
         desk.until(hundredth / 100)
@@ -127,7 +127,7 @@ def test_a_change_of_mind_within_a_tenth_of_a_second_is_never_told() -> None:
     assert desk.sent[-1][1] == "OPEN"
 
 
-def test_a_repeat_that_was_to_come_dies_with_the_last_holder() -> None:
+def test_a_pending_repeat_is_dropped_with_the_last_holder() -> None:
     desk = Alone()
     desk.opens()
     desk.until(0.5)
@@ -148,7 +148,7 @@ def test_a_close_while_another_holds_closes_nothing_and_drops_no_repeat() -> Non
     assert desk.sent == [(0.0, "OPEN"), (1.0, "OPEN")]
 
 
-def test_a_close_of_somebody_who_does_not_hold_the_door_is_nothing() -> None:
+def test_a_close_from_a_requester_that_does_not_hold_the_door_is_ignored() -> None:
     desk = Alone()
     desk.opens("a")
     desk.closes("b")
@@ -159,7 +159,7 @@ def test_a_close_of_somebody_who_does_not_hold_the_door_is_nothing() -> None:
 # --- late, repeated and reordered requests -----------------------------------------------------
 
 
-def test_a_close_that_was_late_does_not_end_the_next_visit() -> None:
+def test_a_late_close_does_not_end_the_next_visit() -> None:
     desk = Alone()
     desk.opens()
     desk.until(3.0)
@@ -168,7 +168,7 @@ def test_a_close_that_was_late_does_not_end_the_next_visit() -> None:
     assert desk.refused == [(3.0, "stale request")]
 
 
-def test_an_open_that_was_late_or_came_twice_leaves_nobody_behind() -> None:
+def test_a_late_or_doubled_open_leaves_no_holder_behind() -> None:
     desk = Alone()
     desk.opens()
     desk.until(3.0)
@@ -268,7 +268,7 @@ def test_a_requester_is_forgotten_a_minute_after_it_has_gone_and_holders_never_a
     assert set(desk.memory.requesters) == {"a", "c"}
 
 
-def test_a_crowd_of_made_up_names_is_refused_and_the_holder_is_still_heard() -> None:
+def test_many_invented_names_are_refused_and_the_holder_is_still_heard() -> None:
     desk = Alone()
     desk.opens("a")
     for n in range(300):
@@ -283,7 +283,7 @@ def test_a_crowd_of_made_up_names_is_refused_and_the_holder_is_still_heard() -> 
 # --- when it may speak -------------------------------------------------------------------------
 
 
-def test_until_it_may_speak_it_listens_and_then_begins_with_open_for_who_holds_the_door() -> None:
+def test_after_its_quiet_start_it_first_sends_open_for_each_holder() -> None:
     desk = Alone(speaks=False)
     desk.shows("MOVING")
     desk.opens()
@@ -307,7 +307,7 @@ def test_a_close_heard_before_it_may_speak_waits_for_a_state_that_asks_for_it() 
     assert desk.sent == [(3.5, "CLOSED")]
 
 
-def test_beside_another_supervisor_it_is_silent_and_keeps_the_table() -> None:
+def test_beside_another_supervisor_it_sends_nothing_and_keeps_its_table() -> None:
     desk = Alone()
     desk.opens("a")
     desk.until(1.0)
@@ -391,3 +391,11 @@ def test_the_report_names_the_holders_and_the_door_as_it_was_last_seen() -> None
     report = desk.last.report
     assert report == DoorHoldReport(2.0, DoorModeValue.MODE_MOVING, (("b", 1.0), ("a", 2.0)))
     assert report.news() == (DoorModeValue.MODE_MOVING, ("b", "a"))
+
+
+def test_a_holder_that_repeats_itself_does_not_displace_another() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.opens("b")
+    desk.opens("a")
+    assert desk.holders == ["a", "b"]

@@ -106,7 +106,7 @@ def test_the_settings_reach_the_core_and_the_quiet_start() -> None:
     assert [path for path, _ in Settings(doors=[]).problems()] == [("doors",)]
 
 
-def test_the_kind_is_the_drop_in_for_rmfs_own() -> None:
+def test_the_daemon_uses_the_names_and_topics_of_rmfs_own_supervisor() -> None:
     assert set(KIND.requests) == {topics.ADAPTER_DOOR_REQUESTS, topics.DOOR_STATES}
     assert set(KIND.publishes) == {topics.DOOR_REQUESTS, topics.DOOR_SUPERVISOR_HEARTBEAT}
     assert KIND.sole == (topics.DOOR_REQUESTS,)
@@ -132,7 +132,7 @@ def test_the_heartbeat_lists_doors_and_holders_in_the_order_of_names() -> None:
     )
 
 
-def test_what_is_kept_changes_with_who_comes_and_goes_and_not_with_who_repeats_itself() -> None:
+def test_the_file_changes_when_holders_come_or_go_and_not_when_they_repeat_themselves() -> None:
     memory = core.initial("ward", 0.0)
     written = []
     for second in range(10):
@@ -145,7 +145,7 @@ def test_what_is_kept_changes_with_who_comes_and_goes_and_not_with_who_repeats_i
     assert keep.persist({"ward": memory}) == b'{"version":1,"doors":{}}'
 
 
-def test_a_restart_knows_the_holders_and_what_is_older_than_their_visit() -> None:
+def test_after_a_restart_the_holders_are_known_and_older_requests_are_stale() -> None:
     kept = keep.persist(
         {"ward": held("ward", b=5, a=7), "lab": held("lab"), "gate": held("gate", c=1)}
     )
@@ -177,6 +177,6 @@ def test_a_restart_knows_the_holders_and_what_is_older_than_their_visit() -> Non
         b"\xff",
     ],
 )
-def test_a_table_that_was_cut_or_spoilt_is_refused_as_a_whole(kept: bytes) -> None:
+def test_a_table_that_is_cut_or_damaged_is_refused_as_a_whole(kept: bytes) -> None:
     with pytest.raises(ValueError, match="table"):
         keep.restore(kept, ANY, 0.0)

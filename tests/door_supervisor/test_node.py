@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import pytest
+
 from bridges.door_supervisor import KIND
 from bridges.door_supervisor.settings import Settings
 from bridges.rmf import definitions as d
@@ -10,24 +12,9 @@ from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import stamp
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
+from tests.serve.virtual_graph import Disk
 
 HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT
-
-
-class Kept:
-    """The state directory; `full`: nothing more can be written."""
-
-    def __init__(self) -> None:
-        self.kept: bytes | None = None
-        self.full = False
-
-    def read(self) -> bytes | None:
-        return self.kept
-
-    def write(self, kept: bytes) -> None:
-        if self.full:
-            raise OSError("no space left on device")
-        self.kept = kept
 
 
 class Graph:
@@ -36,7 +23,7 @@ class Graph:
     def __init__(self) -> None:
         self.now = 0.0
         self.network = MemoryNetwork()
-        self.kept = Kept()
+        self.disk = Disk()
         self.heard: list[tuple[float, str]] = []
         self.rmf = MemoryTransport(self.network, "rmf")
         self.rmf.subscribe(topics.DOOR_REQUESTS, self._request)
@@ -48,7 +35,7 @@ class Graph:
     def starts(self) -> None:
         self.transport = MemoryTransport(self.network, "ours")
         clock = Clock(lambda: self.now, lambda: 1e6 + self.now)
-        self.node = GraphNode(KIND, Settings(), self.transport, clock, kept=self.kept)
+        self.node = GraphNode(KIND, Settings(), self.transport, clock, kept=self.disk)
         self.node.subscribe()
 
     def asks(self, who: str, mode: int, door: str = "ward") -> None:
@@ -115,15 +102,55 @@ def test_a_restart_closes_nothing_and_the_next_heartbeat_lists_who_holds() -> No
     ]
 
 
-def test_what_cannot_be_kept_is_still_told_and_what_was_spoilt_is_left_out() -> None:
+def test_a_table_that_cannot_be_written_is_still_published_and_damaged_entries_are_left_out() -> (
+    None
+):
     graph = Graph()
     graph.until(4.0)
-    graph.kept.full = True
+    graph.disk.full = True
     graph.asks("a", 2)
     assert graph.heard[-1] == (4.1, "beat ward:a") or graph.heard[-1][1] == "OPEN ward"
     graph.until(4.2)
     assert graph.heard[-1] == (4.1, "beat ward:a")
-    graph.kept.kept = b"\x00"
+    graph.disk.kept = b"\x00"
     graph.transport.close()
     graph.starts()
     assert graph.node.subjects == {}
+
+
+def test_what_cannot_be_kept_is_a_fault_and_tried_again_until_it_is(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    graph = Graph()
+    graph.until(4.0)
+    graph.kept.full = True
+    graph.asks("a", 2)
+    before = graph.kept.kept
+    graph.until(10.0)
+    assert (graph.kept.kept, graph.heard[-1]) == (before, (9.1, "beat ward:a"))
+    [fault] = graph.node.status()["faults"]
+    assert fault["code"] == "NOT_KEPT"
+    graph.kept.full = False
+    graph.until(11.0)
+    assert b'"a"' in (graph.kept.kept or b"")
+    assert graph.node.status()["faults"] == []
+    lines = [r.getMessage() for r in caplog.records if "NOT_KEPT" in r.getMessage()]
+    assert len(lines) == 1
+
+
+def test_nothing_is_said_before_it_is_kept() -> None:
+    graph = Graph()
+    graph.until(4.0)
+    said: list[str] = []
+    write = graph.kept.write
+
+    def tells(kept: bytes) -> None:
+        said.extend(word for _, word in graph.heard if "lab" in word)
+        write(kept)
+
+    graph.kept.write = tells  # type: ignore[method-assign]
+    graph.asks("b", 2, "lab")
+    assert said == []
+    assert graph.heard[-1] == (4.0, "OPEN lab")
+    graph.until(4.2)
+    assert graph.heard[-1] == (4.1, "beat lab:b")

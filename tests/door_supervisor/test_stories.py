@@ -3,55 +3,47 @@
 from bridges.door_supervisor import keep
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
-from hal_fakes.rmf import NEVER, Said, door_request
-from hal_fakes.rmf.supervisors import DoorSupervisor
+from hal_fakes.rmf import NEVER, door_request
 from tests.door_supervisor.world import (
-    EPOCH,
     WARD,
-    Corridor,
-    Disk,
     DoorDaemon,
-    Shell,
+    OurSupervisor,
+    RmfsSupervisor,
     Walker,
+    in_order,
+    to_door,
 )
+from tests.serve.virtual_graph import EPOCH, Disk, World
 
 A, B = "fleet/a", "fleet/b"
 
 
-class Theirs(DoorSupervisor):
-    """RMF's own, by the world's clock."""
-
-    def hear(self, message: d.Message, now: float) -> list[Said]:
-        return super().hear(message, EPOCH + now)
-
-
 class Site:
-    """One door, these robots, and our supervisor from the start. `disk`: its state directory."""
+    """One door, robots with these plans, and a supervisor from the start: ours, with its disk."""
 
-    def __init__(self, *walkers: Walker, theirs: bool = False, **changes: object) -> None:
-        self.net = Corridor()
+    def __init__(
+        self, *plans: list[tuple[float, float]], theirs: bool = False, **changes: object
+    ) -> None:
+        self.world = World(in_order)
         self.disk = Disk()
-        self.changes = changes
-        self.door = DoorDaemon()
-        self.net.parties = {"door": self.door}
-        self.net.parties["supervisor"] = Theirs() if theirs else self.ours()
-        self.net.parties |= {walker.who: walker for walker in walkers}
-
-    def ours(self) -> Shell:
-        return Shell(self.disk, self.net.now, self.rivals, **self.changes)
-
-    def rivals(self) -> int:
-        return sum(isinstance(party, DoorSupervisor) for party in self.net.parties.values())
+        self.door = DoorDaemon(self.world)
+        if theirs:
+            self.rmfs = RmfsSupervisor(self.world)
+        else:
+            self.ours = OurSupervisor(self.world, self.disk, **changes)
+        self.walkers = [
+            Walker(self.world, name, plan) for name, plan in zip((A, B), plans, strict=False)
+        ]
 
     def restarts(self, after_s: float = 0.0) -> None:
-        """The supervisor dies, and is back after a while."""
-        del self.net.parties["supervisor"]
-        self.net.run(self.net.now + after_s)
-        self.net.parties["supervisor"] = self.ours()
+        """Our supervisor dies, and is back after a while."""
+        self.ours.leave()
+        self.world.run(self.world.now + after_s)
+        self.ours.restart()
 
-    def asks(self, who: str, mode: d.DoorModeValue) -> None:
-        request = door_request(WARD, who, mode, EPOCH + self.net.now)
-        self.net.say(who, [(topics.ADAPTER_DOOR_REQUESTS, request)])
+    def asks(self, who: str, mode: d.DoorModeValue, door: str = WARD) -> None:
+        request = door_request(door, who, mode, EPOCH + self.world.now)
+        self.world.send(who, topics.ADAPTER_DOOR_REQUESTS, request)
 
     @property
     def relay(self) -> list[tuple[float, bool]]:
@@ -61,13 +53,13 @@ class Site:
         return next((at, word) for at, word in self.words() if word == "CLOSED")
 
     def words(self) -> list[tuple[float, str]]:
-        return [(at, word) for at, _, word in self.net.to_door()]
+        return [(at, word) for at, _, word in to_door(self.world)]
 
 
 def test_a_robot_passes_a_door() -> None:
-    a = Walker(A, [(10.0, 8.0)])
-    site = Site(a)
-    site.net.run(60.0)
+    site = Site([(10.0, 8.0)])
+    (a,) = site.walkers
+    site.world.run(60.0)
     assert a.log == [(10.0, "asks"), (12.062, "enters"), (20.062, "leaves"), (20.062, "done")]
     assert site.words() == [
         *[(float(s), "OPEN") for s in range(10, 16)],
@@ -81,157 +73,151 @@ def test_a_robot_passes_a_door() -> None:
 def test_a_robot_is_let_in_by_the_open_door_and_a_heartbeat_that_lists_it_and_by_nothing_else() -> (
     None
 ):
-    a = Walker(A, [(10.0, 8.0)])
-    site = Site(a)
+    site = Site([(10.0, 8.0)])
+    (a,) = site.walkers
     site.asks("web", d.DoorModeValue.MODE_OPEN)
-    site.net.run(9.9)
-    del site.net.parties["supervisor"]
-    site.net.run(20.0)
+    site.world.run(9.9)
+    site.ours.leave()
+    site.world.run(20.0)
     assert site.door.door.told[-1][1] == "OPEN"
     assert a.log == [(10.0, "asks")]
-    site.net.parties["supervisor"] = site.ours()
-    site.net.run(24.0)
+    site.ours.restart()
+    site.world.run(24.0)
     assert a.log[1:] == [(23.0, "enters")]
 
 
 def test_of_two_robots_the_first_to_leave_does_not_close_on_the_other() -> None:
-    a, b = Walker(A, [(10.0, 3.0)]), Walker(B, [(13.0, 30.0)])
-    site = Site(a, b)
-    site.net.run(80.0)
+    site = Site([(10.0, 3.0)], [(13.0, 30.0)])
+    a, b = site.walkers
+    site.world.run(80.0)
     assert [what for _, what in a.log] == ["asks", "enters", "leaves", "done"]
-    assert b.log[1:] == [(13.125, "enters"), (43.125, "leaves"), (43.25, "done")]
+    assert b.log[1:] == [(13.125, "enters"), (43.125, "leaves"), (43.2, "done")]
     assert [round(at, 3) for at, _ in site.relay] == [10.0, 46.125]
 
 
 def test_a_supervisor_restarted_with_a_robot_in_the_doorway_closes_nothing() -> None:
-    a = Walker(A, [(10.0, 60.0)])
-    site = Site(a)
-    site.net.run(20.0)
+    site = Site([(10.0, 60.0)])
+    (a,) = site.walkers
+    site.world.run(20.0)
     site.restarts(after_s=5.0)
-    site.net.run(60.0)
+    site.world.run(60.0)
     site.restarts()
-    site.net.run(110.0)
-    assert a.log[2:] == [(72.062, "leaves"), (72.125, "done")]
+    site.world.run(110.0)
+    assert a.log[2:] == [(72.062, "leaves"), (72.1, "done")]
     assert site.first_close() == (72.062, "CLOSED")
     assert [round(at, 3) for at, _ in site.relay] == [10.0, 75.062]
 
 
 def test_rmfs_own_supervisor_would_have_closed_on_it() -> None:
-    site = Site(Walker(A, [(10.0, 60.0)]), theirs=True)
-    site.net.run(20.0)
-    site.net.parties["supervisor"] = Theirs()
-    site.net.run(60.0)
+    site = Site([(10.0, 60.0)], theirs=True)
+    site.world.run(20.0)
+    site.rmfs.restart()
+    site.world.run(60.0)
     assert site.words()[-1][1] == "CLOSED"
     assert [round(at) for at, _ in site.relay] == [10, 23]
 
 
 def test_with_its_memory_lost_it_closes_nothing_before_the_quiet_start_is_over() -> None:
-    a = Walker(A, [(10.0, 60.0)])
-    site = Site(a)
-    site.net.run(20.0)
+    site = Site([(10.0, 60.0)])
+    site.world.run(20.0)
     site.disk.kept = None
     site.restarts()
-    site.net.run(22.9)
+    site.world.run(22.9)
     assert site.words()[-1] == (15.0, "OPEN")
     site.asks(A, d.DoorModeValue.MODE_OPEN)
-    site.net.run(60.0)
+    site.world.run(60.0)
     assert {word for _, word in site.words()} == {"OPEN"}
 
 
 def test_a_supervisor_and_a_door_daemon_that_restart_together_open_again_for_the_robot() -> None:
-    a = Walker(A, [(10.0, 60.0)])
-    site = Site(a)
-    site.net.run(20.0)
-    site.door.restart(20.0)
+    site = Site([(10.0, 60.0)])
+    site.world.run(20.0)
+    site.door.restart()
     site.restarts(after_s=2.0)
-    site.net.run(60.0)
+    site.world.run(60.0)
     assert [(round(at), on) for at, on in site.relay] == [(10, True), (20, False), (25, True)]
     assert site.door.door.told[-1][1] == "OPEN"
 
 
 def test_the_session_of_a_restarted_fleet_adapter_is_cleaned_by_the_next_heartbeat() -> None:
-    a = Walker(A, [(10.0, 60.0)])
-    site = Site(a)
-    site.net.run(20.5)
-    a.restart(20.5)
-    site.net.run(40.0)
-    assert site.first_close() == (21.125, "CLOSED")
+    site = Site([(10.0, 60.0)])
+    (a,) = site.walkers
+    site.world.run(20.5)
+    a.restart()
+    site.world.run(40.0)
+    assert site.first_close() == (21.1, "CLOSED")
     assert site.disk.kept == keep.persist({})
 
 
 def test_beside_rmfs_own_such_a_session_stays_for_ever() -> None:
-    a = Walker(A, [(10.0, 60.0)])
-    site = Site(a, theirs=True)
-    site.net.run(20.5)
-    a.restart(20.5)
-    site.net.run(1000.0)
+    site = Site([(10.0, 60.0)], theirs=True)
+    (a,) = site.walkers
+    site.world.run(20.5)
+    a.restart()
+    site.world.run(1000.0)
     assert [on for _, on in site.relay] == [True]
 
 
 def test_a_door_back_from_offline_with_an_open_session_is_opened_again() -> None:
-    a = Walker(A, [(10.0, 60.0)])
-    site = Site(a)
+    site = Site([(10.0, 60.0)])
+    (a,) = site.walkers
     site.door.door.bus.down = "no reply"
-    site.net.run(30.0)
+    site.world.run(30.0)
     assert a.log == [(10.0, "asks")]
     site.door.door.bus.down = ""
-    site.net.run(40.0)
+    site.world.run(40.0)
     assert [(round(at), what) for at, what in a.log[1:]] == [(32, "enters")]
 
 
 def test_a_door_that_lost_its_power_under_a_robot_is_opened_again_without_its_asking() -> None:
-    a = Walker(A, [(10.0, 60.0)])
-    site = Site(a)
-    site.net.run(20.0)
-    site.door.restart(20.0)
-    site.net.run(40.0)
+    site = Site([(10.0, 60.0)])
+    site.world.run(20.0)
+    site.door.restart()
+    site.world.run(40.0)
     assert [on for _, on in site.relay] == [True, False, True]
     assert site.relay[-1][0] <= 21.25
 
 
 def test_a_door_left_open_from_the_web_raises_an_alarm_and_stays_open() -> None:
     site = Site(open_alarm_s=60.0)
-    site.net.run(10.0)
+    site.world.run(10.0)
     site.asks("web", d.DoorModeValue.MODE_OPEN)
-    site.net.run(69.9)
-    shell = site.net.parties["supervisor"]
-    assert isinstance(shell, Shell)
-    assert shell.faults() == {}
-    site.net.run(600.0)
-    assert shell.faults() == {WARD: ["DOOR_HELD_OPEN: longer than 60 s by web"]}
+    site.world.run(69.9)
+    assert site.ours.faults() == {}
+    site.world.run(600.0)
+    assert site.ours.faults() == {WARD: ["DOOR_HELD_OPEN: longer than 60 s by web"]}
     assert [on for _, on in site.relay] == [True]
     site.asks("web", d.DoorModeValue.MODE_CLOSED)
-    site.net.run(610.0)
-    assert shell.faults() == {}
+    site.world.run(610.0)
+    assert site.ours.faults() == {}
     assert [on for _, on in site.relay] == [True, False]
 
 
 def test_beside_another_supervisor_it_is_passive_and_takes_over_without_a_close() -> None:
-    a = Walker(A, [(10.0, 60.0)])
-    site = Site(a)
-    site.net.parties["theirs"] = Theirs()
-    site.net.run(30.0)
-    assert {who for _, who, topic, _ in site.net.said if topic in SUPERVISORS} == {"theirs"}
-    del site.net.parties["theirs"]
-    site.net.run(60.0)
-    after = [(at, who, word) for at, who, word in site.net.to_door() if at > 30.0]
+    site = Site([(10.0, 60.0)])
+    theirs = RmfsSupervisor(site.world)
+    site.world.run(30.0)
+    assert {who for _, who, topic, _ in site.world.sent if topic in SUPERVISORS} == {theirs.name}
+    theirs.leave()
+    site.world.run(60.0)
+    after = [(at, who, word) for at, who, word in to_door(site.world) if at > 30.0]
     assert after == [(33.25, "supervisor", "OPEN")]
-    site.net.parties["theirs"] = Theirs()
-    site.net.run(60.25)
-    at = len(site.net.said)
-    site.net.run(70.0)
-    assert "supervisor" not in {who for _, who, _, _ in site.net.said[at:]}
+    theirs.restart()
+    site.world.run(60.25)
+    at = len(site.world.sent)
+    site.world.run(70.0)
+    assert "supervisor" not in {who for _, who, _, _ in site.world.sent[at:]}
 
 
 SUPERVISORS = (topics.DOOR_REQUESTS, topics.DOOR_SUPERVISOR_HEARTBEAT)
 
 
 def test_the_heartbeat_goes_out_each_second_and_when_the_table_changes() -> None:
-    site = Site(Walker(A, [(5.25, 2.0)]))
-    site.net.run(8.5)
+    site = Site([(5.25, 2.0)])
+    site.world.run(8.5)
     beats = [
         (at, [(s.door_name, [h.requester_id for h in s.sessions]) for s in beat.all_sessions])
-        for at, _, topic, beat in site.net.said
+        for at, _, topic, beat in site.world.sent
         if topic == topics.DOOR_SUPERVISOR_HEARTBEAT
     ]
     listed = [(WARD, [A])]
@@ -241,23 +227,22 @@ def test_the_heartbeat_goes_out_each_second_and_when_the_table_changes() -> None
         (5.0, []),
         (5.25, listed),
         (6.25, listed),
-        (6.375, listed),  # the robot has asked again
+        (6.35, listed),  # the robot has asked again
         (7.25, listed),
         (8.25, listed),  # it is inside
     ]
 
 
-def test_doors_are_each_others_nobody() -> None:
+def test_each_door_has_its_own_table() -> None:
     site = Site(doors=None)
-    site.net.parties["lab"] = DoorDaemon(name="lab")
-    site.net.run(5.0)
+    DoorDaemon(site.world, "lab")
+    site.world.run(5.0)
     site.asks(A, d.DoorModeValue.MODE_OPEN)
-    request = door_request("lab", A, d.DoorModeValue.MODE_CLOSED, EPOCH + 5.0)
-    site.net.say(A, [(topics.ADAPTER_DOOR_REQUESTS, request)])
-    site.net.run(20.0)
+    site.asks(A, d.DoorModeValue.MODE_CLOSED, "lab")
+    site.world.run(20.0)
     asked = {
         (said.door_name, said.requested_mode.value)
-        for _, _, topic, said in site.net.said
+        for _, _, topic, said in site.world.sent
         if topic == topics.DOOR_REQUESTS
     }
     assert asked == {(WARD, d.DoorModeValue.MODE_OPEN)}
@@ -265,12 +250,10 @@ def test_doors_are_each_others_nobody() -> None:
 
 def test_a_door_that_is_heard_no_more_is_forgotten() -> None:
     site = Site()
-    site.net.run(5.0)
-    del site.net.parties["door"]
-    shell = site.net.parties["supervisor"]
-    assert isinstance(shell, Shell)
-    site.net.run(63.9)
-    assert list(shell.memories) == [WARD]
-    site.net.run(66.0)
-    assert list(shell.memories) == []
-    assert shell.wake_at() < NEVER
+    site.world.run(5.0)
+    site.world.remove("ward")
+    site.world.run(63.9)
+    assert site.ours.subjects == [WARD]
+    site.world.run(66.0)
+    assert site.ours.subjects == []
+    assert site.ours.wake_at() < NEVER

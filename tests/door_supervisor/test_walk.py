@@ -1,9 +1,12 @@
 """Every history to a depth, and drawn ones: the rules once more, in other words.
 
 The walk: all 4^7 = 16384 histories of seven steps, 0.75 s apart, of two requesters who open and
-close (stamps in order); then all 6^5 = 7776 of late requests, states and leave to speak.
+close (stamps in order); then all 6^5 = 7776 of late requests, states and leave to speak. But for
+`make deep` they are two steps and one step shorter.
 """
 
+from collections.abc import Callable
+from copy import copy
 from itertools import product
 from typing import Any
 
@@ -17,9 +20,12 @@ from bridges.door_supervisor.memory import OPEN, Limits, Memory
 from bridges.door_supervisor.settings import Settings
 from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
 from bridges.rmf.definitions import DoorModeValue, DoorRequest
+from tests.depth import depth, examples
+from tests.walk import histories
 
 LIMITS = Limits(open_alarm_s=30.0)
 CLOCK_AHEAD = 1000
+STEP_S = 0.75
 
 
 class Ledger:
@@ -35,6 +41,12 @@ class Ledger:
         self.wake_at = 0.0
         self.sent: list[tuple[float, int]] = []
         self.hears(MaySpeak(speaks))
+
+    def copy(self) -> "Ledger":
+        """The same from here on."""
+        made = copy(self)
+        made.holders, made.newest, made.sent = set(self.holders), dict(self.newest), [*self.sent]
+        return made
 
     def hears(self, event: Any) -> None:
         self._note(event)
@@ -84,13 +96,23 @@ def stamp(now: float, aged: float = 0.0) -> int:
     return int((CLOCK_AHEAD + now - aged) * 1e9)
 
 
-def test_every_history_of_two_requesters_to_depth_seven() -> None:
+def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
+    """The same with this event, heard now, and a step's time later."""
+    ledger = ledger.copy()
+    ledger.hears(event(ledger.now))
+    ledger.until(ledger.now + STEP_S)
+    return ledger
+
+
+def asked(ledger: Ledger, move: tuple[Any, str]) -> Ledger:
+    """The same after this word of this requester."""
+    word, who = move
+    return after(ledger, lambda now: word(who, stamp(now)))
+
+
+def test_every_history_of_two_requesters_keeps_the_rules() -> None:
     words = list(product((OpenRequested, CloseRequested), "ab"))
-    for history in product(words, repeat=7):
-        ledger = Ledger(speaks=True)
-        for step, (word, who) in enumerate(history):
-            ledger.until(step * 0.75)
-            ledger.hears(word(who, stamp(ledger.now)))
+    for ledger, history in histories(Ledger(speaks=True), words, depth(5, 7), asked):
         ledger.until(6.0)
         last = {who: word for word, who in history}
         held = OpenRequested in last.values()
@@ -99,20 +121,16 @@ def test_every_history_of_two_requesters_to_depth_seven() -> None:
         assert words_sent[-1:] == ([2] if held else [0] if opened else [])
 
 
-def test_every_history_of_late_requests_states_and_leave_to_speak_to_depth_five() -> None:
-    steps: list[Any] = [
+def test_every_history_of_late_requests_and_states_keeps_the_rules() -> None:
+    events: list[Callable[[float], Any]] = [
         lambda now: OpenRequested("a", stamp(now)),
         lambda now: CloseRequested("a", stamp(now)),
         lambda now: CloseRequested("a", stamp(now, aged=1.0)),
         lambda now: OpenRequested("a", stamp(now, aged=1.0)),
         lambda now: StateHeard(DoorModeValue.MODE_OPEN),
-        lambda now: MaySpeak(int(now / 0.75) % 2 == 1),
+        lambda now: MaySpeak(int(now / STEP_S) % 2 == 1),
     ]
-    for history in product(steps, repeat=5):
-        ledger = Ledger(speaks=False)
-        for step, event in enumerate(history):
-            ledger.until(step * 0.75)
-            ledger.hears(event(ledger.now))
+    for ledger, _ in histories(Ledger(speaks=False), events, depth(4, 5), after):
         ledger.until(5.0)
 
 
@@ -154,16 +172,16 @@ def _would_be_believed(ledger: Ledger, event: Any) -> bool:
     return ledger.now > requester.heard_at + 9.0 or requester.doubted_at > requester.doubted_since
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=examples(300), deadline=None, derandomize=True)
 @given(HISTORIES)
-def test_in_every_history_the_words_are_what_the_table_says_and_never_too_many(
+def test_in_every_history_the_requests_follow_the_table_and_their_pace(
     history: list[tuple[float, Any]],
 ) -> None:
     ledger = told(history)
     ledger.until(ledger.now + 10.0)
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=examples(300), deadline=None, derandomize=True)
 @given(HISTORIES)
 def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
     history: list[tuple[float, Any]],
@@ -181,9 +199,9 @@ def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
         ] == [2]
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=examples(200), deadline=None, derandomize=True)
 @given(st.binary(max_size=60))
-def test_no_file_is_taken_by_halves(kept: bytes) -> None:
+def test_a_damaged_file_is_refused_as_a_whole(kept: bytes) -> None:
     try:
         restored = keep.restore(kept, Settings(), 0.0)
     except ValueError:

@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 
-from hal_fakes.domain import free_domain
 from tests.serve.site import ROOT, command, daemon, environment
 from tests.waiting import wait_until
 
@@ -68,9 +67,9 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
 class Site:
     """One file, and whoever is asked about it in the house that we stand in."""
 
-    def __init__(self, here: Path, text: str, bus: dict[str, Any]) -> None:
+    def __init__(self, here: Path, domain: int, text: str, bus: dict[str, Any]) -> None:
         self.here, self._text = here, text
-        self._domain = free_domain()
+        self._domain = domain
         self._bus = bus
         self.file = here / "ward.yaml"
         self.point_at({})
@@ -137,9 +136,11 @@ def sort(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def site(sort: str, house: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Site:
+def site(
+    sort: str, house: Path, domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Site:
     monkeypatch.chdir(house)
-    return Site(tmp_path, *SITES[sort])
+    return Site(tmp_path, domain, *SITES[sort])
 
 
 def test_it_is_checked(site: Site, sort: str) -> None:

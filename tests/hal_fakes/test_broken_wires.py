@@ -69,7 +69,7 @@ def truth(lift: WiredLift) -> tuple[str | None, bool]:
 
 
 @pytest.mark.parametrize("signal", INPUTS)
-def test_a_cut_input_is_never_taken_for_an_open_door_or_another_floor(
+def test_a_cut_input_never_reads_as_an_open_door_or_another_floor(
     lift: WiredLift, signal: str
 ) -> None:
     lift.plant.fail(signal, "off")
@@ -136,7 +136,7 @@ def test_a_welded_call_relay_keeps_calling(lift: WiredLift) -> None:
     assert lift.plant.car.floor == 2
 
 
-def test_letting_go_switches_everything_off(lift: WiredLift) -> None:
+def test_releasing_the_points_switches_everything_off(lift: WiredLift) -> None:
     assert len(list(ride(lift, until=2.0))) == 39
     lift.driver.close()
     assert relays(lift)[-2:] == [

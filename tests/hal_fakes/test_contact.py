@@ -64,7 +64,7 @@ def test_a_cut_input_reads_its_pull(active: Any, pull: Any, reads: bool) -> None
 
 
 @pytest.mark.parametrize(("active", "reads"), [("high", False), ("low", True)])
-def test_a_cut_input_of_a_module_reads_nought(active: Any, reads: bool) -> None:
+def test_a_cut_input_of_a_module_reads_0(active: Any, reads: bool) -> None:
     contact = Contact(wire(active, None), "seed")
     contact.fail("off", 0.0)
     assert contact.shows is reads

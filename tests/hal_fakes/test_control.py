@@ -69,7 +69,7 @@ def world(tmp_path: Path) -> Iterator[World]:
     made.running.close()
 
 
-def test_whoever_follows_hears_every_edge_from_then_on(world: World) -> None:
+def test_a_follower_hears_every_edge_from_then_on(world: World) -> None:
     caller = world.call()
     assert caller.say("follow") == "ok"
     before = time.monotonic()
@@ -83,7 +83,7 @@ def test_whoever_follows_hears_every_edge_from_then_on(world: World) -> None:
     assert times == pytest.approx([before, before + QUICK.agv_s])
 
 
-def test_people_press_and_wires_fail_on_command(world: World) -> None:
+def test_presses_and_failures_are_made_on_command(world: World) -> None:
     caller = world.call()
     assert caller.say("press Lift1 fire_alarm on") == "ok"
     assert world.running.plants["Lift1"].sense("fire_alarm")
@@ -119,7 +119,9 @@ def test_people_press_and_wires_fail_on_command(world: World) -> None:
         ),
     ],
 )
-def test_what_cannot_be_done_is_answered_with_why(world: World, line: str, answer: str) -> None:
+def test_an_impossible_order_is_answered_with_the_reason(
+    world: World, line: str, answer: str
+) -> None:
     assert world.call().say(line) == answer
 
 

@@ -70,7 +70,7 @@ def test_a_ride_on_simulated_hardware(lift: SimulatedLift) -> None:
     )
 
 
-def test_a_story_told_on_the_socket_reaches_the_pins(
+def test_orders_on_the_control_socket_reach_the_pins(
     lift: SimulatedLift, simulation: Simulation
 ) -> None:
     caller = Caller(simulation.socket_path("header"))

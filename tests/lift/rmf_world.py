@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from bridges.rmf.definitions import LiftRequest, LiftState, Message
-from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, AnyTopic
 from hal_fakes.rmf import Party, Said
 from hal_fakes.rmf.phases import EndLiftSession, RequestLift
 from hal_fakes.rmf.robot import Robot
@@ -119,7 +119,7 @@ class World:
                 if topic in party.subscribes:
                     left += party.hear(message, self._now)
 
-    def _to_node(self, topic: Topic[LiftRequest] | Topic[LiftState], message: Message) -> None:
+    def _to_node(self, topic: AnyTopic, message: Message) -> None:
         if not isinstance(message, LiftRequest):
             return
         if topic == ADAPTER_LIFT_REQUESTS:

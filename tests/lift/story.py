@@ -14,8 +14,7 @@ from bridges.core.decision import OperatorReset
 from bridges.core.kind import AnyDeviceKind
 from bridges.lift import KIND
 from bridges.lift.memory import LiftLimits
-from bridges.lift.settings import Durations as Limits
-from bridges.lift.settings import Floor, LiftSettings
+from bridges.lift.settings import Durations, Floor, LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.rmf.definitions import (
     LiftDoor,
@@ -196,12 +195,17 @@ class Story:
         debounce: dict[str, float] | None = None,
         fire_reset: Any = "auto",
         alarm: Any = "none",
+        agv_mode: Any = "requested",
         kind: AnyDeviceKind = KIND,
         **limits: Any,
     ) -> None:
         self.building = building or Building()
         self.settings = LiftSettings(
-            floors=floors or FLOORS, limits=Limits(**limits), fire_reset=fire_reset, alarm=alarm
+            floors=floors or FLOORS,
+            limits=Durations(**limits),
+            fire_reset=fire_reset,
+            alarm=alarm,
+            agv_mode=agv_mode,
         )
         self.limits = LiftLimits.of(self.settings, DEBOUNCE if debounce is None else debounce)
         self.now = 0.0

@@ -14,6 +14,7 @@ from drivers.lift.dry_contact import wires
 from hal_fakes.plants.lift import FAILS
 from hal_fakes.plants.plant import FailureMode
 from hal_fakes.rmf.robot import Robot
+from tests.depth import part
 from tests.lift.rmf_world import World
 from tests.lift.wired import WiredStory, shipped
 
@@ -49,7 +50,7 @@ class Witness:
             assert state.current_floor == self.open_at
 
 
-def ride(part: str, mode: FailureMode, broken_at: float) -> WiredStory:
+def ride(broken: str, mode: FailureMode, broken_at: float) -> WiredStory:
     """A robot's ride to L3 on a lift that breaks; it is mended, the robot gives up, another rides."""
     story = WiredStory(scan_s=0.1, agv_timeout_s=5, floor_timeout_s=10, door_timeout_s=5)
     robot, other = Robot("fleet/a"), Robot("fleet/b")
@@ -72,9 +73,9 @@ def ride(part: str, mode: FailureMode, broken_at: float) -> WiredStory:
     rmf.run(1.0)
     rmf.asks(robot, "L3")
     rmf.run(broken_at)
-    story.fail(part, mode)
+    story.fail(broken, mode)
     rmf.run(30.0)
-    story.fail(part, None)
+    story.fail(broken, None)
     rmf.run(31.0)
     rmf.releases(robot)
     rmf.until_done(robot)
@@ -85,14 +86,14 @@ def ride(part: str, mode: FailureMode, broken_at: float) -> WiredStory:
     return story
 
 
-@pytest.mark.parametrize(("part", "mode"), BREAKS)
-def test_a_part_broken_before_the_ride(part: str, mode: FailureMode) -> None:
-    ride(part, mode, broken_at=1.0)
+@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 2))
+def test_a_part_broken_before_the_ride(broken: str, mode: FailureMode) -> None:
+    ride(broken, mode, broken_at=1.0)
 
 
-@pytest.mark.parametrize(("part", "mode"), BREAKS)
-def test_a_part_that_breaks_on_the_way(part: str, mode: FailureMode) -> None:
-    ride(part, mode, broken_at=3.0)
+@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 2, 1))
+def test_a_part_that_breaks_on_the_way(broken: str, mode: FailureMode) -> None:
+    ride(broken, mode, broken_at=3.0)
 
 
 @pytest.mark.parametrize("signal", [w for w in WIRES if w.startswith("floor")])

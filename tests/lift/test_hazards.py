@@ -106,7 +106,7 @@ def test_a_hazard_that_has_cleared_leaves_no_latch(hazard: Hazard, mode: str) ->
     assert (story.state, story.faults) == ("AGV, closed at L1, A to L1", [])
 
 
-def test_a_hazard_on_the_way_cancels_the_call_and_the_ride_goes_on_when_it_is_over() -> None:
+def test_a_hazard_on_the_way_cancels_the_call_and_the_ride_resumes_afterwards() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L3")
@@ -126,7 +126,7 @@ def test_a_hazard_on_the_way_cancels_the_call_and_the_ride_goes_on_when_it_is_ov
     assert story.state == "AGV, open at L3, A to L3"
 
 
-def test_a_hazard_that_only_flickers_is_none_and_one_that_flickers_off_stays() -> None:
+def test_a_hazard_that_flickers_on_is_ignored_and_one_that_flickers_off_stays() -> None:
     story = waiting()
     story.building.hazard(Hazard.FIRE)
     story._scan()
@@ -161,7 +161,7 @@ def test_a_hazard_clears_after_the_longer_of_its_two_times(
     assert story.faults == []
 
 
-def test_a_reset_while_nothing_can_be_seen_makes_no_fire() -> None:
+def test_a_reset_while_nothing_can_be_read_does_not_report_a_fire() -> None:
     story = waiting(fire_reset="manual", alarm="fire_alarm_trigger")
     story.building.unreadable = "no answer"
     story.run(5.0)
@@ -180,7 +180,7 @@ def test_fire_comes_before_every_other_mode() -> None:
     assert story.faults == [h.name for h in Hazard]
 
 
-def test_overload_keeps_the_door_and_only_delays() -> None:
+def test_an_overload_keeps_the_door_held_and_only_delays_the_ride() -> None:
     story = inside()
     story.building.hazard(Hazard.OVERLOAD)
     story.run(3.0)
@@ -265,7 +265,7 @@ def test_agv_mode_that_is_never_confirmed_is_waited_for_through_an_overload() ->
     assert story.outputs == LiftOutputs(agv_request=True)
 
 
-def test_with_automatic_reset_the_lift_is_rmfs_again_when_the_fire_is_over() -> None:
+def test_with_automatic_reset_rmf_gets_the_lift_back_when_the_fire_is_over() -> None:
     story = waiting(fire_reset="auto")
     story.building.hazard(Hazard.FIRE)
     story.run(5.0)
@@ -274,7 +274,9 @@ def test_with_automatic_reset_the_lift_is_rmfs_again_when_the_fire_is_over() -> 
     assert story.outputs == HELD
 
 
-def test_with_manual_reset_only_an_operator_gives_the_lift_back_and_only_after_the_fire() -> None:
+def test_with_manual_reset_only_an_operator_gives_the_lift_back_and_only_after_the_fire_is_over() -> (
+    None
+):
     story = waiting(fire_reset="manual")
     story.building.hazard(Hazard.FIRE)
     story.run(5.0)
@@ -317,7 +319,7 @@ def test_an_end_or_a_new_request_does_not_clear_a_fire_latch() -> None:
         ("emergency_signal", EmergencySignal((), True), EmergencySignal((), False)),
     ],
 )
-def test_the_fleets_hear_true_once_and_false_only_after_an_operators_reset(
+def test_the_fire_alarm_topic_hears_true_once_and_false_only_after_an_operators_reset(
     alarm: str, on: object, off: object
 ) -> None:
     story = waiting(alarm=alarm)
@@ -359,7 +361,7 @@ def test_a_node_that_saw_no_fire_never_says_that_it_is_over() -> None:
     assert story.alarms == []
 
 
-def test_without_a_word_in_the_settings_a_fire_is_not_told_to_the_fleets() -> None:
+def test_a_fire_is_not_told_to_the_fleets_unless_the_settings_say_so() -> None:
     story = waiting()
     story.building.hazard(Hazard.FIRE)
     story.run(5.0)

@@ -64,7 +64,7 @@ def test_no_call_and_no_door_command_while_the_agv_relay_has_to_rest() -> None:
     assert driven(Relays(), wishes, limits()) == ["A", "", "", "A L1"]
 
 
-def test_a_relay_switches_on_so_many_times_a_minute_and_no_more() -> None:
+def test_a_relay_switches_on_at_most_so_many_times_a_minute() -> None:
     on, off = LiftOutputs(agv_request=True), LiftOutputs()
     wishes = [(float(i), (on, off)[i % 2]) for i in range(12)]
     rules = limits(max_cycles_per_min=3)
@@ -72,13 +72,13 @@ def test_a_relay_switches_on_so_many_times_a_minute_and_no_more() -> None:
         "A", "", "A", "", "A", "", "", "", "", "", "", "", "", "A"]  # fmt: skip
 
 
-def test_off_never_waits() -> None:
+def test_switching_off_never_waits() -> None:
     rules = limits(min_off_s=60, dead_time_s=60, max_cycles_per_min=1)
     relays = Relays().step(call("L1"), 0.0, rules)
     assert relays.step(LiftOutputs(), 0.0, rules).outputs() == LiftOutputs()
 
 
-def test_relays_say_when_they_will_have_rested() -> None:
+def test_the_core_wakes_when_relays_have_rested() -> None:
     rules = limits(min_off_s=2.0, max_cycles_per_min=2)
     relays = Relays()
     for now, wish in ((0.0, call("L1")), (1.0, call("L2")), (3.0, call("L2")), (4.0, hold())):
@@ -96,12 +96,12 @@ def test_relays_say_when_they_will_have_rested() -> None:
     assert worn.changes_at(call("L1"), 6.0, rules) == 7.0
 
 
-def test_whoever_wants_a_call_and_a_door_command_at_once_gets_the_call() -> None:
+def test_a_call_goes_before_a_door_command_when_both_are_wanted() -> None:
     both = LiftOutputs(agv_request=True, call="L1", hold_door=Side.FRONT)
     assert driven(Relays(), [(0.0, both), (9.0, both)], limits()) == ["A L1", "A L1"]
 
 
-def test_a_lift_without_rests_still_changes_its_call_by_way_of_off() -> None:
+def test_without_rest_times_a_call_still_goes_off_before_the_next_one_is_on() -> None:
     story = Story(Building(replace(AT_L1, level="L4")), dead_time_s=0, min_off_s=0)
     story.run(1.0)
     story.asks("A", "L1")
@@ -131,7 +131,7 @@ def test_the_door_is_let_go_before_agv_mode_at_the_end_and_all_at_once_in_a_haza
         assert times == ([2.1, 2.1] if hazard else [3.5, 4.0])
 
 
-def test_a_burst_of_changing_requests_wears_no_relay() -> None:
+def test_a_burst_of_changing_requests_does_not_wear_the_relays() -> None:
     story = Story(Controller(), max_cycles_per_min=5)
     story.run(1.0)
     for i in range(600):
@@ -142,7 +142,7 @@ def test_a_burst_of_changing_requests_wears_no_relay() -> None:
 
 
 @pytest.mark.parametrize("inside", [False, True])
-def test_a_door_that_is_open_for_its_own_time_only_lets_nobody_in_or_out(inside: bool) -> None:
+def test_a_door_that_is_only_open_for_its_own_dwell_time_is_not_offered(inside: bool) -> None:
     closed = replace(AT_L1, door=Door.CLOSED)
     story = Story(Building(closed), max_cycles_per_min=2, request_timeout_s=99)
     story.run(1.0)
@@ -177,7 +177,7 @@ def test_a_reset_gives_no_second_pulse_where_nothing_was_wrong() -> None:
 
 
 @pytest.mark.parametrize("pulse_s", [0.3, 1.0])
-def test_a_pulse_has_its_whole_width(pulse_s: float) -> None:
+def test_a_pulse_lasts_its_whole_width(pulse_s: float) -> None:
     story = Story(Controller(), call_pulse_s=pulse_s)
     story.run(1.0)
     story.asks("A", "L4")

@@ -20,6 +20,7 @@ from bridges.lift.signals import (
     Requested,
     Side,
 )
+from bridges.rmf.definitions import LiftMode
 
 DEBOUNCE = {"floor": 0.08, "door": 0.03, "rear_door": 0.04, "agv_mode": 0.05, Hazard.FIRE: 0.06}
 AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
@@ -124,11 +125,11 @@ def test_a_fault_says_what_is_wrong(what: str) -> None:
 
 
 @pytest.mark.parametrize("event", [Ended("A"), IoFailed("timeout"), OperatorReset(), RivalSeen()])
-def test_what_is_no_request_is_not_refused(event: Any) -> None:
+def test_an_event_that_is_not_a_request_is_not_refused(event: Any) -> None:
     assert Told()(0.0, AT_L1, event).decision.refused == ""
 
 
-def test_at_the_very_end_of_its_age_a_reading_says_nothing_more() -> None:
+def test_a_reading_says_nothing_at_the_exact_end_of_its_age() -> None:
     burning = replace(AT_L1, door=Door.BOTH, hazards=frozenset({Hazard.EMERGENCY}))
     told = Told(stale_after_s=2.0)(0.0, burning)(2.0, IoFailed("timeout"))
     assert told.faults == (Fault("INPUTS_NOT_FRESH", "timeout"),)
@@ -163,7 +164,7 @@ def test_a_door_with_one_contact_wakes_the_core_when_it_has_come_to_its_other_en
     assert told.decision.wake_at == 4.0
 
 
-def test_rmfs_silence_and_the_next_try_wake_the_core() -> None:
+def test_the_core_wakes_for_rmfs_silence_and_for_the_next_try() -> None:
     told = Told(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED)
     assert told.decision.wake_at == 31.0
     told = Told(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
@@ -189,20 +190,20 @@ def test_a_pulsed_call_that_a_hazard_cut_short_is_given_again_when_it_is_over() 
     assert told.decision.outputs.call == "L3"
 
 
-def test_nothing_is_refused_that_is_only_taken_note_of() -> None:
+def test_an_event_that_is_only_noted_is_not_refused() -> None:
     told = Told(release_grace_s=2.0)(0.0, AT_L1)(0.1, WriteFailed("timeout"))
     assert told.decision.refused == ""
     told(0.2, AT_L1, ASKED)(1.0, AT_L1, Ended("A"))(1.5, ASKED)
     assert (told.decision.refused, told.decision.report.session) == ("", "A")
 
 
-def test_a_short_grace_is_one_too() -> None:
+def test_even_a_short_grace_is_kept() -> None:
     told = Told(release_grace_s=0.5)(0.0, AT_L1)(0.1, ASKED)(1.0, AT_L1, Ended("A"))
     assert told.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
     assert told(1.5, AT_L1).decision.outputs == LiftOutputs()
 
 
-def test_in_the_instant_in_which_the_grace_ends_the_lift_is_anybodys() -> None:
+def test_anybody_may_have_the_lift_in_the_instant_in_which_the_grace_ends() -> None:
     told = Told(release_grace_s=2.0)(0.0, AT_L1)(0.1, ASKED)(1.0, Ended("A"))
     told(2.9, AT_L1)
     told(3.0, Requested("B", True, "L1"))
@@ -210,7 +211,7 @@ def test_in_the_instant_in_which_the_grace_ends_the_lift_is_anybodys() -> None:
     assert told.decision.report.session == "B"
 
 
-def test_a_reset_believes_the_floor_that_is_shown_at_once() -> None:
+def test_after_a_reset_the_shown_floor_is_believed_at_once() -> None:
     told = Told()(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))
     assert (told.decision.report.floor, told(0.1, OperatorReset()).decision.report.floor) == (
         "",
@@ -218,34 +219,34 @@ def test_a_reset_believes_the_floor_that_is_shown_at_once() -> None:
     )
 
 
-def test_a_door_that_is_not_shown_open_is_no_estimate() -> None:
+def test_a_door_that_is_not_shown_open_is_not_marked_as_estimated() -> None:
     sample = replace(AT_L1, door=Door.NOT_CLOSED, motion=Motion.UP)
     told = Told(door_travel_s=1.0, stale_after_s=60.0)(0.0, sample)(2.0, sample)
     shown = told.decision.report
     assert (shown.door.name, shown.estimated) == ("DOOR_MOVING", False)
 
 
-def test_a_floor_may_come_its_own_debounce_after_the_cars_last_movement() -> None:
+def test_a_floor_may_change_up_to_its_debounce_after_the_cars_last_movement() -> None:
     moving = replace(AT_L1, motion=Motion.UP)
     told = Told({"floor": 0.5}, stale_after_s=60.0)(0.0, moving)(1.0, moving)
     told(1.1, AT_L1)(2.9, replace(AT_L1, level="L2"))(3.45, replace(AT_L1, level="L2"))
     assert (told.decision.report.floor, told.faults) == ("L2", ())
 
 
-def test_in_the_last_instant_of_a_movements_memory_the_next_floor_is_believed() -> None:
+def test_the_next_floor_is_believed_in_the_last_instant_in_which_a_movement_is_remembered() -> None:
     told = Told(stale_after_s=60.0)(0.0, AT_L1)(1.0, replace(AT_L1, motion=Motion.UP))
     told(1.0 + MOTION_MEMORY_S, replace(AT_L1, level="L2"))
     assert (told.decision.report.floor, told.faults) == ("L2", ())
 
 
-def test_a_car_may_pass_a_floor_unseen_in_exactly_its_least_time() -> None:
+def test_a_car_may_pass_a_floor_unseen_in_exactly_its_least_travel_time() -> None:
     moving = replace(AT_L1, motion=Motion.UP)
     told = Told(stale_after_s=60.0, floor_travel_min_s=2.0)(0.0, moving)
     told(2.0, replace(moving, level="L3"))
     assert (told.decision.report.floor, told.faults) == ("L3", ())
 
 
-def test_a_request_that_finds_unwritten_outputs_is_judged_by_their_age() -> None:
+def test_unwritten_outputs_are_judged_by_their_age_when_a_request_comes() -> None:
     told = Told(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
     assert told(1.0, ASKED).decision.refused == ""
     told = Told(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
@@ -262,7 +263,7 @@ def test_the_core_wakes_when_its_first_reading_has_settled() -> None:
     assert Told(DEBOUNCE)(1.0, AT_L1).decision.wake_at == 1.03
 
 
-def test_a_floor_that_was_no_position_once_is_one_when_the_car_really_goes_there() -> None:
+def test_a_floor_that_was_not_believed_is_believed_when_the_car_really_goes_there() -> None:
     told = Told(stale_after_s=60.0)(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))(0.2, AT_L1)
     moving = replace(AT_L1, motion=Motion.UP)
     for now, level in ((1.0, None), (2.0, "L2"), (3.0, None), (4.0, "L3")):
@@ -270,6 +271,9 @@ def test_a_floor_that_was_no_position_once_is_one_when_the_car_really_goes_there
     assert (told.decision.report.floor, told.faults) == ("L3", ())
 
 
-def test_a_reading_in_the_instant_in_which_the_last_one_is_too_old_starts_afresh() -> None:
+def test_a_reading_in_the_instant_in_which_the_last_one_expires_starts_afresh() -> None:
     told = Told(DEBOUNCE)(0.0, AT_L1)(0.5, AT_L1)(1.5, AT_L1)
-    assert [fault.code for fault in told.faults] == ["INPUTS_NOT_FRESH"]
+    shown = told.decision.report
+    assert (shown.mode, shown.floor, told.faults) == (LiftMode.MODE_OFFLINE, "", ())
+    told(1.6, AT_L1)
+    assert told.decision.report.floor == "L1"

@@ -16,7 +16,7 @@ def times(story: Story) -> list[float]:
     return [round(at, 2) for at, _ in story.told]
 
 
-def test_states_come_each_second_and_never_because_of_a_request() -> None:
+def test_states_come_each_second_and_are_never_caused_by_a_request() -> None:
     quiet, asked = Story(Building(OPEN_AT_L1)), Story(Building(OPEN_AT_L1))
     for story in (quiet, asked):
         story.run(1.0)
@@ -30,7 +30,7 @@ def test_states_come_each_second_and_never_because_of_a_request() -> None:
     assert times(quiet) == [0.0, 0.1, 1.0, *range(2, 16)]
 
 
-def test_a_change_is_told_at_once_and_many_changes_ten_times_a_second() -> None:
+def test_a_change_is_published_at_once_and_many_changes_ten_times_a_second() -> None:
     story = Story(Building(OPEN_AT_L1), scan_s=0.01, debounce={})
     story.run(1.55)
     story.building.set(level="L2", motion=Motion.UP)
@@ -44,7 +44,7 @@ def test_a_change_is_told_at_once_and_many_changes_ten_times_a_second() -> None:
     assert min(gaps) >= 0.1
 
 
-def test_a_change_that_is_over_before_it_could_be_told_is_not_told() -> None:
+def test_a_change_that_is_over_before_its_state_is_due_is_not_published() -> None:
     story = Story(Building(OPEN_AT_L1), scan_s=0.01, debounce={})
     story.run(1.55)
     for door in (Door.CLOSED, Door.OPEN, Door.CLOSED):
@@ -55,7 +55,7 @@ def test_a_change_that_is_over_before_it_could_be_told_is_not_told() -> None:
     assert [state for at, state in story.states if at > 1.5] == ["AGV, closed at L1"]
 
 
-def test_a_stamp_is_when_the_inputs_were_read_and_not_when_the_state_was_told() -> None:
+def test_a_states_stamp_is_when_its_inputs_were_read_and_not_when_it_was_published() -> None:
     story = Story(Building(OPEN_AT_L1))
     story.run(2.0)
     story.building.unreadable = "timeout"
@@ -64,7 +64,7 @@ def test_a_stamp_is_when_the_inputs_were_read_and_not_when_the_state_was_told() 
     assert ages == [0.0, 0.0, 0.0, 0.1, 1.0, 2.0, 3.0, 4.0]
 
 
-def test_never_read_is_stamp_zero_offline_and_nothing_written() -> None:
+def test_a_lift_that_was_never_read_is_offline_with_stamp_zero_and_nothing_is_written() -> None:
     building = Building(OPEN_AT_L1)
     building.unreadable = "no such chip"
     story = Story(building)
@@ -85,13 +85,13 @@ def test_never_read_is_stamp_zero_offline_and_nothing_written() -> None:
     assert story.faults == ["INPUTS_NOT_FRESH"]
 
 
-def test_nothing_is_said_of_an_open_door_before_the_inputs_have_been_read() -> None:
+def test_no_open_door_is_shown_before_the_inputs_have_been_read() -> None:
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     assert story.states == [(0.0, "OFFLINE, moving at ?"), (0.1, "AGV, open at L1")]
 
 
-def test_a_device_that_goes_and_comes_is_two_lines_in_the_log(
+def test_the_log_has_one_line_when_a_device_is_lost_and_one_when_it_is_back(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     story = Story(Building(OPEN_AT_L1))
@@ -122,7 +122,7 @@ def test_a_new_daemon_finds_the_lift_in_agv_mode_and_waits_to_be_asked() -> None
     assert story.edges[-2:] == [(5.0, "hold_door", None), (5.0, "agv_request", False)]
 
 
-def test_outputs_are_made_safe_and_it_is_said_when_that_fails() -> None:
+def test_outputs_are_made_safe_and_a_failure_of_that_is_logged() -> None:
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     story.asks("A", "L1")

@@ -12,13 +12,14 @@ from bridges.lift import KIND, core
 from bridges.lift.signals import Door, Hazard, LiftSample, Motion
 from bridges.rmf.definitions import LiftDoor, LiftRequest, LiftState
 from hal_fakes.rmf.robot import Robot
+from tests.depth import examples
 from tests.lift.invariants import check
 from tests.lift.rmf_world import World as Rmf
 from tests.lift.story import AGV, END, HUMAN, Building, Controller, Story
 from tests.lift.walk import Step, World
 
-FEW = settings(derandomize=True, deadline=None, max_examples=60)
-STORMS = settings(derandomize=True, deadline=None, max_examples=40)
+FEW = settings(derandomize=True, deadline=None, max_examples=examples(60))
+STORMS = settings(derandomize=True, deadline=None, max_examples=examples(40))
 
 
 @dataclass

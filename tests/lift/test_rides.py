@@ -29,7 +29,7 @@ def at(level: str | None, door: Door = Door.CLOSED, *, agv: bool = True) -> Lift
     return LiftSample(level, door, motion=Motion.STOPPED, agv=agv)
 
 
-def test_a_robot_rides_up_and_down_and_the_lift_is_nobodys_again() -> None:
+def test_a_robot_rides_up_and_down_and_releases_the_lift() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L3")
@@ -85,7 +85,7 @@ def test_a_robot_rides_up_and_down_and_the_lift_is_nobodys_again() -> None:
     assert story.faults == []
 
 
-def test_the_state_is_everything_that_rmf_asks_of_a_lift() -> None:
+def test_a_lift_state_fills_every_field_that_rmf_asks_for() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("fleet/A", "L3")
@@ -116,7 +116,7 @@ def test_a_call_waits_until_the_status_input_confirms_agv_mode() -> None:
     assert story.edges == [(1.0, "agv_request", True), (5.1, "call", "L2")]
 
 
-def test_an_end_is_honoured_whatever_its_fields_say_and_commands_no_car() -> None:
+def test_an_end_is_obeyed_whatever_its_other_fields_say_and_calls_no_car() -> None:
     for floor, door in (("", 0), ("L2", 2), ("attic", 7)):
         story = Story(Controller(), release_grace_s=0)
         story.run(1.0)
@@ -226,7 +226,7 @@ def test_floors_have_any_names_and_are_never_read_by_their_last_character() -> N
     assert calls == ["L10", "B1", "8F_r", "G"]
 
 
-def test_two_requests_for_two_floors_in_one_scan_end_in_the_second() -> None:
+def test_of_two_requests_for_two_floors_in_one_scan_the_second_counts() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.request(
@@ -242,7 +242,7 @@ def test_two_requests_for_two_floors_in_one_scan_end_in_the_second() -> None:
     ]
 
 
-def test_another_destination_on_the_way_rests_the_relays_between_the_two_calls() -> None:
+def test_relays_rest_between_two_calls_when_the_destination_changes_on_the_way() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L4")
@@ -303,7 +303,7 @@ def test_a_car_that_has_drifted_from_its_destination_is_called_anew(pulse_s: flo
     assert story.outputs == LiftOutputs(agv_request=True, call="L1")
 
 
-def test_without_an_agv_status_line_the_request_is_all_there_is_to_know() -> None:
+def test_without_an_agv_status_line_agv_mode_counts_as_soon_as_it_is_requested() -> None:
     story = Story(Building(replace(at("L1", Door.OPEN), agv=None)))
     story.run(1.0)
     assert story.state == "HUMAN, open at L1"
@@ -313,7 +313,7 @@ def test_without_an_agv_status_line_the_request_is_all_there_is_to_know() -> Non
     assert story.state == "AGV, open at L1, A to L1"
 
 
-def test_without_motion_lines_a_car_with_an_open_door_at_a_floor_stands() -> None:
+def test_without_motion_lines_a_car_with_an_open_door_at_a_floor_counts_as_standing() -> None:
     building = Building(replace(at("L1", Door.OPEN), motion=None))
     story = Story(building)
     story.run(1.0)
@@ -329,7 +329,7 @@ def test_without_motion_lines_a_car_with_an_open_door_at_a_floor_stands() -> Non
 TWO_DOORS = {"L1": Floor(), "L2": Floor(), "L2_rear": Floor(level="L2", side=Side.REAR)}
 
 
-def test_each_of_a_landings_two_floor_names_holds_and_shows_its_own_door() -> None:
+def test_each_of_the_two_floor_names_of_a_landing_holds_and_shows_its_own_door() -> None:
     building = Building(replace(at("L2", agv=False), rear_door=Door.CLOSED))
     story = Story(building, floors=TWO_DOORS)
     story.run(1.0)
@@ -354,7 +354,7 @@ def test_each_of_a_landings_two_floor_names_holds_and_shows_its_own_door() -> No
     ]
 
 
-def test_a_door_that_is_not_wired_is_never_open() -> None:
+def test_a_door_without_wires_is_never_shown_open() -> None:
     story = Story(Building(at("L2", Door.OPEN)), floors=TWO_DOORS)
     story.run(1.0)
     story.asks("A", "L2_rear")
@@ -362,7 +362,7 @@ def test_a_door_that_is_not_wired_is_never_open() -> None:
     assert story.state == "AGV, moving at L2_rear, A to L2_rear"
 
 
-def test_without_a_session_either_door_is_the_door() -> None:
+def test_without_a_session_either_open_door_is_shown() -> None:
     building = Building(replace(at("L2"), rear_door=Door.OPEN))
     story = Story(building, floors=TWO_DOORS)
     story.run(1.0)

@@ -175,5 +175,6 @@ def test_defect_l_the_log_had_a_line_each_second(caplog: pytest.LogCaptureFixtur
             story.run(story.now + 1.0)
     lines = [r.getMessage() for r in caplog.records]
     assert lines == [
-        'refused device=Lift1 kind="held by A" detail="session_id B, agv yes, destination L1"'
+        'refused device=Lift1 kind="held by another session"'
+        ' detail="A; session_id B, agv yes, destination L1"'
     ]

@@ -23,7 +23,7 @@ def boarding(**inputs: object) -> Story:
     return story
 
 
-def test_an_open_door_is_offered_when_everything_says_so() -> None:
+def test_an_open_door_is_offered_when_every_input_confirms_it() -> None:
     assert boarding().state == "AGV, open at L1, A to L1"
 
 
@@ -51,7 +51,7 @@ def test_an_open_door_is_offered_when_everything_says_so() -> None:
         ({"agv": False}, "HUMAN, moving at L1", []),
     ],
 )
-def test_one_input_that_does_not_say_so_and_no_open_door_is_offered(
+def test_an_open_door_is_not_offered_when_one_input_contradicts_it(
     inputs: dict[str, object], state: str, faults: list[str]
 ) -> None:
     story = boarding(**inputs)
@@ -69,7 +69,7 @@ def test_one_input_that_does_not_say_so_and_no_open_door_is_offered(
         (Motion.CONTRADICTORY, LiftMotion.MOTION_UNKNOWN),
     ],
 )
-def test_motion_is_what_the_lines_say(motion: Motion, told: LiftMotion) -> None:
+def test_motion_is_read_from_the_motion_lines(motion: Motion, told: LiftMotion) -> None:
     assert boarding(motion=motion).motions[-1] is told
 
 
@@ -89,7 +89,7 @@ def test_a_door_contact_that_glitches_on_the_way_never_reads_as_open() -> None:
     assert [edge for edge in story.edges if edge[1] == "hold_door"] == []
 
 
-def test_a_short_glitch_at_the_very_floor_of_the_destination_is_no_open_door_either() -> None:
+def test_a_short_door_contact_glitch_at_the_destination_does_not_read_as_an_open_door() -> None:
     story = boarding(door=Door.CLOSED)
     story.run(2.01)
     story.building.set(door=Door.OPEN)
@@ -100,14 +100,14 @@ def test_a_short_glitch_at_the_very_floor_of_the_destination_is_no_open_door_eit
     assert [state for _, state in story.states if "open" in state] == []
 
 
-def test_an_open_contact_while_moving_is_a_moving_door_and_no_command_to_open() -> None:
+def test_an_open_contact_while_the_car_moves_reads_as_a_moving_door() -> None:
     story = boarding(motion=Motion.UP)
     story.run(5.0)
     assert story.state == "AGV, moving at L1, A to L1"
     assert story.edges == [(1.0, "agv_request", True), (1.0, "call", "L1")]
 
 
-def test_a_floor_that_is_only_passed_is_no_arrival() -> None:
+def test_passing_a_floor_is_not_an_arrival() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L3")
@@ -118,7 +118,7 @@ def test_a_floor_that_is_only_passed_is_no_arrival() -> None:
     assert [state for _, state in story.states if "open" in state] == []
 
 
-def test_a_code_that_jumps_over_a_floor_is_no_position_until_it_comes_back() -> None:
+def test_a_floor_code_that_jumps_over_a_floor_is_not_believed_until_it_comes_back() -> None:
     story = boarding()
     story.building.set(level="L3")
     story.run(5.0)
@@ -133,7 +133,7 @@ def test_a_code_that_jumps_over_a_floor_is_no_position_until_it_comes_back() -> 
     assert story.faults == []
 
 
-def test_a_code_that_changes_while_the_car_stands_is_no_position() -> None:
+def test_a_floor_code_that_changes_while_the_car_stands_is_not_believed() -> None:
     story = boarding()
     story.run(5.0)
     story.building.set(level="L2")
@@ -142,7 +142,7 @@ def test_a_code_that_changes_while_the_car_stands_is_no_position() -> None:
     assert story.faults == ["POSITION_LOST"]
 
 
-def test_a_code_that_cannot_be_is_not_washed_clean_by_a_while_between_floors() -> None:
+def test_an_impossible_floor_code_stays_doubted_after_time_between_floors() -> None:
     story = boarding()
     story.building.set(level="L3")
     story.run(3.0)
@@ -153,7 +153,7 @@ def test_a_code_that_cannot_be_is_not_washed_clean_by_a_while_between_floors() -
     assert story.faults == ["POSITION_LOST"]
 
 
-def test_a_floor_once_doubted_is_believed_when_the_car_really_goes_there() -> None:
+def test_a_doubted_floor_is_believed_once_the_car_really_goes_there() -> None:
     story = boarding()
     story.building.set(level="L3")
     story.run(3.0)
@@ -166,7 +166,7 @@ def test_a_floor_once_doubted_is_believed_when_the_car_really_goes_there() -> No
     assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
 
 
-def test_a_code_that_changes_long_after_the_car_has_stopped_is_no_position() -> None:
+def test_a_floor_code_that_changes_long_after_the_car_stopped_is_not_believed() -> None:
     story = boarding()
     story.building.set(motion=Motion.UP)
     story.run(3.0)
@@ -177,7 +177,7 @@ def test_a_code_that_changes_long_after_the_car_has_stopped_is_no_position() -> 
     assert story.faults == ["POSITION_LOST"]
 
 
-def test_a_slowly_debounced_code_still_belongs_to_the_movement_before_it() -> None:
+def test_a_slowly_debounced_floor_code_still_belongs_to_the_last_movement() -> None:
     building = Building(OPEN_AT_L1)
     story = Story(building, debounce={"floor": 3.0})
     story.run(5.0)
@@ -188,7 +188,7 @@ def test_a_slowly_debounced_code_still_belongs_to_the_movement_before_it() -> No
     assert (story.faults, story.state) == ([], "AGV, open at L2")
 
 
-def test_an_operator_who_resets_says_that_the_code_is_right() -> None:
+def test_an_operators_reset_confirms_the_floor_code() -> None:
     story = boarding()
     story.building.set(level="L3")
     story.run(5.0)
@@ -207,7 +207,7 @@ def test_a_reset_moves_nothing_where_nothing_is_wrong() -> None:
     assert (story.edges, story.states) == (edges, states)
 
 
-def test_without_motion_lines_the_next_floor_is_believed_and_a_jump_is_not() -> None:
+def test_without_motion_lines_the_next_floor_is_believed_but_a_jump_is_not() -> None:
     story = boarding(motion=None)
     story.building.set(level="L2")
     story.run(3.0)
@@ -253,7 +253,7 @@ def test_the_lines_of_a_lift_that_only_speak_in_agv_mode_are_believed_when_they_
     ]
 
 
-def test_a_movement_counts_at_first_sight_where_the_motion_lines_meant_nothing_before() -> None:
+def test_a_movement_counts_at_once_when_the_motion_lines_had_no_meaning_before() -> None:
     building = Building(LiftSample("L1", Door.OPEN, motion=None, agv=True))
     story = Story(building, debounce={"motion": 5.0})
     story.run(7.0)
@@ -273,7 +273,7 @@ def test_one_missed_reading_changes_nothing() -> None:
         assert (story.edges, story.states) == (edges, states)
 
 
-def test_without_readings_the_lift_is_offline_dark_and_still_heard_of() -> None:
+def test_without_readings_the_lift_is_offline_with_outputs_off_and_still_publishes_states() -> None:
     story = boarding()
     story.building.unreadable = "no answer from 10.0.0.7"
     story.run(12.0)
@@ -287,7 +287,7 @@ def test_without_readings_the_lift_is_offline_dark_and_still_heard_of() -> None:
     ]
 
 
-def test_readings_that_come_back_bring_the_lift_back_without_anybody() -> None:
+def test_the_lift_comes_back_by_itself_when_its_readings_come_back() -> None:
     story = boarding()
     story.building.unreadable = "no answer"
     story.run(12.0)
@@ -298,7 +298,7 @@ def test_readings_that_come_back_bring_the_lift_back_without_anybody() -> None:
     assert story.faults == []
 
 
-def test_what_was_believed_before_the_readings_stopped_is_not_believed_after() -> None:
+def test_what_was_believed_before_the_readings_stopped_is_not_believed_afterwards() -> None:
     story = boarding()
     story.building.unreadable = "no answer"
     story.run(12.0)
@@ -312,7 +312,7 @@ def test_what_was_believed_before_the_readings_stopped_is_not_believed_after() -
     assert story.faults == []
 
 
-def test_a_code_that_cannot_be_right_does_not_become_right_by_a_loss_of_readings() -> None:
+def test_an_impossible_floor_code_is_still_doubted_after_a_loss_of_readings() -> None:
     story = boarding()
     story.building.set(level="L3")
     story.run(3.0)
@@ -324,7 +324,7 @@ def test_a_code_that_cannot_be_right_does_not_become_right_by_a_loss_of_readings
     assert story.faults == ["POSITION_LOST"]
 
 
-def test_a_car_that_nobody_looked_at_for_a_while_may_have_moved() -> None:
+def test_a_car_that_was_not_read_for_a_while_may_have_moved() -> None:
     story = boarding()
     story.run(9.0)
     story.building.set(level="L3")
@@ -344,7 +344,7 @@ def test_a_floor_that_was_reached_in_a_short_gap_is_believed() -> None:
     assert (story.faults, story.state) == ([], "AGV, open at L2, A to L1")
 
 
-def test_half_a_glitch_before_a_gap_and_half_after_it_are_no_change() -> None:
+def test_a_glitch_that_a_gap_cuts_in_half_changes_nothing() -> None:
     story = boarding(door=Door.CLOSED)
     story.building.set(door=Door.OPEN)
     story._scan()
@@ -357,7 +357,7 @@ def test_half_a_glitch_before_a_gap_and_half_after_it_are_no_change() -> None:
     assert [state for _, state in story.states if "open" in state] == []
 
 
-def test_an_input_that_never_keeps_still_is_not_believed() -> None:
+def test_an_input_that_never_settles_is_not_believed() -> None:
     story = boarding()
     story.building.unreadable = "timeout"
     story.run(2.05)
@@ -400,7 +400,7 @@ def test_without_any_debounce_the_first_reading_counts() -> None:
     assert story.edges == [(0.0, "agv_request", True), (0.0, "hold_door", "front")]
 
 
-def test_one_contact_that_proves_open_proves_nothing_else() -> None:
+def test_a_contact_for_open_proves_nothing_about_closed() -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_OPEN)), door_travel_s=4.0)
     story.run(3.0)
     assert story.state == "AGV, moving at L1"
@@ -420,7 +420,7 @@ def test_one_contact_that_proves_open_proves_nothing_else() -> None:
     assert [round(at, 1) for at, _ in story.states[-3:]] == [5.1, 6.1, 10.1]
 
 
-def test_one_contact_that_proves_closed_lets_an_open_door_be_estimated_and_marked() -> None:
+def test_with_only_a_closed_contact_an_open_door_is_estimated_and_marked() -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=Door.CLOSED)), door_travel_s=4.0)
     story.run(1.0)
     story.asks("A", "L1")
@@ -442,9 +442,7 @@ def test_one_contact_that_proves_closed_lets_an_open_door_be_estimated_and_marke
         (Door.CLOSED, Door.NOT_CLOSED, "open (estimated)"),
     ],
 )
-def test_of_two_doors_only_what_rests_on_an_estimate_is_marked(
-    front: Door, rear: Door, shown: str
-) -> None:
+def test_of_two_doors_only_the_estimated_one_is_marked(front: Door, rear: Door, shown: str) -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=front, rear_door=rear)))
     story.run(9.0)
     assert story.node.status()["door"] == shown
@@ -457,7 +455,7 @@ def test_an_estimated_door_that_is_not_offered_is_a_moving_one() -> None:
     assert story.node.status()["door"] == "moving"
 
 
-def test_an_estimated_door_that_stirs_is_not_there() -> None:
+def test_an_estimated_door_that_starts_to_move_is_no_longer_at_its_end() -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_CLOSED)), door_travel_s=4.0)
     story.run(6.0)
     assert story.state == "AGV, open at L1"
@@ -466,7 +464,7 @@ def test_an_estimated_door_that_stirs_is_not_there() -> None:
     assert story.node.status()["door"] == "moving"
 
 
-def test_the_core_says_when_an_input_that_was_seen_for_the_first_time_will_count() -> None:
+def test_the_core_wakes_when_an_input_seen_for_the_first_time_has_settled() -> None:
     rules = Story(Building(OPEN_AT_L1)).limits
     before = decide(Memory(), Requested("A", True, "L1"), 0.0, rules)
     assert [fault.detail for fault in before.report.faults] == ["not read yet"]
@@ -474,14 +472,14 @@ def test_the_core_says_when_an_input_that_was_seen_for_the_first_time_will_count
     assert first.wake_at == 10.0 + rules.debounce_s("door")
 
 
-def test_the_core_says_when_either_door_is_estimated_to_be_there() -> None:
+def test_the_core_wakes_when_either_door_is_estimated_to_have_arrived() -> None:
     rules = Story(Building(OPEN_AT_L1), debounce={}, door_travel_s=0.7).limits
     for front, rear in ((Door.NOT_OPEN, Door.OPEN), (Door.OPEN, Door.NOT_CLOSED)):
         sample = LiftSample("L1", front, rear_door=rear)
         assert decide(Memory(), Sampled(sample), 10.0, rules).wake_at == 10.7
 
 
-def test_a_fault_is_news_and_its_words_are_not() -> None:
+def test_a_new_fault_is_news_but_a_change_of_its_words_is_not() -> None:
     rules = Story(Building(OPEN_AT_L1), debounce={}).limits
     first = decide(Memory(), Sampled(OPEN_AT_L1), 0.0, rules).report
     lost = [replace(first, faults=(Fault("INPUTS_NOT_FRESH", f"timeout {i}"),)) for i in (1, 2)]
@@ -514,7 +512,7 @@ def test_a_floor_code_is_believed_after_people_used_the_lift_while_it_meant_noth
     assert story.faults == []
 
 
-def test_between_valid_floor_codes_a_jump_is_no_position() -> None:
+def test_a_jump_between_valid_floor_codes_is_not_believed() -> None:
     lift = FloorsInAgvMode()
     story = Story(lift)
     story.run(1.0)
@@ -525,7 +523,7 @@ def test_between_valid_floor_codes_a_jump_is_no_position() -> None:
     assert (story.state, story.faults) == ("AGV, closed at ?, A to L1", ["POSITION_LOST"])
 
 
-def test_a_flicker_of_the_agv_line_makes_no_jump_a_position() -> None:
+def test_a_flicker_of_the_agv_line_does_not_make_a_jump_believable() -> None:
     lift = FloorsInAgvMode()
     story = Story(lift)
     story.run(1.0)

@@ -21,7 +21,7 @@ def boarded() -> Story:
     return story
 
 
-def test_others_change_nothing_while_a_session_is_held() -> None:
+def test_requests_of_others_change_nothing_while_a_session_is_held() -> None:
     alone, beset = boarded(), boarded()
     for story in (alone, beset):
         for second in range(5, 15):
@@ -34,15 +34,15 @@ def test_others_change_nothing_while_a_session_is_held() -> None:
             story.run(float(second))
     assert beset.edges == alone.edges
     assert beset.states == alone.states
-    assert beset.node.refused == {"held by A": 30, "empty session_id": 10}
+    assert beset.node.refused == {"held by another session": 30, "empty session_id": 10}
 
 
-def test_messages_are_sorted_by_lift_name_before_anything_sees_them() -> None:
+def test_a_message_names_the_lift_that_it_is_for() -> None:
     assert KIND.device_name(LiftRequest(lift_name="Lift2", session_id="A")) == "Lift2"
     assert KIND.device_name(LiftState(lift_name="Lift3")) == "Lift3"
 
 
-def test_end_frees_the_lift_at_once_and_lets_go_in_order_after_the_grace() -> None:
+def test_an_end_frees_the_lift_at_once_and_releases_outputs_in_order_after_the_grace() -> None:
     story = boarded()
     story.ends("A")
     story.run(10.0)
@@ -67,12 +67,12 @@ def test_the_same_session_back_within_the_grace_finds_everything_as_it_was() -> 
     assert story.state == "AGV, open at L1, A to L1"
 
 
-def test_within_the_grace_nobody_else_is_granted_and_afterwards_anybody() -> None:
+def test_nobody_else_is_granted_a_session_within_the_grace_and_anybody_afterwards() -> None:
     story = boarded()
     story.ends("A")
     story.run(6.9)
     story.asks("B", "L2")
-    assert story.node.refused == {"released by A a moment ago": 1}
+    assert story.node.refused == {"released a moment ago": 1}
     assert story.state == "AGV, open at L1"
     story.run(7.0)
     story.asks("B", "L2")
@@ -104,7 +104,7 @@ def test_a_second_end_does_not_prolong_the_grace() -> None:
     assert story.edges[-1] == (7.0, "agv_request", False)
 
 
-def test_the_grace_energises_nothing_that_was_off() -> None:
+def test_nothing_that_was_off_is_energised_during_the_grace() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L1")
@@ -141,7 +141,7 @@ def test_a_pulse_cut_short_by_an_end_is_given_again_to_the_session_that_comes_ba
                      (5.0, "call", None)]  # fmt: skip
 
 
-def test_in_the_grace_a_hazard_switches_off_and_a_robot_inside_still_gets_its_session_back() -> (
+def test_a_hazard_in_the_grace_switches_outputs_off_but_a_robot_inside_gets_its_session_back() -> (
     None
 ):
     story = boarded()
@@ -158,7 +158,7 @@ def test_in_the_grace_a_hazard_switches_off_and_a_robot_inside_still_gets_its_se
     assert story.outputs == LiftOutputs()
 
 
-def test_after_a_hazard_has_ended_the_grace_nothing_is_held_again() -> None:
+def test_nothing_is_held_again_after_a_hazard_has_ended_the_grace() -> None:
     story = boarded()
     story.ends("A")
     story.building.hazard(Hazard.CODE_BLUE)
@@ -176,7 +176,7 @@ def test_agv_mode_lost_in_the_grace_lets_the_door_go() -> None:
     assert story.edges[2:] == [(4.1, "hold_door", None), (7.0, "agv_request", False)]
 
 
-def test_a_car_that_stirs_in_the_grace_is_not_held_open() -> None:
+def test_the_door_of_a_car_that_moves_in_the_grace_is_not_held() -> None:
     story = boarded()
     story.ends("A")
     story.building.set(motion=Motion.UP)
@@ -184,7 +184,7 @@ def test_a_car_that_stirs_in_the_grace_is_not_held_open() -> None:
     assert story.edges[2:] == [(4.1, "hold_door", None)]
 
 
-def test_agv_mode_that_ends_before_the_relay_has_rested_was_the_session_before() -> None:
+def test_agv_mode_that_ends_before_the_relay_has_rested_belongs_to_the_last_session() -> None:
     story = Story(Building(OPEN_AT_L1), release_grace_s=0)
     story.run(1.0)
     story.asks("A", "L1")

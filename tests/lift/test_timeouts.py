@@ -41,7 +41,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("fault", "inputs", "limit", "default_s", "output"), CASES)
-def test_what_does_not_come_in_time_is_a_fault_with_outputs_off(
+def test_a_step_that_times_out_is_a_fault_with_outputs_off(
     fault: str, inputs: tuple[str, Door, bool], limit: str, default_s: float, output: str
 ) -> None:
     story = lift(inputs[0], inputs[1], agv=inputs[2])
@@ -55,7 +55,7 @@ def test_what_does_not_come_in_time_is_a_fault_with_outputs_off(
 
 
 @pytest.mark.parametrize(("fault", "inputs", "limit", "default_s", "output"), CASES)
-def test_it_is_tried_three_times_more_and_then_latched_against_every_repeat(
+def test_a_failed_step_is_tried_three_times_more_and_then_latched(
     fault: str, inputs: tuple[str, Door, bool], limit: str, default_s: float, output: str
 ) -> None:
     story = lift(inputs[0], inputs[1], agv=inputs[2], **{limit: 4.0})
@@ -112,14 +112,14 @@ def test_a_latched_fault_ends_with_an_operators_reset() -> None:
     assert tries(story, "hold_door")[-2:] == [200.0, 214.0]
 
 
-def test_in_a_fault_no_open_door_is_offered_though_there_is_one() -> None:
+def test_in_a_fault_an_open_door_is_not_offered() -> None:
     story = latched()
     story.building.set(door=Door.OPEN)
     keep_asking(story, 210.0)
     assert story.state == "AGV, moving at L1, A to L1"
 
 
-def test_what_comes_after_all_in_a_later_try_ends_the_fault_and_starts_the_count_anew() -> None:
+def test_a_later_try_that_succeeds_ends_the_fault_and_resets_the_count() -> None:
     story = lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0)
     keep_asking(story, 16.0)
     assert story.faults == ["DOOR_OPENING_FAULT"]
@@ -132,7 +132,7 @@ def test_what_comes_after_all_in_a_later_try_ends_the_fault_and_starts_the_count
     assert [round(b - a, 1) for a, b in pairwise(starts[2:])] == [34.0, 64.0]
 
 
-def test_agv_mode_lost_on_the_way_switches_off_and_is_tried_again() -> None:
+def test_agv_mode_lost_on_the_way_switches_outputs_off_and_is_requested_again() -> None:
     story = Story(Building(LiftSample("L2", Door.CLOSED, motion=Motion.STOPPED, agv=True)))
     story.run(1.0)
     story.asks("A", "L1")
@@ -162,7 +162,7 @@ def test_agv_mode_lost_with_the_robot_at_the_open_door_shows_the_true_door() -> 
     assert story.state == "HUMAN, open at L1, A to L1"
 
 
-def test_a_car_that_people_take_first_is_called_until_it_comes() -> None:
+def test_the_call_stays_on_while_people_take_the_car_first() -> None:
     """Without an AGV status line nothing keeps people from stealing the car."""
     building = Building(LiftSample("L2", Door.CLOSED, motion=Motion.STOPPED, agv=None))
     story = Story(building)
@@ -214,7 +214,7 @@ def test_rmf_silent_with_a_robot_inside_holds_and_warns() -> None:
     assert story.faults == []
 
 
-def test_outputs_that_cannot_be_written_are_tried_again_and_soon_a_fault_with_all_off() -> None:
+def test_outputs_that_cannot_be_written_soon_become_a_fault_with_all_outputs_off() -> None:
     story = lift("L1", Door.OPEN, agv=True)
     story.run(5.0)
     story.building.unwritable = "no answer from the relay module"
@@ -236,7 +236,7 @@ def test_outputs_that_cannot_be_written_are_tried_again_and_soon_a_fault_with_al
     assert (story.outputs, story.faults) == (HELD, [])
 
 
-def test_one_write_that_fails_is_made_up_for_by_the_next() -> None:
+def test_a_failed_write_is_repaired_by_the_next_one() -> None:
     story = lift("L1", Door.OPEN, agv=True)
     story.run(5.0)
     for _ in range(10):

@@ -1,33 +1,21 @@
 """Every state within some steps of the start, and of each stage of a ride: what is true in all."""
 
-from collections.abc import Callable
 from math import inf
 
 import pytest
 from msgspec.structs import replace
 
-from bridges.lift.memory import LiftLimits
 from bridges.lift.signals import Door, LiftOutputs, Motion
+from tests.depth import depth
 from tests.lift.invariants import check, nothing_changes_before_wake_at
-from tests.lift.walk import IDLE, MOVES, Step, World, limits_of, moved, start, waited, walk
+from tests.lift.walk import IDLE, World, limits_of, start, walker
 
 LIMITS = limits_of()
 OFF = LiftOutputs()
 
 
-def unseen(step: Step) -> None:
-    """Not looked at."""
-
-
-def path(*steps: str | float, limits: LiftLimits = LIMITS) -> World:
-    """The state that these moves and waits lead to."""
-    world = start(limits)
-    for step in steps:
-        if isinstance(step, str):
-            world = moved(world, MOVES[step], limits, unseen)
-        else:
-            world = waited(world, step, limits, unseen)
-    return world
+WALKER = walker(LIMITS)
+DEPTH = depth(2, 3)
 
 
 CALLED = (1.0, "A asks L3", 1.0, "agv on", 0.05)
@@ -48,7 +36,7 @@ ROOTS = {
 
 def test_the_stages_of_a_ride_are_what_they_are_called() -> None:
     def stage(name: str) -> tuple[object, ...]:
-        memory = path(*ROOTS[name]).memory
+        memory = WALKER.path(start(LIMITS), *ROOTS[name]).memory
         session = memory.session
         return (session and (session.boarded, session.retry_at), memory.grace is not None,
                 memory.relays.outputs().call, memory.fire_latched)  # fmt: skip
@@ -65,45 +53,43 @@ def test_the_stages_of_a_ride_are_what_they_are_called() -> None:
     }
 
 
-def all_is_true_in(states: Callable[[], list[World]]) -> int:
+def all_is_true_around(*roots: World) -> int:
     """Checks every step and state; how many states."""
-    found = states()
+    found = WALKER.walk(roots, DEPTH, check)
     for world in found:
         nothing_changes_before_wake_at(world, LIMITS)
     return len(found)
 
 
-def test_every_state_within_three_steps_of_the_start() -> None:
-    assert all_is_true_in(lambda: walk([start(LIMITS)], 3, LIMITS, check)) > 4000
+def test_every_state_within_some_steps_of_the_start() -> None:
+    assert all_is_true_around(start(LIMITS)) > depth(300, 4000)
 
 
 @pytest.mark.parametrize("root", ROOTS)
-def test_every_state_within_three_steps_of_a_stage_of_a_ride(root: str) -> None:
-    assert all_is_true_in(lambda: walk([path(*ROOTS[root])], 3, LIMITS, check)) > 1000
+def test_every_state_within_some_steps_of_a_stage_of_a_ride(root: str) -> None:
+    stage = WALKER.path(start(LIMITS), *ROOTS[root])
+    assert all_is_true_around(stage) > depth(150, 1000)
 
 
 def home(world: World) -> World:
     """The building mends itself and stands idle at L1; RMF ends every session; an operator resets."""
     world = replace(world, sample=IDLE, readable=True, writable=True)
-    world = waited(world, 6.0, LIMITS, check)
-    for move in ("A ends", "B ends", "reset"):
-        world = moved(world, MOVES[move], LIMITS, check)
-    return waited(world, 9.0, LIMITS, check)
+    return WALKER.path(world, 6.0, "A ends", "B ends", "reset", 9.0, seen=check)
 
 
 def serves(world: World) -> bool:
     """Somebody new asks, AGV mode comes, the car comes, the door opens."""
-    world = moved(world, MOVES["B asks L1"], LIMITS, check)
-    wanted = waited(world, 1.0, LIMITS, check).memory.relays.outputs()
+    world = WALKER.path(world, "B asks L1", seen=check)
+    wanted = WALKER.path(world, 1.0, seen=check).memory.relays.outputs()
     sample = replace(IDLE, agv=True, door=Door.OPEN, motion=Motion.STOPPED)
-    world = waited(replace(world, sample=sample), 1.0, LIMITS, check)
+    world = WALKER.path(replace(world, sample=sample), 1.0, seen=check)
     session = world.memory.session
     return wanted.agv_request and session is not None and session.boarded
 
 
 def test_from_every_state_a_building_without_faults_returns_to_idle_and_serves_again() -> None:
-    roots = [start(LIMITS), *(path(*steps) for steps in ROOTS.values())]
-    for world in walk(roots, 2, LIMITS, unseen):
+    roots = [WALKER.path(start(LIMITS), *steps) for steps in ((), *ROOTS.values())]
+    for world in WALKER.walk(roots, depth(1, 2)):
         idle = home(world)
         assert (idle.memory.session, idle.memory.grace) == (None, None)
         assert idle.memory.relays.outputs() == OFF

@@ -29,7 +29,7 @@ def sessions(story: Story) -> list[str]:
 
 
 @pytest.mark.parametrize("adapters_first", [False, True])
-def test_a_whole_ride_completes_with_no_edge_too_many(adapters_first: bool) -> None:
+def test_a_whole_ride_completes_without_a_surplus_relay_edge(adapters_first: bool) -> None:
     robot = Robot(A)
     rmf = world(robot, adapters_first=adapters_first)
     rmf.rides(robot, "L3", "L1")
@@ -50,7 +50,7 @@ def test_a_whole_ride_completes_with_no_edge_too_many(adapters_first: bool) -> N
     assert sessions(rmf.story) == ["", A, ""]
 
 
-def test_a_hundred_requests_a_second_make_no_state_more() -> None:
+def test_a_hundred_requests_a_second_cause_no_additional_state() -> None:
     quiet, loud = Story(Controller()), Story(Controller())
     for story in (quiet, loud):
         story.run(1.0)
@@ -83,7 +83,9 @@ def test_a_robot_that_waits_is_served_after_the_one_that_rides(adapters_first: b
 
 
 @pytest.mark.parametrize("adapters_first", [False, True])
-def test_without_grace_the_next_robot_is_served_within_three_states(adapters_first: bool) -> None:
+def test_without_grace_the_next_robot_has_the_lift_within_three_states(
+    adapters_first: bool,
+) -> None:
     a, b = Robot(A), Robot(B)
     rmf = World(Story(Controller(), release_grace_s=0), a, b, adapters_first=adapters_first)
     rmf.run(1.0)
@@ -122,7 +124,7 @@ def test_a_lost_end_is_repeated_until_it_is_heard(times: int) -> None:
 
 
 @pytest.mark.parametrize("adapters_first", [False, True])
-def test_a_supervisor_that_restarts_with_a_robot_in_the_car_ends_nothing(
+def test_a_supervisor_that_restarts_with_a_robot_in_the_car_does_not_end_its_session(
     adapters_first: bool,
 ) -> None:
     robot = Robot(A)

@@ -4,7 +4,7 @@ A state is the core's memory, with every time relative to now, and the building 
 are beyond every limit are made equal, so that states that cannot behave differently are one.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -15,22 +15,24 @@ from bridges.core.debounce import Settled
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from bridges.lift.core import decide, initial, published
 from bridges.lift.memory import Channel, LiftLimits, Memory
-from bridges.lift.settings import Durations as Limits
-from bridges.lift.settings import LiftSettings
-from bridges.lift.signals import Door, Ended, Event, Hazard, LiftSample, Motion
-from bridges.lift.signals import Requested as Asked
+from bridges.lift.settings import Durations, LiftSettings
+from bridges.lift.signals import Door, Ended, Event, Hazard, LiftSample, Motion, Requested
+from tests.walk import Walker
 
 LONG_S = 55.0
 """Without a wake_at, a scan each so many seconds is enough here; below `stale_after_s`."""
 
 
-def limits_of(debounce: dict[str, float] | None = None, **changes: Any) -> LiftLimits:
+def limits_of(
+    debounce: dict[str, float] | None = None, agv_mode: Any = "requested", **changes: Any
+) -> LiftLimits:
     """The default durations, but for the age of readings, which costs scans."""
     settings = LiftSettings(
         floors=["L1", "L2", "L3"],
-        limits=Limits(**{"stale_after_s": 60.0, **changes}),
+        limits=Durations(**{"stale_after_s": 60.0, **changes}),
         fire_reset="manual",
         alarm="fire_alarm_trigger",
+        agv_mode=agv_mode,
     )
     return LiftLimits.of(settings, debounce or {})
 
@@ -96,11 +98,11 @@ def reading(world: World) -> Event:
 
 MOVES: dict[str, Move] = {
     **{
-        f"{who} asks {floor}": _event(Asked(who, True, floor))
+        f"{who} asks {floor}": _event(Requested(who, True, floor))
         for who in ("A", "B")
         for floor in ("L1", "L3")
     },
-    "A asks human": _event(Asked("A", False, "L1")),
+    "A asks human": _event(Requested("A", False, "L1")),
     "A ends": _event(Ended("A")),
     "B ends": _event(Ended("B")),
     "agv on": _inputs(agv=True),
@@ -272,25 +274,12 @@ def key(world: World) -> tuple[Any, ...]:
     )
 
 
-def neighbours(world: World, limits: LiftLimits, seen: Seen) -> Iterator[World]:
-    """Every state one step away."""
-    for move in MOVES.values():
-        yield moved(world, move, limits, seen)
-    for seconds in TIMES:
-        yield waited(world, seconds, limits, seen)
-
-
-def walk(roots: list[World], depth: int, limits: LiftLimits, seen: Seen) -> list[World]:
-    """Breadth first from the roots; every state within `depth` steps, once."""
-    found = {key(root): root for root in roots}
-    edge = list(found.values())
-    for _ in range(depth):
-        fresh: list[World] = []
-        for world in edge:
-            for state in neighbours(world, limits, seen):
-                name = key(state)
-                if name not in found:
-                    found[name] = state
-                    fresh.append(state)
-        edge = fresh
-    return list(found.values())
+def walker(limits: LiftLimits) -> Walker[World, Move]:
+    """The lift's, with these limits."""
+    return Walker(
+        MOVES,
+        TIMES,
+        lambda world, move, seen: moved(world, move, limits, seen),
+        lambda world, seconds, seen: waited(world, seconds, limits, seen),
+        key,
+    )

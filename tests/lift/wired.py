@@ -1,12 +1,20 @@
 """The whole lift without its pins: node, driver, wires and plant, in virtual time."""
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
+
+import msgspec
 
 from bridges.lift.signals import LiftOutputs, LiftSample
 from bridges.settings.load import load
+from drivers.hal.modbus import ModbusBus
+from drivers.hal.modbus.dead_man import Guard, Watchdogs
+from drivers.hal.modbus.points import Point, Range
 from drivers.hal.points import Pull
+from drivers.lift import register
 from drivers.lift.dry_contact import Settings, create, debounce, wires
+from hal_fakes.modbus import register_lift
 from hal_fakes.plants.lift import LiftPlant
 from hal_fakes.plants.plant import FailureMode
 from hal_fakes.wiring import Wiring
@@ -78,18 +86,61 @@ class _Lines:
         self.write(self._safe)
 
 
+class GatewayBuilding(Building):
+    """The plant behind a gateway's registers; it is also the bus (`drivers.hal.modbus.lines.Units`)."""
+
+    def __init__(self, settings: register.Settings) -> None:
+        super().__init__()
+        self.plant = register_lift.build("Lift1", settings)
+        self._cells = register_lift.RegisterLift(self.plant, settings)
+        self._driver = register.create("Lift1", settings, cast(ModbusBus, _Registers(self)))
+
+    def open(self) -> None:
+        self._driver.open()
+
+    def read(self) -> LiftSample:
+        super().read()
+        return self._driver.read()
+
+    def write(self, outputs: LiftOutputs) -> None:
+        super().write(outputs)
+        self._driver.write(outputs)
+
+
+class _Registers:
+    """The gateway's registers, at once and without a wire."""
+
+    def __init__(self, building: GatewayBuilding) -> None:
+        self._building = building
+        self._watchdogs = Watchdogs(cast(ModbusBus, self), None, lambda: building.now)
+
+    def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:
+        cells, now = self._building._cells, self._building.now
+        return {point: cells.get(point, now) for point in asked.points()}
+
+    def write(self, point: Point, value: int, safe: bool = False) -> None:
+        assert self._building._cells.set(point, value, self._building.now)
+
+    def guard(self, units: Iterable[int]) -> Guard:
+        return self._watchdogs.guard(units)
+
+    def insist(self) -> None:
+        """Nothing waits here."""
+
+
 class WiredStory(Story):
-    """The shipped lift in service."""
+    """A lift in service; the shipped one if it is not said which."""
 
     building: WiredBuilding
 
-    def __init__(self, **limits: Any) -> None:
-        settings = shipped()
+    def __init__(self, settings: Settings | None = None, **limits: Any) -> None:
+        settings = settings or shipped()
         super().__init__(
             WiredBuilding(settings),
-            floors=list(settings.stops()),
+            floors=settings.floors,
             debounce=dict(debounce(settings)),
-            **limits,
+            agv_mode=settings.agv_mode,
+            **{**msgspec.structs.asdict(settings.limits), **limits},
         )
 
     def fail(self, part: str, mode: FailureMode | None) -> None:

@@ -7,10 +7,7 @@ from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.lift_supervisor import core
 from bridges.lift_supervisor.memory import Limits, Memory
 from bridges.lift_supervisor.report import SupervisorReport
-from bridges.lift_supervisor.signals import Ended
-from bridges.lift_supervisor.signals import Requested as Asked
-from bridges.lift_supervisor.signals import StateHeard as Shown
-from bridges.lift_supervisor.signals import Target as Wish
+from bridges.lift_supervisor.signals import Ended, Requested, StateHeard, Target
 from bridges.rmf.definitions import LiftMode, LiftRequest
 
 MODES = {"AGV": LiftMode.MODE_AGV, "FIRE": LiftMode.MODE_FIRE, "OFFLINE": LiftMode.MODE_OFFLINE}
@@ -58,7 +55,7 @@ class Alone:
         """An adapter's request, sent `aged` s ago by its own clock."""
         stamp = self.now + self.skew - aged
         door = 2 if kind == 1 else 0
-        self.hears(Asked(session, Wish(kind, floor, door), stamp, self.now - stamp))
+        self.hears(Requested(session, Target(kind, floor, door), stamp, self.now - stamp))
 
     def ends(self, session: str, *, aged: float = 0.0) -> None:
         """Its END."""
@@ -77,7 +74,7 @@ class Alone:
     ) -> None:
         """A LiftState."""
         door = 2 if open else 0
-        self.hears(Shown(session, floor, to, door, MODES[mode], floors))
+        self.hears(StateHeard(session, floor, to, door, MODES[mode], floors))
 
     def ride(self, session: str = "a") -> None:
         """The lift is there, for this session: nothing is left to ask for."""

@@ -21,9 +21,7 @@ def test_a_first_request_is_sent_at_once_and_without_a_state_only_once() -> None
     assert desk.sent == [(0.0, "AGV a L3")]
 
 
-def test_a_state_that_does_not_show_what_was_asked_causes_one_repeat_each_at_1_hz_at_the_most() -> (
-    None
-):
+def test_each_state_that_does_not_show_the_request_causes_a_repeat_at_1_hz_at_most() -> None:
     desk = Alone()
     desk.asks("a")
     for tenth in range(1, 31):
@@ -42,7 +40,7 @@ def test_a_state_that_does_not_show_what_was_asked_causes_one_repeat_each_at_1_h
         StateHeard("a", "L1", "L3", 1, 2),
     ],
 )
-def test_whatever_differs_causes_the_repeat(mismatch: StateHeard) -> None:
+def test_any_difference_between_request_and_state_causes_the_repeat(mismatch: StateHeard) -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(1.0)
@@ -53,7 +51,7 @@ def test_whatever_differs_causes_the_repeat(mismatch: StateHeard) -> None:
 @pytest.mark.parametrize(
     "match", [StateHeard("a", "L3", "", 2, 2), StateHeard("a", "L1", "L3", 2, 2)]
 )
-def test_a_state_that_shows_what_was_asked_causes_none(match: StateHeard) -> None:
+def test_a_state_that_shows_the_request_causes_no_repeat(match: StateHeard) -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(1.0)
@@ -195,7 +193,7 @@ def test_a_session_that_another_lift_daemon_shows_after_the_end_confirms_it_too(
     assert desk.report.holder == ""
 
 
-def test_an_end_of_somebody_who_neither_has_nor_wants_the_lift_is_nothing() -> None:
+def test_an_end_from_a_robot_that_neither_has_nor_wants_the_lift_is_ignored() -> None:
     desk = Alone()
     desk.asks("a")
     desk.ends("b")
@@ -283,7 +281,7 @@ def test_who_waits_in_silence_for_10_s_leaves_the_queue_and_comes_back_at_its_en
     assert desk.waiting == ["c", "b"]
 
 
-def test_while_the_lift_is_silent_its_requesters_may_be() -> None:
+def test_requesters_may_be_silent_while_the_lift_is_silent() -> None:
     """Fleet adapters repeat themselves at its states, and at nothing else."""
     desk = Alone(Limits(holder_ttl_s=70.0))
     desk.asks("a")
@@ -340,7 +338,7 @@ def test_who_ends_while_it_waits_leaves_the_queue() -> None:
     assert desk.sent == [(0.0, "AGV a L3")]
 
 
-def test_a_queue_has_an_end() -> None:
+def test_a_queue_has_a_greatest_length() -> None:
     desk = Alone()
     for number in range(core.MAX_CLAIMS + 1):
         desk.asks(f"robot {number}")
@@ -369,7 +367,7 @@ def test_a_session_that_the_lift_shows_goes_before_the_queue_if_its_robot_asks()
     assert desk.sent == [(0.0, "AGV b L1"), (0.5, "AGV a L3")]
 
 
-def test_who_has_had_the_lift_is_not_ended_for_a_short_silence_though_the_node_has_lost_it() -> (
+def test_a_holder_is_not_ended_for_a_short_silence_although_the_lift_daemon_has_lost_the_session() -> (
     None
 ):
     desk = Alone()
@@ -391,7 +389,7 @@ def test_while_the_lift_shows_a_stranger_nobody_else_is_sent_to_it() -> None:
     assert desk.sent == [(0.0, "AGV b L3")]
 
 
-def test_a_session_that_nobody_has_asked_for_for_3_s_of_states_is_ended() -> None:
+def test_a_session_that_no_robot_requests_for_3_s_is_ended() -> None:
     desk = Alone()
     for second in range(5):
         desk.until(float(second))
@@ -401,7 +399,7 @@ def test_a_session_that_nobody_has_asked_for_for_3_s_of_states_is_ended() -> Non
     assert desk.sent == [(3.0, "END a L2"), (4.0, "END a L2")]
 
 
-def test_a_stranger_that_is_seen_again_after_a_silence_of_the_lift_has_its_3_s_again() -> None:
+def test_a_strangers_session_gets_its_3_s_again_after_the_lift_was_silent() -> None:
     desk = Alone()
     desk.shows("a")
     desk.until(1.0)

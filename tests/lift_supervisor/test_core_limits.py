@@ -70,7 +70,7 @@ def test_a_holders_human_mode_is_passed_on_in_a_hazard() -> None:
 # --- while it may not speak --------------------------------------------------------------------
 
 
-def test_it_listens_before_it_speaks_and_then_goes_on_with_the_ride_that_it_finds() -> None:
+def test_after_its_quiet_start_it_continues_the_ride_that_it_finds() -> None:
     desk = Alone(speaks=False)
     desk.asks("b", "L1")
     for second in (0.5, 1.5, 2.5):
@@ -95,7 +95,7 @@ def test_a_session_shown_throughout_the_quiet_time_and_asked_for_by_nobody_is_en
     assert desk.sent == [(3.0, "END a L2")]
 
 
-def test_an_end_in_the_quiet_time_is_remembered_as_no_claim() -> None:
+def test_an_end_in_the_quiet_time_removes_the_robots_claim() -> None:
     desk = Alone(speaks=False)
     desk.asks("a")
     desk.until(1.0)
@@ -124,7 +124,7 @@ def test_beside_another_supervisor_it_falls_silent_and_goes_on_from_what_it_sees
     assert desk.sent == [(0.0, "AGV a L3"), (5.0, "AGV b L1")]
 
 
-def test_it_may_not_speak_before_it_is_told_so() -> None:
+def test_nothing_is_sent_before_sending_is_allowed() -> None:
     assert not core.initial("Lift1", 0.0).may_speak
 
 
@@ -162,7 +162,7 @@ def test_with_synchronised_clocks_a_young_request_from_before_our_start_counts_a
     assert desk.refused == [(0.0, "stale request"), (60.0, "stale request")]
 
 
-def test_in_the_quiet_time_what_comes_from_the_future_is_not_believed() -> None:
+def test_a_request_from_the_future_is_not_believed_in_the_quiet_time() -> None:
     """Our clock is not set yet: all that is replayed looks new."""
     desk = Alone(speaks=False)
     desk.skew = 3600.0

@@ -57,7 +57,7 @@ def test_what_cannot_be_asked_is_refused_by_name(changes: dict[str, object], kin
     assert refusal.value.kind == kind
 
 
-def test_a_state_is_what_it_shows() -> None:
+def test_a_lift_state_is_read_field_by_field() -> None:
     state = LiftState(Time(), "Lift1", ("L1", "L3"), "L1", "L3", 1, 1, (1, 2), 2, "fleet/a")
     shown = StateHeard("fleet/a", "L1", "L3", 1, 2, ("L1", "L3"))
     assert messages.accept_state(state, ANY, 0.0) == shown
@@ -76,7 +76,9 @@ def test_a_state_is_what_it_shows() -> None:
         ({"available_floors": ("x",) * 1001}, "impossible available_floors"),
     ],
 )
-def test_a_state_with_endless_texts_is_not_kept(changes: dict[str, object], kind: str) -> None:
+def test_a_state_with_texts_that_are_too_long_is_dropped(
+    changes: dict[str, object], kind: str
+) -> None:
     state = replace(LiftState(lift_name="Lift1"), **changes)  # type: ignore[arg-type]
     with pytest.raises(RequestRefused) as refusal:
         messages.accept_state(state, ANY, 0.0)

@@ -15,13 +15,14 @@ from bridges.rmf.definitions import LiftRequest
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS
 from tests.lift_supervisor.world import (
-    EPOCH,
     LiftNode,
     OurSupervisor,
     Rider,
     RmfsSupervisor,
-    World,
+    requests,
+    sessions,
 )
+from tests.serve.virtual_graph import EPOCH, World
 
 A, B, C = "fleet/a", "fleet/b", "fleet/c"
 UP, DOWN = ("L1", "L3"), ("L3", "L1")
@@ -37,13 +38,13 @@ def supervisor_first(sender: str, receiver: str) -> Sequence[float]:
 
 def changes(world: World) -> list[str]:
     """What the node was told, without the repeats."""
-    said = [text for _, text in world.requests()]
+    said = [text for _, text in requests(world)]
     return [text for text, before in zip(said, ["", *said], strict=False) if text != before]
 
 
 def shown(world: World) -> list[str]:
     """Whom the lift has shown, one after the other."""
-    return [session for _, session in world.sessions()]
+    return [session for _, session in sessions(world)]
 
 
 def lines(lift: LiftNode) -> list[tuple[str, object]]:
@@ -91,8 +92,8 @@ def test_a_second_robot_is_served_as_soon_as_the_first_has_released(route: objec
         "AGV fleet/b L1",
         "END fleet/b L1",
     ]
-    ended_at = next(at for at, text in world.requests() if text == "END fleet/a L3")
-    passed_on_at = next(at for at, text in world.requests() if text == "AGV fleet/b L3")
+    ended_at = next(at for at, text in requests(world) if text == "END fleet/a L3")
+    passed_on_at = next(at for at, text in requests(world) if text == "AGV fleet/b L3")
     assert passed_on_at - ended_at < 1.1  # the next state, at 1 Hz
 
 
@@ -115,7 +116,7 @@ def test_ends_lost_on_either_side_are_repeated_until_one_is_obeyed(lost: int) ->
     robots = [Rider(world, A, UP), Rider(world, B, DOWN, starts_at=8.0)]
     world.run(180.0, lambda: all(robot.done for robot in robots))
     assert shown(world) == [A, "", B, ""]
-    ends = [at for at, text in world.requests() if text.startswith("END fleet/a")]
+    ends = [at for at, text in requests(world) if text.startswith("END fleet/a")]
     assert len(ends) == lost + 1
     assert all(0.99 < later - at < 1.1 for at, later in pairwise(ends))
     assert all(robot.done for robot in robots)
@@ -206,7 +207,7 @@ def test_a_hundred_old_requests_of_many_sessions_move_nothing_at_a_restart() -> 
         )
         for n in range(1900, 2000)
     ]
-    world.retained["fleet"] = deque(old)
+    world.retained["fleet"] = deque((ADAPTER_LIFT_REQUESTS, request) for request in old)
     supervisor.restart()
     robot = Rider(world, A, UP, starts_at=2010.0)
     world.run(2100.0)
@@ -235,9 +236,7 @@ def test_beside_rmfs_own_it_is_silent_and_takes_over_in_mid_ride_when_that_is_go
     ours = OurSupervisor(world)
     lift, robot = LiftNode(world), Rider(world, A, UP)
     world.run(12.5)
-    assert {sender for _, sender, topic, _ in world.sent if topic == LIFT_REQUESTS.name} == {
-        rmfs.name
-    }
+    assert {sender for _, sender, topic, _ in world.sent if topic == LIFT_REQUESTS} == {rmfs.name}
     assert ours.node.status()["passive"]
     assert world.publishers[LIFT_REQUESTS.name] == {rmfs.name}
     rmfs.leave()
@@ -304,7 +303,7 @@ def test_in_a_fire_nobody_new_is_sent_and_the_rides_come_after_it() -> None:
     lift.lift.hazard(Hazard.FIRE)
     robots = [Rider(world, A, UP), Rider(world, B, DOWN, starts_at=8.0)]
     world.run(60.0)
-    assert (world.requests(), lift.lift.edges) == ([], [])
+    assert (requests(world), lift.lift.edges) == ([], [])
     lift.lift.hazard()
     world.run(200.0, lambda: all(robot.done for robot in robots))
     assert shown(world) == [A, "", B, ""]

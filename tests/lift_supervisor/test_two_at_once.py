@@ -44,7 +44,7 @@ class LateTransport(MemoryTransport):
         return self.ends[-1]
 
 
-def test_of_two_that_begin_at_once_exactly_one_serves_soon_and_for_good() -> None:
+def test_of_two_supervisors_that_start_at_once_exactly_one_serves_in_the_end() -> None:
     now = 0.0
     network = MemoryNetwork()
     transports = [LateTransport(network, name) for name in ("one", "two")]

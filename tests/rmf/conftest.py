@@ -4,23 +4,33 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from cyclonedds.domain import DomainParticipant
 
 from bridges.core.fields import Zenoh
+from bridges.rmf.choose import missing_of_dds
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.transport import Transport
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf.domains import domain_of_this_run
+
+if missing_of_dds():
+    collect_ignore = [
+        "test_dds.py",
+        "test_flood.py",
+        "test_namesake.py",
+        "test_network.py",
+        "test_wires.py",
+    ]
 
 Join = Callable[[str], Transport]
 """Open a node of this name on the graph of this test."""
 
 
 ZENOH = {"zenoh": Zenoh(), "zenoh_ros2dds": Zenoh(keys="ros2dds")}
+DDS = pytest.param("dds", marks=pytest.mark.dds)
 ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
 
 
-@pytest.fixture(params=["memory", "dds", "zenoh", ROS2])
+@pytest.fixture(params=["memory", DDS, "zenoh", ROS2])
 def join(request: pytest.FixtureRequest) -> Iterator[Join]:
     """One graph for the test, on each transport in turn; its nodes leave at the end."""
     network = MemoryNetwork()
@@ -33,7 +43,7 @@ def join(request: pytest.FixtureRequest) -> Iterator[Join]:
     yield from _graph(on[request.param])
 
 
-@pytest.fixture(params=["dds", "zenoh", ROS2])
+@pytest.fixture(params=[DDS, "zenoh", ROS2])
 def join_any_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
     """One graph for the test, on each transport that has a wire."""
     yield from _graph(joining(request.param, domain_of_this_run()))
@@ -67,6 +77,8 @@ def join_ros() -> Iterator[Join]:
 def observer(join_dds: Join) -> Iterator[Any]:
     """A participant that is none of ours, in the same process and so in the same domain."""
     join_dds("keeps_the_domain")
+    from cyclonedds.domain import DomainParticipant
+
     participant = DomainParticipant(domain_of_this_run())
     yield participant
     del participant
@@ -81,9 +93,7 @@ def joining(transport: str, domain: int) -> Join:
             return ZenohTransport(name, domain, loopback=True, settings=ZENOH[transport])
         # Imported here: there may be no ROS.
         module = importlib.import_module(f"bridges.rmf.{transport}")
-        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[
-            transport
-        ]
+        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
         node: Transport = getattr(module, kind)(name, domain, loopback=True)
         return node
 

@@ -7,5 +7,5 @@ from hal_fakes.domain import free_domain
 
 @cache
 def domain_of_this_run() -> int:
-    """The domain that tests of this process share, where one of their own is not needed."""
+    """The domain that tests of this process share, unless they need one of their own."""
     return free_domain()

@@ -16,6 +16,7 @@ from typing import Any
 from bridges.rmf import topics
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher
+from tests.rmf import zenoh_hostile
 from tests.rmf.conftest import joining
 from tests.waiting import wait_until
 
@@ -82,6 +83,9 @@ def hostile(domain: int, transport: str) -> None:
     The forged ones use up the sequence numbers of the writer's next own samples: only later ones of
     its fifty good ones arrive.
     """
+    if transport == "zenoh":
+        zenoh_hostile.main(*zenoh_hostile.arguments(domain))
+        return
     from cyclonedds.domain import Domain, DomainParticipant
     from cyclonedds.pub import DataWriter
     from cyclonedds.qos import Policy, Qos

@@ -6,8 +6,8 @@ stdin; it shares no code with `bridges/`. Each line of its output is JSON.
 `tokens PATTERN`: each token under a key, as it comes and goes.
 `samples KEY`: each sample under a key, with its attachment taken apart by zenoh's own deserializer.
 `history KEY DEPTH`: the same for who wants what is retained, as rmw_zenoh subscribes.
-`say KEY TOKEN HEX [DEPTH]`: a node that publishes once those who listen are there, as rmw_zenoh does; with
-a depth it retains.
+`say KEY TOKEN HEX [DEPTH]`: a node that publishes once somebody listens, as rmw_zenoh does; with a
+depth it retains.
 """
 
 import json
@@ -15,6 +15,7 @@ import struct
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import xxhash
@@ -43,13 +44,16 @@ def main(endpoint: str, *orders: str) -> None:
 
 def tell(**line: object) -> None:
     with PRINTING:
-        print(json.dumps(line), flush=True)
+        sys.stdout.write(json.dumps(line) + "\n")
+        sys.stdout.flush()
 
 
 def tokens(session: zenoh.Session, pattern: str) -> Any:
     return session.liveliness().declare_subscriber(
         pattern,
-        lambda sample: tell(token=str(sample.key_expr), is_there=sample.kind == zenoh.SampleKind.PUT),
+        lambda sample: tell(
+            token=str(sample.key_expr), is_there=sample.kind == zenoh.SampleKind.PUT
+        ),
         history=True,
     )
 
@@ -113,7 +117,12 @@ def say(session: zenoh.Session, key: str, token: str, payload: str, depth: str =
     return publisher, alive
 
 
-ORDERS = {"tokens": tokens, "samples": samples, "history": history, "say": say}
+ORDERS: dict[str, Callable[..., Any]] = {
+    "tokens": tokens,
+    "samples": samples,
+    "history": history,
+    "say": say,
+}
 
 if __name__ == "__main__":
     main(*sys.argv[1:])

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from bridges.rmf import definitions as d
 from bridges.rmf.cdr import CdrError, decode, encode
-from tests.rmf import idl_types
 from tests.rmf.values import MESSAGE_TYPES, repeatable, values
 
 REQUEST = d.LiftRequest("Lift1", d.Time(5, 6), "fleet/robot", 1, "L3", 2)
@@ -33,8 +32,11 @@ def test_every_message_comes_back_as_it_was(message: Any) -> None:
     assert decode(type(message), encode(type(message), message)) == message
 
 
+@pytest.mark.dds
 @pytest.mark.parametrize("message_type", MESSAGE_TYPES, ids=lambda kind: kind.__name__)
 def test_cyclonedds_itself_writes_the_same_bytes(message_type: Any) -> None:
+    from tests.rmf import idl_types
+
     @repeatable
     @given(values(message_type))
     def written_alike(message: Any) -> None:

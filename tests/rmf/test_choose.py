@@ -1,18 +1,21 @@
 import importlib.util
 import logging
+import re
 import sys
 from importlib.machinery import ModuleSpec
+from pathlib import Path
 from types import ModuleType
 from typing import Literal
 
 import msgspec
 import pytest
 
-from bridges.core.fields import Rmf
+from bridges.core.fields import Rmf, Zenoh
 from bridges.rmf.choose import domain_id, open_transport, stays_on_loopback
-from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import PACKAGES
 from bridges.rmf.transport import TransportError
+from bridges.settings.load import Problem, SettingsError, load
+from tests.rmf.conftest import DDS, ROS2
 from tests.rmf.domains import domain_of_this_run
 
 
@@ -98,17 +101,19 @@ def test_without_rmfs_packages_the_error_names_the_one_that_is_missing(bare_rclp
         open_transport(Rmf(transport="ros2"), "node", localhost=True)
 
 
-@pytest.mark.parametrize("transport", ["auto", "dds"])
-def test_ros_args_are_for_ros_alone(no_ros: None, transport: Literal["auto", "dds"]) -> None:
+@pytest.mark.parametrize("transport", ["auto", DDS, "zenoh"])
+def test_ros_args_are_for_ros_alone(
+    no_ros: None, transport: Literal["auto", "dds", "zenoh"]
+) -> None:
     rmf = Rmf(transport=transport, domain_id=domain_of_this_run())
     with pytest.raises(TransportError, match="--ros-args -r a:=b: only rclpy understands this"):
         open_transport(rmf, "node", localhost=True, ros_args=["--ros-args", "-r", "a:=b"])
     open_transport(rmf, "node", localhost=True, ros_args=["--ros-args"]).close()
 
 
-@pytest.mark.parametrize("transport", ["dds", pytest.param("ros2", marks=pytest.mark.ros)])
+@pytest.mark.parametrize("transport", [DDS, "zenoh", ROS2])
 def test_a_node_name_has_only_the_characters_that_ros_knows(
-    transport: Literal["dds", "ros2"],
+    transport: Literal["dds", "zenoh", "ros2"],
 ) -> None:
     rmf = Rmf(transport=transport, domain_id=domain_of_this_run())
     node = open_transport(rmf, "rmf_bridge_lift-a.ü", localhost=True)
@@ -135,10 +140,12 @@ def test_without_cyclonedds_the_error_says_how_to_get_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "cyclonedds", None)  # as if it could not be found
+    monkeypatch.delitem(sys.modules, "cyclonedds.core", raising=False)
     with pytest.raises(TransportError, match="pip install --no-binary cyclonedds"):
         open_transport(Rmf(transport="dds"), "node", localhost=True)
 
 
+@pytest.mark.dds
 def test_auto_opens_dds_without_ros_and_says_why(
     no_ros: None, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -146,19 +153,84 @@ def test_auto_opens_dds_without_ros_and_says_why(
     domain = domain_of_this_run()
     node = open_transport(Rmf(domain_id=domain), "chosen", localhost=True)
     node.close()
-    assert isinstance(node, DdsTransport)
+    assert type(node).__name__ == "DdsTransport"
     assert [text.split(" reason=")[0] for text in caplog.messages] == [
         f"transport speaks=dds domain_id={domain} network=localhost"
     ]
     assert 'reason="rclpy does not import: ' in caplog.text
 
 
+def test_auto_opens_zenoh_where_neither_ros_nor_cyclonedds_is_and_says_why(
+    no_ros: None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setitem(sys.modules, "cyclonedds", None)  # as on arm64
+    monkeypatch.delitem(sys.modules, "cyclonedds.core", raising=False)
+    caplog.set_level(logging.INFO)
+    domain = domain_of_this_run()
+    node = open_transport(Rmf(domain_id=domain), "chosen", localhost=True)
+    node.close()
+    assert type(node).__name__ == "ZenohTransport"
+    assert [text.split(" reason=")[0] for text in caplog.messages] == [
+        f"transport speaks=zenoh domain_id={domain} network=localhost"
+    ]
+    assert "; cyclonedds does not import: " in caplog.text
+
+
+def test_the_yamls_zenoh_section_reaches_the_transport(tmp_path: Path) -> None:
+    zenoh = Zenoh(user="lift", password_file=str(tmp_path / "none"))
+    with pytest.raises(TransportError, match=r"password_file .*none cannot be read"):
+        open_transport(Rmf(transport="zenoh", zenoh=zenoh), "node")
+    open_transport(Rmf(transport="zenoh", zenoh=zenoh), "node", localhost=True).close()
+
+
+@pytest.mark.parametrize(
+    ("zenoh", "problems"),
+    [
+        ("{}", []),
+        ("{connect: [tcp/10.0.0.5:7447, 'tls/[::1]:7447'], tls: {ca: /ca.pem}}", []),
+        ("{connect: []}", ["'connect' has 0 entries: at least 1 are wanted"]),
+        ("{connect: [10.0.0.5]}", ["item 1 of 'connect' is '10.0.0.5': protocol/host:port"]),
+        ("{password: x}", ["unknown key 'password'"]),
+        ("{user: lift}", ["user and password_file go together: give both, or none"]),
+        ("{tls: {}}", ["no endpoint is encrypted: write connect: [tls/host:port]"]),
+        ("{listen: [tls/0.0.0.0:7447]}", ["who listens with TLS needs tls: {certificate: "]),
+        (
+            "{connect: [tls/rmf:7447], tls: {certificate: /c.pem}}",
+            ["certificate and private_key go together: give both, or none"],
+        ),
+    ],
+)
+def test_what_cannot_be_in_the_zenoh_section_is_named(
+    tmp_path: Path, zenoh: str, problems: list[str]
+) -> None:
+    shipped = (Path(__file__).parents[2] / "config" / "lift_supervisor.yaml").read_text()
+    rmf = f"rmf: {{transport: zenoh, zenoh: {zenoh}}}\n"
+    file = tmp_path / "site.yaml"
+    file.write_text(re.sub(r"^rmf:.*\n(?: .*\n)*", rmf, shipped, flags=re.MULTILINE))
+    found = [problem.text for problem in problems_of(file)]
+    assert len(found) == len(problems)
+    for text, start in zip(found, problems, strict=True):
+        assert text.startswith(start)
+
+
+def problems_of(file: Path) -> tuple[Problem, ...]:
+    """What is wrong with a file."""
+    try:
+        load(file)
+    except SettingsError as error:
+        return error.problems
+    return ()
+
+
+@pytest.mark.parametrize("speaks", [DDS, "zenoh"])
 def test_simulation_stays_on_loopback_whatever_the_yaml_and_the_environment_say(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    speaks: Literal["dds", "zenoh"],
 ) -> None:
     caplog.set_level(logging.INFO)
     monkeypatch.setenv("CYCLONEDDS_URI", "<no configuration at all/>")
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
-    rmf = Rmf(transport="dds", domain_id=domain_of_this_run(), network="subnet")
+    rmf = Rmf(transport=speaks, domain_id=domain_of_this_run(), network="subnet")
     open_transport(rmf, "simulated", localhost=True).close()
     assert "network=localhost reason=configured" in caplog.text

@@ -17,28 +17,24 @@ from bridges.rmf.dds import DdsTransport
 from bridges.rmf.loopback import LOOPBACK
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import TransportError
-from hal_fakes.domain import free_domain
 from tests.rmf import peer
 from tests.rmf.conftest import Join
 from tests.rmf.domains import domain_of_this_run
 from tests.rmf.observing import PUBLICATION, SUBSCRIPTION, seen
 from tests.waiting import wait_until
 
-DOMAIN = domain_of_this_run()
-OTHER_DOMAIN = free_domain()
-
 
 @pytest.fixture(scope="module")
 def echo() -> Iterator[None]:
     """A second process that sends everything back."""
-    with peer.running("echo", DOMAIN):
+    with peer.running("echo", domain_of_this_run()):
         yield
 
 
 # --- bad input -------------------------------------------------------------------------------
 
 
-def test_noise_on_our_ports_disturbs_nobody(join_dds: Join, echo: None) -> None:
+def test_noise_on_our_ports_disturbs_nobody(domain: int, join_dds: Join, echo: None) -> None:
     received: list[d.LiftState] = []
     node = join_dds("here")
     node.subscribe(LIFT_STATES.named("pong_lift_states"), received.append)
@@ -49,7 +45,7 @@ def test_noise_on_our_ports_disturbs_nobody(join_dds: Join, echo: None) -> None:
         for _ in range(300):
             packet = b"RTPS" * noise.randint(0, 1) + noise.randbytes(noise.randint(0, 200))
             for port in (10, 11, 12, 13):  # discovery and data of the two processes in the domain
-                sender.sendto(packet, ("127.0.0.1", 7400 + 250 * DOMAIN + port))
+                sender.sendto(packet, ("127.0.0.1", 7400 + 250 * domain_of_this_run() + port))
     after = d.LiftState(lift_name="after")
     publisher.publish(after)
     wait_until(lambda: received[-1] == after, "a message after the noise comes back")
@@ -105,32 +101,36 @@ def test_the_node_and_its_ends_stand_on_the_ros_graph(join_dds: Join, observer: 
 
 
 def test_without_a_usable_network_the_error_says_what_to_look_at(
+    domain: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     nowhere = LOOPBACK.replace('"lo"', '"no-such-interface"')
     monkeypatch.setenv("CYCLONEDDS_URI", nowhere)
     with pytest.raises(TransportError, match="is a network interface up, and does CYCLONEDDS_URI"):
-        DdsTransport("nobody", OTHER_DOMAIN, loopback=False)
+        DdsTransport("nobody", domain, loopback=False)
 
 
-def test_on_the_subnet_cyclones_own_configuration_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_on_the_subnet_cyclones_own_configuration_stands(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
-    node = DdsTransport("configured", OTHER_DOMAIN, loopback=False)
+    node = DdsTransport("configured", domain, loopback=False)
     try:
         publisher = node.publisher(Topic("ping_lift_states", d.LiftState))
-        with peer.running("echo", OTHER_DOMAIN):
+        with peer.running("echo", domain):
             wait_until(lambda: publisher.matched() == 1, "a process on loopback is found")
     finally:
         node.close()
 
 
 def test_a_domain_that_is_open_on_the_network_is_not_taken_for_loopback(
+    domain: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
-    exposed = DdsTransport("exposed", OTHER_DOMAIN, loopback=False)
+    exposed = DdsTransport("exposed", domain, loopback=False)
     try:
         with pytest.raises(TransportError):
-            DdsTransport("simulated", OTHER_DOMAIN, loopback=True)
+            DdsTransport("simulated", domain, loopback=True)
     finally:
         exposed.close()

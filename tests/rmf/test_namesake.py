@@ -14,7 +14,6 @@ from cyclonedds.topic import Topic
 from bridges.rmf import definitions as d
 from bridges.rmf.dds import DdsTransport
 from bridges.rmf.topics import LIFT_REQUESTS
-from hal_fakes.domain import free_domain
 from tests.waiting import wait_until
 
 # mypy knows nothing of cyclonedds.
@@ -31,16 +30,16 @@ class LiftRequest(IdlStruct, typename="rmf_lift_msgs.msg.dds_.LiftRequest_"):
 class Lift:
     """The node that obeys requests, and what it has heard."""
 
-    def __init__(self) -> None:
-        self.domain = free_domain()
+    def __init__(self, domain: int) -> None:
+        self.domain = domain
         self.heard: list[d.LiftRequest] = []
         self.node = DdsTransport("lift", self.domain, loopback=True)
         self.subscription = self.node.subscribe(LIFT_REQUESTS, self.heard.append)
 
 
 @pytest.fixture
-def lift() -> Iterator[Lift]:
-    made = Lift()
+def lift(domain: int) -> Iterator[Lift]:
+    made = Lift(domain)
     yield made
     made.node.close()
 

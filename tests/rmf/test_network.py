@@ -11,7 +11,6 @@ from bridges.rmf.dds import DdsTransport
 from bridges.rmf.loopback import LOOPBACK
 from bridges.rmf.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
 from bridges.rmf.transport import TransportError
-from hal_fakes.domain import free_domain
 from tests.rmf import peer
 from tests.waiting import wait_until
 
@@ -77,8 +76,7 @@ class Echoed:
 
 
 @pytest.fixture
-def echoed(machine: Machine) -> Iterator[Echoed]:
-    domain = free_domain()
+def echoed(domain: int, machine: Machine) -> Iterator[Echoed]:
     made = Echoed(domain)
     with peer.running("echo", domain):
         wait_until(lambda: made.comes_back(1), "the process is found")

@@ -17,7 +17,6 @@ from bridges.rmf.ros_types import fields_of
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import TransportError
-from hal_fakes.domain import free_domain
 from tests.rmf import peer
 from tests.rmf.conftest import ROS2, Join, joining
 from tests.rmf.domains import domain_of_this_run
@@ -156,9 +155,8 @@ def _subscriptions(looking: Any, topic: Topic[Any]) -> list[Any]:
 
 @pytest.mark.parametrize(("breaks", "warns"), [("", False), ("typehash=RIHS01_", True)])
 def test_ros_has_nothing_to_warn_about_when_a_dds_node_joins(
-    monkeypatch: pytest.MonkeyPatch, breaks: str, warns: bool
+    domain: int, monkeypatch: pytest.MonkeyPatch, breaks: str, warns: bool
 ) -> None:
-    domain = free_domain()
     if breaks:  # so that we know that a warning would be seen
         monkeypatch.setattr("bridges.rmf.dds_ends.type_hash", lambda kind: "none")
     command = [sys.executable, "-m", "tests.rmf.peer", "echo", str(domain), "ros2"]
@@ -213,13 +211,12 @@ def test_a_name_that_ros_does_not_allow_is_refused(join_ros: Join) -> None:
         join_ros("lift-node")
 
 
-def test_stamps_follow_the_simulated_clock_where_use_sim_time_says_so() -> None:
+def test_stamps_follow_the_simulated_clock_where_use_sim_time_says_so(domain: int) -> None:
     from rclpy.qos import QoSProfile
     from rosgraph_msgs.msg import Clock
 
     from bridges.rmf.ros2 import Ros2Transport
 
-    domain = free_domain()
     simulated = ["--ros-args", "-p", "use_sim_time:=true"]
     node = Ros2Transport("node", domain, loopback=True, ros_args=simulated)
     gazebo: Any = joining("ros2", domain)("gazebo")

@@ -1,9 +1,7 @@
 """What every transport with a wire does: `dds` everywhere, `ros2` where ROS is (make test-ros)."""
 
-import os
-import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import pytest
@@ -16,18 +14,14 @@ from hypothesis import given
 
 from bridges.rmf import definitions as d
 from bridges.rmf.rihs01 import type_hash
-from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE, Topic
-from bridges.rmf.transport import Publisher, TransportError
-from hal_fakes.domain import free_domain
-from tests.rmf import peer
+from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from tests.rmf import golden_qos, peer
 from tests.rmf.conftest import ROS2, Join, joining
 from tests.rmf.domains import domain_of_this_run
+from tests.rmf.golden_qos import GOLDEN
 from tests.rmf.observing import PUBLICATION, SUBSCRIPTION, seen
 from tests.rmf.values import repeatable, values
-from tests.waiting import wait_until
-
-DOMAIN = domain_of_this_run()
-OTHER_DOMAIN = free_domain()
+from tests.waiting import LEASE_S, wait_until
 
 ALL_TOPICS = pytest.mark.parametrize("topic", peer.TOPICS.values(), ids=peer.TOPICS.keys())
 OURS = pytest.mark.parametrize("ours", ["dds", ROS2])
@@ -37,7 +31,7 @@ THEIRS = pytest.mark.parametrize("theirs", ["dds", ROS2])
 @pytest.fixture(scope="module", params=["dds", ROS2])
 def echo(request: pytest.FixtureRequest) -> Iterator[None]:
     """A second process that sends everything back, on each wire in turn."""
-    with peer.running("echo", DOMAIN, request.param):
+    with peer.running("echo", domain_of_this_run(), request.param):
         yield
 
 
@@ -70,7 +64,7 @@ def test_every_message_survives_the_wire_to_another_process_and_back(
     "name", ["EMERGENCY_SIGNAL", "FIRE_ALARM_TRIGGER", "ADAPTER_LIFT_REQUESTS"]
 )
 def test_retained_messages_reach_a_process_that_starts_later(
-    ours: str, theirs: str, name: str
+    domain: int, ours: str, theirs: str, name: str
 ) -> None:
     topic = peer.TOPICS[name]
     numbered: dict[Any, Callable[[int], d.Message]] = {
@@ -80,13 +74,13 @@ def test_retained_messages_reach_a_process_that_starts_later(
     }
     received: list[Any] = []
     sent = [numbered[topic.type](number) for number in range(130)]
-    node = joining(ours, OTHER_DOMAIN)("here")
+    node = joining(ours, domain)("here")
     try:
         publisher = node.publisher(topic.named(f"ping_{topic.name}"))
         node.subscribe(topic.named(f"pong_{topic.name}"), received.append)
         for message in sent:
             publisher.publish(message)
-        with peer.running("echo", OTHER_DOMAIN, theirs):
+        with peer.running("echo", domain, theirs):
             wait_until(lambda: len(received) == 100, "the hundred newest come back")
     finally:
         node.close()
@@ -96,15 +90,15 @@ def test_retained_messages_reach_a_process_that_starts_later(
 @OURS
 @THEIRS
 def test_what_a_supervisor_retained_is_not_replayed_to_a_lift_that_starts_later(
-    ours: str, theirs: str
+    domain: int, ours: str, theirs: str
 ) -> None:
     received: list[d.LiftRequest] = []
-    node = joining(ours, OTHER_DOMAIN)("supervisor")
+    node = joining(ours, domain)("supervisor")
     try:
         publisher = node.publisher(LIFT_REQUESTS.named("ping_lift_requests"))
         node.subscribe(LIFT_REQUESTS.named("pong_lift_requests"), received.append)
         publisher.publish(d.LiftRequest("before"))
-        with peer.running("echo", OTHER_DOMAIN, theirs):
+        with peer.running("echo", domain, theirs):
             after = d.LiftRequest("after")
             wait_until(lambda: received or peer.sent(publisher, after), "a new one comes back")
     finally:
@@ -114,78 +108,24 @@ def test_what_a_supervisor_retained_is_not_replayed_to_a_lift_that_starts_later(
 
 @OURS
 @THEIRS
-def test_a_process_that_leaves_is_gone_at_once_for_the_others(ours: str, theirs: str) -> None:
-    node = joining(ours, OTHER_DOMAIN)("stays")
+def test_a_process_that_leaves_is_gone_at_once_for_the_others(
+    domain: int, ours: str, theirs: str
+) -> None:
+    node = joining(ours, domain)("stays")
     try:
         publisher = node.publisher(LIFT_STATES.named("ping_lift_states"))
         subscription = node.subscribe(LIFT_STATES.named("pong_lift_states"), print)
-        with peer.running("echo", OTHER_DOMAIN, theirs):
+        with peer.running("echo", domain, theirs):
             wait_until(lambda: publisher.matched() and subscription.matched(), "it is found")
-        # Without a farewell it would be missed only when its lease runs out, after 10 s.
+        # Without a farewell it would be missed only when its lease runs out.
         wait_until(
-            lambda: not publisher.matched() and not subscription.matched(), "it is gone", 5.0
+            lambda: not publisher.matched() and not subscription.matched(), "it is gone", LEASE_S
         )
     finally:
         node.close()
 
 
 # --- on our own thread -------------------------------------------------------------------------
-
-
-def test_messages_arrive_on_the_thread_of_the_transport(join_any_wire: Join) -> None:
-    threads: list[str] = []
-    listener = join_any_wire("listener")
-    listener.subscribe(LIFT_STATES, lambda _: threads.append(threading.current_thread().name))
-    publisher = join_any_wire("speaker").publisher(LIFT_STATES)
-    wait_until(lambda: threads or peer.sent(publisher, d.LiftState()), "a message arrives")
-    assert {name.rpartition("-")[0] for name in threads} == {"listener"}
-
-
-def test_a_reader_thread_that_has_died_shows_at_the_next_publish(
-    join_any_wire: Join, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    died: list[Any] = []
-    monkeypatch.setattr(threading, "excepthook", died.append)
-
-    def broken(message: d.LiftState) -> None:
-        raise ArithmeticError
-
-    node = join_any_wire("broken")
-    node.subscribe(LIFT_STATES, broken)
-    publisher = node.publisher(LIFT_STATES)
-    wait_until(lambda: died or not _refuses(publisher), "the first message is sent")
-    wait_until(lambda: died, "the thread dies")
-    wait_until(lambda: _refuses(publisher), "publishing is refused")
-
-
-def _refuses(publisher: Publisher[d.LiftState]) -> bool:
-    try:
-        publisher.publish(d.LiftState())
-    except TransportError:
-        return True
-    return False
-
-
-def test_nodes_that_come_and_go_leave_no_thread_no_file_and_no_complaint_behind(
-    join_any_wire: Join, caplog: pytest.LogCaptureFixture
-) -> None:
-    def come_and_go() -> None:
-        node = join_any_wire("guest")
-        node.subscribe(LIFT_REQUESTS, print)
-        node.publisher(LIFT_STATES).publish(d.LiftState())
-        node.close()
-
-    for _ in range(5):  # what a library starts once and keeps
-        come_and_go()
-    before = _threads_and_files()
-    for _ in range(10):
-        come_and_go()
-    wait_until(lambda: _threads_and_files() <= before, "threads and files are as before")
-    assert caplog.messages == []
-
-
-def _threads_and_files() -> tuple[int, int]:
-    return len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd"))
 
 
 # --- bad input ---------------------------------------------------------------------------------
@@ -197,7 +137,7 @@ def test_forged_samples_are_dropped_and_the_good_ones_after_them_arrive(
     received: list[d.LiftRequest] = []
     node = join_wire("listener")
     node.subscribe(LIFT_REQUESTS, received.append)
-    with peer.running("hostile", DOMAIN):
+    with peer.running("hostile", domain_of_this_run()):
         wait_until(lambda: received[-1:] == [d.LiftRequest("after")], "a good one arrives")
     names = [request.lift_name for request in received]
     assert names[names.index("Lift1") :] == ["Lift1"] + ["after"] * names.count("after")
@@ -240,47 +180,39 @@ def test_a_type_of_the_same_name_with_other_fields_is_never_taken_for_ours(
     assert set(received) == {d.LiftRequest("Lift1")}
 
 
-def test_a_peer_whose_durability_does_not_fit_is_named_once(
-    join_any_wire: Join, caplog: pytest.LogCaptureFixture
-) -> None:
-    join_any_wire("listener").subscribe(FIRE_ALARM_TRIGGER, print)
-    join_any_wire("stranger").publisher(replace(FIRE_ALARM_TRIGGER, publish=VOLATILE))
-    wait_until(lambda: len(caplog.messages) == 2, "both ends say so")
-    assert sorted(caplog.messages) == [
-        'misfit topic=fire_alarm_trigger reason="a publisher is not heard:'
-        ' its durability does not fit ours"',
-        'misfit topic=fire_alarm_trigger reason="a subscription is not served:'
-        ' its durability does not fit ours"',
-    ]
-
-
 # --- as the others see us ----------------------------------------------------------------------
 
 
 @ALL_TOPICS
-def test_each_end_has_the_qos_the_type_and_the_type_hash_of_the_table(
+def test_each_end_has_the_type_the_type_hash_and_the_qos_of_the_golden_table(
     join_wire: Join, observer: Any, topic: Topic[Any]
 ) -> None:
     node = join_wire("observed")
     node.publisher(topic)
     node.subscribe(topic, print)
-    written, read = seen(observer, PUBLICATION, topic), seen(observer, SUBSCRIPTION, topic)
+    ends = (seen(observer, PUBLICATION, topic), seen(observer, SUBSCRIPTION, topic))
+    ros_type, *golden = GOLDEN[topic.name]
+    wire_type = ros_type.replace("/", "::msg::dds_::") + "_"
+    assert {end.type_name for end in ends} == {wire_type}
+    assert [as_ros_shows(end.qos) for end in ends] == golden
+    for end in ends:
+        assert end.qos[Policy.DataRepresentation] == Policy.DataRepresentation(True, False)
+        assert end.qos[Policy.Userdata].data.decode() == f"typehash={type_hash(topic.type)};"
+    if golden[0].durability == "TRANSIENT_LOCAL":
+        kept = ends[0].qos[Policy.DurabilityService].history
+        assert kept == Policy.History.KeepLast(golden[0].depth)
 
-    package = d.PACKAGES[topic.type]
-    wire_type = f"{package}::msg::dds_::{topic.type.__name__}_"
-    assert {written.type_name, read.type_name} == {wire_type}
-    for qos in (written.qos, read.qos):
-        assert isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable)
-        assert qos[Policy.DataRepresentation] == Policy.DataRepresentation(True, False)
-        assert qos[Policy.Userdata].data.decode() == f"typehash={type_hash(topic.type)};"
-    durability = {
-        "volatile": Policy.Durability.Volatile,
-        "transient_local": Policy.Durability.TransientLocal,
+
+def as_ros_shows(qos: Any) -> golden_qos.Qos:
+    """Of an end's QoS on DDS, what the golden table has."""
+    names = {
+        "Reliable": "RELIABLE",
+        "Volatile": "VOLATILE",
+        "TransientLocal": "TRANSIENT_LOCAL",
+        "KeepLast": "KEEP_LAST",
     }
-    assert written.qos[Policy.Durability] == durability[topic.publish.durability]
-    assert written.qos[Policy.History] == Policy.History.KeepLast(topic.publish.depth)
-    assert read.qos[Policy.Durability] == durability[topic.subscribe.durability]
-    assert read.qos[Policy.History] == Policy.History.KeepLast(topic.subscribe.depth)
-    if topic.publish.durability == "transient_local":
-        service = written.qos[Policy.DurabilityService]
-        assert service.history == Policy.History.KeepLast(topic.publish.depth)
+    policies = (qos[Policy.Reliability], qos[Policy.Durability], qos[Policy.History])
+    reliability, durability, history = (
+        names[type(policy).__name__.rpartition(".")[2]] for policy in policies
+    )
+    return golden_qos.Qos(reliability, durability, history, qos[Policy.History].depth)

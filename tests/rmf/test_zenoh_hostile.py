@@ -7,30 +7,22 @@ import pytest
 
 from bridges.rmf import definitions as d
 from bridges.rmf.cdr import encode
-from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import LIFT_REQUESTS
 from bridges.rmf.zenoh import ZenohTransport
-from hal_fakes.domain import free_domain
-from tests.rmf.zenoh_hostile import FLOOD
-from tests.rmf.zenoh_programs import meeting
+from tests.rmf.zenoh_hostile import FLOOD, GOOD, arguments
 from tests.waiting import wait_until
 
 BY_HAND = 8
-"""Without attachment, with two that are none, cut short, empty, two of 10 MB, a deletion; the wrong hash and
-the wildcard are the next two."""
+"""Without attachment, with two that are none, cut short, empty, two of 10 MB, a deletion. Then comes a
+wrong hash, which is another key, and a wildcard, which is counted too."""
 
 
 def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arrive(
-    caplog: pytest.LogCaptureFixture,
+    domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
-    domain = free_domain()
-    good = d.LiftRequest("Lift1", d.Time(5, 6), "fleet/robot", 1, "L3", 2)
-    type_key = f"rmf_lift_msgs::msg::dds_::LiftRequest_/{type_hash(d.LiftRequest)}"
-    token = f"@ros2_lv/{domain}/5e/0/7/MP/%/%/liar/%lift_requests/{type_key}/::,10:,:,:,,"
     received: list[d.LiftRequest] = []
     node = ZenohTransport("listener", domain, loopback=True)
-    command = [sys.executable, "-m", "tests.rmf.zenoh_hostile", meeting(domain)]
-    command += [f"{domain}/lift_requests/{type_key}", encode(d.LiftRequest, good).hex(), token]
+    command = [sys.executable, "-m", "tests.rmf.zenoh_hostile", *arguments(domain)]
     try:
         node.subscribe(LIFT_REQUESTS, received.append)
         with subprocess.Popen(
@@ -45,7 +37,7 @@ def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arr
             child.wait()
     finally:
         node.close()
-    assert set(map(repr, received)) == {repr(good)}
+    assert set(map(repr, received)) == {repr(GOOD)}
     # Of a flood the newest hundred wait for our thread: the rest need not be looked at.
     assert BY_HAND + 1 < node.dropped["lift_requests"] <= BY_HAND + 1 + FLOOD
     assert [text.split(" further")[0] for text in caplog.messages] == [
@@ -53,9 +45,8 @@ def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arr
     ]
 
 
-def test_nothing_forged_is_taken_for_a_message() -> None:
+def test_nothing_forged_is_taken_for_a_message(domain: int) -> None:
     """The hash in a key is part of it: another one is another key; a wildcard is no key of ours."""
-    domain = free_domain()
     received: list[d.LiftRequest] = []
     node = ZenohTransport("listener", domain, loopback=True)
     liar = ZenohTransport("liar", domain, loopback=True)

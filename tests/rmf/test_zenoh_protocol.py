@@ -14,13 +14,13 @@ from bridges.rmf.cdr import encode
 from bridges.rmf.definitions import LiftState
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.zenoh import ZenohTransport
-from hal_fakes.domain import free_domain
 from tests.rmf import rmw_zenoh_reader
 from tests.rmf.conftest import ZENOH
+from tests.rmf.domains import domain_of_this_run
 from tests.rmf.zenoh_programs import meeting, reading
 from tests.waiting import wait_until
 
-DOMAIN = free_domain()
+DOMAIN = domain_of_this_run()
 STATE = (
     "rmf_lift_msgs::msg::dds_::LiftState_"
     "/RIHS01_ce0553cd08eeeb321bdae554efdb6d2ebb2be9755df2e34895cbef55b51f4c06"
@@ -115,7 +115,7 @@ def test_a_sample_has_the_key_the_bytes_and_the_attachment_of_rmw_zenoh(
 def test_the_first_sample_of_a_publisher_is_number_one() -> None:
     attachment = zenoh_keys.attachment(1, 2, bytes(range(16)))
     assert attachment.hex() == (
-        "0100000000000000" "0200000000000000" "10" "000102030405060708090a0b0c0d0e0f"
+        "0100000000000000020000000000000010000102030405060708090a0b0c0d0e0f"
     )
     assert zenoh_keys.sender(attachment) == bytes(range(16))
     assert zenoh_keys.sender(attachment[:-1]) is None

@@ -11,11 +11,12 @@ import pytest
 import trustme
 
 from bridges.core.fields import Zenoh, ZenohTls
+from bridges.rmf import addresses, zenoh_config
 from bridges.rmf import definitions as d
-from bridges.rmf import network, zenoh_config
 from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_STATES
 from bridges.rmf.transport import TransportError
 from bridges.rmf.zenoh import ZenohTransport
+from tests.rmf import peer
 from tests.rmf.zenoh_programs import Router, free_port
 from tests.waiting import wait_until
 
@@ -87,7 +88,9 @@ def test_a_node_that_starts_before_its_router_is_there_as_soon_as_it_is(
     lift, rmf = site.node("lift", endpoint, mode=mode), site.node("rmf", endpoint, mode=mode)
     talk = Talk(lift, rmf)
     alarm = lift.publisher(FIRE_ALARM_TRIGGER)
-    with suppress(TransportError):  # a client says that it has no session; it retains it all the same
+    with suppress(
+        TransportError
+    ):  # a client says that it has no session; it retains it all the same
         alarm.publish(d.Bool(True))
     rang: list[d.Bool] = []
     rmf.subscribe(FIRE_ALARM_TRIGGER, rang.append)
@@ -151,7 +154,7 @@ class Machine:
     """Its addresses, as the test wants them."""
 
     def __init__(self) -> None:
-        self.addresses: network.Addresses = frozenset({(2, "10.0.0.7")})
+        self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
 
 
 def test_another_address_is_joined_with_all_ends_and_what_was_retained_goes_out_again(
@@ -159,7 +162,7 @@ def test_another_address_is_joined_with_all_ends_and_what_was_retained_goes_out_
 ) -> None:
     caplog.set_level(logging.INFO)
     machine = Machine()
-    monkeypatch.setattr(network, "addresses", lambda: machine.addresses)
+    monkeypatch.setattr(addresses, "addresses", lambda: machine.addresses)
     router = site.router()
     # The kernel takes 0.0.0.0 for this machine; that it is loopback our code does not know.
     anywhere = router.endpoint.replace("127.0.0.1", "0.0.0.0")
@@ -177,9 +180,8 @@ def test_another_address_is_joined_with_all_ends_and_what_was_retained_goes_out_
     rang: list[d.Bool] = []
     site.node("late", router.endpoint, mode="client").subscribe(FIRE_ALARM_TRIGGER, rang.append)
     wait_until(lambda: rang, "who comes late hears what was retained")
-    other = rmf.publisher(LIFT_STATES)
-    other.publish(d.LiftState(lift_name="to the lift"))
-    wait_until(lambda: back or other.publish(d.LiftState(lift_name="to the lift")), "it hears")
+    other, state = rmf.publisher(LIFT_STATES), d.LiftState(lift_name="to the lift")
+    wait_until(lambda: back or peer.sent(other, state), "it hears")
     assert set(back) == {"to the lift"}
     assert rang == [d.Bool(True)]
 
@@ -328,9 +330,11 @@ def test_a_node_on_loopback_takes_no_notice_of_the_settings_and_opens_no_other_a
     finally:
         node.close()
     for config in zenoh_config.on_loopback(DOMAIN):
-        endpoints = [*config["connect/endpoints"], *config["listen/endpoints"]] if (
-            "connect/endpoints" in config
-        ) else config["listen/endpoints"]
+        endpoints = (
+            [*config["connect/endpoints"], *config["listen/endpoints"]]
+            if ("connect/endpoints" in config)
+            else config["listen/endpoints"]
+        )
         assert all(map(zenoh_config.is_local, endpoints))
         assert config["scouting/multicast/enabled"] is False
 

@@ -9,7 +9,6 @@ from hypothesis import given
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.zenoh import ZenohTransport
-from hal_fakes.domain import free_domain
 from tests.rmf import peer
 from tests.rmf.conftest import ZENOH
 from tests.rmf.values import repeatable, values
@@ -27,16 +26,16 @@ class Here:
 
 
 @pytest.fixture(params=ZENOH)
-def here(request: pytest.FixtureRequest) -> Iterator[Here]:
-    made = Here(request.param, free_domain())
+def here(request: pytest.FixtureRequest, domain: int) -> Iterator[Here]:
+    made = Here(request.param, domain)
     yield made
     made.node.close()
 
 
 @pytest.fixture(scope="module", params=ZENOH)
-def echoed(request: pytest.FixtureRequest) -> Iterator[ZenohTransport]:
+def echoed(request: pytest.FixtureRequest, module_domain: int) -> Iterator[ZenohTransport]:
     """A node, and a second process that sends back what it says."""
-    made = Here(request.param, free_domain())
+    made = Here(request.param, module_domain)
     with peer.running("echo", made.domain, made.way):
         yield made.node
     made.node.close()
@@ -114,7 +113,9 @@ def test_those_who_stay_find_who_comes_after_the_first_of_them_has_gone(here: He
         late = ZenohTransport("late", here.domain, loopback=True, settings=ZENOH[here.way])
         try:
             said = late.publisher(states)
-            wait_until(lambda: heard or peer.sent(said, d.LiftState(lift_name="Lift1")), "they meet too")
+            wait_until(
+                lambda: heard or peer.sent(said, d.LiftState(lift_name="Lift1")), "they meet too"
+            )
         finally:
             late.close()
     finally:

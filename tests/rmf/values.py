@@ -8,6 +8,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from bridges.rmf import definitions as d
+from tests.depth import examples
 
 NUMBERS: dict[str, st.SearchStrategy[Any]] = {
     "uint8": st.integers(0, 2**8 - 1),
@@ -19,7 +20,7 @@ NUMBERS: dict[str, st.SearchStrategy[Any]] = {
 }
 TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20)
 
-repeatable = settings(derandomize=True, deadline=None, database=None, max_examples=40)
+repeatable = settings(derandomize=True, deadline=None, database=None, max_examples=examples(40))
 """The same values in every run."""
 
 MESSAGE_TYPES: tuple[Any, ...] = typing.get_args(d.Message)

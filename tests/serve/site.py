@@ -12,12 +12,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from bridges.rmf.dds import DdsTransport
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
-from tests.waiting import wait_until
+from hal_fakes.wire import join, wire
+from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
+PATIENT = "stale_after_s: 30"
+"""A busy machine that keeps the daemon from scanning for a while does not take its door away."""
 YAML = """
 kind: door
 driver: dry_contact
@@ -26,7 +28,7 @@ buses:
   module: {{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}}}
 doors:
   ward_door:
-    limits: {{close_grace_s: 0}}
+    limits: {{close_grace_s: 0, stale_after_s: 30}}
     inputs:
       opened: {{point: "unit 1 discrete input 0", active: high}}
       closed: {{point: "unit 1 discrete input 1", active: high}}
@@ -38,7 +40,8 @@ doors:
 class Module:
     """The I/O module and the door behind it; it outlives every daemon."""
 
-    def __init__(self, directory: Path, domain: int, transport: str = "dds") -> None:
+    def __init__(self, directory: Path, domain: int, transport: str | None = None) -> None:
+        transport = transport or wire()
         self.directory = directory
         self.domain = domain
         self.edges: list[dict[str, Any]] = []
@@ -53,7 +56,8 @@ class Module:
         assert self._far_side.stdout
         tcp = json.loads(self._far_side.stdout.readline())["tcp"]
         self.file = directory / "ward_door.yaml"
-        self.file.write_text(YAML.format(domain=domain, transport=transport, port=tcp["port"]))
+        self.yaml = YAML.format(domain=domain, transport=transport, port=tcp["port"])
+        self.file.write_text(self.yaml)
         self._follow = socket.socket(socket.AF_UNIX)
         self._follow.connect(str(path))
         self._follow.sendall(b"follow\n")
@@ -71,13 +75,22 @@ class Module:
         self.edges += [json.loads(line) for line in lines if line.startswith(b"{")]
         return [edge["value"] for edge in self.edges if edge["signal"] == "hold_open"]
 
+    def hang(self) -> None:
+        """The module answers nobody, and its relay stays as it is."""
+        self._far_side.send_signal(signal.SIGSTOP)
+
+    def go_on(self) -> None:
+        """It answers again."""
+        self._far_side.send_signal(signal.SIGCONT)
+
     def close(self) -> None:
         """Take the module off the wall."""
+        self.go_on()
         self._follow.close()
         assert self._far_side.stdin
         assert self._far_side.stdout
         self._far_side.stdin.close()
-        self._far_side.wait(10)
+        self._far_side.wait(PATIENCE_S)
         self._far_side.stdout.close()
 
 
@@ -97,7 +110,8 @@ def command(*arguments: str | Path) -> list[str]:
 
 def environment(**more: str) -> dict[str, str]:
     """This one's, as no service."""
-    own = {k: v for k, v in os.environ.items() if not k.startswith(("RMF_", "NOTIFY", "WATCHDOG"))}
+    units = ("RMF_", "NOTIFY", "WATCHDOG", "RUNTIME_DIR", "STATE_DIR", "SERVICE_RESULT")
+    own = {name: value for name, value in os.environ.items() if not name.startswith(units)}
     return own | more
 
 
@@ -118,10 +132,10 @@ class Daemon:
         """Until the log says so."""
         wait_until(lambda: text in self.log.read_text(), f"{text!r} in {self.log}")
 
-    def end(self, number: signal.Signals) -> int:
+    def end(self, number: int) -> int:
         """Send a signal and give the exit code."""
         self.process.send_signal(number)
-        return self.process.wait(20)
+        return self.process.wait(PATIENCE_S)
 
 
 @contextmanager
@@ -131,8 +145,23 @@ def daemon(file: Path, runtime_dir: Path, *options: str, **env: str) -> Iterator
     try:
         yield started
     finally:
-        started.process.kill()
-        started.process.wait()
+        started.process.terminate()
+        try:
+            started.process.wait(20)
+        finally:
+            started.process.kill()
+            started.process.wait()
+
+
+def hold_open(module: Module, graph: "Graph", running: Daemon) -> None:
+    """Ask until the relay holds the door."""
+    running.wait_for("ready")
+
+    def held() -> bool:
+        graph.ask(DoorModeValue.MODE_OPEN)
+        return module.relay() == [True]
+
+    wait_until(held, "the relay holds the door")
 
 
 class Graph:
@@ -140,13 +169,17 @@ class Graph:
 
     def __init__(self, domain: int) -> None:
         self.states: list[DoorState] = []
-        self.transport = DdsTransport("rmf", domain, loopback=True)
+        self.transport = join("rmf", domain)
         self._requests = self.transport.publisher(DOOR_REQUESTS)
         self.heard = self.transport.subscribe(DOOR_STATES, self.states.append)
 
     def ask(self, mode: DoorModeValue) -> None:
         """Send a request once the node has matched."""
         wait_until(self._requests.matched, "the node listens")
+        self.request(mode)
+
+    def request(self, mode: DoorModeValue) -> None:
+        """Send a request, whoever listens."""
         request = DoorRequest(
             door_name="ward_door", requester_id="r", requested_mode=DoorMode(int(mode))
         )

@@ -8,7 +8,7 @@ def test_a_stamp_is_the_wall_clock_now_less_the_age_of_the_reading_and_0_for_nev
     assert clock.stamp(None) == Time(0, 0)
 
 
-def test_what_is_told_is_told_each_second_at_once_when_it_changes_and_10_times_a_second_at_most() -> (
+def test_a_state_is_due_each_second_and_at_once_when_it_changes_but_10_times_a_second_at_most() -> (
     None
 ):
     pace = Pace()

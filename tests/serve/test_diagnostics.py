@@ -5,11 +5,10 @@ from pathlib import Path
 import pytest
 
 from bridges.rmf import definitions as d
-from bridges.rmf.dds import DdsTransport
 from bridges.rmf.topics import DIAGNOSTICS, DOOR_STATES
 from bridges.serve.diagnostics import MOST, diagnosis, faults
-from hal_fakes.domain import free_domain
-from tests.serve.site import Module, daemon
+from hal_fakes.wire import join
+from tests.serve.site import PATIENT, Module, daemon
 from tests.waiting import wait_until
 
 AT = d.Time(7, 8)
@@ -82,10 +81,12 @@ def test_a_flood_of_names_does_not_make_the_message_grow_without_end() -> None:
     assert len(diagnosis("node", "lift", {}, devices, AT).status) == 1 + MOST
 
 
-def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(tmp_path: Path) -> None:
-    domain = free_domain()
+def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(
+    domain: int, tmp_path: Path
+) -> None:
     module = Module(tmp_path, domain)
-    listener = DdsTransport("listener", domain, loopback=True)
+    module.file.write_text(module.yaml.replace(PATIENT, "stale_after_s: 1"))
+    listener = join("listener", domain)
     heard: list[d.DiagnosticArray] = []
     listener.subscribe(DIAGNOSTICS, heard.append)
     try:
@@ -102,12 +103,11 @@ def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(tmp_path: Pat
         listener.close()
 
 
-def test_diagnostics_can_be_left_off(tmp_path: Path) -> None:
-    domain = free_domain()
+def test_diagnostics_can_be_left_off(domain: int, tmp_path: Path) -> None:
     module = Module(tmp_path, domain)
     text = module.file.read_text()
     module.file.write_text(text.replace("rmf: {", "rmf: {diagnostics: false, "))
-    listener = DdsTransport("listener", domain, loopback=True)
+    listener = join("listener", domain)
     states: list[d.DoorState] = []
     listener.subscribe(DOOR_STATES, states.append)
     diagnostics = listener.subscribe(DIAGNOSTICS, lambda message: None)

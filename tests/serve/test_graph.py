@@ -19,6 +19,7 @@ from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from bridges.serve.presence import SPREAD_MOST_S
 from bridges.serve.serving import Serving
+from hal_fakes import wire
 from tests.rmf.domains import domain_of_this_run
 from tests.waiting import wait_until
 
@@ -66,7 +67,7 @@ def test_after_its_quiet_start_what_an_adapter_asks_is_passed_on_with_our_stamp(
     assert site.sent == [replace(asked, request_time=stamp(WALL + 3.0))]
 
 
-def test_until_it_may_speak_it_is_no_publisher_to_anybody() -> None:
+def test_before_its_quiet_start_is_over_it_has_no_publisher() -> None:
     site = Site()
     ear = site.others.subscribe(LIFT_REQUESTS, lambda request: None)
     site.until(2.99)
@@ -141,7 +142,7 @@ def test_what_is_refused_is_counted_by_name_and_logged_once(
 
 
 def test_made_up_names_do_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(graph_node, "MAX_SUBJECTS", 3)
+    monkeypatch.setattr(graph_node, "MAX_UNSHOWN", 3)
     site = Site()
     site.until(3.0)
     for number in range(5):
@@ -149,6 +150,69 @@ def test_made_up_names_do_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -
     assert (len(site.node.subjects), site.node.refused) == (3, {"too many names": 2})
     site.until(63.0)
     assert site.node.subjects == {}
+
+
+def test_a_lift_that_shows_itself_finds_room_in_a_flood_of_names(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(graph_node, "MAX_UNSHOWN", 3)
+    monkeypatch.setattr(graph_node, "MAX_SUBJECTS", 5)
+    site = Site()
+    site.until(3.0)
+    for number in range(5):
+        site.asks(lift=f"made up {number}")
+    for number in range(6):
+        site.lift.publish(LiftState(lift_name=f"lift {number}", current_floor="L1"))
+    site.node.round()
+    site.asks(lift="lift 4")
+    assert site.sent[-1].lift_name == "lift 4"
+    assert (len(site.node.subjects), site.node.refused) == (8, {"too many names": 3})
+
+
+def test_the_lifts_of_the_yaml_are_never_turned_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(graph_node, "MAX_UNSHOWN", 0)
+    monkeypatch.setattr(graph_node, "MAX_SUBJECTS", 0)
+    site = Site(Settings(lifts=["Lift1", "Lift2"]))
+    site.until(3.0)
+    for lift in ("Lift1", "Lift2", "Lift3"):
+        site.asks(lift=lift)
+    assert [request.lift_name for request in site.sent] == ["Lift1", "Lift2"]
+    assert site.node.refused == {"not ours": 1}
+
+
+def test_who_waits_for_a_lift_that_is_gone_for_long_is_forgotten_and_who_has_it_never() -> None:
+    site = Site()
+    site.until(3.0)
+    for lift, session in (("Lift1", "fleet/a"), ("Lift2", "")):
+        site.lift.publish(LiftState(lift_name=lift, session_id=session))
+        site.node.round()
+        site.asks(session="fleet/a", lift=lift)
+        site.asks(session="fleet/b", lift=lift)
+    site.until(602.0)
+    assert list(site.node.subjects) == ["Lift1", "Lift2"]
+    site.until(604.0)
+    site.asks(session="", lift="")
+    assert list(site.node.subjects) == ["Lift1"]
+
+
+def test_a_defect_in_a_core_costs_one_message_and_is_told_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def breaks(*arguments: object) -> Any:
+        raise ZeroDivisionError("defect")
+
+    site = Site()
+    site.until(3.0)
+    site.node._kind = replace(KIND, requests={**KIND.requests, LIFT_STATES: breaks})
+    for _ in range(3):
+        site.lift.publish(LiftState(lift_name="Lift1"))
+        site.node.round()
+    site.asks()
+    assert [request.session_id for request in site.sent] == ["fleet/a"]
+    assert site.node.refused == {"a defect": 3}
+    assert [r.getMessage() for r in caplog.records if r.exc_info] == [
+        "defect kind=lift_supervisor subject=Lift1 reason=defect"
+    ]
 
 
 def test_the_status_says_who_holds_each_lift_who_waits_and_what_is_wrong() -> None:
@@ -159,7 +223,12 @@ def test_the_status_says_who_holds_each_lift_who_waits_and_what_is_wrong() -> No
     site.lift.publish(LiftState(lift_name="Lift1", current_floor="L1", session_id="fleet/a"))
     site.node.round()
     site.until(8.0)
-    assert site.node.status() == {"passive": False, "other_publishers": 0, "refused": {}}
+    assert site.node.status() == {
+        "passive": False,
+        "other_publishers": 0,
+        "refused": {},
+        "faults": [],
+    }
     assert site.node.devices() == {
         "Lift1": {
             "session": "fleet/a",
@@ -197,7 +266,9 @@ def test_faults_are_logged_when_they_come_and_when_they_go(
     ]
 
 
-def test_a_lost_wire_is_logged_and_does_not_end_it(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_lost_transport_is_logged_and_does_not_end_the_daemon(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     site = Site()
     site.until(3.0)
     site.adapter.publish(LiftRequest("Lift1", stamp(WALL + 3.0), "fleet/a", 1, "L3", 2))
@@ -211,7 +282,7 @@ def test_a_lost_wire_is_logged_and_does_not_end_it(caplog: pytest.LogCaptureFixt
 # --- with its thread, and on the wire ----------------------------------------------------------
 
 
-@pytest.fixture(params=["memory", "dds"])
+@pytest.fixture(params=["memory", "wire"])
 def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]:
     network, nodes = MemoryNetwork(), list[Transport]()
 
@@ -219,8 +290,7 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
         if request.param == "memory":
             nodes.append(MemoryTransport(network, name))
         else:
-            dds = pytest.importorskip("bridges.rmf.dds")
-            nodes.append(dds.DdsTransport(name, domain_of_this_run(), loopback=True))
+            nodes.append(wire.join(name, domain_of_this_run()))
         return nodes[-1]
 
     yield join
@@ -228,7 +298,9 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
         node.close()
 
 
-def test_in_a_thread_it_serves_until_it_is_stopped(join: Callable[[str], Transport]) -> None:
+def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
+    join: Callable[[str], Transport],
+) -> None:
     """One that is passive for a rival hears of its end, and speaks; to others it is one publisher."""
     others, ours, rival = join("others"), join("supervisor"), join("rival")
     rival.publisher(LIFT_REQUESTS)

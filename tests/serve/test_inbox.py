@@ -18,7 +18,7 @@ def test_a_flood_drops_the_oldest_and_counts_them() -> None:
     assert inbox.dropped == 3
 
 
-def test_of_several_from_one_sender_the_last_counts_after_what_came_before_it() -> None:
+def test_the_newest_message_of_a_sender_replaces_its_older_ones() -> None:
     inbox: Inbox[str] = Inbox()
     for event, sender in (("OPEN by a", "a"), ("OPEN by b", "b"), ("CLOSE by a", "a")):
         inbox.put("A", event, sender)

@@ -1,105 +1,9 @@
 """A bus and its devices in rounds, in virtual time: who is scanned when, and what the end does."""
 
-from collections.abc import Callable
+import pytest
 
-from bridges.door import KIND
-from bridges.door.memory import DoorLimits
-from bridges.door.settings import DoorSettings
-from bridges.door.signals import DoorOutputs, DoorSample
-from bridges.rmf import topics
-from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest
-from bridges.serve.clock import Clock
-from bridges.serve.device import Node
-from bridges.serve.loop import Loop
-from drivers import DriverError
-from drivers.hal import Bus
-
-SCAN_S = 0.25
-
-
-class Door:
-    """One door's driver; `during` is called in the middle of each reading. It can be `lost`."""
-
-    def __init__(self, name: str, log: Callable[[str], None]) -> None:
-        self.during: Callable[[], None] = lambda: None
-        self.lost = False
-        self._name = name
-        self._log = log
-
-    def open(self) -> None:
-        self._log(f"{self._name} claimed")
-
-    def read(self) -> DoorSample:
-        self._log(f"{self._name} read")
-        self.during()
-        return DoorSample(opened=False, closed=True)
-
-    def write(self, outputs: DoorOutputs) -> None:
-        if outputs.hold_open:
-            self._log(f"{self._name} held")
-
-    def make_safe(self) -> None:
-        if self.lost:
-            raise DriverError("no answer")
-        self._log(f"{self._name} off")
-
-    def close(self) -> None:
-        self._log(f"{self._name} closed")
-
-
-class Wires(Bus):
-    """A bus that tells of edges."""
-
-    def __init__(self, log: Callable[[str], None]) -> None:
-        self._log = log
-        self.edge: Callable[[], None] = lambda: None
-
-    def on_edge(self, wake: Callable[[], None]) -> None:
-        self.edge = wake
-
-    def insist(self) -> None:
-        self._log("bus insists")
-
-    def close(self) -> None:
-        self._log("bus closed")
-
-
-class Corridor:
-    """Two doors on one bus. `story`: (s, what)."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-        self.story: list[tuple[float, str]] = []
-        self.bus = Wires(self.tell)
-        self.doors = {name: Door(name, self.tell) for name in ("ward", "lab")}
-        clock = Clock(lambda: self.now, lambda: 1e6 + self.now)
-        settings = DoorSettings()
-        limits = DoorLimits.of(settings, {})
-        nodes = [
-            Node(name, KIND, settings, limits, door, lambda topic, message: None, clock)
-            for name, door in self.doors.items()
-        ]
-        self.loop = Loop("module", self.bus, nodes, SCAN_S, clock)
-
-    def tell(self, what: str) -> None:
-        self.story.append((self.now, what))
-
-    def round(self, at: float) -> list[str]:
-        """A round at this time; what happened in it."""
-        self.now = at
-        before = len(self.story)
-        self.loop.round()
-        return [what for _, what in self.story[before:]]
-
-    def asks(self, door: str) -> None:
-        """RMF wants it open."""
-        request = DoorRequest(
-            requester_id="a",
-            door_name=door,
-            requested_mode=DoorMode(int(DoorModeValue.MODE_OPEN)),
-        )
-        node = next(node for node in self.loop.nodes if node.name == door)
-        self.loop.inbox.put(door, node.event(topics.DOOR_REQUESTS, request))
+from bridges.rmf.definitions import DoorModeValue, DoorState
+from tests.serve.corridor import SCAN_S, Corridor
 
 
 def test_each_device_is_scanned_once_a_period() -> None:
@@ -153,3 +57,52 @@ def test_one_device_that_cannot_be_switched_off_keeps_no_other_on_and_is_told() 
     corridor.doors["ward"].lost = True
     assert not corridor.loop.end()
     assert (0.0, "lab off") in corridor.story
+
+
+def test_after_a_suspension_nothing_is_shown_that_was_only_true_before_it() -> None:
+    """SIGSTOP, or a laptop's sleep, is shorter than the door's readings may be old."""
+    corridor = Corridor(debounce={"opened": 0.1, "closed": 0.1})
+    for i in range(7):
+        corridor.round(SCAN_S * i)
+    assert [shown(state) for _, state in corridor.states[-2:]] == ["ward CLOSED", "lab CLOSED"]
+    for door in corridor.doors.values():
+        door.opened = True
+    corridor.states.clear()
+    for at in (2.4, 2.5, 2.6):
+        corridor.round(at)
+    assert [(at, shown(state)) for at, state in corridor.states] == [
+        (2.4, "ward UNKNOWN"),
+        (2.4, "lab UNKNOWN"),
+        (2.5, "ward OPEN"),
+        (2.5, "lab OPEN"),
+    ]
+
+
+def shown(state: DoorState) -> str:
+    mode = DoorModeValue(state.current_mode.value)
+    return f"{state.door_name} {mode.name.removeprefix('MODE_')}"
+
+
+def test_a_bus_that_takes_long_suspends_nobody(caplog: pytest.LogCaptureFixture) -> None:
+    corridor = Corridor()
+    corridor.round(0.0)
+
+    def waits() -> None:
+        corridor.now += 8.0
+
+    corridor.doors["ward"].during = waits
+    for _ in range(5):
+        corridor.round(max(corridor.now, corridor.loop.wake_at))
+    assert "suspended" not in caplog.text
+
+
+def test_each_device_that_is_scanned_and_each_call_of_the_bus_shows_that_the_loop_lives() -> None:
+    """Thirty silent units make a round of thirty timeouts, and no hang."""
+    corridor = Corridor()
+    counts: list[int] = []
+    corridor.doors["ward"].during = lambda: counts.append(corridor.loop.finished)
+    corridor.doors["lab"].during = lambda: counts.append(corridor.loop.finished)
+    corridor.round(0.0)
+    corridor.bus.calls += 1
+    counts.append(corridor.loop.finished)
+    assert counts == [0, 1, 3]

@@ -11,18 +11,17 @@ from pathlib import Path
 import pytest
 
 from bridges.rmf.definitions import DoorModeValue
-from hal_fakes.domain import free_domain
+from hal_fakes.wire import wire
 from tests.rmf.conftest import ROS2
-from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment
-from tests.waiting import wait_until
+from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment, hold_open
+from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 
-OPEN, CLOSED = DoorModeValue.MODE_OPEN, DoorModeValue.MODE_CLOSED
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(params=["dds", ROS2])
-def module(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, free_domain(), request.param)
+@pytest.fixture(params=[wire(), ROS2])
+def module(domain: int, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Module]:
+    standing = Module(tmp_path, domain, request.param)
     yield standing
     standing.close()
 
@@ -34,24 +33,14 @@ def graph(module: Module) -> Iterator[Graph]:
     joined.transport.close()
 
 
-def _hold_open(module: Module, graph: Graph, running: Daemon) -> None:
-    running.wait_for("ready")
-
-    def held() -> bool:
-        graph.ask(OPEN)
-        return module.relay() == [True]
-
-    wait_until(held, "the relay holds the door")
-
-
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_releases_the_relay_and_leaves_the_graph_at_once(
     module: Module, graph: Graph, tmp_path: Path, number: signal.Signals
 ) -> None:
     with daemon(module.file, tmp_path / "run") as running:
-        _hold_open(module, graph, running)
+        hold_open(module, graph, running)
         assert running.end(number) == 0
-        assert graph.heard.matched() == 0
+        wait_until(lambda: graph.heard.matched() == 0, "it has left the graph", LEASE_S)
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["lock"]
 
@@ -59,8 +48,8 @@ def test_a_signal_releases_the_relay_and_leaves_the_graph_at_once(
 def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_the_yaml_says_now(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
-    with daemon(module.file, tmp_path / "run") as running:
-        _hold_open(module, graph, running)
+    with daemon(module.file, tmp_path / "run", RMF_BRIDGE_SERVICE="1") as running:
+        hold_open(module, graph, running)
         off = command("outputs-off", module.file, "--runtime-dir", tmp_path / "run")
         refused = subprocess.run(off, env=environment(), capture_output=True, text=True)
         assert (refused.returncode, module.relay()) == (69, [True])
@@ -72,8 +61,8 @@ def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_th
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
 
 
-def test_outputs_that_cannot_be_verified_off_are_said_so(module: Module, tmp_path: Path) -> None:
-    module.file.write_text(YAML.format(domain=module.domain, transport="dds", port=1))
+def test_outputs_that_cannot_be_verified_off_are_reported(module: Module, tmp_path: Path) -> None:
+    module.file.write_text(YAML.format(domain=module.domain, transport=wire(), port=1))
     done = subprocess.run(
         command("outputs-off", module.file, "--runtime-dir", tmp_path / "run"),
         env=environment(),
@@ -88,7 +77,7 @@ def test_a_second_node_for_the_same_door_takes_both_out_of_service(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     with daemon(module.file, tmp_path / "one") as first:
-        _hold_open(module, graph, first)
+        hold_open(module, graph, first)
         with daemon(module.file, tmp_path / "two") as second:
             wait_until(lambda: graph.last() is DoorModeValue.MODE_OFFLINE, "the door is OFFLINE")
             first.wait_for("TWO_NODES_FOR_ONE_DEVICE")
@@ -100,7 +89,7 @@ def test_one_runtime_directory_has_one_daemon(module: Module, tmp_path: Path) ->
     with daemon(module.file, tmp_path / "run") as first:
         first.wait_for("ready")
         second = Daemon(module.file, tmp_path / "run")
-        assert second.process.wait(20) == 69
+        assert second.process.wait(PATIENCE_S) == 69
 
 
 def test_systemd_hears_ready_then_finished_scans_then_stopping(
@@ -154,7 +143,7 @@ def test_a_configuration_that_cannot_be_right_never_starts(tmp_path: Path) -> No
     ("options", "env", "why"),
     [
         (["--simulate"], {"RMF_BRIDGE_SERVICE": "1"}, "never simulates"),
-        (["--expose"], {}, "goes with"),
+        (["--expose"], {}, "needs --simulate"),
     ],
 )
 def test_a_service_never_simulates_and_a_real_device_needs_no_expose(
@@ -171,9 +160,9 @@ def test_a_service_never_simulates_and_a_real_device_needs_no_expose(
     assert why in refused.stderr
 
 
-def test_a_killed_simulation_leaves_no_process_behind(tmp_path: Path) -> None:
+def test_a_killed_simulation_leaves_no_process_behind(domain: int, tmp_path: Path) -> None:
     file = ROOT / "config" / "door_modbus.yaml"
-    options = ("--simulate", "--domain-id", str(free_domain()))
+    options = ("--simulate", "--domain-id", str(domain))
     with daemon(file, tmp_path / "run", *options) as running:
         running.wait_for("ready")
         children = Path(f"/proc/{running.process.pid}/task/{running.process.pid}/children")
@@ -183,9 +172,9 @@ def test_a_killed_simulation_leaves_no_process_behind(tmp_path: Path) -> None:
     wait_until(lambda: not any(_alive(pid) for pid in pids), "the far side has ended")
 
 
-def test_a_simulation_says_so_wherever_it_is_looked_at(tmp_path: Path) -> None:
+def test_a_simulation_says_so_wherever_it_is_looked_at(domain: int, tmp_path: Path) -> None:
     file = ROOT / "config" / "lift_dry_contact.yaml"
-    options = ("--simulate", "--domain-id", str(free_domain()))
+    options = ("--simulate", "--domain-id", str(domain))
     with daemon(file, tmp_path / "run", *options) as running:
         running.wait_for("ready")
         status = tmp_path / "run" / "status.json"

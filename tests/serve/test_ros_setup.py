@@ -10,8 +10,8 @@ import pytest
 from bridges.core.fields import Rmf
 from bridges.rmf.ros_setup import SOURCED, sourced, sourcing
 from bridges.rmf.transport import TransportError
-from hal_fakes.domain import free_domain
 from tests.serve.site import daemon
+from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
 ARGV = ["python", "rmf-bridge", "run", "my lift.yaml"]
@@ -46,12 +46,14 @@ def test_a_file_that_is_not_there_ends_ros2_and_is_logged_by_auto(
     assert caplog.messages == [f'no_ros_setup file={nowhere} reason="it is not there"']
 
 
-def test_the_daemon_that_has_sourced_it_is_the_process_that_was_started(tmp_path: Path) -> None:
+def test_the_daemon_that_has_sourced_it_is_the_process_that_was_started(
+    domain: int, tmp_path: Path
+) -> None:
     setup = tmp_path / "a setup.bash"
     setup.write_text('echo "sourced $# $FROM_SETUP" >&2\nexport FROM_SETUP=yes\nfalse\n')
     file = tmp_path / "lift.yaml"
     shipped = (ROOT / "config/lift_dry_contact.yaml").read_text()
-    lines = f"rmf:\n  transport: auto\n  ros_setup: {setup}\n  domain_id: {free_domain()}\n"
+    lines = f"rmf:\n  transport: auto\n  ros_setup: {setup}\n  domain_id: {domain}\n"
     begin, end = shipped.index("rmf:"), shipped.index("buses:")
     file.write_text(f"{shipped[:begin]}{lines}\n{shipped[end:]}")
     with daemon(file, tmp_path / "run", "--simulate") as running:
@@ -70,5 +72,5 @@ def test_ros2_without_its_setup_file_does_not_start(tmp_path: Path) -> None:
     wanted = "rmf: {transport: ros2, ros_setup: /opt/ros/none/setup.bash}\n\n"
     file.write_text(shipped[:begin] + wanted + shipped[end:])
     with daemon(file, tmp_path / "run", "--simulate") as running:
-        assert running.process.wait(20) == 69
+        assert running.process.wait(PATIENCE_S) == 69
     assert "ros_setup: /opt/ros/none/setup.bash is not there" in running.log.read_text()

@@ -1,68 +1,258 @@
+"""What a daemon has in its directories, and which directories those are."""
+
+import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from bridges.serve import directory, places
 from bridges.serve.directory import (
     AlreadyRunning,
+    Holder,
     KeptFile,
     RuntimeDirectory,
-    directory,
-    running_pid,
+    Unknown,
+    find,
+    holder,
     state_file,
 )
+from bridges.serve.places import Places
+from bridges.serve.record import Record
+
+FILE = Path("/etc/rmf-bridges/lift.yaml")
+OURS = Holder(os.getpid(), str(FILE), True)
+CLAIMED = Record(str(FILE), b"kind: lift\n", {"make.yaml": b"for: door_register\n"})
+
+
+def in_one(path: Path) -> Places:
+    return Places(path, path)
+
+
+def held(path: Path, *, serves: bool = True, file: Path = FILE) -> RuntimeDirectory:
+    return RuntimeDirectory(in_one(path), file, serves=serves, wait_s=0.0)
 
 
 def test_a_runtime_directory_has_one_daemon_at_a_time(tmp_path: Path) -> None:
-    first = RuntimeDirectory(tmp_path / "lift")
-    with pytest.raises(AlreadyRunning):
-        RuntimeDirectory(tmp_path / "lift")
+    first = held(tmp_path / "lift")
+    with pytest.raises(AlreadyRunning, match=rf"process {os.getpid()}, for {FILE}"):
+        held(tmp_path / "lift")
     first.close()
-    RuntimeDirectory(tmp_path / "lift").close()
+    held(tmp_path / "lift").close()
 
 
-def test_the_daemon_that_holds_a_directory_is_found_by_its_process_id(tmp_path: Path) -> None:
-    assert running_pid(tmp_path) is None
-    held = RuntimeDirectory(tmp_path)
-    assert running_pid(tmp_path) == os.getpid()
-    held.close()
-    assert running_pid(tmp_path) is None
+def test_the_daemon_that_holds_a_directory_is_found_with_what_it_serves(tmp_path: Path) -> None:
+    there = in_one(tmp_path)
+    assert holder(there) is None
+    serving = held(tmp_path)
+    assert holder(there) == OURS
+    serving.close()
+    assert holder(there) is None
 
 
-def test_what_is_claimed_is_remembered_until_it_is_released(tmp_path: Path) -> None:
-    held = RuntimeDirectory(tmp_path)
-    assert held.claimed() is None
-    held.claim(b"kind: lift\n")
-    held.close()
-    again = RuntimeDirectory(tmp_path)
-    claimed = again.claimed()
-    assert claimed is not None
-    assert claimed.read_bytes() == b"kind: lift\n"
+def test_either_of_its_locks_shows_that_a_daemon_lives(tmp_path: Path) -> None:
+    both = Places(tmp_path / "run", tmp_path / "state")
+    serving = RuntimeDirectory(both, FILE, serves=True)
+    for path in (tmp_path / "run" / "lock", tmp_path / "state" / "lock"):
+        path.rename(path.with_name("away"))
+        assert holder(both) == OURS
+        path.with_name("away").rename(path)
+    serving.close()
+
+
+def test_what_is_claimed_is_remembered_whole_until_it_is_released(tmp_path: Path) -> None:
+    first = held(tmp_path)
+    assert first.records.unreleased() == []
+    first.claim(CLAIMED)
+    first.close()
+    again = held(tmp_path)
+    assert again.records.unreleased() == [CLAIMED]
+    again.claim(CLAIMED)
     again.released()
-    assert again.claimed() is None
+    assert again.records.unreleased() == []
     again.close()
 
 
+def test_a_daemon_on_another_yaml_writes_over_nothing_that_is_unreleased(tmp_path: Path) -> None:
+    first = held(tmp_path)
+    first.claim(CLAIMED)
+    first.close()
+    edited = Record(str(FILE), b"kind: door\n", {})
+    second = held(tmp_path)
+    second.claim(edited)
+    assert sorted(r.yaml for r in second.records.unreleased()) == [b"kind: door\n", b"kind: lift\n"]
+    second.released()
+    assert second.records.unreleased() == [CLAIMED]
+    second.close()
+
+
+def test_a_record_counts_only_for_the_file_that_it_names(tmp_path: Path) -> None:
+    first = held(tmp_path)
+    first.claim(CLAIMED)
+    first.close()
+    other = held(tmp_path, file=Path("/home/pi/lift.yaml"))
+    assert other.records.unreleased() == []
+    other.close()
+
+
+def test_a_record_goes_where_it_outlives_a_power_cut_and_elsewhere_only_where_that_is_full(
+    tmp_path: Path,
+) -> None:
+    both = Places(tmp_path / "run", tmp_path / "state")
+    serving = RuntimeDirectory(both, FILE, serves=True)
+    in_the_way = tmp_path / "state" / f".{CLAIMED.name}.new"
+    in_the_way.mkdir()
+    serving.claim(CLAIMED)
+    assert [p.parent.name for p in tmp_path.rglob("claimed-*")] == ["run"]
+    in_the_way.rmdir()
+    serving.write_status(b"{}")
+    assert (tmp_path / "state" / CLAIMED.name).exists()
+    serving.released()
+    assert list(tmp_path.rglob("claimed-*")) == []
+    serving.close()
+
+
 def test_the_status_of_a_daemon_that_is_gone_is_not_left_behind(tmp_path: Path) -> None:
-    held = RuntimeDirectory(tmp_path)
-    held.write_status(b"{}")
+    serving = held(tmp_path)
+    serving.write_status(b"{}")
     assert (tmp_path / "status.json").read_bytes() == b"{}"
-    held.close()
+    serving.close()
     assert not (tmp_path / "status.json").exists()
 
 
-def test_the_runtime_directory_is_as_given_else_systemds_else_the_users(
-    monkeypatch: pytest.MonkeyPatch,
+def test_a_failed_write_is_logged_once_and_tried_again_until_it_works(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    file = Path("/etc/rmf-bridges/lift.yaml")
+    caplog.set_level("INFO")
+    serving = held(tmp_path)
+    (tmp_path / ".status.json.new").mkdir()
+    for _ in range(3):
+        serving.write_status(b"{}")
+    (tmp_path / ".status.json.new").rmdir()
+    serving.write_status(b"{}")
+    serving.write_status(b"{}")
+    serving.close()
+    said = [message.split(" reason")[0] for message in caplog.messages]
+    assert said == ["not_written what=status.json", "written_again what=status.json"]
+
+
+def test_a_directory_that_was_removed_is_made_again_with_its_lock_and_its_record(
+    tmp_path: Path,
+) -> None:
+    serving = held(tmp_path / "run")
+    serving.claim(CLAIMED)
+    for path in (tmp_path / "run").iterdir():
+        path.unlink()
+    (tmp_path / "run").rmdir()
+    serving.write_status(b"{}")
+    assert holder(in_one(tmp_path / "run")) == OURS
+    assert serving.records.unreleased() == [CLAIMED]
+    serving.close()
+
+
+def test_a_start_waits_while_outputs_are_being_switched_off(tmp_path: Path) -> None:
+    text = (
+        "import sys; from pathlib import Path; from bridges.serve.directory import *;"
+        "from bridges.serve.places import Places; p = Path(sys.argv[1]);"
+        "d = RuntimeDirectory(Places(p, p), Path('x'), serves=False);"
+        "print('held', flush=True); sys.stdin.read()"
+    )
+    command = [sys.executable, "-c", text, str(tmp_path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout
+        assert other.stdout.readline() == b"held\n"
+        with pytest.raises(AlreadyRunning):
+            held(tmp_path)
+        assert other.stdin
+        other.stdin.close()
+        RuntimeDirectory(in_one(tmp_path), FILE, serves=True, wait_s=20.0).close()
+
+
+@pytest.fixture
+def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A machine with services and users, none of whom is told by systemd where things are."""
+    for name in ("RUNTIME_DIRECTORY", "STATE_DIRECTORY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(places, "SERVICE_RUN", tmp_path / "run")
+    monkeypatch.setattr(places, "SERVICE_STATE", tmp_path / "var")
+    monkeypatch.setattr(places, "USERS_RUN", tmp_path / "user")
+    monkeypatch.setattr(places, "TMP", tmp_path / "tmp")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "user" / "7"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "home"))
+    return tmp_path
+
+
+def test_the_runtime_directory_is_the_given_one_or_systemds_or_the_services_or_the_users(
+    machine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    by_hand = Places(machine / "user/7/rmf-bridge/lift", machine / "home/rmf-bridge/lift")
+    service = Places(machine / "run/lift", machine / "var/lift")
+    assert find(FILE, None) == by_hand
+    RuntimeDirectory(service, FILE, serves=True).close()
+    assert find(FILE, None) == service
+    assert find(Path("/home/pi/lift.yaml"), None) == by_hand
     monkeypatch.setenv("RUNTIME_DIRECTORY", "/run/rmf-bridge/lift")
-    assert directory(file, "/tmp/here") == Path("/tmp/here")
-    assert directory(file, None) == Path("/run/rmf-bridge/lift")
-    monkeypatch.delenv("RUNTIME_DIRECTORY")
-    monkeypatch.setenv("XDG_RUNTIME_DIR", "/run/user/7")
-    assert directory(file, None) == Path("/run/user/7/rmf-bridge/lift")
+    assert find(FILE, None) == in_one(Path("/run/rmf-bridge/lift"))
+    monkeypatch.setenv("STATE_DIRECTORY", "/var/lib/rmf-bridge/lift")
+    assert find(FILE, None).state == Path("/var/lib/rmf-bridge/lift")
+    assert find(FILE, "/tmp/here") == in_one(Path("/tmp/here"))
+
+
+def test_after_a_power_cut_the_record_alone_shows_the_service(machine: Path) -> None:
+    service = Places(machine / "run/lift", machine / "var/lift")
+    serving = RuntimeDirectory(service, FILE, serves=True)
+    serving.claim(CLAIMED)
+    serving.close()
+    for path in (machine / "run/lift").iterdir():
+        path.unlink()
+    (machine / "var/lift/lock").unlink()
+    assert find(FILE, None) == service
+
+
+def test_root_by_sudo_finds_the_daemon_that_this_user_has_started_by_hand(
+    machine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runtime = machine / "user" / str(os.getuid()) / "rmf-bridge" / "lift"
+    RuntimeDirectory(in_one(runtime), FILE, serves=True).close()
+    assert find(FILE, None).runtime == machine / "user/7/rmf-bridge/lift"
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setenv("SUDO_UID", str(os.getuid()))
+    assert find(FILE, None).runtime == runtime
+    monkeypatch.setenv("SUDO_UID", "65534")
+    assert find(FILE, None).runtime == machine / "user/7/rmf-bridge/lift"
+
+
+def test_without_xdg_a_daemon_by_hand_is_below_tmp(
+    machine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("XDG_RUNTIME_DIR")
-    assert directory(file, None) == Path(f"/tmp/rmf-bridge-{os.getuid()}/rmf-bridge/lift")
+    assert find(FILE, None).runtime == machine / f"tmp/rmf-bridge-{os.getuid()}/rmf-bridge/lift"
+
+
+def test_a_lock_that_is_a_symbolic_link_or_nonsense_says_nothing(tmp_path: Path) -> None:
+    (tmp_path / "lock").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(Unknown):
+        holder(in_one(tmp_path))
+    (tmp_path / "lock").unlink()
+    (tmp_path / "lock").write_text(json.dumps({"pid": "all", "file": 1}))
+    assert holder(in_one(tmp_path)) is None
+    assert directory._written(tmp_path / "lock") == Holder(0, "", False)
+
+
+def test_a_directory_that_somebody_else_could_have_made_is_not_believed(tmp_path: Path) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir(mode=0o700)
+    assert places.distrusted(mine) == ""
+    (tmp_path / "link").symlink_to(mine)
+    assert "is a symbolic link" in places.distrusted(tmp_path / "link")
+    anybodys = tmp_path / "anybodys"
+    anybodys.mkdir()
+    anybodys.chmod(0o777)
+    assert "can be written by others" in places.distrusted(anybodys)
+    (anybodys / "planted").mkdir()
+    assert "can be written by others" in places.distrusted(anybodys / "planted")
 
 
 def test_what_must_outlive_the_daemon_is_replaced_whole(
@@ -78,3 +268,34 @@ def test_what_must_outlive_the_daemon_is_replaced_whole(
     monkeypatch.delenv("STATE_DIRECTORY")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "home"))
     assert state_file(Path("doors.yaml")) == tmp_path / "home/rmf-bridge/doors/kept.json"
+
+
+def test_what_cannot_be_kept_in_the_state_directory_is_kept_in_the_runtime_directory(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
+    kept = KeptFile(state, runtime)
+    kept.write(b"one")
+    state.unlink()
+    state.mkdir()  # nothing can be put in its place
+    kept.write(b"two")
+    kept.write(b"three")
+    assert (kept.read(), runtime.read_bytes()) == (b"three", b"three")
+    assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_written"]
+    state.rmdir()
+    state.write_bytes(b"one")  # as a disk that has come back has it
+    assert KeptFile(state, runtime).read() == b"three"
+    kept.write(b"four")
+    assert (KeptFile(state, runtime).read(), runtime.exists()) == (b"four", False)
+
+
+def test_where_neither_can_be_written_the_old_one_stands(tmp_path: Path) -> None:
+    state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
+    kept = KeptFile(state, runtime)
+    kept.write(b"one")
+    for folder in (state.parent, runtime.parent):
+        folder.mkdir(exist_ok=True)
+        (folder / ".kept.json.new").mkdir()
+    with pytest.raises(OSError, match=r"kept\.json\.new"):
+        kept.write(b"two")
+    assert kept.read() == b"one"

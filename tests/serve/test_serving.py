@@ -1,6 +1,5 @@
 """The thread of a service, with rounds as a test writes them down."""
 
-import threading
 import time
 
 import pytest
@@ -23,6 +22,7 @@ class Rounds:
         self.wake_at = CLOCK.monotonic() + 3600.0
         self.ready = False
         self.works = True
+        self.finished = 0
         self.ended = 0
         self._safe = safe
 
@@ -39,7 +39,7 @@ def test_a_thread_is_ready_when_a_round_is_done_and_what_it_serves_says_so() -> 
     rounds = Rounds()
     rounds.ready = True
     thread = Serving(rounds, CLOCK)
-    assert (thread.alive, thread.ready, thread.scans) == (False, False, 0)
+    assert (thread.alive, thread.ready, thread.finished) == (False, False, 0)
     thread.start()
     rounds.inbox.wake()
     wait_until(lambda: thread.ready, "a round is done")
@@ -58,14 +58,14 @@ def test_a_thread_that_could_not_switch_off_says_so_when_it_is_stopped() -> None
 
 
 def test_a_thread_that_dies_of_a_defect_switches_off_first(
-    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
-    died: list[str] = []
-    monkeypatch.setattr(threading, "excepthook", lambda args: died.append(str(args.exc_value)))
     rounds = Rounds()
     rounds.works = False
     thread = Serving(rounds, CLOCK)
     thread.start()
     rounds.inbox.wake()
     wait_until(lambda: not thread.alive, "it has died")
-    assert (died, rounds.ended, thread.scans) == (["a defect of ours"], 1, 0)
+    died = 'died thread=rounds reason="a defect of ours"'
+    assert [r.getMessage() for r in caplog.records] == [died]
+    assert (rounds.ended, thread.finished) == (1, 0)

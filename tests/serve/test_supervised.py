@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from hal_fakes.domain import free_domain
 from tests.serve.site import Daemon, command, daemon, environment
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -30,8 +29,7 @@ class Building:
 
 
 @pytest.fixture
-def building(tmp_path: Path) -> Iterator[Building]:
-    domain = free_domain()
+def building(domain: int, tmp_path: Path) -> Iterator[Building]:
     options = ("--simulate", "--domain-id", str(domain))
     supervisor = daemon(CONFIG / "lift_supervisor.yaml", tmp_path / "supervisor", *options)
     lift = daemon(CONFIG / "lift_dry_contact.yaml", tmp_path / "lift", *options)
@@ -54,7 +52,7 @@ def test_a_lift_is_asked_for_through_the_supervisor_and_released_by_an_operator(
     building.lift.wait_for("outputs device=Lift1 outputs=-")
 
 
-def test_two_supervisors_are_never_two_opinions(building: Building, tmp_path: Path) -> None:
+def test_of_two_supervisors_only_one_speaks(building: Building, tmp_path: Path) -> None:
     file = CONFIG / "lift_supervisor.yaml"
     options = ("--simulate", "--domain-id", str(building.domain))
     with daemon(file, tmp_path / "second", *options) as second:

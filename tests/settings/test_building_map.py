@@ -158,28 +158,30 @@ def test_names_that_agree_are_no_problem(
     assert complaints(capsys, text, building) == []
 
 
-def test_agreement_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_says_that_all_names_agree(capsys: pytest.CaptureFixture[str]) -> None:
     Path("device.yaml").write_text(LIFT)
     assert main(["check", "device.yaml", "--building-map", "graph.yaml"]) == 0
-    assert "\nnamed as on graph.yaml: Lift1, L1, L2\n" in capsys.readouterr().out
+    assert "\nsame names as in graph.yaml: Lift1, L1, L2\n" in capsys.readouterr().out
 
 
-def test_a_lift_that_the_map_spells_otherwise(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_lift_that_the_map_spells_differently_is_named(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert complaints(capsys, LIFT.replace("Lift1", "lift_1")) == [
         "device.yaml:5:3: building.yaml has no lift 'lift_1': did you mean 'Lift1' (line 17)?"
     ]
 
 
-def test_a_floor_that_no_level_is_called(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_floor_without_a_level_of_that_name_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert complaints(capsys, LIFT.replace("L2", "Level2")) == [
-        "device.yaml:6:5: on building.yaml (line 18) 'Lift1' stops at 'L2' too: a robot sent there"
-        " would be refused for ever. Add the floor, or take the stop off the map",
+        "device.yaml:6:5: on building.yaml (line 18) 'Lift1' also stops at 'L2': a robot sent there"
+        " would always be refused. Add the floor, or remove the stop from the map",
         "device.yaml:6:18: the lift 'Lift1' does not stop at 'Level2' on building.yaml:"
         " it has L1, L2",
     ]
 
 
-def test_a_level_where_the_lift_does_not_stop(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_level_where_the_lift_does_not_stop_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     said = complaints(capsys, LIFT.replace("L2", "L10"), "graph.yaml")
     assert said[1:] == [
         "device.yaml:6:18: the lift 'Lift1' does not stop at 'L10' on graph.yaml, though the level"
@@ -192,16 +194,16 @@ def test_floors_that_are_a_mapping_are_found_by_their_keys(
 ) -> None:
     text = LIFT.replace("[L1, L2]", "\n      L1: {}\n      B1: {level: L2}")
     assert complaints(capsys, text) == [
-        "device.yaml:6:5: on building.yaml (line 18) 'Lift1' stops at 'L2' too: a robot sent there"
-        " would be refused for ever. Add the floor, or take the stop off the map",
+        "device.yaml:6:5: on building.yaml (line 18) 'Lift1' also stops at 'L2': a robot sent there"
+        " would always be refused. Add the floor, or remove the stop from the map",
         "device.yaml:8:7: the lift 'Lift1' does not stop at 'B1' on building.yaml: it has L1, L2",
     ]
 
 
 def test_a_charger_is_a_vertex_where_robots_charge(capsys: pytest.CaptureFixture[str]) -> None:
     assert complaints(capsys, CHARGER.replace("pad_a", "pharmacy")) == [
-        "device.yaml:5:3: building.yaml:12: the waypoint 'pharmacy' is no charger: is_charger is"
-        " not true"
+        "device.yaml:5:3: building.yaml:12: the waypoint 'pharmacy' is not a charger: set"
+        " is_charger: true"
     ]
     assert complaints(capsys, CHARGER.replace("pad_a", "charger_9")) == [
         "device.yaml:5:3: building.yaml has no charger 'charger_9': it has pad_a"
@@ -212,8 +214,8 @@ def test_a_coordinators_waypoints_and_stations_stand_on_the_map(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert complaints(capsys, COORDINATOR) == [
-        "device.yaml:6:7: building.yaml:12: the waypoint 'pharmacy' is no charger: is_charger is"
-        " not true",
+        "device.yaml:6:7: building.yaml:12: the waypoint 'pharmacy' is not a charger: set"
+        " is_charger: true",
         "device.yaml:9:51: building.yaml has no waypoint 'wait': it has pad_a, pharmacy",
     ]
 
@@ -225,18 +227,20 @@ def test_a_map_without_any_lift_says_so(capsys: pytest.CaptureFixture[str]) -> N
     ]
 
 
-def test_a_kind_that_names_nothing_on_a_map(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_kind_without_names_on_a_map_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     Path("device.yaml").write_text("kind: lift_supervisor\n")
     assert main(["check", "device.yaml", "--building-map", "building.yaml"]) == 0
-    assert "\nnothing in this file stands on building.yaml\n" in capsys.readouterr().out
+    assert "\nthis file uses no names that building.yaml could confirm\n" in capsys.readouterr().out
 
 
-def test_what_is_no_map_is_refused_where_it_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_is_not_a_map_is_refused_at_the_place_that_is_wrong(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     Path("device.yaml").write_text(LIFT)
     assert main(["check", "device.yaml", "--building-map", "device.yaml"]) == 78
     assert capsys.readouterr() == (
         "",
-        "device.yaml:1:1: this is no building map or navigation graph: it has no 'levels:'\n"
+        "device.yaml:1:1: this is not a building map or navigation graph: it has no 'levels:'\n"
         "1 error\n",
     )
 
@@ -247,24 +251,27 @@ def test_every_odd_form_is_named_with_its_place() -> None:
         "  [x]: {}\nlifts: [Lift1]\n"
     )
     assert problems_of(text) == [
-        "map.yaml:3:15: 'vertices' is not a list, as RMF has it",
-        "map.yaml:4:12: 'doors' is not a list, as RMF has it",
-        "map.yaml:6:16: a vertex is not a list ([x, y, ...]), as RMF has it",
-        "map.yaml:7:3: a name in 'levels' is not a text",
-        "map.yaml:8:8: 'lifts' is not a mapping (name: ...), as RMF has it",
+        "map.yaml:3:15: 'vertices' must be a list, as RMF has it",
+        "map.yaml:4:12: 'doors' must be a list, as RMF has it",
+        "map.yaml:6:16: a vertex must be a list ([x, y, ...]), as RMF has it",
+        "map.yaml:7:3: a name in 'levels' must be text",
+        "map.yaml:8:8: 'lifts' must be a mapping (name: ...), as RMF has it",
     ]
 
 
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("", "map.yaml:1:1: the file is empty: it begins with 'levels: ...'"),
-        ("- 1\n", "map.yaml:1:1: the file is not a mapping: it begins with 'levels: ...'"),
+        ("", "map.yaml:1:1: the file is empty: begin it with 'levels: ...'"),
+        ("- 1\n", "map.yaml:1:1: the file is not a mapping: begin it with 'levels: ...'"),
         (b"levels: \xff", "map.yaml:1:9: byte 0xff is not UTF-8: save the file as UTF-8"),
         ("levels: " + "[" * 40, "map.yaml:1:40: nested more than 32 deep"),
-        ("levels: &a [*a]", "map.yaml:1:13: an alias ('*name') inside the very value that it"),
-        ("levels: !!python/name:os.system x", "map.yaml:1:9: tags ('!...') are not read"),
-        (b" " * (MAP.max_bytes + 1), "map.yaml:1:1: longer than 4096 KiB: this is no building map"),
+        ("levels: &a [*a]", "map.yaml:1:13: an alias ('*name') inside the value that it"),
+        ("levels: !!python/name:os.system x", "map.yaml:1:9: a tag ('!...') is not acce"),
+        (
+            b" " * (MAP.max_bytes + 1),
+            "map.yaml:1:1: longer than 4096 KiB: this is not a building map",
+        ),
     ],
 )
 def test_a_hostile_file_ends_in_a_clear_text(text: str | bytes, problem: str) -> None:
@@ -275,5 +282,5 @@ def test_values_that_multiply_by_aliases_are_not_written_out() -> None:
     lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 8)]
     assert problems_of("\n".join(lines)) == [
-        f"map.yaml:6:5: more than {MAP.max_values} values, with aliases written out"
+        f"map.yaml:6:5: more than {MAP.max_values} values, counting repeated aliases"
     ]

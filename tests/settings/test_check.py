@@ -104,7 +104,7 @@ def test_problems_go_to_stderr_with_their_number(capsys: pytest.CaptureFixture[s
     assert check("gate.yaml") == 78
     assert capsys.readouterr() == (
         "",
-        "gate.yaml:15:32: 'tries' is 0: a whole number of at least 1 is wanted\n"
+        "gate.yaml:15:32: 'tries' is 0: write a whole number of at least 1\n"
         "gate.yaml:15:35: unknown key 'gian': did you mean 'gain'? known here: "
         "open_s, close_s, tries, even, gain, loud, baud, label\n"
         "2 errors\n",

@@ -13,6 +13,7 @@ from bridges.core.fields import Rmf
 from bridges.settings import names as named
 from bridges.settings.load import Config, Problem, load
 from drivers.hal.points import Wire
+from tests.depth import examples
 from tests.settings.reading import RIGHT, changed, config_of
 
 GATE = {
@@ -62,7 +63,7 @@ def test_a_driver_without_a_table_has_no_wires(file: Path) -> None:
     assert config_of(file, text).wires("north") == []
 
 
-def test_what_is_legal_but_worth_a_look_is_kept_as_warnings(file: Path) -> None:
+def test_a_legal_but_unlikely_setting_is_kept_as_a_warning(file: Path) -> None:
     text = changed("    limits:", "    accept_unsafe: {hold: the door is light}\n    limits:")
     text = changed("tries: 2", "loud: true", text)
     assert config_of(file, text).warnings == (
@@ -131,7 +132,7 @@ Quoting.add_representer(
 
 @pytest.mark.parametrize("flow", [True, False])
 def test_every_right_file_becomes_what_msgspec_makes_of_its_values(file: Path, flow: bool) -> None:
-    @settings(derandomize=True, max_examples=60, deadline=None, database=None)
+    @settings(derandomize=True, max_examples=examples(60), deadline=None, database=None)
     @given(st.dictionaries(NAMES, gates(), min_size=1, max_size=1))
     def check(devices: dict[str, Any]) -> None:
         raw = {"kind": "gate", "driver": "contact", "buses": {"b": {"type": "pins"}}}

@@ -27,17 +27,19 @@ def test_a_name_that_no_file_can_have_is_one_problem() -> None:
 
 
 def test_a_file_longer_than_any_device_yaml_is_not_read(file: Path) -> None:
-    assert problems_of(file, "#" * 300_000) == ["1:1: longer than 256 KiB: this is no device YAML"]
+    assert problems_of(file, "#" * 300_000) == [
+        "1:1: longer than 256 KiB: this is not a device YAML"
+    ]
 
 
 @pytest.mark.parametrize("text", ["", "# nothing yet\n", "\n\n", "\ufeff"])
 def test_an_empty_file_is_one_problem(file: Path, text: str) -> None:
-    assert problems_of(file, text) == ["1:1: the file is empty: it begins with 'kind: ...'"]
+    assert problems_of(file, text) == ["1:1: the file is empty: begin it with 'kind: ...'"]
 
 
 @pytest.mark.parametrize("text", ["- a\n- b\n", "gate\n", "---\n", "[]"])
 def test_a_file_that_is_no_mapping_is_one_problem(file: Path, text: str) -> None:
-    assert problems_of(file, text) == ["1:1: the file is not a mapping: it begins with 'kind: ...'"]
+    assert problems_of(file, text) == ["1:1: the file is not a mapping: begin it with 'kind: ...'"]
 
 
 def test_bytes_that_are_not_utf_8_are_named_at_their_place(file: Path) -> None:
@@ -57,7 +59,7 @@ def test_lines_may_end_as_on_windows(file: Path) -> None:
 
 def test_a_control_character_is_named_at_its_place(file: Path) -> None:
     assert problems_of(file, "kind: gate\n# \x07\n") == [
-        "2:3: the character U+0007 may not stand in YAML: delete it"
+        "2:3: the character U+0007 is not allowed in YAML: delete it"
     ]
 
 
@@ -88,7 +90,7 @@ SYNTAX = {
         "1:1: not YAML: found incompatible YAML document (version 1.* is required)"
     ),
     "a: *b\n": "1:4: not YAML: found undefined alias 'b'",
-    "a: &b 1\nc: &b 2\n": "2:4: an anchor ('&name') with a name that is taken already",
+    "a: &b 1\nc: &b 2\n": "2:4: an anchor ('&name') whose name is already used",
 }
 
 
@@ -99,7 +101,7 @@ def test_a_mistake_in_the_syntax_keeps_its_line_and_column(file: Path, text: str
 
 def test_tags_are_refused_wherever_they_stand_and_whatever_they_say(file: Path) -> None:
     text = RIGHT.replace("dds,", "!!python/object:os.system dds,").replace("[in,", "[! in,")
-    refused = "tags ('!...') are not read: delete it; a text may need quotes"
+    refused = "a tag ('!...') is not accepted: delete it, or quote the text"
     assert problems_of(file, text) == [f"3:18: {refused}", f"8:13: {refused}"]
 
 
@@ -118,7 +120,7 @@ def test_an_alias_inside_its_own_value_does_not_hang(file: Path, text: str) -> N
 
 def test_an_alias_inside_its_own_value_is_one_problem(file: Path) -> None:
     assert problems_of(file, "a: &x\n  b: [1, *x]\n") == [
-        "2:10: an alias ('*name') inside the very value that it repeats"
+        "2:10: an alias ('*name') inside the value that it repeats"
     ]
 
 
@@ -126,7 +128,7 @@ def test_aliases_cannot_make_a_small_file_huge(file: Path) -> None:
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 9)]
     assert problems_of(file, "\n".join(lines)) == [
-        "5:5: more than 20000 values, with aliases written out"
+        "5:5: more than 20000 values, counting repeated aliases"
     ]
 
 

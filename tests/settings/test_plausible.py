@@ -43,12 +43,12 @@ def test_the_door_itself_is_right_and_warns_of_nothing(file: Path) -> None:
 REFUSED = {
     "a bus that is read too seldom": (
         door(f"{TCP}, scan_s: 2", limits="{stale_after_s: 1.5}"),
-        "13:29: stale_after_s is 1.5, and its bus is read every 2 s (scan_s): it would never be in"
-        " service; read more often",
+        "13:29: stale_after_s is 1.5, but its bus is read every 2 s (scan_s): readings would"
+        " always be stale; lower scan_s",
     ),
     "a timeout of nothing": (
         door(limits="{open_timeout_s: 0}"),
-        "13:30: 'open_timeout_s' is 0: a number from 1 to 86400 s is wanted",
+        "13:30: 'open_timeout_s' is 0: write a number from 1 to 86400 s",
     ),
     "a topic that RMF has not": (
         door(rmf="{topics: {dor_states: x}}"),
@@ -62,7 +62,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_it_is_refused(file: Path, what: str) -> None:
+def test_an_implausible_setting_is_refused(file: Path, what: str) -> None:
     text, problem = REFUSED[what]
     found = problems_of(file, text)
     assert len(found) == 1
@@ -84,7 +84,7 @@ WARNED = {
 
 
 @pytest.mark.parametrize("what", WARNED)
-def test_it_is_warned_of(file: Path, what: str) -> None:
+def test_an_unlikely_setting_is_warned_of(file: Path, what: str) -> None:
     text, warning = WARNED[what]
     assert warnings_of(file, text) == [warning]
 

@@ -36,15 +36,15 @@ gates:
 extra: 1
 """
 FOUND = """\
-4:18: 'transport' is 'ddss': auto, dds, ros2 or zenoh is wanted (did you mean 'dds'?)
+4:18: 'transport' is 'ddss': write auto, dds, ros2 or zenoh (did you mean 'dds'?)
 4:35: 'domain_id' is written 017, which YAML may read as the number 15: \
 write a whole number from 0 to 232 plainly
 4:62: 'gate_states' is written no, which YAML may read as false: \
 if the text is meant, write "no" in quotes
 6:24: unknown key 'chp': did you mean 'chip'? known here: type, chip
-6:38: 'chip' is the number 1.0: a whole number is wanted
-7:17: 'type' is 'modul': module or pins is wanted (did you mean 'module'?)
-8:49: 'port' is 70000: a whole number from 1 to 65535 is wanted
+6:38: 'chip' is the number 1.0: write a whole number
+7:17: 'type' is 'modul': write module or pins (did you mean 'module'?)
+8:49: 'port' is 70000: write a whole number from 1 to 65535
 12:17: item 2 of 'lanes' is the number 2: if the text is meant, write "2" in quotes
 12:20: item 3 of 'lanes' is written 1:30, which YAML may read as the number 90: \
 if the text is meant, write "1:30" in quotes
@@ -52,40 +52,40 @@ if the text is meant, write "1:30" in quotes
 if the text is meant, write "~" in quotes
 12:29: item 5 of 'lanes' is the number 1e3: if the text is meant, write "1e3" in quotes
 14:23: '17' is not a pin: write A1
-14:35: 'active' is 'hgh': high or low is wanted (did you mean 'high'?)
+14:35: 'active' is 'hgh': write high or low (did you mean 'high'?)
 14:40: unknown key 'pul': did you mean 'pull'? known here: point, active, pull, debounce_s
-15:52: 'debounce_s' is 20: a number from 0 to 10 s is wanted
-16:7: the key 'closed' is on line 15 already: delete one of the two
-17:22: 1A (A1) is taken by north inputs.closed on line 15: north inputs.other needs a point of its own
+15:52: 'debounce_s' is 20: write a number from 0 to 10 s
+16:7: the key 'closed' is already on line 15: delete one of the two
+17:22: 1A (A1) is used by north inputs.closed on line 15: north inputs.other needs a point of its own
 17:52: 'debounce_s' is written 20 ms: write the number alone; a number from 0 to 10 s is wanted
 18:7: 'last': pull is missing
 20:7: 'hold' needs 'active': high or low
-20:21: A1 is taken by north inputs.closed on line 15: north outputs.hold needs a point of its own
-21:20: the key '0x1' is on line 21 already: delete one of the two
+20:21: A1 is used by north inputs.closed on line 15: north outputs.hold needs a point of its own
+21:20: the key '0x1' is already on line 21: delete one of the two
 21:29: this key is written 01, which YAML may read as the number 1: \
 write a whole number from 0 to 15 plainly
-21:38: this key is the text "3": a whole number from 0 to 15 is wanted, without quotes
-21:48: this key is 99: a whole number from 0 to 15 is wanted
-22:22: 'open_s' is not a number (.nan): a number from 0.1 to 60 s is wanted
-22:35: 'tries' is 0: a whole number of at least 1 is wanted
-22:44: 'loud' is written yes, which not every YAML reads alike: write true
-22:56: 'label' is 'A': a small word is wanted
-22:65: 'gain' is the text "1": a number is wanted, without quotes
-22:70: 'close_s' has no value: a number from 0 to 86400 s is wanted
+21:38: this key is the text "3": write a whole number from 0 to 15, without quotes
+21:48: this key is 99: write a whole number from 0 to 15
+22:22: 'open_s' is not a number (.nan): write a number from 0.1 to 60 s
+22:35: 'tries' is 0: write a whole number of at least 1
+22:44: 'loud' is written yes, which YAML versions read differently: write true
+22:56: 'label' is 'A': write a small word
+22:65: 'gain' is the text "1": write a number, without quotes
+22:70: 'close_s' has no value: write a number from 0 to 86400 s
 24:10: unknown bus 'boxx': did you mean 'box'? known here: header, spare, box
-25:23: 'side' is 'lft': left or right is wanted (did you mean 'left'?)
-25:41: item 2 of 'heights' is 9: a number above 0 and below 5 m is wanted
-25:44: item 3 of 'heights' is the text 'x': a number above 0 and below 5 m is wanted
-25:49: 'b' has no value: a mapping (key: value) is wanted
-25:54: merge keys ('<<') are not read: write the keys out
-26:37: tags ('!...') are not read: delete it; a text may need quotes
+25:23: 'side' is 'lft': write left or right (did you mean 'left'?)
+25:41: item 2 of 'heights' is 9: write a number above 0 and below 5 m
+25:44: item 3 of 'heights' is the text 'x': write a number above 0 and below 5 m
+25:49: 'b' has no value: write a mapping (key: value)
+25:54: merge keys ('<<') are not accepted: write the keys out
+26:37: a tag ('!...') is not accepted: delete it, or quote the text
 27:3: 'west' needs 'bus': header, spare or box
-27:21: 'inputs' is a list: a mapping (key: value) is wanted
+27:21: 'inputs' is a list: write a mapping (key: value)
 27:33: unknown key 'acept_unsafe': did you mean 'accept_unsafe'? known here: \
 bus, accept_unsafe, lanes, inputs, outputs, bits, codes, limits
 28:3: this name is written no, which YAML may read as false: \
 if the text is meant, write "no" in quotes
-28:7: 'no' is the number 3: a mapping (key: value) is wanted
+28:7: 'no' is the number 3: write a mapping (key: value)
 29:1: unknown key 'extra': known here: kind, driver, rmf, buses, gates
 """
 

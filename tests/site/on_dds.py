@@ -15,9 +15,9 @@ from typing import Any
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
-from bridges.rmf.dds import DdsTransport
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Subscription
+from hal_fakes import wire
 from hal_fakes.demo.daemons import Daemon, stop_all
 from hal_fakes.plants.plant import Edge
 from tests.site.robots import Places, Resident
@@ -70,7 +70,7 @@ class DdsPlace:
         self.dropped: dict[str, int] = {}
         self._timeline = timeline
         self._closed = False
-        self._inner = DdsTransport(name.replace("/", "_"), domain, loopback=True)
+        self._inner = wire.join(name.replace("/", "_"), domain)
 
     def publisher(self, topic: Topic[Any]) -> Publisher[Any]:
         return self._inner.publisher(topic)

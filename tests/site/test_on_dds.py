@@ -6,22 +6,21 @@ from pathlib import Path
 
 import pytest
 
-from hal_fakes.domain import free_domain
 from tests.site.on_dds import RealSite
 
 
 @pytest.fixture
 def site(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+    domain: int, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[RealSite]:
     directory: Path = tmp_path_factory.mktemp("s")  # a socket's name has 107 characters at the most
     monkeypatch.setenv("XDG_STATE_HOME", str(directory))
-    site = RealSite(directory, free_domain(), ("red", "green", "blue"))
+    site = RealSite(directory, domain, ("red", "green", "blue"))
     yield site
     site.close()
 
 
-@pytest.mark.timeout(180)
+@pytest.mark.long
 def test_three_robots_share_a_lift_and_a_door_while_everybody_is_killed_once(
     site: RealSite,
 ) -> None:

@@ -5,14 +5,13 @@ outputs after WATCHDOG_S, as those with a watchdog do; the GPIO header has no bu
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from drivers.hal import HalError, points
 from drivers.hal.modbus.points import Point
 from drivers.hal.points import Pull, Wire
-from hal_fakes.http_charger import HttpCharger as Station
+from hal_fakes.http_charger import HttpCharger
 from hal_fakes.modbus.register_door import RegisterDoor
 from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.machine import Machine
@@ -81,17 +80,6 @@ class _Lines:
             self._far.drive(self._safe)
 
 
-@dataclass
-class _Reply:
-    """As much of pymodbus's reply as `drivers/hal/modbus/registers.py` looks at."""
-
-    address: int
-    registers: list[int] = field(default_factory=list)
-
-    def isError(self) -> bool:
-        return False
-
-
 class RegisterFar:
     """A door operator's registers (the part of `drivers.hal.modbus.ModbusBus` that its driver uses)."""
 
@@ -116,34 +104,13 @@ class RegisterFar:
             for point, value in self._first.items():
                 self._door.set(point, value, self._timeline.now)
 
-    def read(self, asked: Any) -> dict[Point, bool]:
+    def read(self, asked: Any, safe: bool = False) -> dict[Point, int]:
         self._answers()
-        return {p: bool(self._door.get(p, self._timeline.now)) for p in asked.points()}
+        return {p: self._door.get(p, self._timeline.now) for p in asked.points()}
 
-    def write(self, point: Point, value: int) -> None:
+    def write(self, point: Point, value: int, safe: bool = False) -> None:
         self._answers()
         self._door.set(point, int(value), self._timeline.now)
-
-    def ask(self, unit: int, function: int, what: str, call: Callable[[Any], Any]) -> Any:
-        self._answers()
-        return call(self)
-
-    # ---- as a pymodbus client
-
-    def read_holding_registers(self, start: int, *, count: int, device_id: int) -> _Reply:
-        return self._registers("holding register", start, count, device_id)
-
-    def read_input_registers(self, start: int, *, count: int, device_id: int) -> _Reply:
-        return self._registers("input register", start, count, device_id)
-
-    def write_register(self, address: int, value: int, *, device_id: int) -> _Reply:
-        self._door.set(Point(device_id, "holding register", address), value, self._timeline.now)
-        return _Reply(address, [value])
-
-    def _registers(self, table: Any, start: int, count: int, unit: int) -> _Reply:
-        now = self._timeline.now
-        values = [self._door.get(Point(unit, table, start + i), now) for i in range(count)]
-        return _Reply(start, values)
 
     def _answers(self) -> None:
         if self.down:
@@ -157,7 +124,7 @@ class HttpFar:
         self.down = False
         self._timeline = timeline
         self._plant = plant
-        self._station = Station(plant, settings)
+        self._station = HttpCharger(plant, settings)
 
     def watchdog(self) -> None:
         """It charges by itself."""

@@ -1,8 +1,8 @@
 """Every request that `send` can make: its message, when it is fulfilled, and why it is not.
 
 Messages and the conditions that fulfil them are those of RMF's fleet adapters (rmf_ros2 9dedd0f).
-There is one file for each kind of device; here is what they share. A request's `obstacles` are a table,
-from the most telling line to the last, which always holds.
+There is one file for each kind of device; this one has what they share. A request's `obstacles` are a
+table, most specific first; the last one always applies.
 """
 
 from collections.abc import Iterable
@@ -12,16 +12,16 @@ from typing import Any, ClassVar, NamedTuple
 
 from bridges.commands.graph import CommandLine, Heard
 from bridges.rmf import words
-from bridges.rmf.topics import Topic
+from bridges.rmf.topics import AnyTopic
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
     """What has happened since the command began; times are monotonic s.
 
-    `listeners`: subscriptions matched on the request's topic. `states`: those that concern the
-    request, in order. `names`: every device of the kind that was heard. `heartbeat`: the door
-    supervisor's latest.
+    `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
+    request, in order. `names`: every device of the kind that was heard. `heartbeat`: the latest of the
+    door supervisor.
     """
 
     began_at: float
@@ -45,7 +45,7 @@ class Seen:
         return self.states[-1].message
 
     def requesters(self, door: str) -> list[str] | None:
-        """Who holds the door by a heartbeat heard after our first request; None without one."""
+        """Who holds the door, by a heartbeat heard after our first request; None without one."""
         sent_at = self.first_sent_at
         if self.heartbeat is None or sent_at is None or self.heartbeat.at < sent_at:
             return None
@@ -59,20 +59,20 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """The effect is there."""
+    """The request took effect."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """It is not, and this is why."""
+    """The request had no effect; `text` says why."""
 
     text: str
 
 
 class Obstacle(NamedTuple):
-    """What stands between a request and its effect, if `present`; `remedy`: the command that helps."""
+    """A possible reason why a request has no effect; `remedy`: the command that helps."""
 
     present: bool
     text: str
@@ -88,39 +88,39 @@ class Request:
     line: CommandLine = field(default=CommandLine(), kw_only=True)
 
     kind: ClassVar[str]
-    states: ClassVar[Topic[Any]]
-    own: ClassVar[Topic[Any]]
-    adapter: ClassVar[Topic[Any] | None] = None
+    states: ClassVar[AnyTopic]
+    own: ClassVar[AnyTopic]
+    adapter: ClassVar[AnyTopic | None] = None
     listener: ClassVar[str] = ""
 
     @property
-    def topic(self) -> Topic[Any]:
-        """The daemon's own, or the one that fleet adapters use."""
+    def topic(self) -> AnyTopic:
+        """The daemon's own topic, or the one that fleet adapters use."""
         return self.own if self.direct or self.adapter is None else self.adapter
 
     def message(self, seen: Seen) -> words.Requested | None:
-        """What to send, without its stamp; None while that is not known yet."""
+        """The message to send, without its stamp; None while it cannot be made yet."""
         raise NotImplementedError
 
     def outcome(self, seen: Seen) -> Done | Failed | None:
-        """Whether it is over, as far as the states tell."""
+        """The outcome, if the states show one."""
         raise NotImplementedError
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
-        """Why there is no effect, by the last state: the first that is present counts."""
+        """Why there is no effect, judged by the last state; the first `present` one counts."""
         raise NotImplementedError
 
     def about(self, state: words.Stated) -> bool:
-        """It is that device's."""
+        """Whether the state is of this device."""
         return words.device(state) == self.name
 
     def ready(self, seen: Seen) -> bool:
-        """The device itself has been heard."""
+        """Whether the device has been heard."""
         return bool(seen.states)
 
     def nobody(self) -> Obstacle:
-        """No supervisor, or no daemon."""
-        silence = f"nobody subscribes to {self.topic.name}"
+        """No supervisor or daemon listens to the request."""
+        silence = f"no node subscribes to {self.topic.name}"
         if self.topic == self.own:
             listener = self.listener or f"{self.kind} daemon"
             return Obstacle(True, f"no {listener} runs in this domain: {silence}", self._loopback())
@@ -128,17 +128,15 @@ class Request:
         return Obstacle(
             True,
             f"no {self.kind} supervisor runs in this domain: {silence}",
-            f"to ask the {self.kind}'s daemon itself: {there}",
+            f"to ask the {self.kind}'s own daemon: {there}",
         )
 
     def unheard(self, names: frozenset[str]) -> Obstacle:
-        """Another is spelt like it, or none is there at all."""
+        """The device has not been heard; perhaps another has a similar name."""
         topic = self.states.name
         if not names:
-            silence = (
-                f"nothing is heard on {topic}: no daemon of it runs in this domain and network"
-            )
-            return Obstacle(True, silence, self._loopback())
+            here = f"no {self.kind} daemon runs in this domain and network"
+            return Obstacle(True, f"nothing is heard on {topic}: {here}", self._loopback())
         there = ", ".join(sorted(names))
         near = nearest(self.name, names)
         return Obstacle(True, f"no '{self.name}' on {topic}; there: {there}{near}")
@@ -147,11 +145,11 @@ class Request:
         if "--localhost" in self.line.options:
             return ""
         there = self.line.again_with("--localhost")
-        return f"for a simulation, which is on the loopback interface: {there}"
+        return f"for a simulation on the loopback interface: {there}"
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """`; did you mean 'Lift1'?`, or "" when none is spelt like it."""
+    """`; did you mean 'Lift1'?`, or "" when no name is similar."""
     folded = {n.lower(): n for n in names}
     near = get_close_matches(name.lower(), folded, n=1, cutoff=0.6)
     return f"; did you mean '{folded[near[0]]}'?" if near else ""

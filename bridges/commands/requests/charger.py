@@ -1,14 +1,14 @@
-"""A charger assigned to a robot, or no longer: by its own daemon, or from the coordinator's queue."""
+"""Assigning a charger to a robot and cancelling that: by its daemon, or by the coordinator's queue."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.stamps import duration
-from bridges.rmf.topics import Topic
+from bridges.rmf.topics import AnyTopic
 
 ANY: Final = "any"
 SERVING: Final = (
@@ -26,23 +26,23 @@ class _Charger(Request):
 
 @dataclass(frozen=True, slots=True)
 class Charge(_Charger):
-    """The charger assigned to a robot under our request id."""
+    """Assign the charger to a robot under our request id."""
 
     fleet: str
     robot: str
     request_id: str
     start_timeout_s: float
 
-    own: ClassVar[Topic[Any]] = topics.CHARGER_REQUESTS
+    own: ClassVar[AnyTopic] = topics.CHARGER_REQUESTS
 
     def message(self, seen: Seen) -> d.ChargerRequest:
-        """The same id each time, so that a repeat is no new request."""
+        """The request, always with the same id, so that a repeat is not a new request."""
         charger = "" if self.name == ANY else self.name
         limit = duration(self.start_timeout_s)
         return d.ChargerRequest(charger, self.fleet, self.robot, limit, self.request_id)
 
     def outcome(self, seen: Seen) -> Done | None:
-        """A state with our id that serves it."""
+        """Done when a state with our id shows that the charger serves the robot."""
         answer = seen.answer()
         if answer is None or answer.state not in SERVING or answer.request_id != self.request_id:
             return None
@@ -50,7 +50,7 @@ class Charge(_Charger):
         return Done(f"{self.name} is {state} for request {self.request_id}")
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
-        """An error, or another's request."""
+        """An error, or another request."""
         state: d.ChargerState = seen.latest()
         cancel = self.line.other("send", "charger", self.name, "--cancel", state.request_id)
         return (
@@ -60,7 +60,7 @@ class Charge(_Charger):
                 f"{self.name} serves request {state.request_id}",
                 f"to cancel that: {cancel}",
             ),
-            Obstacle(True, f"{self.name} did not take the request: its daemon's log says why"),
+            Obstacle(True, f"{self.name} did not accept the request: its daemon's log says why"),
         )
 
 
@@ -71,18 +71,18 @@ def _error(state: d.ChargerState) -> Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class ChargeCancel(_Charger):
-    """The charger no longer assigned to that request."""
+    """Cancel the request that the charger is assigned to."""
 
     request_id: str
 
-    own: ClassVar[Topic[Any]] = topics.CHARGER_CANCELS
+    own: ClassVar[AnyTopic] = topics.CHARGER_CANCELS
 
     def message(self, seen: Seen) -> d.ChargerCancel:
-        """By its id."""
+        """The cancel of this request id."""
         return d.ChargerCancel(self.name, self.request_id)
 
     def outcome(self, seen: Seen) -> Done | Failed | None:
-        """Released, or the id gone; an id that was never there is a mistake worth an error."""
+        """Done when the charger is released or shows another id; Failed if it never showed this one."""
         answer = seen.answer()
         if answer is None or self._holds(answer):
             return None
@@ -96,7 +96,7 @@ class ChargeCancel(_Charger):
         return state.request_id == self.request_id and state.state not in released
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
-        """It goes on."""
+        """The charger still serves the request."""
         text = f"{self.name} still serves request {self.request_id}: its daemon's log says why"
         return (Obstacle(True, text),)
 
@@ -106,28 +106,28 @@ COORDINATOR: Final = "charger coordinator"
 
 @dataclass(frozen=True, slots=True)
 class QueuedCharge(Charge):
-    """Some charger that serves this robot; the charger of this `name`, unless it is ANY."""
+    """Ask the coordinator for the charger of this `name`, or for any (ANY), for this robot."""
 
     own = topics.ADAPTER_CHARGER_REQUESTS
     listener = COORDINATOR
 
     @property
     def who(self) -> str:
-        """The robot, by its fleet."""
+        """The robot as FLEET/ROBOT."""
         return f"{self.fleet}/{self.robot}"
 
     def about(self, state: words.Stated) -> bool:
-        """A charger that shows this robot."""
+        """Whether a charger shows this robot."""
         return isinstance(state, d.ChargerState) and (
             (state.robot_fleet, state.robot_name) == (self.fleet, self.robot)
         )
 
     def ready(self, seen: Seen) -> bool:
-        """Some charger is heard."""
+        """Whether any charger has been heard."""
         return bool(seen.names)
 
     def outcome(self, seen: Seen) -> Done | None:
-        """A charger serves it."""
+        """Done when a charger serves the robot."""
         answer = seen.answer()
         if answer is None or answer.state not in SERVING:
             return None
@@ -135,49 +135,49 @@ class QueuedCharge(Charge):
         return Done(f"{answer.charger_name} is {state} for {self.who}")
 
     def unheard(self, names: frozenset[str]) -> Obstacle:
-        """It waits, as far as one can see."""
+        """No charger shows the robot yet: it probably waits in the queue."""
         if not names:
-            silence = "no charger is heard: no daemon of one runs in this domain and network"
+            silence = "no charger is heard: no charger daemon runs in this domain and network"
             return Obstacle(True, silence, self._loopback())
         cancel = ("send", "charger", ANY, "--queue", "--cancel", self.request_id)
         return Obstacle(
             True,
             f"no charger serves {self.who} yet: it waits in the {COORDINATOR}'s queue"
-            " (`rmf-bridge watch` shows it), or was refused (the coordinator's log says why)",
+            " (see `rmf-bridge watch`), or the request was refused (see the coordinator's log)",
             f"to withdraw the request: {self.line.other(*cancel)}",
         )
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
-        """What the charger says that has it."""
-        text = f"the {COORDINATOR} has not given {self.who} a charger: its log says why"
+        """The charger's error, or no charger assigned."""
+        text = f"the {COORDINATOR} has not assigned {self.who} a charger: its log says why"
         return _error(seen.latest()), Obstacle(True, text)
 
 
 @dataclass(frozen=True, slots=True)
 class QueuedCancel(ChargeCancel):
-    """A queued request withdrawn; no state shows whether it was there."""
+    """Withdraw a queued request; no state shows whether there was one."""
 
     own = topics.ADAPTER_CHARGER_CANCELS
     listener = COORDINATOR
 
     def message(self, seen: Seen) -> d.ChargerCancel:
-        """By its id, whichever charger it was for."""
+        """The cancel of this request id, for any charger."""
         return d.ChargerCancel("", self.request_id)
 
     def about(self, state: words.Stated) -> bool:
-        """No state tells."""
+        """No state shows a queued request."""
         return False
 
     def ready(self, seen: Seen) -> bool:
-        """Some charger is heard."""
+        """Whether any charger has been heard."""
         return bool(seen.names)
 
     def outcome(self, seen: Seen) -> Done | None:
-        """The coordinator was told."""
+        """Done once the cancel has been sent."""
         if seen.first_sent_at is None:
             return None
         return Done(f"the {COORDINATOR} was told that request {self.request_id} is withdrawn")
 
     def unheard(self, names: frozenset[str]) -> Obstacle:
-        """Nobody was told."""
-        return Obstacle(True, f"the {COORDINATOR} could not be told")
+        """The cancel was never sent."""
+        return Obstacle(True, f"the cancel was not sent: no {COORDINATOR} listens")

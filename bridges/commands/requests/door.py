@@ -1,4 +1,4 @@
-"""A door held open, and released, as DoorOpen.cpp and DoorClose.cpp do."""
+"""Holding a door open and releasing it, as DoorOpen.cpp and DoorClose.cpp do."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,10 +10,10 @@ from bridges.rmf import topics
 
 @dataclass(frozen=True, slots=True)
 class DoorMove(Request):
-    """The door open, or closed.
+    """Open or close the door.
 
-    On the adapter topic also what a fleet adapter waits for: the supervisor's heartbeat lists us while
-    we want it open, and no longer afterwards.
+    On the adapter topic it also waits for the supervisor's heartbeat, as a fleet adapter does: it must
+    list us while we hold the door, and no longer after we have released it.
     """
 
     opened: bool
@@ -25,11 +25,11 @@ class DoorMove(Request):
 
     @property
     def mode(self) -> d.DoorModeValue:
-        """The mode that is asked for."""
+        """The requested mode."""
         return d.DoorModeValue.MODE_OPEN if self.opened else d.DoorModeValue.MODE_CLOSED
 
     def message(self, seen: Seen) -> d.DoorRequest:
-        """OPEN or CLOSED."""
+        """The request for that mode."""
         return d.DoorRequest(
             requester_id=self.requester,
             door_name=self.name,
@@ -37,7 +37,7 @@ class DoorMove(Request):
         )
 
     def outcome(self, seen: Seen) -> Done | None:
-        """The mode, and on the adapter topic the heartbeat."""
+        """Done when the door has the mode and, on the adapter topic, the heartbeat agrees."""
         answer = seen.answer()
         if answer is None or answer.current_mode.value != self.mode:
             return None
@@ -50,21 +50,22 @@ class DoorMove(Request):
         return requesters is not None and (self.requester in requesters) == self.opened
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
-        """By the mode that the door is in."""
+        """Judged by the mode of the door."""
         mode, name = seen.latest().current_mode.value, self.name
         others = ", ".join(r for r in seen.requesters(name) or [] if r != self.requester)
         return (
             Obstacle(
                 mode == d.DoorModeValue.MODE_OFFLINE,
-                f"the daemon does not reach the controller of {name}",
+                f"the daemon cannot reach the controller of {name}",
             ),
             Obstacle(
                 mode == d.DoorModeValue.MODE_UNKNOWN,
-                f"the contacts of {name} contradict each other, or it took too long",
+                f"the contacts of {name} contradict each other, or the door took too long",
             ),
             Obstacle(
                 mode == self.mode,
-                f"{name} is there, but no heartbeat of a door supervisor confirms it",
+                f"{name} is {'open' if self.opened else 'closed'}, but no heartbeat of a door"
+                " supervisor confirms it",
             ),
             Obstacle(self.opened, f"{name} did not open"),
             Obstacle(bool(others), f"{name} is held open by {others}"),

@@ -1,4 +1,4 @@
-"""A ride, as RequestLift.cpp asks for it, and the end of a session, as EndLiftSession.cpp does."""
+"""Requesting a lift, as RequestLift.cpp does, and ending a session, as EndLiftSession.cpp does."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -24,14 +24,14 @@ class _Lift(Request):
 
 @dataclass(frozen=True, slots=True)
 class LiftRide(_Lift):
-    """The session, and the car at this floor with its door open, as a fleet adapter asks for it."""
+    """Ask for a session, and for the car at this floor with its door open, as a fleet adapter does."""
 
     floor: str
     session: str
     granted_only: bool = False
 
     def message(self, seen: Seen) -> d.LiftRequest:
-        """AGV_MODE with DOOR_OPEN, whatever is wanted: fleets send nothing else."""
+        """Always AGV_MODE with DOOR_OPEN: fleets send nothing else."""
         return d.LiftRequest(
             lift_name=self.name,
             session_id=self.session,
@@ -41,7 +41,7 @@ class LiftRide(_Lift):
         )
 
     def outcome(self, seen: Seen) -> Done | Failed | None:
-        """The four fields that RequestLift waits for; a floor not served fails at once."""
+        """Done when RequestLift's four fields match; an unserved floor fails at once."""
         latest = seen.latest()
         if latest and latest.available_floors and self.floor not in latest.available_floors:
             floors = ", ".join(latest.available_floors)
@@ -59,7 +59,7 @@ class LiftRide(_Lift):
         return self.granted_only or arrived
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
-        """Session, mode, or where the car got stuck."""
+        """The session, the mode, or the floor or door that the car has not reached."""
         state: d.LiftState = seen.latest()
         name, session, mode = self.name, state.session_id, state.current_mode
         word = words.word(d.LiftMode, mode)
@@ -86,7 +86,7 @@ class LiftRide(_Lift):
 
 @dataclass(frozen=True, slots=True)
 class LiftEnd(_Lift):
-    """The session over: `session`, or that of the first LiftState when it is ""."""
+    """End `session`; if it is "", that of the first LiftState heard."""
 
     session: str = ""
 
@@ -106,7 +106,7 @@ class LiftEnd(_Lift):
         )
 
     def outcome(self, seen: Seen) -> Done | None:
-        """The state shows another session, or none."""
+        """Done when the state shows another session, or none."""
         session = self._ending(seen)
         if seen.states and not session:
             return Done(f"{self.name} has no session: nothing to end")
@@ -116,9 +116,10 @@ class LiftEnd(_Lift):
         return Done(f"{self.name} is no longer held by {session}")
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
-        """Only a supervisor that drops the request can stand between."""
+        """The session is still shown."""
         if self.direct:
-            return (Obstacle(True, f"{self.name} still shows the session: its log says why"),)
+            text = f"{self.name} still shows the session: its daemon's log says why"
+            return (Obstacle(True, text),)
         text = f"{self.name} still shows the session: the supervisor may have dropped the request"
         there = self.line.again_with("--direct")
-        return (Obstacle(True, text, f"to ask the lift's daemon itself: {there}"),)
+        return (Obstacle(True, text, f"to ask the lift's own daemon: {there}"),)

@@ -3,7 +3,7 @@
 import unicodedata
 from collections.abc import Iterator, Sequence
 
-from bridges.commands.sheets.told import BusTold, Part, Told
+from bridges.commands.sheets.told import MEANINGS, WIRES, BusTold, Part, Told
 from bridges.core.table import Table
 
 
@@ -26,19 +26,22 @@ def _bus(bus: BusTold) -> str:
     return f"bus {bus.name} ({bus.type}){f': {settings}' if settings else ''}"
 
 
-def _wiring(parts: Sequence[Part]) -> list[str]:
-    """The wires of all devices of a bus, under one heading."""
-    first = [(part.device, part.tables[0]) for part in parts]
-    headings = [("device", *table.headings) for _, table in first]
-    return aligned([*headings[:1], *((name, *row) for name, table in first for row in table.rows)])
+def _wiring(parts: Sequence[Part]) -> Iterator[str]:
+    """The wires of all devices of a bus under one heading; then what those say that have none."""
+    for title in (WIRES, MEANINGS):
+        found = [(p.device, table) for p in parts for table in p.tables if table.title == title]
+        headings = [("device", *table.headings) for _, table in found[:1]]
+        rows = [(device, *row) for device, table in found for row in table.rows]
+        yield from aligned([*headings, *rows]) if rows else []
 
 
 def _tables(parts: Sequence[Part]) -> Iterator[str]:
     """The other tables; what several devices have alike is printed once."""
     alike: dict[Table, list[str]] = {}
     for part in parts:
-        for table in part.tables[1:] if part.bus else part.tables:
-            alike.setdefault(table, []).append(part.device)
+        for table in part.tables:
+            if table.title not in (WIRES, MEANINGS):
+                alike.setdefault(table, []).append(part.device)
     for table, devices in alike.items():
         yield f"{', '.join(devices)}: {table.title}"
         yield from _table(table)

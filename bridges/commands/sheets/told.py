@@ -16,6 +16,8 @@ from drivers.hal.points import Wire
 
 HEADINGS = ("signal", "point", "direction", "active", "pull", "debounce", "at rest", "wire broken")
 BROKEN = {True: "asserted", False: "not asserted", None: "floats"}
+WIRES, MEANINGS = "wires", "meanings"
+"""The tables that say what is on the bus."""
 SETTINGS = ("setting", "value", "not the default")
 
 
@@ -23,7 +25,7 @@ class Part(msgspec.Struct, frozen=True, kw_only=True):
     """One controller: its wires, or what it is asked and told, and its tables.
 
     `device`: its name; a kind's without devices. `bus`: its bus's name, or "". `tables`: how it is
-    wired, or what it talks to, comes first where there is a bus.
+    wired and what it talks to come first.
     """
 
     device: str
@@ -71,7 +73,7 @@ def told(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = 
         sha256=hashlib.sha256(config.text).hexdigest(),
         buses=[_bus(config, bus) for bus in config.buses],
         parts=[_graph(config)] if config.section is not None else _devices(config),
-        notes=list(notes),
+        notes=[*notes, *map(str, config.notes)],
         errors=list(errors),
         warnings=list(config.warnings),
     )
@@ -95,25 +97,23 @@ def _devices(config: Config) -> list[Part]:
 
 
 def _device(config: Config, name: str) -> Part:
-    settings, bus = config.devices[name], config.bus_of(name)
-    tables = [*config.driver_type.tables(settings), _settings(settings)]
-    tables = [_wiring(config, name, bus), *(table for table in tables if table.rows)]
-    return Part(device=name, bus=bus, tables=tables)
+    settings, bus, driver = config.devices[name], config.bus_of(name), config.driver_type(name)
+    point = config.bus_type(bus).describe
+    wires = tuple(_row(wire, point(wire.point)) for wire in config.wires(name))
+    meanings = tuple(driver.describe(settings, config.buses[bus]))
+    tables = [
+        Table(WIRES, HEADINGS, wires),
+        Table(MEANINGS, ("what", "meaning"), meanings),
+        *driver.tables(settings),
+        _settings(settings),
+    ]
+    return Part(device=name, bus=bus, tables=[table for table in tables if table.rows])
 
 
 def _settings(settings: Any) -> Table:
     """Durations and choices; the bus is told already, and accepted wires by a warning."""
-    rows = (row for row in choices_of(settings) if row[0] not in ("bus", "accept_unsafe"))
+    rows = (row for row in choices_of(settings) if row[0] not in ("bus", "driver", "accept_unsafe"))
     return Table("settings", SETTINGS, tuple(rows))
-
-
-def _wiring(config: Config, name: str, bus: str) -> Table:
-    wires = config.wires(name)
-    if wires:
-        point = config.bus_type(bus).describe
-        return Table("wires", HEADINGS, tuple(_row(wire, point(wire.point)) for wire in wires))
-    rows = config.driver_type.describe(config.devices[name], config.buses[bus])
-    return Table("meanings", ("what", "meaning"), tuple(rows))
 
 
 def _row(wire: Wire, point: str) -> tuple[str, ...]:

@@ -93,7 +93,10 @@ class CanBus(Bus):
             left_s = deadline - self.now()
             if left_s <= 0:
                 return False
-            self._step(left_s)
+            try:
+                self._step(left_s)
+            finally:
+                self.calls += 1
             self._taken_at = self.now()
         return True
 

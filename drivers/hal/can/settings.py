@@ -24,7 +24,7 @@ BITRATES: Final = (
 Interface = Annotated[
     str,
     msgspec.Meta(
-        pattern=r"^[A-Za-z0-9._-]{1,15}$", extra={"pattern": "an interface's name, such as can0,"}
+        pattern=r"^[A-Za-z0-9._-]{1,15}$", extra={"pattern": "an interface's name, such as can0"}
     ),
 ]
 Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]

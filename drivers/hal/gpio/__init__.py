@@ -18,7 +18,14 @@ import msgspec
 from bridges.core.fields import Period
 from drivers.hal import BusType, HalError, Where
 from drivers.hal.gpio.bus import GpioBus
-from drivers.hal.gpio.header import J8, boot_level, canonical, describe, wire_problems
+from drivers.hal.gpio.header import (
+    J8,
+    boot_level,
+    canonical,
+    describe,
+    wire_problems,
+    wire_warnings,
+)
 
 __all__ = [
     "BUS",
@@ -30,6 +37,7 @@ __all__ = [
     "describe",
     "open_bus",
     "wire_problems",
+    "wire_warnings",
 ]
 
 
@@ -90,4 +98,5 @@ BUS = BusType(
     canonical=canonical,
     describe=describe,
     wire_problems=wire_problems,
+    wire_warnings=wire_warnings,
 )

@@ -21,6 +21,15 @@ SUPPLY = {1: "3.3 V", 2: "5 V", 4: "5 V", 17: "3.3 V"}
 
 FIXED_PULL_UP = ("BCM2", "BCM3")
 HAT_EEPROM = ("BCM0", "BCM1")
+SHARED = {
+    "BCM0": "a HAT's EEPROM, which the firmware reads at boot",
+    "BCM1": "a HAT's EEPROM, which the firmware reads at boot",
+    "BCM2": "I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
+    "BCM3": "I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
+    "BCM14": "the serial console, which sends and switches it at boot (enable_uart=1)",
+    "BCM15": "the serial console (enable_uart=1)",
+}
+"""Pins that the firmware or the kernel may use, as a Raspberry Pi is often set up."""
 
 
 def canonical(point: str) -> str:
@@ -79,3 +88,14 @@ def wire_problems(wire: Wire) -> Iterable[str]:
         yield "flash is for modules that time pulses; a pin's are timed here: leave it out"
     elif name in HAT_EEPROM:
         yield f"{name} belongs to the HAT EEPROM, and the firmware drives it at boot: use another"
+
+
+def wire_warnings(wire: Wire) -> Iterable[str]:
+    """What else may use this pin."""
+    try:
+        name = canonical(wire.point)
+    except ValueError:
+        return  # reported where points are spelled
+    if name in SHARED:
+        free = "; see that it is switched off in config.txt, or use another pin"
+        yield f"{name} is for {SHARED[name]}{free}"

@@ -19,6 +19,7 @@ from gpiozero.pins.lgpio import LGPIOFactory, LGPIOPin
 from gpiozero.pins.local import LocalPiFactory, LocalPiPin
 
 from drivers.hal import HalError
+from drivers.hal.gpio.holders import holders
 
 # Any board with the 40-pin header: gpiozero wants one to name pins, and a hardened unit hides
 # /proc/cpuinfo, where it would look.
@@ -72,9 +73,12 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
         self._held = True
 
     def _holder(self) -> str:
-        """Who has the line, as the kernel knows it."""
-        *_, user = lgpio.gpio_get_line_info(self.factory._handle, self._number)
-        return f"; it is held by {user!r}: stop that, or take another pin" if user else ""
+        """Who has the line: who has the chip open, else the label that the kernel has."""
+        *_, label = lgpio.gpio_get_line_info(self.factory._handle, self._number)
+        if not label:
+            return ""
+        names = " or ".join(holders(Path(f"/dev/gpiochip{self.factory._chip}"))) or repr(label)
+        return f"; it is held by {names}: stop that, or take another pin"
 
 
 class HeldFactory(LGPIOFactory):  # type: ignore[misc]

@@ -144,6 +144,8 @@ class ModbusBus(Bus):
             else:
                 self._link.mended()
                 return answer, ""
+            finally:
+                self.calls += 1
         return None, reason
 
     def _refused(self, backoff: Backoff, unit: int, text: str, code: int) -> HalError:

@@ -92,7 +92,8 @@ class Lines:
         self._safe = dict(safe)
         self._readable = readable
         self._back = Image(units, outputs.values() if readable else ())
-        self._all = Image(units, [*inputs.values(), *(outputs.values() if readable else ())])
+        read = [point.cell for point in inputs.values()]
+        self._all = Image(units, [*read, *(outputs.values() if readable else ())])
         self._set: dict[str, int] = {}
         self._touched = False
         self._claimed = False
@@ -128,7 +129,7 @@ class Lines:
         image = self._all.read()
         self._verify(known, image)
         self._set = known
-        return {name: image[point] for name, point in self._inputs.items()}
+        return {name: p.of(image[p.cell]) for name, p in self._inputs.items()}
 
     def bring(self, values: Mapping[str, int]) -> None:
         """Set those of these outputs that are not known to be so."""

@@ -1,8 +1,9 @@
 """Where a point is at a Modbus module: unit, table and address, as a YAML spells them.
 
-Addresses are those on the wire: they begin at 0. Manuals often print the data model's numbers, which
-begin at 1 and carry the table in their first digit (coil 0 is 00001, discrete input 0 is 10001); such
-a number is refused with the address that is probably meant.
+A contact is a discrete input, a coil, or one bit of a register; a relay is a coil. Addresses are those
+on the wire: they begin at 0. Manuals often print the data model's numbers, which begin at 1 and carry
+the table in their first digit (coil 0 is 00001, discrete input 0 is 10001, input register 0 is 30001,
+holding register 0 is 40001); such a number is refused with the address that is probably meant.
 """
 
 import re
@@ -13,7 +14,7 @@ from typing import Final, Literal
 from drivers.hal.points import Wire
 
 Table = Literal["coil", "discrete input", "holding register", "input register"]
-"""A contact or relay is in one of the first two; registers are spelled in `registers.py`."""
+"""Places without a unit, registers as a whole among them, are spelled in `registers.py`."""
 
 GAP_MAX: Final[dict[Table, int]] = {
     "coil": 8,
@@ -32,25 +33,55 @@ COUNT_MAX: Final[dict[Table, int]] = {
 }
 """The most that one reply can carry (Modbus Application Protocol V1.1b3, 6.1 to 6.4)."""
 
-_MODEL_DIGIT: Final[dict[Table, int]] = {"coil": 0, "discrete input": 1}
+BITS: Final = 16
+"""A register has so many; bit 0 is the least."""
+
+_MODEL_DIGIT: Final[dict[Table, int]] = {
+    "coil": 0,
+    "discrete input": 1,
+    "input register": 3,
+    "holding register": 4,
+}
+_TABLES: Final[dict[str, Table]] = {
+    **{name: name for name in _MODEL_DIGIT},
+    "holding": "holding register",
+}
 _SPELLING: Final = re.compile(
     r"unit\s*(?P<unit>[0-9]+)[\s,]+(?P<table>[a-z][a-z\s_-]*?)[\s_]*(?P<address>0x[0-9a-f]+|[0-9]+)"
+    r"(?:[\s,]+bit\s*(?P<bit>[0-9]+))?"
 )
-_HOW: Final = "write 'unit 1 coil 0' or 'unit 1 discrete input 0'; addresses begin at 0"
+_HOW: Final = (
+    "write 'unit 1 coil 0', 'unit 1 discrete input 0' or 'unit 1 holding register 0 bit 0';"
+    " addresses begin at 0"
+)
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Point:
-    """One bit or register of one unit. `str` of it is its one spelling."""
+    """One coil, discrete input or register of one unit, or one bit of a register.
+
+    `str` of it is its one spelling.
+    """
 
     unit: int
     table: Table
     address: int
+    bit: int | None = None
 
     def __str__(self) -> str:
         plain = str(self.address)
         address = f"0x{self.address:x}" if _is_model_number(self.table, plain) else plain
-        return f"unit {self.unit} {self.table} {address}"
+        bit = "" if self.bit is None else f" bit {self.bit}"
+        return f"unit {self.unit} {self.table} {address}{bit}"
+
+    @property
+    def cell(self) -> "Point":
+        """What is read to know it: the whole register, where it is one bit of that."""
+        return self if self.bit is None else Point(self.unit, self.table, self.address)
+
+    def of(self, value: int) -> int:
+        """Its own value, from that of its cell."""
+        return value if self.bit is None else value >> self.bit & 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +111,8 @@ def parse(text: str) -> Point:
     unit, table = int(words["unit"]), _table(text, words["table"])
     if unit > 247 and unit != 255:
         raise ValueError(f"unit {unit} does not exist: units are 0 to 247, and 255 on Modbus TCP")
-    return Point(unit, table, _address(table, words["address"]))
+    address_on_wire = address(table, words["address"])
+    return Point(unit, table, address_on_wire, _bit(text, table, words["bit"]))
 
 
 def canonical(point: str) -> str:
@@ -91,7 +123,8 @@ def canonical(point: str) -> str:
 def describe(point: str) -> str:
     """With the number that a manual would print: `unit 1 coil 0 (00001)`."""
     found = parse(point)
-    return f"{found} ({_MODEL_DIGIT[found.table]}{found.address + 1:04})"
+    digit, bit = _MODEL_DIGIT[found.table], "" if found.bit is None else f" bit {found.bit}"
+    return f"{found} ({digit}{found.address + 1:04}{bit})"
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:
@@ -105,7 +138,12 @@ def wire_problems(wire: Wire) -> Iterable[str]:
     if wire.direction == "in":
         return
     yield from _flash_problems(wire, point)
-    if point.table != "coil":
+    if point.bit is not None:
+        yield (
+            "an output is a coil: to write a register would write its other bits too, which may be"
+            " somebody else's; driver: register commands with whole registers"
+        )
+    elif point.table != "coil":
         yield f"an output is a coil, and a {point.table} can only be read"
     if wire.active == "low":
         yield (
@@ -153,28 +191,42 @@ def _joins(last: Range, point: Point, gap: int | None) -> bool:
 
 def _table(text: str, words: str) -> Table:
     name = " ".join(re.split(r"[\s_-]+", words.strip()))
-    if name in _MODEL_DIGIT:
-        return name
-    if "register" in name:
-        raise ValueError(f"{text!r}: a contact or relay is one bit, and a register is none: {_HOW}")
+    if name in _TABLES:
+        return _TABLES[name]
     if name == "input":
-        raise ValueError(f"{text!r}: say which input: 'discrete input'")
+        raise ValueError(f"{text!r}: say which input: 'discrete input', or 'input register'")
     raise ValueError(f"{text!r}: there is no table {name!r}: {_HOW}")
 
 
-def _address(table: Table, text: str) -> int:
-    address = int(text, 16) if text.startswith("0x") else int(text)
-    if address > 65535:
+def _bit(text: str, table: Table, bit: str | None) -> int | None:
+    """The bit of a register; None of what is one bit already."""
+    if table in ("coil", "discrete input"):
+        if bit is not None:
+            raise ValueError(f"{text!r}: a {table} is one bit already: leave 'bit {bit}' out")
+        return None
+    if bit is None:
+        raise ValueError(
+            f"{text!r}: a contact is one bit: say which of the register's, 'bit 0' say"
+        )
+    if int(bit) >= BITS:
+        raise ValueError(f"{text!r}: a register has bits 0 to 15, and 0 is the least")
+    return int(bit)
+
+
+def address(table: Table, text: str) -> int:
+    """An address of this table. Raises ValueError with what to write instead."""
+    number = int(text, 16) if text.startswith("0x") else int(text)
+    if number > 65535:
         raise ValueError(f"address {text} does not exist: addresses are 0 to 65535")
     if _is_model_number(table, text):
-        raise ValueError(_model_number(table, text, address))
-    return address
+        raise ValueError(_model_number(table, text, number))
+    return number
 
 
 def _is_model_number(table: Table, text: str) -> bool:
-    if text.startswith("0"):
+    if table in ("coil", "discrete input") and text.startswith("0"):
         return len(text) > 1 and not text.startswith("0x")
-    return table == "discrete input" and len(text) == 5 and text.startswith("1")
+    return len(text) == 5 and text.startswith(str(_MODEL_DIGIT[table]))
 
 
 def _model_number(table: Table, text: str, number: int) -> str:
@@ -187,8 +239,9 @@ def _model_number(table: Table, text: str, number: int) -> str:
 
 
 def _how(text: str) -> str:
-    number = re.fullmatch(r"\s*(?P<table>[01])(?P<address>[0-9]{4,5})\s*", text)
+    number = re.fullmatch(r"\s*(?P<digit>[0134])(?P<address>[0-9]{4,5})\s*", text)
     if not number or int(number["address"]) == 0:
         return _HOW
-    table = "coil" if number["table"] == "0" else "discrete input"
-    return f"write 'unit 1 {table} {int(number['address']) - 1}' with the right unit"
+    table = next(t for t, digit in _MODEL_DIGIT.items() if digit == int(number["digit"]))
+    bit = " bit 0" if "register" in table else ""
+    return f"write 'unit 1 {table} {int(number['address']) - 1}{bit}' with the right unit"

@@ -11,7 +11,7 @@ from typing import Annotated, Final
 
 import msgspec
 
-from drivers.hal.modbus.points import Point, Table
+from drivers.hal.modbus.points import Point, Table, address
 
 Word = Annotated[int, msgspec.Meta(ge=0, le=65535)]
 """What a register holds."""
@@ -28,7 +28,6 @@ TABLES: Final[dict[str, Table]] = {
 REGISTERS: Final = ("holding register", "input register")
 WRITABLE: Final = ("coil", "holding register")
 
-_MODEL: Final[dict[str, Table]] = {"4": "holding register", "3": "input register"}
 _SPELLING: Final = re.compile(r"(?P<table>[a-z][a-z _-]*?)[\s_]+(?P<address>0x[0-9a-f]+|[0-9]+)")
 
 
@@ -39,15 +38,7 @@ def place(text: str, tables: Collection[str] = tuple(TABLES)) -> tuple[Table, in
     table = TABLES.get(re.sub(r"[\s_-]+", " ", words["table"])) if words else None
     if words is None or table is None or table not in tables:
         raise ValueError(f"{text!r}: write {how}; addresses begin at 0")
-    address = int(words["address"], 0 if words["address"].startswith("0x") else 10)
-    if address > 65535:
-        raise ValueError(f"address {words['address']} does not exist: addresses are 0 to 65535")
-    if (model := words["address"])[0] in _MODEL and len(model) == 5 and table == _MODEL[model[0]]:
-        raise ValueError(
-            f"{model} looks like a number of the data model, which begins at 1: write"
-            f" {table} {int(model[1:]) - 1}; or 0x{address:x} if {model} really is the address"
-        )
-    return table, address
+    return table, address(table, words["address"])
 
 
 def misplaced(text: str, tables: Collection[str]) -> str | None:

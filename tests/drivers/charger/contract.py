@@ -15,7 +15,7 @@ from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerOutputs, Cha
 from drivers import Driver, DriverError
 from hal_fakes.plants.plant import Plant
 from tests.drivers.hal.modbus.module import Time
-from tests.waiting import wait_until
+from tests.waiting import at_last, wait_until
 
 ON, OFF, AS_IT_IS = ChargerOutputs(True), ChargerOutputs(False), ChargerOutputs(None)
 PACE = 20.0
@@ -47,9 +47,13 @@ class Bench:
 
     def scan(self, outputs: ChargerOutputs) -> Activity:
         """One scan; what the station does."""
-        activity = self.driver.read().activity
-        self.driver.write(outputs)
+        activity = at_last(lambda: self.driver.read().activity, "a reading", self.a_moment)
+        at_last(lambda: self.driver.write(outputs), "written", self.a_moment)
         return activity
+
+    def a_moment(self) -> None:
+        """All pauses are over."""
+        self.clock.now += 60.0
 
     def until(self, activity: Activity, outputs: ChargerOutputs) -> None:
         """Scans, until the station reads that."""
@@ -57,7 +61,7 @@ class Bench:
 
     def patiently(self) -> Activity | str:
         """What it reads with all pauses over; or why it cannot be read."""
-        self.clock.now += 60.0
+        self.a_moment()
         try:
             return self.driver.read().activity
         except DriverError as error:
@@ -99,7 +103,7 @@ class ChargerContract(ABC):
         bench.until(Activity.IDLE, OFF)
         assert bench.switched() == [True, False]
 
-    def test_the_same_level_again_is_no_new_command(self, bench: Bench) -> None:
+    def test_the_same_level_again_sends_no_command(self, bench: Bench) -> None:
         bench.driver.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
@@ -107,7 +111,7 @@ class ChargerContract(ABC):
             bench.scan(ON)
         assert bench.switched() == [True]
 
-    def test_no_level_leaves_a_charge_as_it_is(self, bench: Bench) -> None:
+    def test_without_a_wanted_level_a_charge_stays_as_it_is(self, bench: Bench) -> None:
         bench.driver.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
@@ -161,7 +165,7 @@ class ChargerContract(ABC):
         return bench.switched("range_check")
 
     @pytest.mark.parametrize("mode", ["off", "slow", "garbage", "wrong"])
-    def test_each_way_of_failing_is_a_driver_error_and_never_charging(
+    def test_every_failure_is_a_driver_error_and_never_reads_as_charging(
         self, bench: Bench, mode: Any
     ) -> None:
         bench.driver.open()

@@ -22,6 +22,7 @@ from drivers.charger.can_frames import (
 )
 from drivers.charger.can_map import PROFILE, FrameMap
 from drivers.hal import can as hal
+from drivers.profiles.texts import FOLDER
 from tests.drivers.hal.can.far_end import Reactive, failure
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_wiferion.yaml"
@@ -119,7 +120,7 @@ def test_published_temperatures_are_scaled() -> None:
         ("0000000000000010", "", ""),  # kept off by our frames: no error
     ],
 )
-def test_published_error_bits_name_what_is_wrong_and_whose_it_is(
+def test_error_bits_name_the_fault_and_its_side(
     charger: Charger, payload: str, side: str, text: str
 ) -> None:
     charger.says(0x1FFD2304, payload)
@@ -140,7 +141,7 @@ def test_an_error_whose_signals_come_after_its_state_has_its_side_from_the_first
     assert (sample.side, sample.error_text) == ("robot", "the receiver is too hot")
 
 
-def test_an_error_without_a_sign_is_waited_for_once(charger: Charger) -> None:
+def test_the_signals_of_an_error_are_waited_for_once(charger: Charger) -> None:
     charger.says(0x1FFD2304, "0000000000000000")
     for waits in (True, False, False):
         charger.status(8)
@@ -161,7 +162,7 @@ def test_bad_positioning_is_out_of_range(charger: Charger) -> None:
 # ---- what is sent, and how often
 
 
-def test_power_is_the_published_frames_at_their_pace(charger: Charger) -> None:
+def test_power_is_sent_as_the_published_frames_at_their_pace(charger: Charger) -> None:
     sent = [charger.scan(ON) for _ in range(31)]
     assert [n for n, frames in enumerate(sent) if frames] == [0, 10, 20, 30]
     assert [frames for frames in sent if frames] == [FED] * 4
@@ -180,7 +181,7 @@ def test_no_level_goes_on_with_the_last_one(charger: Charger) -> None:
     assert [charger.scan(OFF, 0.5), charger.scan(LEFT, 0.5), charger.scan(LEFT)] == [KEPT_OFF] * 3
 
 
-def test_a_charger_that_is_not_seen_is_kept_off_but_not_fed(charger: Charger) -> None:
+def test_a_charger_that_is_not_heard_is_kept_off_and_gets_no_setpoints(charger: Charger) -> None:
     charger.scan(ON)
     charger.far.now += 2
     assert failure(charger.driver.read)
@@ -191,7 +192,7 @@ def test_a_charger_that_is_not_seen_is_kept_off_but_not_fed(charger: Charger) ->
     assert charger.got == KEPT_OFF
 
 
-def test_the_end_takes_the_power_away(charger: Charger) -> None:
+def test_make_safe_takes_the_power_away(charger: Charger) -> None:
     charger.scan(ON)
     charger.driver.make_safe()
     assert charger.got == KEPT_OFF
@@ -210,7 +211,7 @@ def test_closing_takes_away_what_was_given_and_nothing_else(charger: Charger) ->
 # ---- what is not seen
 
 
-def test_a_status_that_stays_away_is_no_state(charger: Charger) -> None:
+def test_a_missing_status_frame_is_no_state(charger: Charger) -> None:
     charger.scan(OFF)
     charger.far.now += 0.9
     charger.driver.read()
@@ -346,7 +347,7 @@ def test_a_frame_that_is_never_sent_is_a_problem() -> None:
 
 def test_a_map_in_the_yaml_is_read_like_a_profile(tmp_path: Path) -> None:
     text = EXAMPLE.read_text("utf-8")
-    profile = (dbc.FOLDER / "wiferion.yaml").read_text("utf-8")
+    profile = (FOLDER / "wiferion.yaml").read_text("utf-8")
     inline = profile[profile.index("map:") :].replace("\n", "\n    ")
     file = tmp_path / "charger.yaml"
     file.write_text(text.replace("profile: wiferion", inline.rstrip()), "utf-8")
@@ -367,7 +368,7 @@ def test_two_chargers_that_send_the_same_frames_need_two_buses(tmp_path: Path) -
     with pytest.raises(SettingsError) as caught:
         load(file)
     taken = [
-        f"frame {frame} is taken by charger_c profile" for frame in ("0x18FF50E5", "0x1806E5F4")
+        f"frame {frame} is used by charger_c profile" for frame in ("0x18FF50E5", "0x1806E5F4")
     ]
     assert all(text in str(caught.value) for text in taken)
 
@@ -408,7 +409,7 @@ def test_a_map_without_a_receiver_verifies_nobody() -> None:
 @pytest.mark.parametrize(
     "text", ["", "hello", 'VERSION ""\nBO_ 1 A: 8 X\n SG_ B : 0|99@1+ (1,0) [0|1] "" X\n']
 )
-def test_what_is_no_dbc_file_is_a_value_error_on_one_line(text: str) -> None:
+def test_a_file_that_is_not_a_dbc_file_is_a_value_error_on_one_line(text: str) -> None:
     with pytest.raises(ValueError, match="is no DBC file") as caught:
         dbc.Dbc(text)
     assert "\n" not in str(caught.value)

@@ -156,7 +156,7 @@ def test_a_receiver_that_starts_anew_is_told_again(receiver: Receiver) -> None:
     assert receiver.writes == [ENABLE, ENABLE]
 
 
-def test_the_end_is_as_the_yaml_says() -> None:
+def test_the_daemons_end_keeps_or_stops_the_charge_as_the_yaml_says() -> None:
     receiver = Receiver()
     receiver.made("keep").make_safe()
     assert receiver.writes == []
@@ -186,7 +186,7 @@ def test_the_example_is_right_and_says_what_is_untried() -> None:
     assert "not tried on hardware" in str(warning)
 
 
-def test_what_cannot_be_known_is_worth_a_warning() -> None:
+def test_facts_that_the_yaml_cannot_supply_are_warned_of() -> None:
     made = Settings(node=10, heartbeat="none", receivers={"7": "tiny/r1"})
     paths = [path for path, _ in warnings(made)]
     assert paths == [(), ("heartbeat",), ("receivers",)]
@@ -209,7 +209,7 @@ def test_one_node_is_one_charger(tmp_path: Path) -> None:
     with pytest.raises(SettingsError) as caught:
         load(file)
     [problem] = caught.value.problems
-    assert "node 10 is taken by charger_b node" in str(problem)
+    assert "node 10 is used by charger_b node" in str(problem)
 
 
 @pytest.mark.parametrize("node", [0, 128])

@@ -12,7 +12,7 @@ from drivers.charger import http as charger_http
 from drivers.charger import modbus as charger_modbus
 from drivers.hal import http, modbus
 from hal_fakes.http import HttpServer
-from hal_fakes.http_charger import HttpCharger as Station
+from hal_fakes.http_charger import HttpCharger
 from hal_fakes.modbus import ModbusServer
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.pad import PadPlant
@@ -32,7 +32,7 @@ class TestAnotherMakeOnHttp(ChargerContract):
         settings = load(CONFIG / "charger_http_full.yaml").devices["charger_b"]
         plant = ChargerPlant("a", settings.receivers, commanded=True, asked=True, pace=PACE)
         world, clock = RealTime({"a": plant}), Time()
-        server = HttpServer([Station(world.plants["a"], settings)], "", timeout_s=0.5)
+        server = HttpServer([HttpCharger(world.plants["a"], settings)], "", timeout_s=0.5)
         plain = {"type": "http", "api_base": "tpu", "timeout_s": 0.5, **server.replace}
         bus = http.HttpBus(msgspec.convert(plain, http.Settings), clock)
 

@@ -271,7 +271,7 @@ class Frames(CanContract):
         bench.until(Activity.IDLE, OFF)
         assert bench.switched() == [True, False]
 
-    def test_whose_receiver_it_is_is_read_and_nobody_is_nobody(self, pad: PadBench) -> None:
+    def test_the_receiver_id_is_read_and_no_robot_has_none(self, pad: PadBench) -> None:
         def sees(receiver: str) -> bool:
             sample = pad.sample(OFF)
             return sample is not None and sample.measured.receiver_id == receiver

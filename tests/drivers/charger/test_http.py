@@ -19,6 +19,7 @@ from drivers.charger.http import DRIVER, Settings, create, describe, warnings
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
 from drivers.hal import http as bus_file
+from tests.depth import examples
 
 CODES = Codes(idle=[0], handshake=[1, 2], charging=[5], stopping=[11], released=[7], error=[238])
 SETTINGS = Settings(codes=CODES)
@@ -141,7 +142,7 @@ anything = st.recursive(
 )
 
 
-@settings(derandomize=True, max_examples=400, deadline=None)
+@settings(derandomize=True, max_examples=examples(400), deadline=None)
 @example({"state": 5.0})
 @example({"state": "5"})
 @example({"State": 5})

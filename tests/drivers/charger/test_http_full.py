@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from bridges.charger.settings import robot
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings.load import SettingsError, load
-from drivers import DriverError
-from drivers.charger import json_fields
+from drivers import DriverError, json_fields
 from drivers.charger.http import Call, InRange, Settings, create, describe, warnings
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
+from tests.depth import examples
 from tests.drivers.charger.test_http import Station
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_http_full.yaml"
@@ -155,7 +155,7 @@ near = st.fixed_dictionaries(
 )
 
 
-@settings(derandomize=True, max_examples=600, deadline=None)
+@settings(derandomize=True, max_examples=examples(600), deadline=None)
 @given(near)
 def test_whatever_json_comes_it_is_a_driver_error_or_a_sample_and_charging_only_by_its_word(
     said: Any,

@@ -33,7 +33,7 @@ def test_check_names_every_register_and_coil() -> None:
     assert dict(describe(kept, config.buses["rcu"]))["end of the daemon"] == "nothing"
 
 
-def test_its_coils_are_its_own() -> None:
+def test_no_other_device_may_use_its_coils() -> None:
     assert list(claims(SETTINGS)) == [
         ("unit 16 coil 0", ("unit",)),
         ("unit 16 coil 2", ("unit",)),

@@ -11,6 +11,7 @@ from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from drivers.charger import xnergy
 from drivers.charger.xnergy import Orders, Told, settled, steer
+from tests.depth import examples
 
 WELL = {"state": 0, "error_low": 0, "error_high": 0, "range": 0}
 
@@ -93,7 +94,7 @@ def test_only_the_answer_yes_is_in_range_and_only_when_it_is_the_last_checks(res
 any_word = st.integers(0, 0xFFFF)
 
 
-@settings(derandomize=True, max_examples=300, deadline=None)
+@settings(derandomize=True, max_examples=examples(300), deadline=None)
 @given(
     st.fixed_dictionaries(
         dict.fromkeys(("state", "error_low", "error_high"), any_word),

@@ -98,7 +98,7 @@ def test_the_shipped_door_is_sound() -> None:
         ),
     ],
 )
-def test_what_cannot_be_right_is_said_with_its_fix(
+def test_an_impossible_setting_is_named_with_its_fix(
     changes: dict[str, Any], where: str, text: str
 ) -> None:
     assert problems(**changes) == [(where, text)]
@@ -122,7 +122,7 @@ def test_what_cannot_be_right_is_said_with_its_fix(
         ),
     ],
 )
-def test_a_contact_whose_cut_wire_deceives_is_refused_unless_accepted(
+def test_a_contact_whose_cut_wire_reads_as_a_safe_state_is_refused_unless_accepted(
     signal: str, contact: dict[str, Any], text: str
 ) -> None:
     rest: dict[str, Any] = {"on_fire": "open"} if signal == "fire" else {}
@@ -145,20 +145,20 @@ def test_a_relay_that_is_on_from_power_on_is_refused() -> None:
     )
 
 
-def test_what_is_accepted_though_nothing_is_unsafe_about_it_is_worth_a_warning() -> None:
+def test_accepting_wiring_that_is_not_unsafe_is_warned_of() -> None:
     door = settings(accept_unsafe={"opened": "as built"})
     text = "nothing is unsafe about opened: delete this"
     assert list(warnings(door)) == [(("accept_unsafe", "opened"), text)]
 
 
-def test_a_closed_contact_that_a_cut_wire_imitates_is_worth_a_warning() -> None:
+def test_a_closed_contact_that_a_cut_wire_imitates_is_warned_of() -> None:
     inverted = {"point": "unit 1 discrete input 1", "active": "low"}
     text = "a cut wire may read as a closed door; wire a contact that shuts with it"
     assert list(warnings(settings(inputs={"closed": inverted}))) == [(("inputs", "closed"), text)]
     assert list(warnings(settings())) == []
 
 
-def test_guessing_is_worth_a_warning() -> None:
+def test_estimated_feedback_is_warned_of() -> None:
     door = settings(feedback="estimated", inputs={"opened": NONE}, limits={"open_delay_s": 4.0})
     text = "RMF is told OPEN or CLOSED by the clock, whatever the door does"
     assert list(warnings(door)) == [(("feedback",), text)]
@@ -222,7 +222,7 @@ def test_the_cores_limits_are_those_of_the_yaml() -> None:
     )
 
 
-def test_polarity_is_the_wires_and_the_sample_has_none() -> None:
+def test_polarity_is_applied_at_the_wire_and_the_sample_has_none() -> None:
     door = Door(inputs={"obstruction": OBSTRUCTION})
     assert door.driver.read() == DoorSample(opened=False, closed=True, obstruction=False)
     door.plant.press("obstruction", True, 1.0)

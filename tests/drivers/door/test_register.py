@@ -16,7 +16,8 @@ from bridges.settings.load import SettingsError, load
 from drivers.door.register import PROFILE, Settings, decode, door_map, points
 from drivers.door.register_map import DoorMap
 from drivers.hal.modbus.points import Point
-from drivers.profiles import FOLDER
+from drivers.profiles.texts import FOLDER
+from tests.depth import examples
 from tests.door.virtual import CLOSED, CoreAlone
 from tests.settings.reading import problems_of as settings_problems
 
@@ -74,7 +75,7 @@ def test_each_listed_status_is_what_the_map_says() -> None:
         ({"status": 1, "position": 65535}, "the position is not between 0 and 100"),
     ],
 )
-def test_what_contradicts_or_is_not_listed_is_neither_open_nor_closed(
+def test_a_contradictory_or_unlisted_status_is_neither_open_nor_closed(
     words: dict[str, int], lost: str
 ) -> None:
     assert seen(**words) == DoorSample(False, False, obstruction=False, lost=lost)
@@ -91,7 +92,7 @@ def test_errors_are_texts_and_an_unlisted_bit_is_shown_by_its_number() -> None:
     assert found.opened
 
 
-def test_the_obstruction_is_its_bit_alone() -> None:
+def test_only_its_own_bit_means_an_obstruction() -> None:
     assert [seen(status=2, obstruction=word).obstruction for word in (0, 1, 2, 3)] == [
         False,
         True,
@@ -100,7 +101,7 @@ def test_the_obstruction_is_its_bit_alone() -> None:
     ]
 
 
-@tries(derandomize=True, max_examples=500)
+@tries(derandomize=True, max_examples=examples(500))
 @given(
     st.fixed_dictionaries(
         {
@@ -111,7 +112,7 @@ def test_the_obstruction_is_its_bit_alone() -> None:
         }
     )
 )
-def test_no_number_raises_and_none_reads_open_but_those_the_map_lists(
+def test_no_register_value_raises_and_only_listed_ones_read_as_open(
     words: dict[str, int],
 ) -> None:
     sample = decode(GENERIC, words)
@@ -121,7 +122,7 @@ def test_no_number_raises_and_none_reads_open_but_those_the_map_lists(
     assert bool(sample.lost) or words["status"] in range(4)
 
 
-def test_a_door_that_is_lost_is_unknown_at_once_and_known_again_at_once() -> None:
+def test_a_lost_door_is_unknown_at_once_and_known_again_at_once() -> None:
     core = CoreAlone()
     core.sees(CLOSED, 1.0)
     lost = core.hears(Sampled(DoorSample(False, False, lost="status 9 is not in the map")))
@@ -206,7 +207,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
     assert [(w.line, w.column) for w in load(path).warnings] == [(9, 69)]
     second = PROFILED[PROFILED.index("  front:") :].replace("front", "back") + changes
     path.write_text(PROFILED + changes + second)
-    text = r"unit 1 coil 4 is taken by front changes\.command\.at on line 9"
+    text = r"unit 1 coil 4 is used by front changes\.command\.at on line 9"
     with pytest.raises(SettingsError, match=text):
         load(path)
 
@@ -218,7 +219,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
         ("moving: [1]", "moving: [1, 2]", ["9:63: 2 is listed under open already"]),
         ("{4: blocked}", "{0: blocked}", ["9:87: 0 is listed under closed already"]),
         ("open: [2], ", "", ["9:7: 'status' needs 'open': a list ([...])"]),
-        ("open: [2]", "open: []", ["9:64: 'open' has 0 entries: at least 1 are wanted"]),
+        ("open: [2]", "open: []", ["9:64: 'open' has 0 entries: at least 1 are needed"]),
         (
             "at: input register 0",
             "at: coil 3",
@@ -229,7 +230,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
             "at: input register 30001",
             [
                 "9:20: 30001 looks like a number of the data model, which begins at 1: write input"
-                " register 0; or 0x7531 if 30001 really is the address"
+                " register 0; or 0x7531 if 30001 really is the address on the wire"
             ],
         ),
         ("hold: 1, release: 0", "hold: 1, release: 1", ["10:47: 'release' is the value of hold"]),
@@ -259,7 +260,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
         ),
     ],
 )  # fmt: skip
-def test_what_cannot_be_right_is_said_where_it_stands(
+def test_an_impossible_map_is_named_at_its_line(
     tmp_path: Path, old: str, new: str, wanted: list[str]
 ) -> None:
     assert sorted(problems_of(tmp_path / "door.yaml", old, new)) == sorted(wanted)
@@ -281,7 +282,7 @@ def test_two_doors_never_share_a_command(tmp_path: Path) -> None:
     path = tmp_path / "door.yaml"
     second = YAML[YAML.index("  front:") :].replace("front", "back")
     path.write_text(YAML + second)
-    with pytest.raises(SettingsError, match=r"unit 1 coil 0 is taken by front map\.command\.at"):
+    with pytest.raises(SettingsError, match=r"unit 1 coil 0 is used by front map\.command\.at"):
         load(path)
 
 

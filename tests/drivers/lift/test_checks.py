@@ -37,6 +37,7 @@ def binary(**changes: Any) -> dict[str, Any]:
 TWO_FLOORS = {"B1": {}, "G": {}, "1": {}, "G_r": {"level": "G", "side": "rear"}}
 REAR = {"rear_door_opened": line(50), "rear_door_closed": line(51)}
 SERVICE_CODES = {0: "normal", 1: "agv_mode", 2: "fire_alarm"}
+ACCEPTED_SERVICE = dict.fromkeys(("service_bit0", "service_bit1"), "a test")
 SERVICE = {"bits": bits(2, 60), "codes": SERVICE_CODES}
 
 WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
@@ -141,11 +142,14 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
         ],
     ),
     (
-        {"inputs": inputs(service={**SERVICE, "codes": {**SERVICE_CODES, 3: "normal"}})},
+        {
+            "inputs": inputs(service={**SERVICE, "codes": {**SERVICE_CODES, 3: "normal"}}),
+            "accept_unsafe": ACCEPTED_SERVICE,
+        },
         [("inputs.agv_mode", "service shows agv_mode too: keep one")],
     ),
     (
-        {"inputs": inputs(agv_mode=None, service=SERVICE)},
+        {"inputs": inputs(agv_mode=None, service=SERVICE), "accept_unsafe": ACCEPTED_SERVICE},
         [("inputs.service.codes", "3 is missing: say what it means")],
     ),
     (
@@ -300,7 +304,7 @@ def test_the_first_public_wiring_is_possible_when_its_two_unsafe_places_are_acce
     assert found(settings(**literal, accept_unsafe=accepted)) == []
 
 
-def test_an_acceptance_of_nothing_is_pointed_out() -> None:
+def test_accepting_wiring_that_does_not_exist_is_pointed_out() -> None:
     wired = settings(accept_unsafe={"door_closed": "why"})
     assert warned(wired) == [
         ("accept_unsafe.door_closed", "nothing is unsafe about door_closed: delete this")
@@ -336,8 +340,8 @@ def test_an_acceptance_of_nothing_is_pointed_out() -> None:
             [
                 (
                     "floor_code",
-                    "with floor_bit1 cut, G reads as B1: ask for a parity line, or for codes two"
-                    " lines apart",
+                    "with floor_bit1 cut, G reads as B1; with floor_bit1 shorted, B1 reads as G: ask"
+                    " for a parity line, or for codes two lines apart",
                 )
             ],
         ),
@@ -348,14 +352,14 @@ def test_an_acceptance_of_nothing_is_pointed_out() -> None:
             [
                 (
                     "floor_code",
-                    "with floor_bit0 cut, B1 reads as G: ask for a parity line, or for codes two"
-                    " lines apart",
+                    "with floor_bit0 cut, B1 reads as G; with floor_bit0 shorted, G reads as B1: ask"
+                    " for a parity line, or for codes two lines apart",
                 )
             ],
         ),
     ],
 )
-def test_what_works_and_deserves_a_second_look(
+def test_wiring_that_works_but_is_unlikely_is_warned_of(
     changes: dict[str, Any], expected: list[tuple[str, str]]
 ) -> None:
     assert warned(settings(**changes)) == expected

@@ -72,7 +72,7 @@ def test_only_listed_codes_are_floors_and_none_is_between_them() -> None:
     }
 
 
-def test_a_floor_may_have_code_nought_when_another_number_is_between_floors() -> None:
+def test_a_floor_may_have_code_0_if_another_code_means_between_floors() -> None:
     binary = code(
         encoding="binary", bits=bits(2), codes={0: "B1", 1: "G", 2: "1"}, between_floors=[3]
     )

@@ -17,11 +17,11 @@ def sample(wired: Settings, *asserted: str) -> LiftSample:
     return decode(wired, shown, conditional(wired))
 
 
-def test_nothing_asserted_is_a_car_between_floors() -> None:
+def test_without_an_asserted_line_the_car_is_between_floors() -> None:
     assert sample(settings()) == LiftSample(level=None, door=Door.BETWEEN, agv=False)
 
 
-def test_everything_at_once() -> None:
+def test_a_sample_with_every_line_asserted() -> None:
     wired = settings(
         inputs=inputs(up=line(50), down=line(51), overload=line(52), code_blue=line(53))
     )
@@ -43,7 +43,7 @@ def test_each_hazard_line_is_its_hazard() -> None:
 
 
 @pytest.mark.parametrize("prefix", ["door", "rear_door"])
-def test_two_contacts_know_four_doors(prefix: str) -> None:
+def test_two_contacts_tell_four_door_positions(prefix: str) -> None:
     rear = {"rear_door_opened": line(50), "rear_door_closed": line(51)}
     wired = settings(floors={"G": {}, "G_r": {"level": "G", "side": "rear"}}, inputs=inputs(**rear))
     ends = [f"{prefix}_opened", f"{prefix}_closed"]
@@ -60,7 +60,7 @@ def test_two_contacts_know_four_doors(prefix: str) -> None:
     }
 
 
-def test_one_contact_knows_one_end() -> None:
+def test_one_contact_tells_one_end() -> None:
     def ends(proves: str) -> tuple[Door, Door]:
         one = inputs(door_opened=None, door_closed=None, door=line(9, proves=proves))
         wired = settings(inputs=one)
@@ -100,7 +100,7 @@ MOTION: list[tuple[dict[str, Any], dict[tuple[str, ...], Motion]]] = [
 
 
 @pytest.mark.parametrize(("lines", "table"), MOTION)
-def test_motion_by_lines_or_by_code(
+def test_motion_is_read_from_lines_or_from_a_code(
     lines: dict[str, Any], table: dict[tuple[str, ...], Motion]
 ) -> None:
     wired = settings(inputs=inputs(**lines))
@@ -179,7 +179,7 @@ def test_a_call_is_its_line_and_no_other() -> None:
     assert encode(wired, LiftOutputs(hold_door=Side.REAR)) == {**off, "rear_door_open": True}
 
 
-def test_calls_may_be_a_code() -> None:
+def test_calls_may_be_given_as_a_code() -> None:
     wired = settings(
         calls={}, call_code={"bits": [coil(20), coil(21)], "codes": {1: "B1", 2: "G", 3: "1"}}
     )

@@ -58,11 +58,11 @@ def test_points_are_claimed_by_their_one_spelling_at_their_safe_level(bus: Recor
     assert bus.claims == [({"P4": "down"}, {"P18": False, "P7": True})]
 
 
-def test_a_level_means_what_the_wire_says(bus: Recorded) -> None:
+def test_a_level_is_read_by_the_polarity_of_its_wire(bus: Recorded) -> None:
     assert Points(WIRES, bus).read() == {"alarm": True}
 
 
-def test_what_goes_off_goes_first_and_nothing_is_written_twice(bus: Recorded) -> None:
+def test_outputs_that_go_off_are_written_first_and_none_is_written_twice(bus: Recorded) -> None:
     points = Points(WIRES, bus)
     points.open()
     points.write({})
@@ -100,7 +100,7 @@ def test_make_safe_writes_every_output_whatever_was_known(bus: Recorded) -> None
     assert bus.writes == [{"P18": False, "P7": True}]
 
 
-def test_make_safe_is_verified_where_the_bus_can_say(bus: Recorded) -> None:
+def test_make_safe_is_verified_where_outputs_can_be_read_back(bus: Recorded) -> None:
     points = Points(WIRES, bus)
     bus.reads_back = {"P18": False, "P7": True}
     points.make_safe()

@@ -26,7 +26,7 @@ def demo(directory: Path) -> subprocess.Popen[str]:
     )
 
 
-@pytest.mark.timeout(180)
+@pytest.mark.long
 def test_five_situations_are_dealt_with_by_three_daemons_on_one_graph(directory: Path) -> None:
     process = demo(directory)
     try:

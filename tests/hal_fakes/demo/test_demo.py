@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from hal_fakes.demo.daemons import Daemon, Wrong, stop_all
-from hal_fakes.domain import free_domain
-from tests.waiting import wait_until
+from tests.waiting import PATIENCE_S, wait_until
 
 CONFIG = Path(__file__).parents[3] / "config"
 
@@ -30,7 +29,7 @@ def demo(directory: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
         yield process
     finally:
         process.terminate()
-        process.communicate(timeout=30)
+        process.communicate(timeout=PATIENCE_S)
 
 
 def running(directory: Path) -> list[str]:
@@ -50,7 +49,7 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("d")
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.long
 def test_a_robot_goes_through_the_door_rides_the_lift_and_charges(directory: Path) -> None:
     with demo(directory) as process:
         out, _ = process.communicate()
@@ -88,13 +87,15 @@ def test_ctrl_c_stops_every_process_and_leaves_nothing_behind(directory: Path) -
         assert process.stdout is not None
         wait_until(lambda: len(running(directory)) >= 3, "three daemons run")
         process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=30)
+        out, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130, out
     assert (running(directory), list(directory.iterdir())) == ([], [])
 
 
-def test_a_daemon_that_cannot_start_is_noticed_and_its_log_says_why(directory: Path) -> None:
-    daemon = Daemon(CONFIG / "none_such.yaml", directory, free_domain())
+def test_a_daemon_that_cannot_start_is_noticed_and_its_log_says_why(
+    domain: int, directory: Path
+) -> None:
+    daemon = Daemon(CONFIG / "none_such.yaml", directory, domain)
     try:
         wait_until(lambda: died(daemon), "the death is noticed")
         assert "none_such.yaml" in daemon.tail()
@@ -110,12 +111,12 @@ def died(daemon: Daemon) -> bool:
     return False
 
 
-def test_a_daemon_that_hangs_is_killed_with_its_fake(directory: Path) -> None:
-    daemon = Daemon(CONFIG / "door_modbus.yaml", directory, free_domain())
+def test_a_daemon_that_hangs_is_killed_with_its_fake(domain: int, directory: Path) -> None:
+    daemon = Daemon(CONFIG / "door_modbus.yaml", directory, domain)
     try:
         wait_until(lambda: "ready " in daemon.tail(), "the daemon is ready")
         assert len(running(directory)) == 2
         daemon._process.send_signal(signal.SIGSTOP)
     finally:
         stop_all([daemon], within_s=0.2)
-    wait_until(lambda: running(directory) == [], "nobody is left", patience_s=5)
+    wait_until(lambda: running(directory) == [], "nobody is left")

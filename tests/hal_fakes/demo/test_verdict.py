@@ -50,7 +50,7 @@ def right_day() -> Journal:
     return journal
 
 
-def test_a_right_day_has_no_problems() -> None:
+def test_a_demo_without_faults_has_no_problems() -> None:
     assert problems(right_day()) == []
 
 
@@ -101,13 +101,15 @@ def state_after(states: list[Stated], after: Stated) -> Callable[[Journal], None
         ),
     ],
 )
-def test_each_wrong_turn_is_named(change: Callable[[Journal], None], says: str) -> None:
+def test_each_deviation_from_the_plan_is_named(
+    change: Callable[[Journal], None], says: str
+) -> None:
     journal = right_day()
     change(journal)
     assert problems(journal)[0].startswith(says)
 
 
-def test_a_day_on_which_nothing_happened_is_not_right() -> None:
+def test_a_demo_in_which_nothing_happened_is_wrong() -> None:
     assert len(problems(Journal(0.0, lambda _: None, colour=False))) == 6
 
 

@@ -20,7 +20,7 @@ def parked(*failures: tuple[str, FailureMode]) -> ChargerPlant:
     return plant
 
 
-def test_a_plant_is_one() -> None:
+def test_a_plant_has_every_part_of_its_protocol() -> None:
     plant: Plant = ChargerPlant("charger_a")
     assert (plant.name, plant.edges, plant.next_at()) == ("charger_a", [], float("inf"))
 

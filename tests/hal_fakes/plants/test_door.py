@@ -77,7 +77,7 @@ def test_a_push_opens_it_without_a_relay() -> None:
     ]
 
 
-def test_a_fire_is_only_a_contact() -> None:
+def test_a_fire_only_closes_a_contact() -> None:
     door = plant()
     door.press("fire", True, 1.0)
     assert edges(door) == [(1.0, "fire", True)]

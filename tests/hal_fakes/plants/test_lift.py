@@ -77,7 +77,7 @@ def test_without_a_hold_the_door_closes_after_its_dwell_time() -> None:
     ]
 
 
-def test_a_pulse_is_a_call_and_a_glitch_is_none() -> None:
+def test_a_pulse_calls_the_car_and_a_glitch_does_not() -> None:
     plant = in_agv_mode()
     plant.drive("call_G", True, 1.0)
     plant.drive("call_G", False, 1.02)

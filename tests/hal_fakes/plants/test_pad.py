@@ -29,7 +29,7 @@ def states(plant: PadPlant, until: float) -> list[tuple[float, object]]:
     return [(round(e.at, 2), e.value) for e in plant.edges if e.signal == "state"]
 
 
-def test_a_plant_is_one() -> None:
+def test_a_plant_has_every_part_of_its_protocol() -> None:
     plant: Plant = PadPlant("a")
     assert plant.name == "a"
 
@@ -44,7 +44,7 @@ def test_a_robot_shakes_hands_charges_until_it_is_full_and_is_released() -> None
     ]
 
 
-def test_a_robot_that_may_not_charge_does_not() -> None:
+def test_a_robot_that_may_not_charge_is_not_charged() -> None:
     assert states(parked(enabled=False), 100.0) == []
 
 
@@ -111,7 +111,9 @@ def test_a_thermometer_that_fails_lets_nobody_charge(mode: FailureMode) -> None:
         ("wrong", (Activity.IDLE, 1.0, 0.0)),
     ],
 )
-def test_a_battery_that_fails(mode: FailureMode, at_60: tuple[Activity, float, float]) -> None:
+def test_a_battery_that_fails_shows_in_the_reading(
+    mode: FailureMode, at_60: tuple[Activity, float, float]
+) -> None:
     reading = at(parked(("battery", mode)), 60.0)
     assert (reading.activity, reading.battery, reading.amps) == at_60
 
@@ -124,7 +126,9 @@ def test_a_slow_battery_takes_ten_times_as_long() -> None:
     ("mode", "found"),
     [("off", []), ("stuck", [(2.0, "handshake")]), ("slow", [(2.0, "handshake")])],
 )
-def test_a_receiver_that_does_not_answer(mode: FailureMode, found: list[object]) -> None:
+def test_a_receiver_that_does_not_answer_is_not_recognised(
+    mode: FailureMode, found: list[object]
+) -> None:
     assert states(parked(("receiver", mode)), 11.5) == found
 
 

@@ -168,7 +168,7 @@ def test_states_cause_reminders_and_an_offline_door_none(
     assert heard(supervisor, door_state(mode)) == ([] if wanted is None else [door(wanted)])
 
 
-def test_a_request_for_moving_is_none() -> None:
+def test_a_request_for_moving_is_ignored() -> None:
     assert heard(DoorSupervisor(), door_request("ward", A, MOVING, 0)) == []
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from drivers.hal.can import EXTENDED, CanBus, Frame, Settings, Slcan, Wanted, named, warnings
 from tests.drivers.hal.can.far_end import Clock, FarEnd, bus_on, channel, failure, two_ends
+from tests.waiting import PATIENCE_S
 
 Ends = tuple[CanBus, FarEnd, Clock]
 SILENT = "nothing else is heard on the bus either: power, cable, termination, bitrate?"
@@ -47,7 +48,7 @@ def test_an_id_of_29_bits_is_another_than_the_same_of_11(ends: Ends) -> None:
     assert (short, long) == ([Frame(0x123, b"\1")], [Frame(0x123 | EXTENDED, b"\2")])
 
 
-def test_remote_frames_and_fd_frames_are_nobodys(ends: Ends) -> None:
+def test_remote_frames_and_fd_frames_are_ignored(ends: Ends) -> None:
     bus, far, _ = ends
     heard = heard_by(bus, Wanted(0x10))
     far.put(can.Message(arbitration_id=0x10, is_extended_id=False, is_remote_frame=True))
@@ -102,7 +103,7 @@ def test_waiting_ends_when_it_is_heard_or_when_the_time_is_up(ends: Ends) -> Non
     heard = heard_by(bus, Wanted(1))
     assert bus.wait(lambda: bool(heard), 0.02) is False
     far.send(1)
-    assert bus.wait(lambda: bool(heard), 20.0) is True
+    assert bus.wait(lambda: bool(heard), PATIENCE_S) is True
 
 
 # ---- trouble

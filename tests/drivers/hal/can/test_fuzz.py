@@ -11,6 +11,7 @@ from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from drivers import DriverError
 from drivers.charger import can_frames as charger_can_frames
 from drivers.charger import canopen as charger_canopen
+from tests.depth import examples
 from tests.drivers.hal.can.far_end import Reactive
 
 OFF, ON, LEFT = (ChargerOutputs(power, range_checks=1) for power in (False, True, None))
@@ -70,7 +71,7 @@ def says_charging(message: can.Message) -> bool:
     return plain and status and message.data[7] & 0x0F in (1, 2, 3, 4, 5)
 
 
-@settings(derandomize=True, deadline=None, max_examples=400)
+@settings(derandomize=True, deadline=None, max_examples=examples(400))
 @example([frame(STATUS, bytes(7) + b"\5", True), frame(SERIAL, bytes(8), True)])
 @example([frame(STATUS, bytes(6) + b"\5", True), frame(SERIAL, bytes(8), True)])
 @given(frames)
@@ -144,7 +145,7 @@ spoils = st.one_of(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=400)
+@settings(derandomize=True, deadline=None, max_examples=examples(400))
 @given(st.lists(spoils, min_size=1, max_size=8), frames)
 def test_no_answers_break_the_canopen_driver_or_make_a_charge(
     spoiled: list[Callable[[can.Message], list[can.Message]]], between: list[can.Message]

@@ -60,7 +60,7 @@ def side() -> Iterator[Side]:
 NAME = "CANopen node 10 at can0"
 
 
-def test_a_number_is_read_and_written_as_the_makers_frames_are(side: Side) -> None:
+def test_numbers_are_read_and_written_as_in_the_makers_frames(side: Side) -> None:
     ours, node, *_ = side
     assert ours.read(*STATE) == 5
     node.answer = lambda request: ["60" + request[1:4].hex() + "00000000"]
@@ -75,7 +75,7 @@ def test_a_number_may_come_in_four_octets_whose_rest_is_zero(side: Side, command
     assert ours.read(*STATE) == 238
 
 
-def test_a_number_that_is_too_short_or_too_great_is_none(side: Side) -> None:
+def test_a_number_that_is_too_short_or_too_great_is_refused(side: Side) -> None:
     ours, node, *_ = side
     node.answer = lambda request: [value(request, 5, 0x4F)]
     assert failure(lambda: ours.read(*STATE)) == (
@@ -130,7 +130,7 @@ def test_a_reply_of_another_length_or_about_another_object_is_named_and_never_ta
     assert ours.read(*STATE) == 9
 
 
-def test_an_answer_of_another_sort_is_no_number(side: Side) -> None:
+def test_an_answer_of_another_type_is_refused(side: Side) -> None:
     ours, node, *_ = side
     node.answer = lambda request: ["60" + request[1:4].hex() + "05000000"]
     assert failure(lambda: ours.read(*STATE)) == (
@@ -182,7 +182,7 @@ def test_what_switches_off_before_the_end_is_sent_whatever_the_pause(side: Side)
 # ---- heartbeat
 
 
-def test_a_heartbeat_that_is_there_or_comes_soon_is_life(side: Side) -> None:
+def test_a_node_whose_heartbeat_comes_in_time_is_alive(side: Side) -> None:
     ours, _, far, _, _ = side
     far.send(0x70A, "05")
     ours.alive()
@@ -203,7 +203,7 @@ def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side
     assert failure(ours.alive) == ""
 
 
-def test_another_nodes_heartbeat_is_no_life_and_is_named(side: Side) -> None:
+def test_another_nodes_heartbeat_does_not_count_and_is_named(side: Side) -> None:
     ours, _, far, _, _ = side
     far.send(0x70B, "05")
     far.send(0x70A, "05", extended=True)
@@ -213,7 +213,7 @@ def test_another_nodes_heartbeat_is_no_life_and_is_named(side: Side) -> None:
 
 
 @pytest.mark.parametrize("payload", ["", "0500", "0505050505050505"])
-def test_a_heartbeat_of_another_length_is_none(side: Side, payload: str) -> None:
+def test_a_heartbeat_of_the_wrong_length_is_ignored(side: Side, payload: str) -> None:
     ours, _, far, _, _ = side
     far.send(0x70A, payload)
     assert failure(ours.alive) == (

@@ -13,7 +13,7 @@ from hal_fakes.can.slcan_port import SlcanPort, decoded, encoded
 from hal_fakes.plants.pad import PadPlant
 from hal_fakes.plants.plant import Plant
 from tests.drivers.hal.can.far_end import Clock, failure
-from tests.waiting import wait_until
+from tests.waiting import PATIENCE_S, wait_until
 
 
 class Echo:
@@ -79,7 +79,7 @@ def desk() -> Iterator[Desk]:
 def test_frames_go_there_and_back(desk: Desk) -> None:
     desk.bus.send(Frame(0x123, b"\1\2"))
     desk.bus.send(Frame(0x18FF50E5 | EXTENDED, bytes(8)))
-    assert desk.bus.wait(lambda: len(desk.heard) == 2, 20.0)
+    assert desk.bus.wait(lambda: len(desk.heard) == 2, PATIENCE_S)
     assert desk.heard == [Frame(0x124, b"\1\2"), Frame(0x18FF50E6 | EXTENDED, bytes(8))]
 
 
@@ -91,7 +91,7 @@ def test_a_line_is_a_frame_and_a_frame_a_line() -> None:
 def test_acknowledgements_between_frames_hide_none(desk: Desk) -> None:
     for n in range(50):
         desk.bus.send(Frame(0x123, bytes((n,))))
-    assert desk.bus.wait(lambda: len(desk.heard) == 50, 20.0)
+    assert desk.bus.wait(lambda: len(desk.heard) == 50, PATIENCE_S)
     assert [frame.payload[0] for frame in desk.heard] == list(range(50))
 
 
@@ -107,7 +107,7 @@ def test_an_adapter_that_is_pulled_is_a_failure_and_is_found_again_when_it_is_ba
     wait_until(desk.passes, "it passes frames again")
 
 
-def test_noise_that_is_no_slcan_is_a_failure_and_ends_with_it(desk: Desk) -> None:
+def test_noise_on_the_adapter_is_a_failure_that_ends_with_the_noise(desk: Desk) -> None:
     assert desk.passes()
     desk.echo.plant.fail("bus", "garbage")
     wait_until(lambda: desk.text() != "", "it is noticed")
@@ -129,7 +129,7 @@ def test_an_adapter_that_another_program_has_is_named(desk: Desk) -> None:
     other.close()
 
 
-def test_an_adapter_that_takes_nothing_costs_its_time_and_no_more() -> None:
+def test_an_adapter_that_takes_nothing_costs_one_timeout() -> None:
     leader, follower = os.openpty()
     place = Slcan(port=os.ttyname(follower), bitrate=250_000)
     bus = CanBus(Settings(slcan=place, timeout_s=0.05))
@@ -141,7 +141,7 @@ def test_an_adapter_that_takes_nothing_costs_its_time_and_no_more() -> None:
         ended.set()
 
     threading.Thread(target=fill, daemon=True).start()
-    assert ended.wait(20)
+    assert ended.wait(PATIENCE_S)
     bus.close()
     os.close(leader)
     os.close(follower)

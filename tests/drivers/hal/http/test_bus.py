@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from drivers.hal import HalError
 from drivers.hal.http import HttpBus, Settings, open_bus
+from tests.depth import examples
 from tests.drivers.hal.http.far_end import (
     Caller,
     Conversation,
@@ -57,7 +58,7 @@ def failure(talk: Conversation, timeout_s: float = 5.0) -> str:
 # ---- what works
 
 
-def test_a_json_object_is_read() -> None:
+def test_an_answer_that_is_a_json_object_is_read() -> None:
     with FarEnd(always(answer(b'{"state": 5, "error_msg": "\xc3\xbc"}'))) as far:
         bus = bus_to(far.port)
         assert bus.get_json("/state") == {"state": 5, "error_msg": "ü"}
@@ -95,7 +96,7 @@ def test_a_body_in_chunks_is_read_and_its_connection_kept() -> None:
         bus.close()
 
 
-def test_the_environments_proxies_and_passwords_are_not_used(
+def test_proxies_and_passwords_of_the_environment_are_not_used(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "netrc").write_text("machine 127.0.0.1 login a password b\n")
@@ -252,13 +253,13 @@ def test_a_post_with_another_status_fails(status: str) -> None:
         (b"", "no whole HTTP answer"),
     ],
 )
-def test_an_answer_that_is_none_is_an_error_that_says_what_to_look_at(
+def test_an_answer_that_is_not_a_json_object_is_an_error_that_says_what_to_look_at(
     reply: bytes, text: str
 ) -> None:
     assert re.search(text, failure(once(reply)))
 
 
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(derandomize=True, max_examples=examples(150), deadline=None)
 @given(st.binary(max_size=200), st.sampled_from([b"", b"HTTP/1.1 200 OK\r\n", answer(b"")[:-4]]))
 def test_no_bytes_of_a_server_raise_anything_but_a_hal_error(noise: bytes, start: bytes) -> None:
     with FarEnd(once(start + noise)) as far:
@@ -345,7 +346,7 @@ def test_a_server_that_never_ends_its_answer_is_left_at_the_deadline(talk: Conve
 
 
 @pytest.mark.parametrize("talk", [_says_nothing, _headers_without_end])
-def test_a_post_is_bounded_too(talk: Conversation) -> None:
+def test_a_post_ends_at_the_deadline(talk: Conversation) -> None:
     with FarEnd(talk) as far:
         bus = bus_to(far.port, TIMEOUT_S)
         with pytest.raises(HalError, match=r"no complete answer within 0[.]3 s"):

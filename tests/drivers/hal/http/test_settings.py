@@ -3,7 +3,7 @@
 import msgspec
 import pytest
 
-from drivers.hal.http import Base, Settings, base
+from drivers.hal.http import Base, Settings, base, warnings
 
 
 @pytest.mark.parametrize(
@@ -12,6 +12,8 @@ from drivers.hal.http import Base, Settings, base
         ("192.168.1.60", Base("192.168.1.60", 80, ""), "http://192.168.1.60/state"),
         ("192.168.1.60/", Base("192.168.1.60", 80, ""), "http://192.168.1.60/state"),
         ("http://tpu-3.local:8080/api/v1/", Base("tpu-3.local", 8080, "/api/v1"), None),
+        ("https://tpu", Base("tpu", 443, "", "https"), "https://tpu/state"),
+        ("https://tpu:80", Base("tpu", 80, "", "https"), "https://tpu:80/state"),
         ("[fe80::1]:81/api", Base("fe80::1", 81, "/api"), "http://[fe80::1]:81/api/state"),
     ],
 )
@@ -23,7 +25,7 @@ def test_an_address_is_host_port_and_path(text: str, parts: Base, url: str | Non
 @pytest.mark.parametrize(
     ("text", "hint"),
     [
-        ("https://tpu/api", "https is not supported"),
+        ("ftps://tpu/api", "is no address of an API"),
         ("admin:secret@tpu/api", "token_file"),
         ("tpu:99999", "ports are 1 to 65535"),
         ("tpu:0", "ports are 1 to 65535"),
@@ -35,18 +37,32 @@ def test_an_address_is_host_port_and_path(text: str, parts: Base, url: str | Non
         ("", "is no address of an API"),
     ],
 )
-def test_what_is_no_address_is_refused_with_the_fix(text: str, hint: str) -> None:
+def test_a_text_that_is_not_an_address_is_refused_with_its_fix(text: str, hint: str) -> None:
     with pytest.raises(ValueError, match=hint):
         base(text)
 
 
 def test_a_wrong_address_is_a_problem_of_the_settings() -> None:
-    [(path, text)] = Settings(api_base="https://tpu").problems()
+    [(path, text)] = Settings(api_base="tpu:0").problems()
     assert path == ("api_base",)
-    assert text == "https is not supported: write the address of the plain HTTP API"
+    assert text == "port 0 does not exist: ports are 1 to 65535"
     assert list(Settings(api_base="tpu").problems()) == []
 
 
-def test_the_defaults_are_a_second() -> None:
+def test_the_default_timeout_and_scan_are_a_second() -> None:
     made = msgspec.convert({"type": "http", "api_base": "tpu"}, Settings)
     assert made == Settings(api_base="tpu", timeout_s=1.0, scan_s=1.0, token_file=None)
+
+
+def test_what_has_no_effect_is_refused() -> None:
+    made = Settings(api_base="tpu", ca_file="/etc/ca.pem", token_header="X-API-Key")
+    assert list(made.problems()) == [
+        (("ca_file",), "is for https: write api_base: https://…, or leave this out"),
+        (("token_header",), "needs token_file: the file with what the header says"),
+    ]
+
+
+def test_a_token_that_everybody_can_read_on_the_way_is_warned_of() -> None:
+    plain, tls = (Settings(api_base=f"{way}://tpu", token_file="t") for way in ("http", "https"))
+    assert [path for path, _ in warnings(plain)] == [("token_file",)]
+    assert list(warnings(tls)) == []

@@ -18,7 +18,7 @@ from hal_fakes.plants.plant import FAILURE_MODES, Edge, FailureMode
 from hal_fakes.realtime import RealTime
 from hal_fakes.wiring import Wiring
 from tests.drivers.hal.modbus.module import Time
-from tests.waiting import PATIENCE_S, wait_until
+from tests.waiting import PATIENCE_S, at_last, wait_until
 
 TIMEOUT_S = 0.2
 CLOSED = DoorSample(opened=False, closed=True)
@@ -75,6 +75,14 @@ class Site:
             return self.doors[name].read()
         except DriverError as error:
             return str(error)
+
+    def write(self, name: str, outputs: DoorOutputs) -> None:
+        """These outputs."""
+        at_last(lambda: self.doors[name].write(outputs), "written", self.a_moment)
+
+    def a_moment(self) -> None:
+        """Less than a unit that does not answer is left alone for."""
+        self.clock.now += 1.0
 
     def close(self) -> None:
         for door in self.doors.values():
@@ -219,32 +227,31 @@ def test_a_failing_unit_does_not_keep_the_other_from_being_read(
     site: Site, mode: FailureMode
 ) -> None:
     site.plants["front"].fail("unit", mode)
-    read = {
-        name: [_sample_or_none(site.doors[name]) for _ in range(20)] for name in ("front", "ward")
-    }
-    assert read == {"front": [None] * 20, "ward": [CLOSED] * 20}
+    front = [_sample_or_none(site.doors["front"]) for _ in range(20)]
+    ward = [at_last(site.doors["ward"].read, "ward", site.a_moment) for _ in range(20)]
+    assert (front, ward) == ([None] * 20, [CLOSED] * 20)
 
 
 def test_the_inputs_of_a_stuck_unit_stay_as_they_were(site: Site) -> None:
     front, plant = site.doors["front"], site.plants["front"]
-    front.read()
+    at_last(front.read, "a reading", site.a_moment)
     plant.fail("unit", "stuck")
-    front.write(HOLD)
+    site.write("front", HOLD)
     wait_until(lambda: plant.sense("opened"), "the door is open")
-    assert front.read() == CLOSED
+    assert at_last(front.read, "a reading", site.a_moment) == CLOSED
     plant.fail("unit", None)
-    assert front.read() == OPEN
+    assert at_last(front.read, "a reading", site.a_moment) == OPEN
 
 
 def test_a_hold_survives_a_server_that_was_away_without_an_edge(site: Site) -> None:
-    front, plant = site.doors["front"], site.plants["front"]
-    front.write(HOLD)
-    wait_until(lambda: front.read() == OPEN, "the door is open")
+    plant = site.plants["front"]
+    site.write("front", HOLD)
+    wait_until(lambda: site.patiently("front") == OPEN, "the door is open")
     plant.fail("server", "off")
     wait_until(lambda: isinstance(site.patiently("front"), str), "the server is off")
     plant.fail("server", None)
     wait_until(lambda: site.patiently("front") == OPEN, "the server is back")
-    front.write(HOLD)
+    site.write("front", HOLD)
     assert [e.value for e in plant.edges if e.what == "relay"] == [True]
 
 

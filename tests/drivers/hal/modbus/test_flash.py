@@ -316,13 +316,13 @@ def test_the_fake_modules_pulse_is_ended_by_a_coil_that_is_written_off(
         ),
         (
             "unit 1 coil 0",
-            "30:64: unit 1 coil 0 is taken by ward_door outputs.hold_open on line 30:"
+            "30:64: unit 1 coil 0 is used by ward_door outputs.hold_open on line 30:"
             " ward_door outputs.hold_open needs a point of its own",
         ),
         (
             "0x200",
-            "30:64: '0x200' is not a Modbus point: write 'unit 1 coil 0' or"
-            " 'unit 1 discrete input 0'; addresses begin at 0",
+            "30:64: '0x200' is not a Modbus point: write 'unit 1 coil 0',"
+            " 'unit 1 discrete input 0' or 'unit 1 holding register 0 bit 0'; addresses begin at 0",
         ),
     ],
 )

@@ -15,8 +15,10 @@ from drivers.door.dry_contact import DryContactDoor, Settings, create
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.points import Point
 from drivers.hal.points import HalError
+from tests.depth import examples
 from tests.drivers.hal.modbus.line import SerialModule, crc, rtu
 from tests.drivers.hal.modbus.module import Module, Time, bits_reply, bus_to, frame
+from tests.waiting import wait_until
 
 DOOR = msgspec.convert(
     {
@@ -92,7 +94,7 @@ def _attempt(step: Callable[[], object], clock: Time) -> object:
 @settings(
     derandomize=True,
     deadline=None,
-    max_examples=250,
+    max_examples=examples(250),
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(spoils=st.lists(SPOILS, min_size=1, max_size=6), hangs_up=st.booleans())
@@ -162,7 +164,7 @@ class SpoiledLine:
 @settings(
     derandomize=True,
     deadline=None,
-    max_examples=150,
+    max_examples=examples(150),
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(spoils=st.lists(LINE_SPOILS, min_size=1, max_size=5), ignore_echo=st.booleans())
@@ -207,7 +209,7 @@ def saying(sort: type[Module], pdu: bytes) -> Iterator[tuple[Module, ModbusBus]]
 
 
 @SORTS
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(derandomize=True, deadline=None, max_examples=examples(150))
 @given(pdu=PDUS)
 @example(pdu=b"\3\2\xab\xcd")
 def test_a_register_reads_as_what_was_sent_or_not_at_all(sort: type[Module], pdu: bytes) -> None:
@@ -219,7 +221,7 @@ def test_a_register_reads_as_what_was_sent_or_not_at_all(sort: type[Module], pdu
 
 
 @SORTS
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(derandomize=True, deadline=None, max_examples=examples(100))
 @given(pdu=PDUS)
 @example(pdu=bytes.fromhex("0502000007"))
 def test_a_pulse_is_asked_for_once_and_believed_by_its_echo_alone(
@@ -229,4 +231,5 @@ def test_a_pulse_is_asked_for_once_and_believed_by_its_echo_alone(
         with suppress(HalError):
             bus.flash(Point(1, "coil", 0x200), 0.7)
             assert pdu.hex() == "0502000007"
+        wait_until(lambda: module.asked, "the module has read what was asked")
         assert len(module.asked) == 1

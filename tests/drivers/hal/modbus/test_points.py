@@ -18,12 +18,16 @@ from drivers.hal.modbus.points import (
 )
 from drivers.hal.points import Active, Pull, Wire
 
-POINTS = st.builds(
+UNITS = st.sampled_from([0, 1, 16, 247, 255])
+CELLS = st.builds(Point, UNITS, st.sampled_from(["coil", "discrete input"]), st.integers(0, 65535))
+BITS = st.builds(
     Point,
-    st.sampled_from([0, 1, 16, 247, 255]),
-    st.sampled_from(["coil", "discrete input"]),
+    UNITS,
+    st.sampled_from(["holding register", "input register"]),
     st.integers(0, 65535),
+    st.integers(0, 15),
 )
+POINTS = CELLS | BITS
 
 
 @pytest.mark.parametrize(
@@ -35,6 +39,9 @@ POINTS = st.builds(
         ("unit 16, discrete_input 0x1f", "unit 16 discrete input 31"),
         ("unit 255 discrete-input 65535", "unit 255 discrete input 65535"),
         ("unit 1 discrete input 0x2711", "unit 1 discrete input 0x2711"),
+        ("unit 1 holding 40 bit 3", "unit 1 holding register 40 bit 3"),
+        ("Unit 7, input_register 0x10, bit 15", "unit 7 input register 16 bit 15"),
+        ("unit 1 holding register 0x9c41 bit 0", "unit 1 holding register 0x9c41 bit 0"),
     ],
 )
 def test_a_point_has_one_spelling(spelled: str, one_spelling: str) -> None:
@@ -43,12 +50,15 @@ def test_a_point_has_one_spelling(spelled: str, one_spelling: str) -> None:
 
 @settings(derandomize=True)
 @given(POINTS)
-def test_the_one_spelling_spells_itself(point: Point) -> None:
+def test_the_canonical_spelling_reads_as_itself(point: Point) -> None:
     assert parse(str(point)) == point
     assert canonical(str(point)) == str(point)
 
 
-HOW = "write 'unit 1 coil 0' or 'unit 1 discrete input 0'; addresses begin at 0"
+HOW = (
+    "write 'unit 1 coil 0', 'unit 1 discrete input 0' or 'unit 1 holding register 0 bit 0';"
+    " addresses begin at 0"
+)
 MODEL = "looks like a number of the data model, which begins at 1"
 
 
@@ -79,16 +89,37 @@ MODEL = "looks like a number of the data model, which begins at 1"
         ),
         ("unit 248 coil 0", "unit 248 does not exist: units are 0 to 247, and 255 on Modbus TCP"),
         ("unit 1 coil 65536", "address 65536 does not exist: addresses are 0 to 65535"),
-        ("unit 1 input 3", "'unit 1 input 3': say which input: 'discrete input'"),
+        (
+            "40041",
+            "'40041' is not a Modbus point: write 'unit 1 holding register 40 bit 0' with the right"
+            " unit",
+        ),
+        (
+            "unit 1 holding register 40041 bit 3",
+            f"40041 {MODEL}: write holding register 40; or 0x9c69 if 40041 really is the address on"
+            " the wire",
+        ),
+        (
+            "unit 1 input 3",
+            "'unit 1 input 3': say which input: 'discrete input', or 'input register'",
+        ),
         (
             "unit 1 holding register 4",
-            "'unit 1 holding register 4': a contact or relay is one bit, and a register is none:"
-            f" {HOW}",
+            "'unit 1 holding register 4': a contact is one bit: say which of the register's, 'bit 0'"
+            " say",
+        ),
+        (
+            "unit 1 holding register 4 bit 16",
+            "'unit 1 holding register 4 bit 16': a register has bits 0 to 15, and 0 is the least",
+        ),
+        (
+            "unit 1 coil 4 bit 0",
+            "'unit 1 coil 4 bit 0': a coil is one bit already: leave 'bit 0' out",
         ),
         ("unit 1 relay 4", f"'unit 1 relay 4': there is no table 'relay': {HOW}"),
     ],
 )
-def test_what_is_no_point_is_refused_with_what_to_write(text: str, reason: str) -> None:
+def test_a_text_that_is_not_a_point_is_refused_with_an_example(text: str, reason: str) -> None:
     with pytest.raises(ValueError, match=f"^{re.escape(reason)}$"):
         canonical(text)
 
@@ -106,6 +137,7 @@ def test_no_text_but_a_point_gets_through(text: str) -> None:
 def test_the_table_shows_the_number_that_the_manual_prints() -> None:
     assert describe("unit 1 coil 16") == "unit 1 coil 16 (00017)"
     assert describe("unit 2 discrete input 0") == "unit 2 discrete input 0 (10001)"
+    assert describe("unit 1 holding 40 bit 3") == "unit 1 holding register 40 bit 3 (40041 bit 3)"
 
 
 def output(point: str, active: Active = "high") -> Wire:
@@ -121,6 +153,7 @@ def entry(point: str, pull: Pull | None = None) -> Wire:
     [
         entry("unit 1 discrete input 0"),
         entry("unit 1 coil 0"),
+        entry("unit 1 holding register 0 bit 15"),
         output("unit 1 coil 0"),
         output("no point at all"),
     ],
@@ -141,6 +174,11 @@ def test_a_sound_wire_has_no_problem(wire: Wire) -> None:
             "an output is a coil, and a discrete input can only be read",
         ),
         (
+            output("unit 1 holding register 0 bit 3"),
+            "an output is a coil: to write a register would write its other bits too, which may be"
+            " somebody else's; driver: register commands with whole registers",
+        ),
+        (
             output("unit 1 coil 0", "low"),
             "active: low would switch it on whenever the module restarts with its coils at 0: use"
             " the relay's normally open contact and write active: high",
@@ -152,12 +190,20 @@ def test_a_wire_that_cannot_be_right_is_named(wire: Wire, problem: str) -> None:
 
 
 @settings(derandomize=True)
-@given(st.lists(POINTS, max_size=20))
+@given(st.lists(CELLS, max_size=20))
 def test_every_point_is_read_once_and_in_bounds(points: list[Point]) -> None:
     read = [point for bits in ranges(points) for point in bits.points()]
     assert set(points) <= set(read)
     assert len(read) == len(set(read))
     assert all(point.address <= 65535 for point in read)
+
+
+@settings(derandomize=True)
+@given(BITS, st.integers(0, 65535))
+def test_a_bit_of_a_register_is_read_with_its_register(point: Point, word: int) -> None:
+    assert point.cell == Point(point.unit, point.table, point.address)
+    assert point.of(word) == int(f"{word:016b}"[15 - (point.bit or 0)])
+    assert point.cell.of(word) == word
 
 
 def test_a_request_reads_no_more_than_a_reply_can_carry() -> None:

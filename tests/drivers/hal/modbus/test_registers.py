@@ -112,7 +112,7 @@ def test_a_place_has_a_table_and_an_address(text: str, found: tuple[str, int]) -
         ),
     ],
 )
-def test_what_is_no_place_is_refused_with_what_to_write(text: str, reason: str) -> None:
+def test_a_text_that_is_not_a_place_is_refused_with_an_example(text: str, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         place(text)
 

@@ -34,7 +34,7 @@ from hal_fakes.wiring import Wiring
 from tests.drivers.door.contract import CLOSED, HOLD, OPEN, Bench, quick
 from tests.drivers.door.test_contract import dry
 from tests.drivers.hal.modbus.module import Time
-from tests.waiting import wait_until
+from tests.waiting import PATIENCE_S, wait_until
 
 SLOW = 600
 """A time (x 100 ms) in which no test is late."""
@@ -247,6 +247,7 @@ def test_a_killed_daemons_door_is_let_go_by_the_module(tmp_path: Path) -> None:
         assert far_side.stdin
         path.write_text(YAML % json.loads(far_side.stdout.readline())["tcp"]["port"])
         with socket.socket(socket.AF_UNIX) as follow:
+            follow.settimeout(PATIENCE_S)
             follow.connect(str(sock))
             follow.sendall(b"follow\n")
             edges = (json.loads(line) for line in follow.makefile() if line.startswith("{"))

@@ -18,12 +18,68 @@ ABSENT: Final = object()
 Field = Annotated[
     str,
     msgspec.Meta(
-        pattern=r"^[A-Za-z_$@][A-Za-z0-9_$@-]*(\.[A-Za-z0-9_$@-]+)*$(?!\n)",
+        pattern=r"^[A-Za-z_$@][A-Za-z0-9_$@:-]*(\.[A-Za-z0-9_$@:-]+)*$(?!\n)",
         max_length=128,
         extra={"pattern": "names with dots between them (status.code)"},
     ),
 ]
 """Where a value is: names of objects, and numbers of list items (from 0), with dots between them."""
+
+
+Value = bool | int | float | str
+"""What may stand there: true, 3, 0.5 or a word."""
+
+
+class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A yes or no of the answer.
+
+    `field`: where it is: names with dots between them.
+    `when`: the values that are a yes, every other is a no; without them it must be true or false.
+    """
+
+    field: Field
+    when: list[Value] = []
+
+
+def flag(answer: Mapping[str, Any], place: Flag) -> bool:
+    """Yes or no; null is a no. Raises DriverError where it is absent, or neither."""
+    value = needed(answer, place.field)
+    if value is None:
+        return False
+    if place.when and isinstance(value, Value):
+        return any(same(value, yes) for yes in place.when)
+    if not isinstance(value, bool):
+        raise wrong(place.field, value, "a number or text" if place.when else "true or false")
+    return value
+
+
+def place_text(place: Flag) -> str:
+    """For `check`: where it is, and what is a yes."""
+    values = (str(yes).lower() if isinstance(yes, bool) else str(yes) for yes in place.when)
+    return f"{place.field} is {', '.join(values) or 'true'}"
+
+
+def value_of(place: Flag, yes: bool) -> Value:
+    """What who answers writes there for a yes or a no."""
+    if not place.when:
+        return yes
+    if yes:
+        return place.when[0]
+    others: list[Value] = [not place.when[0], *range(len(place.when) + 1)]
+    return next(no for no in others if not any(same(no, when) for when in place.when))
+
+
+def put(answer: dict[str, Any], field: str, value: Any) -> None:
+    """A value at its place, for who answers; list items have no place here."""
+    *above, last = field.split(".")
+    for part in above:
+        answer = answer.setdefault(part, {})
+    answer[last] = value
+
+
+def same(value: object, given: Value) -> bool:
+    """Is it this? In JSON true is no 1, and 1.0 is 1."""
+    return isinstance(value, bool) == isinstance(given, bool) and value == given
 
 
 def found(answer: Any, field: str) -> Any:

@@ -1,0 +1,178 @@
+"""Where a daemon keeps what is its own, found by one rule for every command.
+
+A directory that was given is the only one; else systemd's, in a unit; else the service's, where that
+is about this very file; else the one of a daemon started by hand, for root perhaps by who called sudo.
+
+`runtime` goes with a reboot: the lock and the status. `state` outlives it: what is claimed, since a
+Modbus relay outlives a power cut of ours. A directory that was given is both.
+"""
+
+import grp
+import os
+import pwd
+import stat
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+SERVICE_RUN = Path("/run/rmf-bridge")
+SERVICE_STATE = Path("/var/lib/rmf-bridge")
+USERS_RUN = Path("/run/user")
+TMP = Path("/tmp")
+SERVICE_USER = "rmf-bridge"
+GROUPS = ("gpio", "dialout")
+"""What the unit gives this user beside its own group."""
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """The directories of one daemon."""
+
+    runtime: Path
+    state: Path
+
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """Both, the lasting one first."""
+        return tuple(dict.fromkeys((self.state, self.runtime)))
+
+
+def named(file: Path) -> str:
+    """A file's one name, by which a lock or a record is about it."""
+    return os.path.realpath(file)
+
+
+def as_told(given: str | None, environ: Mapping[str, str] = os.environ) -> Places | None:
+    """What the command line or systemd's unit says; None where neither does."""
+    if given:
+        return Places(Path(given).absolute(), Path(given).absolute())
+    runtime = environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
+    state = environ.get("STATE_DIRECTORY", "").split(":")[0]
+    return Places(Path(runtime), Path(state or runtime)) if runtime else None
+
+
+def of_service(file: Path) -> Places:
+    """Where `rmf-bridge@.service` has them."""
+    return Places(SERVICE_RUN / file.stem, SERVICE_STATE / file.stem)
+
+
+def by_hand(file: Path, environ: Mapping[str, str] = os.environ) -> Places:
+    """Where a daemon has them that this user starts by hand."""
+    runtime = Path(environ.get("XDG_RUNTIME_DIR") or TMP / f"rmf-bridge-{os.getuid()}")
+    return Places(runtime / "rmf-bridge" / file.stem, state_base(environ) / file.stem)
+
+
+def state_base(environ: Mapping[str, str] = os.environ) -> Path:
+    """This user's state directory; one below /tmp where there is no home."""
+    home = os.path.expanduser("~")
+    default = Path(home) / ".local/state" if os.path.isabs(home) else TMP / f"rmf-{os.getuid()}"
+    return Path(environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
+
+
+def everywhere(file: Path) -> Iterator[Places]:
+    """Where a daemon of this file may be: the service's, and the one of a daemon by hand, for root
+    also that of the user who has become root by sudo.
+    """
+    yield of_service(file)
+    if os.geteuid() == 0 and (uid := os.environ.get("SUDO_UID", "")).isdecimal():
+        yield from _of_user(int(uid), file)
+    yield by_hand(file)
+
+
+def _of_user(uid: int, file: Path) -> Iterator[Places]:
+    """What is in his directories; nobody else has put it there."""
+    for base in (USERS_RUN / str(uid), TMP / f"rmf-bridge-{uid}"):
+        runtime = base / "rmf-bridge" / file.stem
+        try:
+            home = Path(pwd.getpwuid(uid).pw_dir)
+            his = base.lstat().st_uid == uid and runtime.lstat().st_uid == uid
+        except (KeyError, OSError):
+            continue
+        if his:
+            yield Places(runtime, home / ".local/state/rmf-bridge" / file.stem)
+
+
+def distrusted(folder: Path) -> str:
+    """Why nothing in a directory may be believed; "" when nobody but its owner and root made it.
+
+    Nobody else may have been able to put it, or a directory above it, where it is.
+    """
+    owner = folder.lstat().st_uid
+    others = 0o022 if os.geteuid() == 0 else 0o002
+    for place in (folder, *folder.parents):
+        found = place.lstat()
+        link = stat.S_ISLNK(found.st_mode)
+        if found.st_uid not in (0, owner):
+            return f"{place} belongs to another user"
+        if link and (place == folder or found.st_uid != 0):
+            return f"{place} is a symbolic link"
+        if not link and found.st_mode & others and not found.st_mode & stat.S_ISVTX:
+            return f"{place} can be written by others"
+    return ""
+
+
+def own(places: Places) -> None:
+    """Raises PermissionError where a directory is there and belongs to another user."""
+    for folder in _existing(places):
+        if folder.stat().st_uid != os.geteuid():
+            raise PermissionError(
+                f"{folder} belongs to {owner_of(folder)}: sudo -u {owner_of(folder)} does it"
+            )
+
+
+def act_as_owner(places: Places) -> None:
+    """Root becomes the directories' owner, for good, with the groups that the unit gives.
+
+    What stands in them can then do no more than their owner could. Raises PermissionError where
+    somebody else could have made them.
+    """
+    for folder in _existing(places):
+        if why := distrusted(folder):
+            raise PermissionError(f"{why}, so nothing in {folder} is believed")
+        found = folder.lstat()
+        if os.geteuid() == 0 and found.st_uid != 0:
+            _become(found.st_uid, found.st_gid)
+    own(places)
+
+
+def _existing(places: Places) -> list[Path]:
+    return [folder for folder in places.folders if os.path.lexists(folder)]
+
+
+def _become(uid: int, gid: int) -> None:
+    os.setgroups(_groups(uid, gid))
+    os.setgid(gid)
+    os.setuid(uid)
+
+
+def _groups(uid: int, gid: int) -> list[int]:
+    """Those that the user has, and for the unit's those that the unit gives it."""
+    try:
+        user = pwd.getpwuid(uid)
+    except KeyError:
+        return [gid]
+    groups = os.getgrouplist(user.pw_name, gid)
+    if user.pw_name == SERVICE_USER:
+        groups += [g.gr_gid for g in grp.getgrall() if g.gr_name in GROUPS]
+    return groups
+
+
+def owner_of(path: Path) -> str:
+    """Whose it is, for a text."""
+    try:
+        return pwd.getpwuid(path.lstat().st_uid).pw_name
+    except (KeyError, OSError):
+        return "another user"
+
+
+def work_somewhere(places: Places) -> None:
+    """Be where lgpio can leave its FIFO when it is imported: in one of these, or below /tmp."""
+    for folder in (places.runtime, places.state, TMP, Path("/dev/shm"), Path("/var/tmp")):
+        probe = folder / f".rmf-bridge-{os.getpid()}"
+        try:
+            os.mkfifo(probe)
+            probe.unlink()
+            os.chdir(folder)
+        except OSError:
+            continue
+        return

@@ -1,0 +1,217 @@
+"""A door behind a controller that answers HTTP with JSON: a relay with inputs (Shelly and the like).
+
+The answer to `state_path` has the contacts; `hold` and `release` switch the relay. Nothing but the
+relay's own timer releases the door when the network is gone, so `hold` sets that timer
+(`switches_off_after_s`) and is sent in every scan while the door is held.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import msgspec
+
+from bridges.core.fields import Timeout
+from bridges.door.settings import DoorSettings
+from bridges.door.signals import DoorOutputs, DoorSample
+from drivers import DriverError, json_fields
+from drivers.door.closing import CLOSING
+from drivers.driver_type import DriverType
+from drivers.hal import http
+from drivers.http_call import Call, Calls, send, told
+from drivers.json_fields import Flag
+from drivers.unsafe import Unsafe, unaccepted
+
+HOLD: Final = "hold_open"
+Problems = Iterator[tuple[tuple[str, ...], str]]
+
+
+class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the answer has what; a limit may be missing with `feedback: estimated`.
+
+    `opened`: the door is fully open.
+    `closed`: the door is closed.
+    `obstruction`: somebody is in the doorway: after CLOSE, the hold is kept until they are not.
+    `fire`: the fire alarm; `on_fire` says what it does.
+    """
+
+    opened: Flag | None = None
+    closed: Flag | None = None
+    obstruction: Flag | None = None
+    fire: Flag | None = None
+
+
+class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A door and its controller. The paths follow the bus's `api_base`.
+
+    `state_path`: where GET answers the inputs.
+    `inputs`: where that answer has what.
+    `hold`: switches on the relay that holds the door open.
+    `release`: switches it off, so that the door closes by its own rules.
+    `held`: where the answer says that the relay is on; without it nothing proves that it is off.
+    `switches_off_after_s`: the relay's own timer, as `hold` sets it (`…&toggle_after=10`): without
+    a new `hold` it is off after that time.
+    """
+
+    state_path: http.Path
+    inputs: Inputs = Inputs()
+    hold: Call
+    release: Call
+    held: Flag | None = None
+    switches_off_after_s: Timeout | None = None
+
+    def off_after(self) -> tuple[float, tuple[str, ...]] | None:
+        """The relay's timer."""
+        path = ("switches_off_after_s",)
+        return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
+
+    def problems(self) -> Problems:
+        """What the fields cannot say one by one."""
+        yield from super().problems()
+        missing = [
+            signal for signal in ("opened", "closed") if getattr(self.inputs, signal) is None
+        ]
+        if self.feedback == "sensors":
+            for signal in missing:
+                text = f"needs '{signal}'; where nothing says so, write feedback: estimated"
+                yield ("inputs",), text
+        elif not missing:
+            yield ("feedback",), "both ends are read: leave feedback out"
+        if bool(self.inputs.fire) != bool(self.on_fire):
+            yield ("inputs",), "a fire input and on_fire go together: give both, or none"
+        if self.hold == self.release:
+            yield ("release",), "is the command of hold"
+        yield from unaccepted(_unsafe(self), self.accept_unsafe)
+
+
+def _unsafe(settings: Settings) -> Iterator[Unsafe]:
+    if settings.switches_off_after_s is None:
+        text = (
+            "when the network dies nothing releases the door: have hold set the relay's own timer, and"
+            " write that as switches_off_after_s"
+        )
+        yield HOLD, ("hold",), text
+
+
+def describe(settings: Settings, bus: http.Settings) -> Iterator[tuple[str, str]]:
+    """For `check`: what is read and what is sent."""
+    api = http.base(bus.api_base)
+    yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
+    for signal in settings.inputs.__struct_fields__:
+        if place := getattr(settings.inputs, signal):
+            yield signal, json_fields.place_text(place)
+    if settings.held:
+        yield "held", json_fields.place_text(settings.held)
+    yield "hold", told(settings.hold, api) + _renewed(settings, bus)
+    yield "release", told(settings.release, api)
+    yield CLOSING
+
+
+def _renewed(settings: Settings, bus: http.Settings) -> str:
+    if settings.switches_off_after_s is None:
+        return ""
+    after = f"off by itself after {settings.switches_off_after_s:g} s"
+    return f", again every {bus.scan_s:g} s while the door is held: {after}"
+
+
+def warnings(settings: Settings) -> Problems:
+    """What is legal, but should be read before the door is put into service: (path, text)."""
+    if settings.switches_off_after_s is not None:
+        text = (
+            "pull the network plug while the door is held, and see that it is released in this time"
+        )
+        yield ("switches_off_after_s",), text
+        if HOLD in settings.accept_unsafe:
+            yield ("accept_unsafe", HOLD), f"nothing is unsafe about {HOLD}: delete this"
+    if settings.held is None:
+        yield (), "held is not read: that the door was released is not verified"
+    if settings.feedback == "estimated":
+        yield ("feedback",), "RMF is told OPEN or CLOSED by the clock, whatever the door does"
+
+
+def create(name: str, settings: Settings, bus: Calls) -> "HttpDoor":
+    """The door on its bus; nothing is sent before `open`."""
+    return HttpDoor(settings, bus)
+
+
+class HttpDoor:
+    """`drivers.Driver` of one door. What was told is None while it is not known to be so."""
+
+    def __init__(self, settings: Settings, bus: Calls) -> None:
+        self._settings = settings
+        self._bus = bus
+        self._renews = settings.switches_off_after_s is not None
+        self._told: bool | None = None
+        self._claimed = False
+        self._touched = False
+
+    def open(self) -> None:
+        """See that the controller answers, and release the door; once only.
+
+        Opened again after a failure it only reads: a door that is held must not drop because one
+        answer was lost.
+        """
+        held = self._held(self._bus.get_json(self._settings.state_path))
+        if not self._claimed and held is not False:
+            self._send(on=False)
+        self._claimed = True
+
+    def read(self) -> DoorSample:
+        """Every input, read now. Raises DriverError."""
+        told, self._told = self._told, None
+        answer = self._bus.get_json(self._settings.state_path)
+        sample = decode(self._settings, answer)
+        self._told = told if self._held(answer) in (None, told) else None
+        return sample
+
+    def write(self, outputs: DoorOutputs) -> None:
+        """Hold the door, or release it; a hold is renewed."""
+        if outputs.hold_open != self._told or (outputs.hold_open and self._renews):
+            self._send(outputs.hold_open)
+
+    def make_safe(self) -> None:
+        """Released, and seen to be where that can be read."""
+        self._send(on=False)
+        if self._settings.held and self._held(self._bus.get_json(self._settings.state_path)):
+            raise DriverError("the relay is still on after it was switched off")
+
+    def close(self) -> None:
+        """Released, if it was ever driven."""
+        if not self._touched:
+            return
+        self._bus.insist()
+        try:
+            self._send(on=False)
+        except DriverError:
+            return  # nobody is left to tell, and the relay's timer is behind it
+
+    def _send(self, on: bool) -> None:
+        self._told, self._touched = None, True
+        send(self._bus, self._settings.hold if on else self._settings.release, safe=not on)
+        self._told = on
+
+    def _held(self, answer: Mapping[str, Any]) -> bool | None:
+        place = self._settings.held
+        return None if place is None else json_fields.flag(answer, place)
+
+
+def decode(settings: Settings, answer: Mapping[str, Any]) -> DoorSample:
+    """What the answer says. Raises DriverError, with the field that has no meaning."""
+
+    def said(place: Flag | None) -> bool | None:
+        return None if place is None else json_fields.flag(answer, place)
+
+    found = settings.inputs
+    return DoorSample(
+        said(found.opened), said(found.closed), said(found.obstruction), said(found.fire)
+    )
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("http",),
+    create=create,
+    describe=describe,
+    warnings=warnings,
+    unwired=lambda settings: (HOLD,),
+    fake="hal_fakes.http_door",
+)

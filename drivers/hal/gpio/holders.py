@@ -1,0 +1,35 @@
+"""Who has a GPIO chip open, by name: the kernel says of a line only its library's label ('lg')."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+
+def holders(chip: Path, proc: Path = Path("/proc")) -> list[str]:
+    """The other processes that have this device open, as far as this user may see: a service by its
+    unit's name, else the command with its process id.
+    """
+    found = (_name(p) for p in _processes(proc) if p.name != str(os.getpid()) and _has(p, chip))
+    return sorted(set(found))
+
+
+def _processes(proc: Path) -> Iterator[Path]:
+    return (process for process in proc.iterdir() if process.name.isdecimal())
+
+
+def _has(process: Path, chip: Path) -> bool:
+    try:
+        return any(os.readlink(fd) == str(chip) for fd in (process / "fd").iterdir())
+    except OSError:  # it has ended, or is another user's
+        return False
+
+
+def _name(process: Path) -> str:
+    try:
+        unit = (process / "cgroup").read_text().strip().rpartition("/")[2]
+        command = (process / "cmdline").read_bytes().rstrip(b"\0").replace(b"\0", b" ")
+    except OSError:
+        return f"process {process.name}"
+    if unit.endswith(".service"):
+        return unit
+    return f"process {process.name} ({command.decode(errors='replace')[:80]})"

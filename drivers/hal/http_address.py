@@ -1,0 +1,54 @@
+"""Where an HTTP API is: its `api_base`, and the paths of its resources below that."""
+
+import re
+from typing import Annotated, Final, NamedTuple
+
+import msgspec
+
+Path = Annotated[
+    str,
+    msgspec.Meta(
+        pattern=r"^/[A-Za-z0-9._~/-]*(\?[A-Za-z0-9._~/:,;=&%+@!$*'()-]*)?$(?!\n)",
+        max_length=256,
+        extra={"pattern": "a path that begins with a slash (/relay/0?turn=on)"},
+    ),
+]
+"""What follows `api_base`, with its query if it has one."""
+
+PORTS: Final = {"http": 80, "https": 443}
+
+_BASE: Final = re.compile(
+    r"(?:(?P<scheme>https?)://)?"
+    r"(?P<host>[A-Za-z0-9_](?:[A-Za-z0-9_.-]{0,251}[A-Za-z0-9])?|\[[0-9A-Fa-f:.]+\])"
+    r"(?::(?P<port>[0-9]{1,5}))?"
+    r"(?P<path>(?:/[A-Za-z0-9._~-]+)*)/?"
+)
+
+
+class Base(NamedTuple):
+    """An `api_base` in parts. `path` is "" or begins with a slash and does not end with one."""
+
+    host: str
+    port: int
+    path: str
+    scheme: str = "http"
+
+    def url(self, path: str) -> str:
+        """The address of one resource of the API."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        port = "" if self.port == PORTS[self.scheme] else f":{self.port}"
+        return f"{self.scheme}://{host}{port}{self.path}{path}"
+
+
+def base(text: str) -> Base:
+    """The parts of an `api_base`. Raises ValueError with what to write instead."""
+    if "@" in text:
+        raise ValueError("no user or password here: put a bearer token in a file, as token_file")
+    found = _BASE.fullmatch(text)
+    if not found:
+        raise ValueError(f"{text!r} is no address of an API: write 192.168.1.60:8080/api, say")
+    scheme = found["scheme"] or "http"
+    port = int(found["port"] or PORTS[scheme])
+    if not 1 <= port <= 65535:
+        raise ValueError(f"port {port} does not exist: ports are 1 to 65535")
+    return Base(found["host"].strip("[]"), port, found["path"], scheme)

@@ -1,0 +1,237 @@
+"""A lift behind a gateway's Modbus registers: floor, door, motion and service state as numbers, hazards
+as bits, commands as registers or coils.
+
+A number that its map does not list is a fault, and never a floor, an open door or a standing car.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
+
+from bridges.lift.settings import LiftSettings
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from drivers.driver_type import DriverType
+from drivers.hal.modbus import ModbusBus
+from drivers.hal.modbus.lines import Lines
+from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
+from drivers.lift import checks
+from drivers.lift.register_map import Flag, FloorField, LiftMap, Number, Problems
+from drivers.lift.table import DEBOUNCE_S, HAZARD_DEBOUNCE_S
+
+DOOR: Final = {"open": Door.OPEN, "closed": Door.CLOSED, "moving": Door.BETWEEN}
+HOLD: Final = {Side.FRONT: "door_open", Side.REAR: "rear_door_open"}
+
+
+class Settings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A lift and where its gateway is.
+
+    `unit`: the gateway's Modbus unit.
+    `map`: where it has what.
+    """
+
+    unit: Unit
+    map: LiftMap
+
+    def problems(self) -> Problems:
+        """What the fields cannot say one by one."""
+        levels, commands = self.levels(), self.map.commands
+        yield from checks.floors(self)
+        landings = set(self.map.floor.codes.values())
+        yield from checks.named("code", ("map", "floor", "codes"), landings, levels)
+        if commands.call:
+            called = set(commands.call.codes.values())
+            yield from checks.named("code", ("map", "commands", "call", "codes"), called, levels)
+        else:
+            yield from checks.named("call", ("map", "commands", "calls"), commands.calls, levels)
+        yield from _rear_door(self)
+        told, asks = self.map.shows("agv_mode"), bool(commands.agv_mode_request)
+        yield from checks.by_call(self, told, asks, ("map", "commands", "agv_mode_request"))
+        for name, part in self.map.parts().items():
+            if part.valid_when and not told:
+                yield ("map", name), "valid_when: agv_mode needs agv_mode, or service to show it"
+            elif part.valid_when and name in ("agv_mode", "service"):
+                yield ("map", name), f"{name} itself tells AGV mode: delete valid_when"
+        if self.accept_unsafe:
+            yield ("accept_unsafe",), "a map has no wires that could be unsafe: delete this"
+
+
+def _rear_door(settings: Settings) -> Problems:
+    rear = any(stop.side is Side.REAR for stop in settings.stops().values())
+    found = settings.map
+    if rear and not found.rear_door:
+        yield ("map",), "no rear_door, and some floors have side: rear"
+    if found.rear_door and not rear:
+        yield ("map", "rear_door"), "no floor has side: rear"
+    if rear and found.commands.door_open and not found.commands.rear_door_open:
+        yield ("map", "commands"), "no rear_door_open, and some floors have side: rear"
+
+
+def warnings(settings: Settings) -> Problems:
+    """What works and deserves a second look: (path below the device, text)."""
+    found, commands = settings.map, settings.map.commands
+    fire, told = found.shows(Hazard.FIRE), found.shows("agv_mode")
+    asks, holds = bool(commands.agv_mode_request), bool(commands.door_open)
+    yield from checks.missing(settings, ("map",), told, asks, fire, holds)
+    if not commands.read_back:
+        text = "commands cannot be read back: that they are off is not verified"
+        yield ("map", "commands", "read_back"), text
+
+
+def notes(settings: Settings) -> Problems:
+    """What the site decides: (path below the device, text)."""
+    return checks.notes(settings, settings.map.shows(Hazard.FIRE))
+
+
+def debounce(settings: Settings) -> Mapping[str, float]:
+    """How long a change must last (s), as for contacts: a gateway may show a number half changed."""
+    return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
+
+
+def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """The places of commands, which nobody else may write."""
+    seen: set[str] = set()
+    for path, where, _ in settings.map.commands.places():
+        if where not in seen and misplaced(where, WRITABLE) is None:
+            seen.add(where)
+            yield str(at(settings.unit, where)), ("map", "commands", *path, "at")
+
+
+def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
+    """For `check`: each part of the map, where it is, and what its numbers mean."""
+    for name, part in settings.map.parts().items():
+        yield name, f"{at(settings.unit, part.at)}{_meaning(part)}"
+    commands = settings.map.commands
+    for signal, _, command in commands.singles():
+        yield signal, f"{at(settings.unit, command.at)}: {command.on} on, {command.off} off"
+    if commands.call:
+        codes = ", ".join(f"{number} {level}" for number, level in commands.call.codes.items())
+        yield "call", f"{at(settings.unit, commands.call.at)}: {codes}, {commands.call.none} none"
+
+
+def _meaning(part: Number | Flag) -> str:
+    text = ", only in AGV mode" if part.valid_when else ""
+    if isinstance(part, Flag):
+        bit = "" if part.bit is None else f" bit {part.bit}"
+        return f"{bit}: asserted at {int(part.active == 'high')}{text}"
+    bits = f" bits {', '.join(map(str, part.bits))}" if part.bits else ""
+    codes = [f"{number} {meaning}" for number, meaning in sorted(part.codes.items())]
+    if isinstance(part, FloorField):
+        codes += [f"{number} between floors" for number in part.between_floors]
+    return f"{bits}: {', '.join(codes)}{text}"
+
+
+def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterLift":
+    """The lift on its bus; nothing is sent before `open`."""
+    inputs = {part: at(settings.unit, p.at) for part, p in settings.map.parts().items()}
+    safe = encode(settings.map, LiftOutputs())
+    outputs = {where: at(settings.unit, where) for where in safe}
+    lines = Lines(bus, inputs, outputs, safe, settings.map.commands.read_back)
+    return RegisterLift(settings.map, lines)
+
+
+class RegisterLift:
+    """One lift (`drivers.Driver[LiftSample, LiftOutputs]`)."""
+
+    def __init__(self, found: LiftMap, lines: Lines) -> None:
+        self._map = found
+        self._lines = lines
+
+    def open(self) -> None:
+        """See that the gateway answers, and ask for nothing."""
+        self._lines.claim()
+
+    def read(self) -> LiftSample:
+        """Every register, read now and decoded."""
+        return decode(self._map, self._lines.read())
+
+    def write(self, outputs: LiftOutputs) -> None:
+        """Bring every command to this level; what goes off goes first."""
+        self._lines.bring(encode(self._map, outputs))
+
+    def make_safe(self) -> None:
+        """Every command off, and read back where it can be."""
+        self._lines.make_safe()
+
+    def close(self) -> None:
+        """Commands off and let go."""
+        self._lines.close()
+
+
+def encode(found: LiftMap, outputs: LiftOutputs) -> dict[str, int]:
+    """Place -> value. Commands that share a register are joined in it."""
+    asserted = {"agv_mode_request"} if outputs.agv_request else set()
+    if outputs.hold_door:
+        asserted.add(HOLD[outputs.hold_door])
+    if outputs.call is not None:
+        asserted.add(f"call_{outputs.call}")
+    return found.commands.words(asserted, outputs.call)
+
+
+def decode(found: LiftMap, words: Mapping[str, int]) -> LiftSample:
+    """What these registers, by part of the map, say. Never raises."""
+    flags = {n: p.asserted(words[n]) for n, p in found.parts().items() if isinstance(p, Flag)}
+    service = _service(found, words)
+    agv = _agv(found, flags, service)
+    unknown = {n for n, part in found.parts().items() if part.valid_when and not agv}
+    level, code_fault = (None, "") if "floor" in unknown else _floor(found, words)
+    return LiftSample(
+        level=level,
+        door=_door(found, "door", words, unknown) or Door.BETWEEN,
+        code_fault=code_fault,
+        rear_door=_door(found, "rear_door", words, unknown),
+        motion=None if "motion" in unknown else _motion(found, words),
+        agv=agv,
+        hazards=frozenset(
+            h for h in Hazard if h == service or (h not in unknown and flags.get(h, False))
+        ),
+        floor_valid="floor" not in unknown,
+    )
+
+
+def _service(found: LiftMap, words: Mapping[str, int]) -> str | None:
+    code = found.service
+    return None if code is None else code.means(code.number(words["service"]))
+
+
+def _agv(found: LiftMap, flags: Mapping[str, bool], service: str | None) -> bool | None:
+    if found.agv_mode:
+        return flags["agv_mode"]
+    return service == "agv_mode" if found.shows("agv_mode") else None
+
+
+def _floor(found: LiftMap, words: Mapping[str, int]) -> tuple[str | None, str]:
+    number = found.floor.number(words["floor"])
+    if number in found.floor.codes:
+        return found.floor.codes[number], ""
+    return None, "" if number in found.floor.between_floors else f"code {number} is no floor's"
+
+
+def _door(
+    found: LiftMap, name: str, words: Mapping[str, int], unknown: Iterable[str]
+) -> Door | None:
+    part = found.rear_door if name == "rear_door" else found.door
+    if part is None:
+        return None
+    if name in unknown:
+        return Door.BETWEEN
+    state = part.codes.get(part.number(words[name]))
+    return DOOR[state] if state else Door.UNKNOWN
+
+
+def _motion(found: LiftMap, words: Mapping[str, int]) -> Motion | None:
+    if found.motion is None:
+        return None
+    state = found.motion.codes.get(found.motion.number(words["motion"]))
+    return Motion(state) if state else Motion.CONTRADICTORY
+
+
+DRIVER = DriverType(
+    settings=Settings,
+    buses=("modbus",),
+    create=create,
+    debounce=debounce,
+    describe=describe,
+    claims=claims,
+    warnings=warnings,
+    notes=notes,
+    fake="hal_fakes.modbus.register_lift",
+)

@@ -1,0 +1,300 @@
+"""Where a lift's gateway has what in its registers, and what its numbers mean: a YAML's map."""
+
+import functools
+import operator
+from collections.abc import Collection, Iterator
+from typing import Annotated, Literal, TypeAlias
+
+import msgspec
+
+from bridges.core.fields import Name
+from bridges.lift.signals import Hazard
+from drivers.hal.modbus.points import BITS
+from drivers.hal.modbus.registers import REGISTERS, TABLES, WRITABLE, Place, Word, misplaced
+from drivers.lift.wiring import ServiceState
+
+Bit = Annotated[int, msgspec.Meta(ge=0, le=BITS - 1)]
+Problems = Iterator[tuple[tuple[str, ...], str]]
+
+
+class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A number in a register.
+
+    `at`: `input register N` or `holding register N`.
+    `bits`: the bits that it consists of, least significant first; the whole register when absent.
+    `valid_when`: with `agv_mode` it means something only while AGV mode is on.
+    """
+
+    at: Place
+    bits: list[Bit] = msgspec.field(default_factory=list)
+    valid_when: Literal["agv_mode"] | None = None
+
+    def number(self, word: int) -> int:
+        """The number, from the register."""
+        if not self.bits:
+            return word
+        return sum((word >> bit & 1) << i for i, bit in enumerate(self.bits))
+
+    def word(self, number: int) -> int:
+        """The register's bits that show a number."""
+        if not self.bits:
+            return number
+        return sum((number >> i & 1) << bit for i, bit in enumerate(self.bits))
+
+    def fits(self, numbers: Collection[int], key: str) -> Problems:
+        """A place that is no register, bits that stand here twice, numbers that do not fit."""
+        yield from _misplaced(self.at, REGISTERS)
+        if len(set(self.bits)) < len(self.bits):
+            yield ("bits",), "a bit stands here twice"
+        for number in numbers:
+            if self.bits and number >> len(self.bits):
+                yield (key, str(number)), f"{number} does not fit on {len(self.bits)} bits"
+
+
+class FloorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the car is.
+
+    `codes`: number -> landing; a number that is not listed is a fault.
+    `between_floors`: the numbers that mean no landing.
+    """
+
+    codes: dict[Word, Name]
+    between_floors: list[Word] = msgspec.field(default_factory=list)
+
+    def problems(self) -> Problems:
+        """What cannot be; a number that means two things."""
+        yield from self.fits([*self.codes, *self.between_floors], "codes")
+        for number in self.codes:
+            if number in self.between_floors:
+                yield ("codes", str(number)), f"{number} means between floors as well"
+
+
+class DoorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A door.
+
+    `codes`: number -> state; a number that is not listed is a fault.
+    """
+
+    codes: dict[Word, Literal["open", "closed", "moving"]]
+
+    def problems(self) -> Problems:
+        """What cannot be; a door that is never open."""
+        yield from self.fits(self.codes, "codes")
+        if not {"open", "closed"} <= set(self.codes.values()):
+            yield ("codes",), "needs a code for open and one for closed"
+
+
+class MotionField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The car's motion.
+
+    `codes`: number -> motion; a number that is not listed is a fault.
+    """
+
+    codes: dict[Word, Literal["stopped", "up", "down", "moving"]]
+
+    def problems(self) -> Problems:
+        """What cannot be; a car that never stands, or never moves."""
+        yield from self.fits(self.codes, "codes")
+        shown = set(self.codes.values())
+        if "stopped" not in shown or not ("moving" in shown or {"up", "down"} <= shown):
+            yield ("codes",), "needs a code for stopped, and for moving or up and down"
+
+
+class ServiceField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The lift's service state.
+
+    `codes`: number -> state; with a number that is not listed the lift is out of service.
+    """
+
+    codes: dict[Word, ServiceState]
+
+    def problems(self) -> Problems:
+        """What cannot be."""
+        yield from self.fits(self.codes, "codes")
+
+    def means(self, number: int) -> str:
+        """The state that a number shows."""
+        state = self.codes.get(number, "fault")
+        return Hazard.OUT_OF_SERVICE if state == "fault" else state
+
+
+Number: TypeAlias = FloorField | DoorField | MotionField | ServiceField
+
+
+class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One bit.
+
+    `at`: `input register N`, `holding register N`, `coil N` or `discrete input N`.
+    `bit`: which of a register's; 0 is the least.
+    `active`: the level at which it is asserted; `high` is 1.
+    `valid_when`: with `agv_mode` it means something only while AGV mode is on.
+    """
+
+    at: Place
+    bit: Bit | None = None
+    active: Literal["high", "low"]
+    valid_when: Literal["agv_mode"] | None = None
+
+    def asserted(self, word: int) -> bool:
+        """What the register or bit says."""
+        return bool(word >> (self.bit or 0) & 1) == (self.active == "high")
+
+    def word(self, asserted: bool) -> int:
+        """The register's bits that say so."""
+        return (asserted == (self.active == "high")) << (self.bit or 0)
+
+    def problems(self) -> Problems:
+        """A place that there is not; a register without its bit."""
+        yield from _misplaced(self.at, tuple(TABLES))
+        register = misplaced(self.at, REGISTERS) is None
+        if register and self.bit is None:
+            yield ("bit",), "a flag is one bit of a register: say which"
+        if self.bit is not None and misplaced(self.at, ("coil", "discrete input")) is None:
+            yield ("bit",), "is for registers: a coil or discrete input is one bit already"
+
+
+class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One thing that is asked of the lift. Off is its safe value.
+
+    `at`: `coil N` or `holding register N`. Commands may share a register: their values are joined,
+    bit by bit.
+    `on`: the value that asks for it.
+    `off`: the value that does not.
+    """
+
+    at: Place
+    on: Word = 1
+    off: Word = 0
+
+    def problems(self) -> Problems:
+        """A place that cannot be written; values that it cannot take."""
+        yield from _misplaced(self.at, WRITABLE)
+        if self.on == self.off:
+            yield ("off",), "is the value of on"
+        for key in ("on", "off"):
+            if getattr(self, key) > 1 and misplaced(self.at, ("coil",)) is None:
+                yield (key,), "a coil is 0 or 1"
+
+
+class CallCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Calls as numbers in a register.
+
+    `at`: `holding register N`.
+    `codes`: number -> landing.
+    `none`: the value that calls nowhere.
+    """
+
+    at: Place
+    codes: dict[Word, Name]
+    none: Word = 0
+
+    def problems(self) -> Problems:
+        """A place that cannot be written; a call that is none."""
+        yield from _misplaced(self.at, ("holding register",))
+        if self.none in self.codes:
+            yield ("codes", str(self.none)), f"{self.none} is no call, as none says"
+
+
+class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is asked of the lift.
+
+    `agv_mode_request`: asks for AGV mode for as long as a robot holds the lift.
+    `door_open`, `rear_door_open`: holds that door open where the car stands.
+    `calls`: landing -> its command; or `call`.
+    `call`: calls as numbers in one register.
+    `read_back`: false where commands can only be written; then they are written in every scan, and
+    nothing proves that they were taken.
+    """
+
+    agv_mode_request: Command | None = None
+    door_open: Command | None = None
+    rear_door_open: Command | None = None
+    calls: dict[Name, Command] = msgspec.field(default_factory=dict)
+    call: CallCommand | None = None
+    read_back: bool = True
+
+    def singles(self) -> Iterator[tuple[str, tuple[str, ...], Command]]:
+        """Each command but `call`: its signal, its path below this section, and itself."""
+        for name in ("agv_mode_request", "door_open", "rear_door_open"):
+            command: Command | None = getattr(self, name)
+            if command:
+                yield name, (name,), command
+        for level, command in self.calls.items():
+            yield f"call_{level}", ("calls", level), command
+
+    def places(self) -> Iterator[tuple[tuple[str, ...], str, int]]:
+        """Each command's path below this section, its place, and the bits that it sets there."""
+        for _, path, command in self.singles():
+            yield path, command.at, command.on | command.off
+        if self.call:
+            bits = functools.reduce(operator.or_, self.call.codes, self.call.none)
+            yield ("call",), self.call.at, bits
+
+    def words(self, asserted: Collection[str], call: str | None) -> dict[str, int]:
+        """Place -> value, for these commands and a call to this landing."""
+        found: dict[str, int] = {}
+        for signal, _, command in self.singles():
+            value = command.on if signal in asserted else command.off
+            found[command.at] = found.get(command.at, 0) | value
+        if self.call:
+            codes = {level: number for number, level in self.call.codes.items()}
+            value = self.call.none if call is None else codes[call]
+            found[self.call.at] = found.get(self.call.at, 0) | value
+        return found
+
+    def problems(self) -> Problems:
+        """Two ways of calling; commands that share a bit of a register."""
+        if self.calls and self.call:
+            yield ("calls",), "calls and call are two ways of calling: keep one"
+        taken: dict[str, int] = {}
+        for path, at, bits in self.places():
+            if at in taken and (not bits or bits & taken[at]):
+                yield (*path, "at"), f"another command has these bits of {at} already"
+            taken[at] = taken.get(at, 0) | bits
+
+
+class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the gateway has what. Addresses begin at 0.
+
+    `floor`: where the car is.
+    `door`, `rear_door`: the car's doors.
+    `motion`: the car's motion.
+    `service`: the lift's service state; it may show hazards and AGV mode.
+    `agv_mode`: AGV mode is on; or one state of `service`.
+    `fire_alarm`: fire, shown as MODE_FIRE; latched with `fire_reset: manual`.
+    `code_blue`, `earthquake`, `emergency`: shown as MODE_EMERGENCY.
+    `out_of_service`, `manual_mode`: shown as MODE_OFFLINE; the second is the key switch.
+    `overload`: delays the ride, and nothing else.
+    `commands`: what is asked of the lift.
+    """
+
+    floor: FloorField
+    door: DoorField
+    rear_door: DoorField | None = None
+    motion: MotionField | None = None
+    service: ServiceField | None = None
+    agv_mode: Flag | None = None
+    fire_alarm: Flag | None = None
+    code_blue: Flag | None = None
+    earthquake: Flag | None = None
+    emergency: Flag | None = None
+    out_of_service: Flag | None = None
+    manual_mode: Flag | None = None
+    overload: Flag | None = None
+    commands: Commands
+
+    def parts(self) -> dict[str, Number | Flag]:
+        """Everything that is read and is there."""
+        read = [name for name in self.__struct_fields__ if name != "commands"]
+        found = {name: getattr(self, name) for name in read}
+        return {name: part for name, part in found.items() if part is not None}
+
+    def shows(self, state: str) -> bool:
+        """Is this state read, as a flag or as one of the service states?"""
+        in_service = self.service is not None and state in self.service.codes.values()
+        return in_service or getattr(self, state) is not None
+
+
+def _misplaced(text: str, tables: tuple[str, ...]) -> Problems:
+    if reason := misplaced(text, tables):
+        yield ("at",), reason

@@ -1,0 +1,79 @@
+"""A door on a relay that answers HTTP: its plant's contacts where the YAML says that they are.
+
+The relay switches itself off when its timer is not renewed. How its server, its headers and its body
+fail is in `hal_fakes/http.py`.
+"""
+
+import json
+import time
+from collections.abc import Mapping
+from typing import Any, Final
+
+from drivers.door.http import HOLD, Settings
+from drivers.hal.points import Wire
+from drivers.json_fields import put, value_of
+from hal_fakes.fake import Fake
+from hal_fakes.plants import door
+from hal_fakes.plants.plant import Plant
+
+PARTS: Final = ("server", "headers", "body")
+
+
+def contacts(settings: Settings) -> list[Wire]:
+    """The controller's own contacts and relay, for the plant: they can fail like wires to us."""
+    fields = settings.inputs.__struct_fields__
+    inputs = [Wire(s, "in", s, "high") for s in fields if getattr(settings.inputs, s)]
+    return [*inputs, Wire(HOLD, "out", HOLD, "high")]
+
+
+class HttpDoor:
+    """A controller (`hal_fakes.http.Station`)."""
+
+    def __init__(self, plant: Plant, settings: Settings) -> None:
+        self.plant = plant
+        self.reads = settings.state_path
+        hold, release = settings.hold, settings.release
+        self.commands: Mapping[tuple[str, str], tuple[str, bool]] = {
+            (hold.method, hold.path): (HOLD, True),
+            (release.method, release.path): (HOLD, False),
+        }
+        self._settings = settings
+        self._on = False
+        self._off_at = float("inf")
+        self._last: bytes | None = None
+
+    def obey(self, signal: str, asserted: bool) -> None:
+        """The relay, and its timer."""
+        now, after_s = time.monotonic(), self._settings.switches_off_after_s
+        self._on = asserted
+        self._off_at = now + after_s if asserted and after_s else float("inf")
+        self.plant.drive(signal, asserted, now)
+
+    def tick(self) -> None:
+        """The timer."""
+        if time.monotonic() >= self._off_at:
+            self.obey(HOLD, False)
+
+    def answer(self) -> bytes:
+        """The answer to `GET state_path` now; wrong where the server is told to be."""
+        self.tick()
+        self.plant.advance(time.monotonic())
+        server, body = self.plant.failures.get("server"), self.plant.failures.get("body")
+        if server == "stuck" and self._last is not None:
+            return self._last
+        said: dict[str, Any] = {}
+        for signal in self._settings.inputs.__struct_fields__:
+            if place := getattr(self._settings.inputs, signal):
+                put(said, place.field, value_of(place, self.plant.sense(signal)))
+                if "wrong" in (server, body):
+                    put(said, place.field, ["?"])
+        if held := self._settings.held:
+            put(said, held.field, value_of(held, self._on))
+        self._last = json.dumps(said).encode()
+        return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: door.build(name, settings, contacts(settings), PARTS),
+    station=lambda plant, settings, bus: HttpDoor(plant, settings),
+)

@@ -1,0 +1,153 @@
+"""A lift's gateway: its plant's contacts as the numbers of its register map, its commands as relays.
+
+Behind the gateway is a lift on contacts, which can be cut like wires to us: a floor's line each, two
+for a door, one for each hazard.
+"""
+
+from collections.abc import Iterator
+from itertools import count
+from typing import Any
+
+import msgspec
+
+from bridges.lift.settings import LiftSettings
+from bridges.lift.signals import Hazard
+from drivers.hal.modbus.points import Point
+from drivers.hal.modbus.registers import at
+from drivers.lift import dry_contact
+from drivers.lift.register import Settings
+from drivers.lift.register_map import DoorField, Flag, LiftMap, MotionField, ServiceField
+from hal_fakes.fake import Fake
+from hal_fakes.plants.lift import LiftPlant, Pace
+from hal_fakes.plants.plant import Plant
+
+NONSENSE = 65535
+"""What a whole register shows of a door that is open and closed at once."""
+
+
+def contacts(settings: Settings) -> dry_contact.Settings:
+    """The lift behind the gateway, as the wiring of its contacts."""
+    found, inputs, coils = settings.map, count(), count()
+
+    def line(part: Any = None, active: str = "high") -> dict[str, Any]:
+        conditional = {"valid_when": "agv_mode"} if part and part.valid_when else {}
+        point = f"unit {settings.unit} discrete input {next(inputs)}"
+        return {"point": point, "active": active, **conditional}
+
+    def coil() -> dict[str, Any]:
+        return {"point": f"unit {settings.unit} coil {next(coils)}", "active": "high"}
+
+    wired = {h.value: line(getattr(found, h), "low") for h in Hazard if found.shows(h)}
+    if found.shows("agv_mode"):
+        wired["agv_mode"] = line()
+    for door in ("door", "rear_door"):
+        if part := getattr(found, door):
+            wired |= {f"{door}_{end}": line(part) for end in ("opened", "closed")}
+    if found.motion:
+        moves = ("moving",) if "moving" in found.motion.codes.values() else ("up", "down")
+        wired |= {name: line(found.motion) for name in moves}
+    levels = settings.levels()
+    singles = [signal for signal, _, _ in found.commands.singles()]
+    plain = {
+        **{n: getattr(settings, n) for n in LiftSettings.__struct_fields__},
+        "inputs": wired,
+        "floor_code": {"encoding": "one_hot", "lines": {n: line(found.floor) for n in levels}},
+        "outputs": {n: coil() for n in singles if not n.startswith("call_")},
+        "calls": {level: coil() for level in levels},
+    }
+    return msgspec.convert(msgspec.to_builtins(plain), dry_contact.Settings)
+
+
+class RegisterLift:
+    """The cells of one gateway. `points`: what it has, `outputs` among it; `unit`: where."""
+
+    def __init__(self, plant: Plant, settings: Settings) -> None:
+        self.plant = plant
+        self.unit = settings.unit
+        self._map: LiftMap = settings.map
+        self._levels = settings.levels()
+        self._parts = {n: at(self.unit, p.at) for n, p in self._map.parts().items()}
+        off = self._map.commands.words((), None)
+        self._written = {at(self.unit, where): value for where, value in off.items()}
+        self.points = frozenset([*self._parts.values(), *self._written])
+        self.outputs = frozenset(self._written)
+
+    def get(self, point: Point, now: float) -> int:
+        """What is read there at `now` (monotonic s)."""
+        self.plant.advance(now)
+        value = self._written.get(point, 0)
+        for name, where in self._parts.items():
+            if where == point:
+                value |= self._word(name)
+        return value
+
+    def set(self, point: Point, value: int, now: float) -> bool:
+        """A write; False where nothing can be written. What goes off goes first."""
+        if point not in self._written:
+            return False
+        self._written[point] = value
+        relays = sorted(self._relays(point, value), key=lambda relay: relay[1])
+        for signal, on in relays:
+            self.plant.drive(signal, on, now)
+        return True
+
+    def _relays(self, point: Point, value: int) -> Iterator[tuple[str, bool]]:
+        """What this value of a place has on or off."""
+        commands = self._map.commands
+        for signal, _, command in commands.singles():
+            if at(self.unit, command.at) == point:
+                yield signal, value & (command.on | command.off) == command.on
+        if commands.call and at(self.unit, commands.call.at) == point:
+            [bits] = [bits for path, _, bits in commands.places() if path == ("call",)]
+            for number, level in commands.call.codes.items():
+                yield f"call_{level}", value & bits == number
+
+    def _word(self, name: str) -> int:
+        part = getattr(self._map, name)
+        if isinstance(part, Flag):
+            return part.word(self.plant.sense(name))
+        if isinstance(part, DoorField):
+            return part.word(self._door(name, part))
+        if isinstance(part, MotionField):
+            return part.word(self._motion(part))
+        if isinstance(part, ServiceField):
+            return part.word(self._service(part))
+        return self._map.floor.word(self._floor())
+
+    def _floor(self) -> int:
+        numbers = {level: number for number, level in self._map.floor.codes.items()}
+        there = [numbers[level] for level in self._levels if self.plant.sense(f"floor_{level}")]
+        return next(iter([*there, *self._map.floor.between_floors]), 0)
+
+    def _door(self, name: str, part: DoorField) -> int:
+        ends = {end: self.plant.sense(f"{name}_{end}") for end in ("opened", "closed")}
+        if all(ends.values()):
+            return NONSENSE
+        state = "open" if ends["opened"] else "closed" if ends["closed"] else "moving"
+        return next((n for n, meaning in part.codes.items() if meaning == state), NONSENSE)
+
+    def _motion(self, part: MotionField) -> int:
+        shown = set(part.codes.values())
+        moves = ("moving",) if "moving" in shown else ("up", "down")
+        state = next((name for name in moves if self.plant.sense(name)), "stopped")
+        return next(n for n, meaning in part.codes.items() if meaning == state)
+
+    def _service(self, part: ServiceField) -> int:
+        states = [h.value for h in Hazard if self._map.shows(h) and self.plant.sense(h)]
+        states += (
+            ["agv_mode"] if self._map.shows("agv_mode") and self.plant.sense("agv_mode") else []
+        )
+        states += ["normal", "fault"]
+        numbers = {state: number for number, state in reversed(part.codes.items())}
+        return next((numbers[state] for state in states if state in numbers), NONSENSE)
+
+
+def build(name: str, settings: Settings, pace: Pace | None = None) -> LiftPlant:
+    """The lift behind this gateway."""
+    return LiftPlant(name, contacts(settings), pace)
+
+
+FAKE = Fake[Settings](
+    plant=lambda name, settings, wires: build(name, settings),
+    station=lambda plant, settings, bus: RegisterLift(plant, settings),
+)

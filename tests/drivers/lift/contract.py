@@ -1,0 +1,221 @@
+"""What every driver of a lift has to do, on whatever it stands: each test of it has a bench of its own.
+
+A test class derives from `LiftContract`, or from `WiredLiftContract` where the link can fail, and says
+how its bench is built. The lift has the landings B1, G and 1 and stands at B1, its door closed. Its
+wires: `fire_alarm`, `agv_mode`, `door_opened`, `door_closed`, `moving`, and a line for each landing.
+"""
+
+import contextlib
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from drivers import Driver, DriverError
+from hal_fakes.plants.lift import Pace
+from hal_fakes.plants.plant import Plant
+from tests.drivers.hal.modbus.module import Time
+from tests.waiting import at_last, wait_until
+
+QUICK = Pace(floor_s=0.2, door_s=0.05, agv_s=0.02, dwell_s=0.1)
+"""A lift that is not worth waiting for."""
+
+IDLE = LiftSample("B1", Door.CLOSED, motion=Motion.STOPPED, agv=False)
+OFF, AGV = LiftOutputs(), LiftOutputs(agv_request=True)
+CALL, HOLD = LiftOutputs(True, call="1"), LiftOutputs(True, hold_door=Side.FRONT)
+
+LiftDriver = Driver[LiftSample, LiftOutputs]
+
+
+class Bench:
+    """One driver on one bus, with a lift behind it. `clock`: the bus's, for its pauses."""
+
+    def __init__(self, driver: LiftDriver, plant: Plant, clock: Time | None = None) -> None:
+        self.driver = driver
+        self.plant = plant
+        self.clock = clock or Time()
+
+    def relays(self) -> list[tuple[str, Any]]:
+        """Every edge of every output so far."""
+        return [(edge.signal, edge.value) for edge in self.plant.edges if edge.what == "relay"]
+
+    def read(self) -> LiftSample:
+        """A reading."""
+        return at_last(self.driver.read, "a reading", self._pause)
+
+    def write(self, outputs: LiftOutputs) -> None:
+        """These outputs."""
+        at_last(lambda: self.driver.write(outputs), "written", self._pause)
+
+    def until(self, holds: Callable[[LiftSample], bool], what: str) -> list[LiftSample]:
+        """Reads until this is so; all that was read on the way."""
+        seen: list[LiftSample] = []
+
+        def look() -> bool:
+            seen.append(self.read())
+            return holds(seen[-1])
+
+        wait_until(look, what)
+        return seen
+
+    def rides(self) -> list[LiftSample]:
+        """AGV mode, a call for 1, and the door held open there; all that was read since the call."""
+        self.write(AGV)
+        self.until(lambda sample: sample.agv is True, "AGV mode")
+        self.write(CALL)
+        seen = self.until(lambda sample: sample.level == "1", "it is there")
+        self.write(HOLD)
+        return seen + self.until(lambda sample: sample.door is Door.OPEN, "its door is open")
+
+    def patiently(self) -> LiftSample | str:
+        """What it reads with all pauses over; or why it could not be read."""
+        self._pause()
+        try:
+            return self.driver.read()
+        except DriverError as error:
+            return str(error)
+
+    def _pause(self) -> None:
+        self.clock.now += 60.0
+
+
+class LiftContract(ABC):
+    """On any bus."""
+
+    @abstractmethod
+    def benches(self) -> contextlib.AbstractContextManager[Bench]:
+        """A bench with an idle lift; nothing is open yet."""
+
+    @pytest.fixture
+    def bench(self) -> Iterator[Bench]:
+        with self.benches() as bench:
+            yield bench
+            bench.driver.close()
+
+    def test_opening_the_driver_moves_nothing(self, bench: Bench) -> None:
+        bench.driver.open()
+        assert (bench.read(), bench.relays()) == (IDLE, [])
+
+    def test_a_call_brings_the_car_and_the_door_is_held_open_there(self, bench: Bench) -> None:
+        bench.driver.open()
+        seen = bench.rides()
+        assert [sample.level for sample in seen if sample.door is Door.OPEN] == ["1"]
+        assert bench.relays() == [
+            ("agv_mode_request", True),
+            ("call_1", True),
+            ("call_1", False),
+            ("door_open", True),
+        ]
+
+    def test_a_car_on_its_way_is_moving_and_between_landings_with_its_door_closed(
+        self, bench: Bench
+    ) -> None:
+        bench.driver.open()
+        bench.plant.fail("car", "slow")
+        bench.write(AGV)
+        bench.until(lambda sample: sample.agv is True, "AGV mode")
+        bench.write(CALL)
+        way = bench.until(lambda sample: sample.motion is Motion.MOVING, "it moves")
+        way += bench.until(lambda sample: sample.level is None, "between landings")
+        assert {sample.door for sample in way} == {Door.CLOSED}
+
+    def test_another_call_goes_on_after_the_one_before_it_is_off(self, bench: Bench) -> None:
+        bench.driver.open()
+        bench.write(AGV)
+        for level in ("G", "1", "B1"):
+            bench.write(LiftOutputs(True, call=level))
+        assert bench.relays()[1:] == [
+            ("call_G", True),
+            ("call_G", False),
+            ("call_1", True),
+            ("call_1", False),
+            ("call_B1", True),
+        ]
+
+    def test_writing_the_same_again_sends_no_command(self, bench: Bench) -> None:
+        bench.driver.open()
+        for _ in range(3):
+            bench.write(CALL)
+        assert sorted(bench.relays()) == [("agv_mode_request", True), ("call_1", True)]
+
+    def test_make_safe_and_close_each_switch_everything_off(self, bench: Bench) -> None:
+        bench.driver.open()
+        for end in (bench.driver.make_safe, bench.driver.close):
+            before = len(bench.relays())
+            bench.write(HOLD)
+            end()
+            assert sorted(bench.relays()[before:]) == [
+                ("agv_mode_request", False),
+                ("agv_mode_request", True),
+                ("door_open", False),
+                ("door_open", True),
+            ]
+
+    def test_closing_what_was_never_open_touches_nothing(self, bench: Bench) -> None:
+        bench.driver.close()
+        assert bench.relays() == []
+
+    def test_a_fire_is_read_for_as_long_as_its_contact_says_so(self, bench: Bench) -> None:
+        bench.driver.open()
+        for burns in (True, False):
+            bench.plant.press("fire_alarm", burns, time.monotonic())
+            hazards = {Hazard.FIRE} if burns else set()
+            wait_until(lambda hazards=hazards: bench.read().hazards == hazards, "seen")  # type: ignore[misc]
+
+    @pytest.mark.parametrize(
+        ("wire", "safe"),
+        [
+            ("fire_alarm", lambda sample: sample.hazards == {Hazard.FIRE}),
+            ("agv_mode", lambda sample: sample.agv is False),
+            ("door_opened", lambda sample: sample.door is Door.BETWEEN),
+            ("floor_1", lambda sample: sample.level is None),
+        ],
+    )
+    def test_a_cut_wire_reads_as_the_safe_one_of_its_two_meanings(
+        self, bench: Bench, wire: str, safe: Callable[[LiftSample], bool]
+    ) -> None:
+        bench.driver.open()
+        bench.rides()
+        bench.plant.fail(wire, "off")
+        bench.until(safe, f"{wire} is cut")
+
+
+class WiredLiftContract(LiftContract):
+    """On a bus whose far side can go away: parts `server` and `unit` of the plant."""
+
+    @pytest.mark.parametrize("part", ["server", "unit"])
+    def test_a_link_that_is_gone_is_a_driver_error_and_the_outputs_survive_it(
+        self, bench: Bench, part: str
+    ) -> None:
+        bench.driver.open()
+        bench.rides()
+        edges = bench.relays()
+        bench.plant.fail(part, "off")
+        wait_until(lambda: isinstance(bench.patiently(), str), "gone")
+        with pytest.raises(DriverError):
+            bench.driver.open()
+        bench.plant.fail(part, None)
+        wait_until(lambda: isinstance(bench.patiently(), LiftSample), "back")
+        bench.driver.open()
+        bench.write(HOLD)
+        assert bench.relays() == edges
+
+    @pytest.mark.parametrize("mode", ["garbage", "wrong", "slow", "stuck"])
+    def test_every_failure_is_a_driver_error_and_never_a_false_reading(
+        self, bench: Bench, mode: Any
+    ) -> None:
+        bench.driver.open()
+        bench.plant.fail("server", mode)
+        seen: list[LiftSample | str] = []
+
+        def failing() -> bool:
+            seen.append(bench.patiently())
+            return isinstance(seen[-1], str)
+
+        wait_until(failing, mode)
+        assert {sample for sample in seen if isinstance(sample, LiftSample)} <= {IDLE}
+        bench.plant.fail("server", None)
+        wait_until(lambda: bench.patiently() == IDLE, "back")

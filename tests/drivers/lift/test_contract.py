@@ -1,0 +1,166 @@
+"""Every driver of a lift keeps the same contract."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+from typing import Any, ClassVar
+
+import msgspec
+
+from drivers.hal import gpio, modbus
+from drivers.lift import register
+from drivers.lift.dry_contact import Settings, create, wires
+from hal_fakes.gpio import WiredFactory
+from hal_fakes.modbus import ModbusServer, register_lift
+from hal_fakes.modbus.rtu import RtuLine
+from hal_fakes.plants.lift import LiftPlant
+from hal_fakes.realtime import RealTime
+from hal_fakes.wiring import Wiring
+from tests.drivers.hal.modbus.module import Time
+from tests.drivers.lift.contract import QUICK, Bench, LiftContract, WiredLiftContract
+from tests.drivers.lift.wirings import FLOORS, inputs, line, whole
+
+TIMEOUT_S = 0.2
+
+
+class TestDryContactsOnModbus(WiredLiftContract):
+    serial: ClassVar[modbus.Serial | None] = None
+
+    def wired(self) -> dict[str, Any]:
+        """The wiring as a YAML has it."""
+        return whole(inputs=inputs(moving=line(4)))
+
+    @contextmanager
+    def benches(self) -> Iterator[Bench]:
+        settings = msgspec.convert(self.wired(), Settings)
+        world = RealTime({"lift": LiftPlant("lift", settings, QUICK)})
+        plant = world.plants["lift"]
+        far_side = [Wiring(plant, wires(settings), modbus.canonical)]
+        server = (
+            RtuLine(far_side, self.serial, slow_s=2.2 * TIMEOUT_S)
+            if self.serial
+            else ModbusServer(far_side, slow_s=1.5 * TIMEOUT_S)
+        )
+        plain = {"type": "modbus", "timeout_s": TIMEOUT_S, **server.replace}
+        clock = Time()
+        bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
+        try:
+            yield Bench(create("lift", settings, bus), plant, clock)
+        finally:
+            bus.close()
+            server.close()
+            world.close()
+
+
+def number(register: int, codes: dict[int, str], **more: Any) -> dict[str, Any]:
+    return {"at": f"input register {register}", "codes": codes, **more}
+
+
+def flag(register: int, bit: int, active: str = "high") -> dict[str, Any]:
+    return {"at": f"input register {register}", "bit": bit, "active": active}
+
+
+def word(on: int) -> dict[str, Any]:
+    return {"at": "holding register 10", "on": on, "off": 0}
+
+
+NUMBERS: dict[str, Any] = {
+    "floor": number(0, {1: "B1", 2: "G", 4: "1"}, between_floors=[0], bits=[0, 1, 2]),
+    "motion": number(0, {0: "stopped", 1: "moving"}, bits=[8]),
+    "door": number(1, {10: "open", 20: "closed", 30: "moving"}),
+    "agv_mode": flag(2, 0),
+    "fire_alarm": flag(2, 15, "low"),
+}
+ONE_WORD = {"agv_mode_request": word(1), "door_open": word(2)}
+CALLS = {"at": "holding register 11", "codes": {1: "B1", 2: "G", 3: "1"}, "none": 9}
+COILS = {"agv_mode_request": {"at": "coil 0"}, "door_open": {"at": "coil 1"}}
+
+
+class TestRegistersWithCallsAsNumbers(WiredLiftContract):
+    commands: ClassVar[dict[str, Any]] = {**ONE_WORD, "call": CALLS}
+
+    @contextmanager
+    def benches(self) -> Iterator[Bench]:
+        plain = {"floors": FLOORS, "unit": 3, "map": {**NUMBERS, "commands": self.commands}}
+        settings = msgspec.convert(plain, register.Settings)
+        assert list(settings.problems()) == []
+        world = RealTime({"lift": register_lift.build("lift", settings, QUICK)})
+        plant = world.plants["lift"]
+        far_side = register_lift.RegisterLift(plant, settings)
+        server = ModbusServer([far_side], slow_s=1.5 * TIMEOUT_S)
+        wire = {"type": "modbus", "timeout_s": TIMEOUT_S, **server.replace}
+        clock = Time()
+        bus = modbus.ModbusBus(msgspec.convert(wire, modbus.Settings), clock)
+        try:
+            yield Bench(register.create("lift", settings, bus), plant, clock)
+        finally:
+            bus.close()
+            server.close()
+            world.close()
+
+
+class TestRegistersWithCallsInOneWord(TestRegistersWithCallsAsNumbers):
+    commands: ClassVar = {
+        **ONE_WORD,
+        "calls": {level: word(16 << i) for i, level in enumerate(FLOORS)},
+    }
+
+
+class TestRegistersWithCoils(TestRegistersWithCallsAsNumbers):
+    commands: ClassVar = {
+        **COILS,
+        "calls": {level: {"at": f"coil {4 + i}"} for i, level in enumerate(FLOORS)},
+    }
+
+
+class TestRegistersThatCannotBeReadBack(TestRegistersWithCallsAsNumbers):
+    commands: ClassVar = {**ONE_WORD, "call": CALLS, "read_back": False}
+
+
+class TestDryContactsOnRs485(TestDryContactsOnModbus):
+    serial: ClassVar = modbus.Serial(port="/dev/null", baudrate=57600, parity="none", stopbits=1)
+
+
+def in_registers(part: Any) -> Any:
+    """The same wiring, with each contact as a bit of a register of a gateway."""
+    if not isinstance(part, dict):
+        return part
+    if "point" in part and "discrete input" in part["point"]:
+        place, number = part["point"].split("discrete input ")
+        register, bit = divmod(int(number), 4)
+        return {**part, "point": f"{place}holding {40 + register} bit {bit}"}
+    return {key: in_registers(value) for key, value in part.items()}
+
+
+class TestContactsAsBitsOfRegisters(TestDryContactsOnModbus):
+    def wired(self) -> dict[str, Any]:
+        found = in_registers(super().wired())
+        assert isinstance(found, dict)
+        return found
+
+
+def on_header(part: Any, pins: Iterator[int]) -> Any:
+    """The same wiring on pins, taken as they come."""
+    if not isinstance(part, dict):
+        return part
+    if "point" in part:
+        pull = {"pull": "down"} if "input" in part["point"] else {}
+        return {**part, "point": f"BCM{next(pins)}", **pull}
+    return {key: on_header(value, pins) for key, value in part.items()}
+
+
+class TestDryContactsOnGpio(LiftContract):
+    @contextmanager
+    def benches(self) -> Iterator[Bench]:
+        plain = on_header(whole(inputs=inputs(moving=line(4))), count(4))
+        settings = msgspec.convert(plain, Settings)
+        world = RealTime({"lift": LiftPlant("lift", settings, QUICK)})
+        plant = world.plants["lift"]
+        factory = WiredFactory([Wiring(plant, wires(settings), gpio.canonical)], lock=world.lock)
+        world.on_step.append(factory.show)
+        bus = gpio.open_bus(gpio.Settings(), factory)
+        try:
+            yield Bench(create("lift", settings, bus), plant)
+        finally:
+            bus.close()
+            world.close()

@@ -1,0 +1,59 @@
+"""What each topic of ours must be on the graph, typed by hand: `bridges/rmf/topics.py` is not asked.
+
+A row is (type, QoS of the end that publishes, QoS of the end that subscribes). Line numbers are of
+rmf_ros2 9dedd0f (2026-05) unless said otherwise.
+"""
+
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+
+class Qos(NamedTuple):
+    """As `ros2 topic info --verbose` shows it."""
+
+    reliability: str
+    durability: str
+    history: str
+    depth: int
+
+
+PLAIN: Final = Qos("RELIABLE", "VOLATILE", "KEEP_LAST", 100)
+RETAINED: Final = Qos("RELIABLE", "TRANSIENT_LOCAL", "KEEP_LAST", 100)
+
+GOLDEN: Final[Mapping[str, tuple[str, Qos, Qos]]] = {
+    # Fleet adapter hears with SystemDefaults keep_last(100) (agv/Node.cpp:37,53), the lift supervisor
+    # with 10, rmf-web reliable volatile 10. One node may publish many lifts back to back: a depth
+    # of 1 (SystemDefaults on Cyclone, rmw_node.cpp:2160-2197) would lose all but the last.
+    "lift_states": ("rmf_lift_msgs/LiftState", PLAIN, PLAIN),
+    # lift_supervisor publishes reliable, transient_local, keep_last(100). A node subscribes volatile,
+    # or its restart would hear up to 100 old requests.
+    "lift_requests": ("rmf_lift_msgs/LiftRequest", RETAINED, PLAIN),
+    # Reliable, transient_local, keep_last(100) at both ends (agv/Node.cpp, lift_supervisor/Node.cpp).
+    "adapter_lift_requests": ("rmf_lift_msgs/LiftRequest", RETAINED, RETAINED),
+    # SystemDefaults: fleet adapter 100, supervisor 10; rmf-web reliable 100.
+    "door_states": ("rmf_door_msgs/DoorState", PLAIN, PLAIN),
+    # door_supervisor publishes SystemDefaults keep_last(10), volatile: nothing is retained.
+    "door_requests": ("rmf_door_msgs/DoorRequest", PLAIN, PLAIN),
+    # SystemDefaults: fleet adapter 100, rmf-web 10, door_supervisor 10.
+    "adapter_door_requests": ("rmf_door_msgs/DoorRequest", PLAIN, PLAIN),
+    # SystemDefaults: door_supervisor 10, fleet adapter 100.
+    "door_supervisor_heartbeat": ("rmf_door_msgs/SupervisorHeartbeat", PLAIN, PLAIN),
+    # RMF has no node for chargers and names no topic: as doors and their requests are.
+    "charger_states": ("rmf_charger_msgs/ChargerState", PLAIN, PLAIN),
+    "charger_requests": ("rmf_charger_msgs/ChargerRequest", PLAIN, PLAIN),
+    "charger_cancels": ("rmf_charger_msgs/ChargerCancel", PLAIN, PLAIN),
+    "adapter_charger_requests": ("rmf_charger_msgs/ChargerRequest", PLAIN, PLAIN),
+    "adapter_charger_cancels": ("rmf_charger_msgs/ChargerCancel", PLAIN, PLAIN),
+    # Fleet adapter publishes SystemDefaults 100.
+    "fleet_states": ("rmf_fleet_msgs/FleetState", PLAIN, PLAIN),
+    # Fleet adapter hears reliable transient_local: a volatile publisher never matches.
+    "charging_assignments": ("rmf_fleet_msgs/ChargingAssignments", RETAINED, RETAINED),
+    # rmf-web's api-server hears reliable transient_local, depth 10.
+    "alert": ("rmf_task_msgs/Alert", RETAINED, RETAINED),
+    # Fleet adapter hears reliable transient_local, 100 (agv/Node.cpp:73-79, since rmf_ros2#341).
+    "fire_alarm_trigger": ("std_msgs/Bool", RETAINED, RETAINED),
+    # Fleet adapter hears reliable transient_local keep_last(100).
+    "emergency_signal": ("rmf_fleet_msgs/EmergencySignal", RETAINED, RETAINED),
+    # diagnostic_aggregator and rqt hear with rclcpp's default: reliable, volatile, keep_last(10).
+    "diagnostics": ("diagnostic_msgs/DiagnosticArray", PLAIN, PLAIN),
+}

@@ -1,0 +1,85 @@
+"""What every transport with a wire does, within one process: threads, misfits, what stays behind."""
+
+import os
+import threading
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from bridges.rmf import definitions as d
+from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE
+from bridges.rmf.transport import Publisher, TransportError
+from tests.rmf import peer
+from tests.rmf.conftest import Join
+from tests.waiting import wait_until
+
+
+def test_messages_arrive_on_the_thread_of_the_transport(join_any_wire: Join) -> None:
+    threads: list[str] = []
+    listener = join_any_wire("listener")
+    listener.subscribe(LIFT_STATES, lambda _: threads.append(threading.current_thread().name))
+    publisher = join_any_wire("speaker").publisher(LIFT_STATES)
+    wait_until(lambda: threads or peer.sent(publisher, d.LiftState()), "a message arrives")
+    assert {name.rpartition("-")[0] for name in threads} == {"listener"}
+
+
+def test_a_reader_thread_that_has_died_shows_at_the_next_publish(
+    join_any_wire: Join, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    died: list[Any] = []
+    monkeypatch.setattr(threading, "excepthook", died.append)
+
+    def broken(message: d.LiftState) -> None:
+        raise ArithmeticError
+
+    node = join_any_wire("broken")
+    node.subscribe(LIFT_STATES, broken)
+    publisher = node.publisher(LIFT_STATES)
+    wait_until(lambda: died or not _refuses(publisher), "the first message is sent")
+    wait_until(lambda: died, "the thread dies")
+    wait_until(lambda: _refuses(publisher), "publishing is refused")
+
+
+def test_nodes_that_come_and_go_leave_no_thread_no_file_and_no_complaint_behind(
+    join_any_wire: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    def come_and_go() -> None:
+        node = join_any_wire("guest")
+        node.subscribe(LIFT_REQUESTS, print)
+        node.publisher(LIFT_STATES).publish(d.LiftState())
+        node.close()
+
+    for _ in range(5):  # what a library starts once and keeps
+        come_and_go()
+    before = _threads_and_files()
+    for _ in range(10):
+        come_and_go()
+    wait_until(lambda: _threads_and_files() <= before, "threads and files are as before")
+    assert caplog.messages == []
+
+
+def test_a_peer_whose_durability_does_not_fit_is_named_once(
+    join_any_wire: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    join_any_wire("listener").subscribe(FIRE_ALARM_TRIGGER, print)
+    join_any_wire("stranger").publisher(replace(FIRE_ALARM_TRIGGER, publish=VOLATILE))
+    wait_until(lambda: len(caplog.messages) == 2, "both ends say so")
+    assert sorted(caplog.messages) == [
+        'misfit topic=fire_alarm_trigger reason="a publisher is not heard:'
+        ' its durability does not fit ours"',
+        'misfit topic=fire_alarm_trigger reason="a subscription is not served:'
+        ' its durability does not fit ours"',
+    ]
+
+
+def _refuses(publisher: Publisher[d.LiftState]) -> bool:
+    try:
+        publisher.publish(d.LiftState())
+    except TransportError:
+        return True
+    return False
+
+
+def _threads_and_files() -> tuple[int, int]:
+    return len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd"))

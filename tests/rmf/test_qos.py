@@ -1,0 +1,49 @@
+"""Every topic's type and QoS, against a table that was typed independently."""
+
+from typing import Any
+
+import pytest
+
+from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.topics import Topic
+from tests.rmf import peer
+from tests.rmf.golden_qos import GOLDEN, RETAINED, Qos
+
+TOPICS = {topic.name: topic for topic in peer.TOPICS.values()}
+
+
+def typed(qos: topics.Qos) -> Qos:
+    """As the golden table has it; RELIABLE and KEEP_LAST are all that `topics.Qos` can say."""
+    return Qos("RELIABLE", qos.durability.upper(), "KEEP_LAST", qos.depth)
+
+
+def test_the_table_of_topics_is_the_golden_one() -> None:
+    ours = {
+        name: (
+            f"{d.PACKAGES[topic.type]}/{topic.type.__name__}",
+            typed(topic.publish),
+            typed(topic.subscribe),
+        )
+        for name, topic in TOPICS.items()
+    }
+    assert ours == GOLDEN
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_on_the_memory_transport_a_late_subscriber_hears_what_the_golden_depths_retain(
+    name: str,
+) -> None:
+    """Also that publisher and subscription match where the golden table says that they do."""
+    topic: Topic[Any] = TOPICS[name]
+    _, publish, subscribe = GOLDEN[name]
+    network = MemoryNetwork()
+    publisher = MemoryTransport(network, "speaker").publisher(topic)
+    for _ in range(publish.depth + 1):
+        publisher.publish(topic.type())
+    heard: list[Any] = []
+    MemoryTransport(network, "late").subscribe(topic, heard.append)
+    retained = (publish.durability, subscribe.durability) == (RETAINED.durability,) * 2
+    assert len(heard) == (min(publish.depth, subscribe.depth) if retained else 0)
+    assert publisher.matched() == 1

@@ -1,0 +1,1 @@
+"""What docs/reliability.md shows: real daemons, hurt from outside, on loopback (`make torture`)."""

@@ -1,0 +1,64 @@
+"""`python -m tests.torture --seed 7`: the table of docs/reliability.md, in ten minutes, on loopback.
+
+Exit code 1, and what happened, when a relay stayed on or a daemon died of what may not end one.
+"""
+
+import argparse
+import random
+import secrets
+import sys
+import tempfile
+import threading
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from tests.torture.deaths import kills, shortages, signals
+from tests.torture.forged import forged
+from tests.torture.table import Table
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Hurt them, print the table."""
+    parser = argparse.ArgumentParser(prog="python -m tests.torture", description=__doc__)
+    parser.add_argument("--seed", type=int, help="one is drawn and printed if left out")
+    parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--times", type=int, default=10, help="of each shortage")
+    parser.add_argument("--forged-s", type=float, default=20.0, help="on each wire")
+    options = parser.parse_args(argv)
+    seed = secrets.randbelow(10**6) if options.seed is None else options.seed
+    began, table, failed = time.monotonic(), Table(), list[str]()
+    with tempfile.TemporaryDirectory(prefix="rmf-bridges-") as base:
+        here, half = Path(base), options.kills // 2
+        parts: list[Callable[[], None]] = [
+            lambda: kills(here / "a", random.Random(seed), options.kills - half, table),
+            lambda: kills(here / "b", random.Random(seed + 1), half, table),
+            lambda: _one_after_another(here, seed, options, table),
+        ]
+        threads = [threading.Thread(target=_tried, args=(part, failed)) for part in parts]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    sys.stdout.write(f"{table}\n\nseed {seed}, {time.monotonic() - began:.0f} s\n")
+    sys.stdout.write("\n".join(failed))
+    return 1 if failed else 0
+
+
+def _one_after_another(here: Path, seed: int, options: argparse.Namespace, table: Table) -> None:
+    signals(here / "c", table)
+    shortages(here / "d", random.Random(seed + 2), options.times, table)
+    forged(here / "e", random.Random(seed + 3), options.forged_s, table)
+
+
+def _tried(part: Callable[[], None], failed: list[str]) -> None:
+    try:
+        part()
+    except BaseException:
+        failed.append(traceback.format_exc())
+        raise
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,156 @@
+"""Deaths and shortages of one door's daemon on a real Modbus server whose relay is looked at."""
+
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bridges.rmf.definitions import DoorModeValue
+from bridges.serve.signals import ENDING
+from hal_fakes.domain import domain_for_a_while
+from tests.serve.site import Daemon, Graph, Module, command, environment
+from tests.torture.table import Table
+from tests.waiting import wait_until
+
+SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
+LONGEST_LIFE_S = 4.0
+PATIENCE_S = 60.0
+
+
+class Door:
+    """A module on the wall, and an RMF that never stops to ask for OPEN."""
+
+    def __init__(self, directory: Path, domain: int) -> None:
+        directory.mkdir()
+        self.module = Module(directory, domain)
+        self.graph = Graph(self.module.domain)
+        self.run = directory / "run"
+        self._stop = threading.Event()
+        self._asks = threading.Thread(target=self._ask)
+        self._asks.start()
+
+    def is_on(self) -> bool:
+        """The relay, as the wire has it."""
+        return self.module.relay()[-1:] == [True]
+
+    def daemon(self, **env: str) -> Daemon:
+        """A daemon that has just been started."""
+        self.graph.states.clear()
+        return Daemon(self.module.file, self.run, **env)
+
+    def held(self) -> Daemon:
+        """A daemon with its relay on, and a unit behind it."""
+        running = self.daemon(**SERVICE)
+        wait_until(self.is_on, "the relay holds the door", PATIENCE_S)
+        return running
+
+    def outputs_off(self) -> int:
+        """As the unit does."""
+        off = command("outputs-off", self.module.file, "--runtime-dir", self.run)
+        return subprocess.run(off, env=environment(**SERVICE), capture_output=True).returncode
+
+    def states_go_on(self) -> None:
+        """Until RMF has heard two more."""
+        before = len(self.graph.states)
+        wait_until(lambda: len(self.graph.states) > before + 1, "states go on", PATIENCE_S)
+
+    def close(self) -> None:
+        self._stop.set()
+        self._asks.join()
+        self.graph.transport.close()
+        self.module.close()
+
+    def _ask(self) -> None:
+        while not self._stop.wait(0.05):
+            self.graph.request(DoorModeValue.MODE_OPEN)
+
+
+@contextmanager
+def door(directory: Path) -> Iterator[Door]:
+    """One door, until the end of the block."""
+    with domain_for_a_while() as domain:
+        standing = Door(directory, domain)
+        try:
+            yield standing
+        finally:
+            standing.close()
+
+
+def kills(directory: Path, rng: random.Random, times: int, table: Table) -> None:
+    """kill -9 at random points of a daemon's life; every other one by hand, with a guard."""
+    pause = threading.Event()
+    with door(directory) as here:
+        for n in range(times):
+            by_hand = n % 2 == 0
+            running = here.daemon(**({} if by_hand else SERVICE))
+            if rng.random() < 0.5:
+                wait_until(here.is_on, "the relay holds the door", PATIENCE_S)
+                pause.wait(rng.uniform(0.0, 1.0))
+            else:
+                pause.wait(rng.uniform(0.0, LONGEST_LIFE_S))
+            was_on = here.is_on()
+            running.end(signal.SIGKILL)
+            if not by_hand:
+                assert here.outputs_off() == 0
+            wait_until(lambda: not here.is_on() and _released(here.run), "off", PATIENCE_S)
+            way = "its guard" if by_hand else "outputs-off"
+            table.count(f"kill -9, then {way}", "relay off" + (", had been on" if was_on else ""))
+
+
+def _released(run: Path) -> bool:
+    return not list(run.glob("claimed-*"))
+
+
+def signals(directory: Path, table: Table) -> None:
+    """Each signal that would end or suspend a process, with the relay on."""
+    with door(directory) as here:
+        for number in sorted(ENDING - set(range(signal.SIGRTMIN + 1, signal.SIGRTMAX))):
+            code = here.held().end(number)
+            wait_until(lambda: not here.is_on(), "the relay is off", PATIENCE_S)
+            table.count("each signal that ends or suspends", f"exit code {code}, relay off")
+
+
+def shortages(directory: Path, rng: random.Random, times: int, table: Table) -> None:
+    """A daemon that holds a door lives through each, and ends in good order."""
+    with door(directory) as here:
+        running = here.held()
+        hurts: dict[str, Callable[[Door, int], None]] = {
+            "full disk": lambda d, pid: _limited(d, pid, resource.RLIMIT_FSIZE, 0),
+            "no descriptor left": lambda d, pid: _limited(d, pid, resource.RLIMIT_NOFILE, 3),
+            "suspended process": _suspended,
+            "removed directory": _removed,
+        }
+        for what in rng.sample([*hurts] * times, k=len(hurts) * times):
+            hurts[what](here, running.process.pid)
+            assert running.process.poll() is None
+            assert here.is_on()
+            table.count(what, "served on")
+        code = running.end(signal.SIGTERM)
+        wait_until(lambda: not here.is_on(), "the relay is off", PATIENCE_S)
+        table.count("the end of that daemon", f"exit code {code}, relay off")
+
+
+def _limited(here: Door, pid: int, what: int, soft: int) -> None:
+    before = resource.prlimit(pid, what)
+    resource.prlimit(pid, what, (soft, before[1]))
+    here.states_go_on()
+    resource.prlimit(pid, what, before)
+
+
+def _suspended(here: Door, pid: int) -> None:
+    os.kill(pid, signal.SIGSTOP)
+    threading.Event().wait(1.0)
+    os.kill(pid, signal.SIGCONT)
+    here.states_go_on()
+
+
+def _removed(here: Door, pid: int) -> None:
+    shutil.rmtree(here.run, ignore_errors=True)
+    here.states_go_on()
+    wait_until((here.run / "status.json").exists, "the directory is there again", PATIENCE_S)
