@@ -171,9 +171,9 @@ def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> Wrong:
         return Wrong(f'is the text "{text}": write {asked}{", without quotes" if read else ""}')
     meant = "" if isinstance(wanted, BoolType) else number_meant(node.value, whole)
     if meant:
-        return Wrong(f"is written {text}: write {meant}; {asked} is wanted")
+        return Wrong(f"is written {text}: write {meant}, {asked}")
     if extra.get("unit") and has_unit(node.value):
-        return Wrong(f"is written {text}: write the number alone; {asked} is wanted")
+        return Wrong(f"is written {text}: write the number alone, {asked}")
     reading = reads_as(node.value) or ""
     if isinstance(wanted, BoolType) and reading in ("true", "false"):
         return Wrong(f"is written {text}, which YAML versions read differently: write {reading}")

@@ -295,7 +295,7 @@ def test_a_device_may_have_a_driver_of_its_own(file: Path) -> None:
 
 def test_a_devices_own_driver_is_one_of_its_kind(file: Path) -> None:
     (problem,) = problems_of(file, OWN.replace("driver: web", "driver: wep"))
-    assert problem == "8:19: 'driver' is 'wep': contact or web is wanted (did you mean 'web'?)"
+    assert problem == "8:19: 'driver' is 'wep': write contact or web (did you mean 'web'?)"
 
 
 def test_a_devices_own_driver_stands_on_its_bus(file: Path) -> None:

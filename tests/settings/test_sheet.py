@@ -144,7 +144,7 @@ def test_json_says_what_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
                 "file": "gate.yaml",
                 "line": 15,
                 "column": 32,
-                "text": "'tries' is 0: a whole number of at least 1 is wanted",
+                "text": "'tries' is 0: write a whole number of at least 1",
             }
         ],
         [],

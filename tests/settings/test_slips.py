@@ -49,7 +49,7 @@ SLIPS = {
     "a section that stands beside what it belongs to": (
         changed("  north:\n", "north:\n").replace("\n    ", "\n  "),
         [
-            "6:1: 'gates' has no value: a mapping (key: value) is wanted",
+            "6:1: 'gates' has no value: write a mapping (key: value)",
             "7:1: 'north' stands beside 'gates', which is empty: indent it below",
         ],
     ),
@@ -67,7 +67,7 @@ SLIPS = {
     ),
     "a decimal comma": (
         changed(LIMIT, "limits:\n      open_s: 3,5"),
-        ["16:15: 'open_s' is written 3,5: write 3.5; a number from 0.1 to 60 s is wanted"],
+        ["16:15: 'open_s' is written 3,5: write 3.5, a number from 0.1 to 60 s"],
     ),
     "a decimal comma within braces": (
         changed("open_s: 3,", "open_s: 3,5,"),
@@ -76,23 +76,23 @@ SLIPS = {
     "a comma that may be either": (
         changed(LIMIT, "limits:\n      open_s: 3,500"),
         [
-            "16:15: 'open_s' is written 3,500: write 3.500, or 3500;"
-            " a number from 0.1 to 60 s is wanted"
+            "16:15: 'open_s' is written 3,500: write 3.500, or 3500,"
+            " a number from 0.1 to 60 s"
         ],
     ),
     "a whole number with its thousands apart": (
         changed("tries: 2", "tries: 1'000"),
-        ["15:32: 'tries' is written 1'000: write 1000; a whole number of at least 1 is wanted"],
+        ["15:32: 'tries' is written 1'000: write 1000, a whole number of at least 1"],
     ),
     "a number in wide digits": (
         changed("tries: 2", "tries: \uff12"),
-        ["15:32: 'tries' is written \uff12: write 2; a whole number of at least 1 is wanted"],
+        ["15:32: 'tries' is written \uff12: write 2, a whole number of at least 1"],
     ),
     "a unit of its own": (
         changed("open_s: 3", "open_s: 300 ms"),
         [
-            "15:22: 'open_s' is written 300 ms: write the number alone;"
-            " a number from 0.1 to 60 s is wanted"
+            "15:22: 'open_s' is written 300 ms: write the number alone,"
+            " a number from 0.1 to 60 s"
         ],
     ),
     "a no-break space within a number": (

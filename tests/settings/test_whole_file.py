@@ -57,7 +57,7 @@ if the text is meant, write "~" in quotes
 15:52: 'debounce_s' is 20: write a number from 0 to 10 s
 16:7: the key 'closed' is already on line 15: delete one of the two
 17:22: 1A (A1) is used by north inputs.closed on line 15: north inputs.other needs a point of its own
-17:52: 'debounce_s' is written 20 ms: write the number alone; a number from 0 to 10 s is wanted
+17:52: 'debounce_s' is written 20 ms: write the number alone, a number from 0 to 10 s
 18:7: 'last': pull is missing
 20:7: 'hold' needs 'active': high or low
 20:21: A1 is used by north inputs.closed on line 15: north outputs.hold needs a point of its own
