@@ -94,7 +94,10 @@ def test_how_long_a_call_lasts_is_told(tmp_path: Path) -> None:
 
 def test_service_and_motion_codes_are_told_number_by_number(tmp_path: Path) -> None:
     more = ("    # A number on three lines", f"{MORE}    # A number on three lines")
-    changes = (more, (DOOR_OPEN, ""))
+    told = "the controller watches its lines"
+    accepted = f"{{service_bit0: {told}, service_bit1: {told}, motion_bit0: {told}}}"
+    accept = ("    inputs:\n", f"    accept_unsafe: {accepted}\n    inputs:\n")
+    changes = (more, (DOOR_OPEN, ""), accept)
     assert table(tmp_path, "service code", *changes) == [
         "normal 0 none emergency: service_bit1",
         "overload 1 service_bit0 normal: service_bit0; out_of_service: service_bit1",
