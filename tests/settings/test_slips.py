@@ -75,10 +75,7 @@ SLIPS = {
     ),
     "a comma that may be either": (
         changed(LIMIT, "limits:\n      open_s: 3,500"),
-        [
-            "16:15: 'open_s' is written 3,500: write 3.500, or 3500,"
-            " a number from 0.1 to 60 s"
-        ],
+        ["16:15: 'open_s' is written 3,500: write 3.500, or 3500, a number from 0.1 to 60 s"],
     ),
     "a whole number with its thousands apart": (
         changed("tries: 2", "tries: 1'000"),
@@ -90,10 +87,7 @@ SLIPS = {
     ),
     "a unit of its own": (
         changed("open_s: 3", "open_s: 300 ms"),
-        [
-            "15:22: 'open_s' is written 300 ms: write the number alone,"
-            " a number from 0.1 to 60 s"
-        ],
+        ["15:22: 'open_s' is written 300 ms: write the number alone, a number from 0.1 to 60 s"],
     ),
     "a no-break space within a number": (
         changed("tries: 2", f"tries: 1{NBSP}000"),
