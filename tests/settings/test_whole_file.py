@@ -82,7 +82,7 @@ write a whole number from 0 to 15 plainly
 27:3: 'west' needs 'bus': header, spare or box
 27:21: 'inputs' is a list: write a mapping (key: value)
 27:33: unknown key 'acept_unsafe': did you mean 'accept_unsafe'? known here: \
-bus, accept_unsafe, lanes, inputs, outputs, bits, codes, limits
+bus, driver, accept_unsafe, lanes, inputs, outputs, bits, codes, limits
 28:3: this name is written no, which YAML may read as false: \
 if the text is meant, write "no" in quotes
 28:7: 'no' is the number 3: write a mapping (key: value)
