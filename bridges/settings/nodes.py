@@ -16,6 +16,7 @@ from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNod
 from yaml.reader import ReaderError
 
 from bridges import regular_file
+from bridges.settings import slips
 
 MAX_DEPTH = 32
 
@@ -31,23 +32,6 @@ class Sort:
 
 
 DEVICE = Sort("device YAML", "kind: ...", 256 * 1024, 20_000)
-
-FIXES = {
-    "found character '\\t' that cannot start any token": "a tab: YAML indents with spaces",
-    "mapping values are not allowed here": (
-        "a second ': ' here: indent the line like its neighbours, or put the text in quotes"
-    ),
-    "could not find expected ':'": "a key without ': ' after it, or a line indented wrongly",
-    "found unexpected end of stream": "the file ends inside a text: its closing quote is missing",
-    "but found another document": (
-        "a second document ('---') starts here: a file describes one daemon, so split it"
-    ),
-    "found duplicate anchor": "an anchor ('&name') whose name is already used",
-}
-FIXES |= {
-    f"found character '{c}' that cannot start any token": f"a text that begins with {c} needs quotes"
-    for c in "@`%"
-}
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -156,6 +140,9 @@ class _Composer(yaml.SafeLoader):
             raise _Refused(mark, "an alias ('*name') inside the value that it repeats")
         self._sizes[id(node)] = size = 1 + sum(self._sizes[id(n)] for n in _children(node))
         self._refuse_more_than_most(mark, size)
+        if isinstance(node, ScalarNode) and is_plain(node) and (odd := slips.odd_space(node.value)):
+            self._page.note(node, odd)
+            node.value = slips.cleaned(node.value)
         return node
 
     def _refuse_more_than_most(self, mark: Mark, values: int) -> None:
@@ -223,7 +210,8 @@ def _root(page: Page, text: str, sort: Sort) -> Node | None:
         raise SettingsError([_problem_after(page, text[: error.position], reason)]) from None
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        raise SettingsError([*page.problems, page.problem(mark, _reason(error))]) from None
+        told = str(error.problem) if isinstance(error, _Refused) else slips.reason(error, text)
+        raise SettingsError([*page.problems, page.problem(mark, told)]) from None
     except (ValueError, OverflowError):
         # PyYAML raises these for numbers that no character or version has, as in "\U00110000".
         assert composer is not None
@@ -234,18 +222,6 @@ def _root(page: Page, text: str, sort: Sort) -> Node | None:
 def _problem_after(page: Page, before: str, text: str) -> Problem:
     lines = re.split(r"\r\n|\r|\n", before)
     return Problem(page.file, len(lines), len(lines[-1]) + 1, text)
-
-
-def _reason(error: MarkedYAMLError) -> str:
-    """PyYAML's text on one line, or the fix for a common cause."""
-    for usual, fix in FIXES.items():
-        if usual in (error.problem, (error.context or "").partition(" '")[0]):
-            return fix
-    if isinstance(error, _Refused):
-        return str(error.problem)
-    mark = error.context_mark
-    context = f" ({error.context}, from line {mark.line + 1})" if mark and error.context else ""
-    return f"not YAML: {error.problem}{context}"
 
 
 def is_plain(node: ScalarNode) -> bool:

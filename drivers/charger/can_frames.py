@@ -15,10 +15,11 @@ import msgspec
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
 from bridges.core.fields import Name
+from bridges.core.table import Table
 from bridges.settings.nodes import unknown
 from drivers import DriverError
 from drivers.charger import dbc
-from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows
+from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows, tables
 from drivers.charger.rules import MEANINGS, UNKNOWN, judge, places
 from drivers.charger.state_codes import first_side
 from drivers.driver_type import DriverType
@@ -106,10 +107,15 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
     after = "a time to be asked of the maker" if stops_s is None else f"{stops_s:g} s"
     return [
         ("bus", can.describe(bus_settings)),
-        *rows(found, settings.setpoints),
+        *rows(found),
         ("end of the daemon", f"power off is sent; unfed it stops after {after}"),
         *found.state.codes.rows(),
     ]
+
+
+def frame_tables(settings: Settings) -> Iterator[Table]:
+    """The frames as bytes."""
+    return tables(frame_map(settings), settings.setpoints)
 
 
 def warnings(settings: Settings) -> Problems:
@@ -282,6 +288,7 @@ DRIVER = DriverType(
     buses=("can",),
     create=create,
     describe=describe,
+    tables=frame_tables,
     claims=claims,
     warnings=warnings,
     fake="hal_fakes.can.frame_charger",

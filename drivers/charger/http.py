@@ -165,6 +165,11 @@ def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
     return HttpCharger(settings, bus)
 
 
+def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """The station's own state, which no other charger can have."""
+    yield f"{settings.fields.state} of {settings.state_path}", ("state_path",)
+
+
 def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str, str]]:
     """What `check` prints in place of a wiring table: (what, meaning)."""
     api, fields = http.base(bus_settings.api_base), settings.fields
@@ -366,6 +371,7 @@ DRIVER = DriverType(
     buses=("http",),
     create=create,
     describe=describe,
+    claims=claims,
     warnings=warnings,
     unwired=lambda settings: (POWER,) if settings.start else (),
     fake="hal_fakes.http_charger",

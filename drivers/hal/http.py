@@ -17,7 +17,7 @@ import msgspec
 
 from bridges import secret_file
 from bridges.core.fields import AbsolutePath, Name, Period
-from drivers.hal import Bus, BusType, HalError
+from drivers.hal import Bus, BusType, HalError, Where
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
@@ -103,6 +103,11 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
             " it, or keep such controllers on a network of their own"
         )
         yield ("token_file",), text
+
+
+def where(settings: Settings) -> Where:
+    """The controller's address."""
+    return Where(base(settings.api_base).url(""), local=False)
 
 
 def open_bus(settings: Settings) -> "HttpBus":
@@ -307,5 +312,6 @@ BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
     fake="hal_fakes.http",
+    where=where,
     warnings=warnings,
 )

@@ -241,7 +241,7 @@ def test_a_file_that_is_not_a_map_is_refused_at_the_place_that_is_wrong(
     assert capsys.readouterr() == (
         "",
         "device.yaml:1:1: this is not a building map or navigation graph: it has no 'levels:'\n"
-        "device.yaml: 1 problem\n",
+        "1 error\n",
     )
 
 

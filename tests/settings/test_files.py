@@ -87,10 +87,7 @@ SYNTAX = {
     "kind: gate\n---\nkind: gate\n": (
         "2:1: a second document ('---') starts here: a file describes one daemon, so split it"
     ),
-    "kind: [a, b\nc: d\n": (
-        "2:2: not YAML: expected ',' or ']', but got ':' (while parsing a flow sequence, "
-        "from line 1)"
-    ),
+    "kind: [a, b\nc: d\n": ("2:2: a ',' is missing before this, or the '[' of line 1 is open"),
     "kind: gate\n- a\n": (
         "2:1: not YAML: expected <block end>, but found '-' (while parsing a block mapping, "
         "from line 1)"

@@ -26,7 +26,8 @@ from msgspec.inspect import (
 )
 from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.commands.check import described
+from bridges.commands.sheets.text import lines
+from bridges.commands.sheets.told import told
 from bridges.core.fields import Rmf
 from bridges.settings import names as named
 from bridges.settings.load import load
@@ -128,7 +129,7 @@ def test_there_are_shipped_files() -> None:
 
 def test_a_shipped_file_is_right_and_has_something_to_show(config: Path) -> None:
     loaded = load(config)
-    assert len(described(loaded)) > 4
+    assert len(lines(told(loaded))) > 4
     assert loaded.text == config.read_bytes()
 
 

@@ -16,7 +16,7 @@ from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.points import canonical, describe, wire_problems
-from drivers.hal.modbus.settings import Settings, unreachable, warnings
+from drivers.hal.modbus.settings import Settings, unreachable, warnings, where
 
 __all__ = [
     "BUS",
@@ -41,6 +41,7 @@ BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
     fake="hal_fakes.modbus",
+    where=where,
     warnings=warnings,
     canonical=canonical,
     describe=describe,

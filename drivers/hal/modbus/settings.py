@@ -6,6 +6,7 @@ from typing import Annotated
 import msgspec
 
 from bridges.core.fields import Period
+from drivers.hal import Where
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.watchdog import Watchdog
 
@@ -60,3 +61,11 @@ def unreachable(settings: Settings, point: str) -> str | None:
         return None
     why = "is everybody at once, and nobody answers" if unit == 0 else "is for Modbus TCP"
     return f"unit {unit} {why}: units on a serial line are 1 to 247"
+
+
+def where(settings: Settings) -> Where:
+    """The gateway or module, or the port of the line, which has one owner."""
+    if settings.serial:
+        return Where(settings.serial.port, local=True, clients="one")
+    assert settings.tcp  # or `problems` has said so
+    return Where(f"{settings.tcp.host}:{settings.tcp.port}", local=False, clients=None)

@@ -26,6 +26,7 @@ from drivers.charger.can_frames import (
     Settings,
     create,
     describe,
+    frame_tables,
     warnings,
 )
 from drivers.charger.can_map import PROFILE, FrameMap
@@ -436,12 +437,23 @@ def test_check_prints_frames_bytes_and_meanings() -> None:
     settings = Settings(profile="wiferion", setpoints=SETPOINTS)
     rows = describe(settings, hal.Settings(socketcan="can0"))
     assert ("state", "ChargerStatus.ChargerState (0x18FF50E5)") in rows
-    assert (
-        "sent, power on",
-        "ChargerControl (0x1806E5F4) every 0.5 s: MaxVoltage 29.4, RefCurrent 30, RefVoltage 29.2",
-    ) in rows
-    assert ("sent, power off", "DisableCharging (0x1806E6F4) every 0.5 s: Signature 170") in rows
     assert ("state charging", "1, 2, 3, 4, 5") in rows
+    sent, read = frame_tables(settings)
+    control, disable = ("ChargerControl", "0x1806E5F4"), ("DisableCharging", "0x1806E6F4")
+    volts = "MaxVoltage 29.4 V, RefCurrent 30 A, RefVoltage 29.2 V"
+    none = "MaxVoltage 0 V, RefCurrent 0 A, RefVoltage 0 V"
+    assert sent.rows == (
+        (*control, "power on", "0.5 s", "01 26 01 2C 01 24 00 00", volts),
+        (*control, "power off", "0.5 s", "00 00 00 00 00 00 00 00", none),
+        (*disable, "power on", "0.5 s", "00 00 00 00 00 00 00 00", "Signature 0"),
+        (*disable, "power off", "0.5 s", "AA 00 00 00 00 00 00 00", "Signature 170"),
+    )
+    status = ("ChargerStatus", "0x18FF50E5")
+    assert read.rows[2] == (*status, "00 00 00 00 00 00 00 01", "ChargerState 1: charging")
+    assert read.rows[9:11] == (
+        (*status, "01 02 00 00 00 00 00 00", "OutputVoltage 25.8 V"),
+        (*status, "00 00 00 81 00 00 00 00", "OutputCurrent 12.9 A"),
+    )
 
 
 def test_a_map_without_a_receiver_verifies_nobody() -> None:
