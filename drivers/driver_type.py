@@ -10,6 +10,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import msgspec
 
+from bridges.core.table import Table
 from drivers import Driver
 from drivers.hal import Remark
 from drivers.hal.points import Wire
@@ -31,6 +32,7 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     `wires(settings)`: the table that an electrician checks (`drivers/hal/points.py`).
     `debounce(settings)`: how long a change of each signal or group must last (s).
     `describe(settings, bus's settings)`: where there are no wires, rows for `check` (what, meaning).
+    `tables(settings)`: codes, pulses and frames, for `check` (`bridges/core/table.py`).
     `claims(settings)`: (place, path) of what no other device of its bus may use, beside the wires'.
     `warnings(settings)`: (path, text) of what is legal but worth a look.
     `notes(settings)`: (path, text) of what a site may well want so, and should know.
@@ -45,6 +47,7 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     wires: Callable[[Settings], Iterable[Wire]] = lambda settings: ()
     debounce: Callable[[Settings], Mapping[str, float]] = lambda settings: {}
     describe: Callable[[Settings, Any], Iterable[tuple[str, str]]] = lambda settings, bus: ()
+    tables: Callable[[Settings], Iterable[Table]] = lambda settings: ()
     claims: Callable[[Settings], Iterable[tuple[str, tuple[str, ...]]]] = lambda settings: ()
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
     notes: Callable[[Settings], Iterable[Remark]] = lambda settings: ()

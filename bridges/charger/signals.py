@@ -56,7 +56,8 @@ class ChargerSample(msgspec.Struct, frozen=True):
     """One reading of one station.
 
     `code`: the vendor's number or word, for texts only. `error_text`: the station's own words,
-    printable and of bounded length. `side`: which side is at fault.
+    printable and of bounded length. `side`: which side is at fault. `charges`: the station is at fault
+    and yet says that it charges.
     """
 
     activity: Activity
@@ -64,6 +65,7 @@ class ChargerSample(msgspec.Struct, frozen=True):
     error_text: str = ""
     measured: Measured = Measured()
     side: FaultSide = ""
+    charges: bool = False
 
 
 class ChargerOutputs(msgspec.Struct, frozen=True):

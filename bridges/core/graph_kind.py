@@ -11,6 +11,7 @@ from typing import Any, Generic, Union
 
 from bridges.core.decision import Decision, M, OperatorReset, R
 from bridges.core.kind import AnyDeviceKind, E, L, Place, S
+from bridges.core.table import Table
 from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
 
@@ -56,8 +57,9 @@ class GraphKind(Generic[S, L, M, E, R]):
     gives the same bytes until something worth keeping changes, and `restore(kept, settings, now)`,
     which raises ValueError for any other bytes. The memory is saved before `together` is sent.
 
-    For a kind with more settings than a few numbers: `described(settings)`, rows for `check`, and
-    `warnings(settings)`, (path, text) of what is legal but may be a mistake.
+    For a kind with more settings than a few numbers: `tables(settings)`, for `check`, and
+    `warnings(settings)`, (path, text) of what is legal but may be a mistake. `speaks_of(settings)`: the
+    devices that it names, as (path, their kind, name); some file of the site must have each of them.
     """
 
     name: str
@@ -77,9 +79,10 @@ class GraphKind(Generic[S, L, M, E, R]):
     together: Callable[[Mapping[str, M]], tuple[Topic[Message], Message]] | None = None
     persist: Callable[[Mapping[str, M]], bytes] | None = None
     restore: Callable[[bytes, S, float], Mapping[str, M]] | None = None
-    described: Callable[[S], list[tuple[str, ...]]] | None = None
+    tables: Callable[[S], Iterable[Table]] = lambda settings: ()
     warnings: Callable[[S], Iterable[tuple[tuple[str, ...], str]]] | None = None
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
+    speaks_of: Callable[[S], Iterable[Place]] = lambda settings: ()
     shown_by: Topic[Message] | None = None
     reserved: Callable[[S], Collection[str]] = lambda settings: ()
 

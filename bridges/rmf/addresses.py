@@ -1,4 +1,4 @@
-"""By which addresses this machine could reach another one, so that a change can be seen."""
+"""The addresses by which this machine can reach another one, so that a change can be noticed."""
 
 import fcntl
 import socket
@@ -12,7 +12,7 @@ UP, LOOPBACK, RUNNING = 0x1, 0x8, 0x40
 
 
 def addresses() -> Addresses:
-    """What is up now, with a link."""
+    """Those of the interfaces that are up and have a link."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
         found = ((index, _address(asking, name)) for index, name in socket.if_nameindex())
         return frozenset((index, address) for index, address in found if address)

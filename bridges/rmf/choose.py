@@ -1,7 +1,7 @@
-"""Which transport a daemon speaks, in which ROS domain, on which network.
+"""Which transport a daemon uses, in which ROS domain, on which network.
 
-The YAML says it; ROS's own environment variables fill in what the YAML leaves open, as they do for
-any ROS node. A file beside this one for each transport: `ros2.py`, `dds.py`, `zenoh.py`.
+The YAML decides. What it leaves open, ROS's environment variables decide, as for any ROS node. Each
+transport has a file beside this one: `ros2.py`, `dds.py`, `zenoh.py`.
 """
 
 import importlib
@@ -101,13 +101,13 @@ def _choice(rmf: Rmf) -> tuple[str, str]:
 
 
 def _best_without(ros: str) -> tuple[str, str]:
-    """What `auto` takes where this is missing of ROS."""
+    """What `auto` takes without rclpy; `ros`: what is missing of ROS."""
     missing = missing_of_dds()
     return ("zenoh", f"{ros}; {missing}") if missing else ("dds", ros)
 
 
 def missing_of_dds() -> str:
-    """What keeps a node from speaking DDS by itself here; "" for nothing."""
+    """Why transport `dds` cannot be used here; "" if it can."""
     try:
         importlib.import_module("cyclonedds.core")
     except ImportError as error:
@@ -116,7 +116,7 @@ def missing_of_dds() -> str:
 
 
 def missing_of_ros() -> str:
-    """What keeps a node from being a ROS node here; "" for nothing."""
+    """Why transport `ros2` cannot be used here; "" if it can."""
     try:
         importlib.import_module("rclpy")
     except ImportError as error:

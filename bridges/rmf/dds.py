@@ -3,9 +3,9 @@
 Names, types and QoS are those that rmw_cyclonedds and rmw_fastrtps use: topic `rt/<name>`, type
 `<package>::msg::dds_::<Type>_`, plain CDR, the type hash in the endpoint's user data.
 
-One thread reads for all subscriptions. Whatever arrives, it goes on: a sample that is not a message
-is dropped, counted, and logged once for its topic. (Cyclone's C library refuses samples that do not
-fit the type before they come here, and says so on stderr.) When reading itself fails, it joins anew.
+One thread reads for all subscriptions. A sample that is not a message does not stop it: the sample is
+dropped, counted, and logged once for its topic. (Cyclone's C library refuses samples that do not fit
+the type before they come here, and says so on stderr.) If reading itself fails, the node joins again.
 
 cyclonedds is imported here, in dds_ends.py, idl.py and graph.py, and these only by choose.py.
 """
@@ -116,7 +116,7 @@ class DdsTransport:
 
     @property
     def lives(self) -> bool:
-        """Its thread reads; a network that is gone is another matter."""
+        """Is its thread reading? True without a network too."""
         return not self._closed and self._thread.is_alive()
 
     def wall(self) -> float:
@@ -150,7 +150,7 @@ class DdsTransport:
         self._joined = True
 
     def _follow_network(self) -> None:
-        """Join anew when the addresses are others than those with which we joined."""
+        """Join again if the machine's addresses have changed since we joined."""
         now = time.monotonic()
         if now < self._look_at or (self._loopback and self._joined):
             return
@@ -220,7 +220,7 @@ class DdsTransport:
                 end.log_misfits()
 
     def _recover(self, error: Exception) -> None:
-        """Reading failed, which nobody foresaw: say it once, and join anew after a while."""
+        """Reading failed unexpectedly: log it once, and join again after a while."""
         if self._closed:
             return
         if not self._failed:
@@ -262,8 +262,8 @@ class DdsTransport:
 
 
 def _shared_domain(domain_id: int, configuration: str) -> Domain:
-    """The domain of this process with this configuration, shared by its participants; there can be
-    no second one beside it."""
+    """The domain of this process with this configuration. All participants share it: Cyclone allows
+    only one."""
     key = domain_id, configuration
     with _domains_lock:
         domain = _domains.get(key)

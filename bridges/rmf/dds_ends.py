@@ -28,7 +28,7 @@ M = TypeVar("M", bound=Message)
 WRITE_BLOCKS_NS: Final = 20_000_000
 """A writer that waits for a peer holds Python's lock meanwhile: keep it below one scan."""
 AT_ONCE: Final = 100
-"""Samples taken from one subscription before the others have their turn."""
+"""How many samples are taken from one subscription before it is the others' turn."""
 POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation", 24: "type"}
 
 
@@ -87,7 +87,7 @@ class DdsPublisher(Generic[M]):
         self._withdraw(self, self._writer)
 
     def log_misfits(self) -> None:
-        """Say that a subscription of this topic cannot be served, when there is a new one."""
+        """Log each new subscription of this topic whose QoS does not match."""
         status = self._writer.get_offered_incompatible_qos_status()
         if status.total_count_change:
             _log_misfit(self.topic, notices.NOT_SERVED, status)
@@ -140,7 +140,7 @@ class DdsSubscription(Generic[M]):
         return True
 
     def log_misfits(self) -> None:
-        """Say that a publisher of this topic cannot be heard, when there is a new one."""
+        """Log each new publisher of this topic whose QoS does not match."""
         status = self._reader.get_requested_incompatible_qos_status()
         if status.total_count_change:
             _log_misfit(self.topic, notices.NOT_HEARD, status)

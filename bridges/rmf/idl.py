@@ -57,7 +57,7 @@ def _calls(message_type: type) -> dict[str, object]:
         return cls(cdr.decode(message_type, sample))
 
     def deserialize_key(cls: SampleType, sample: bytes, /, **options: object) -> None:
-        """Called for what is no message but the news that a writer has gone; RMF has no keys."""
+        """Called when a writer has gone, not for a message. RMF's types have no keys."""
 
     return {
         "__init__": __init__,

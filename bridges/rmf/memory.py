@@ -20,7 +20,7 @@ M = TypeVar("M", bound=Message)
 
 
 class MemoryNetwork:
-    """What the nodes of one test have in common: their publishers and subscriptions."""
+    """The network of one test: the publishers and subscriptions of all its nodes."""
 
     def __init__(self) -> None:
         self.publishers: list[_Publisher[Any]] = []
@@ -129,7 +129,7 @@ class _Subscription(Generic[M]):
         )
 
     def hand_on(self, message: M) -> None:
-        """As on a wire, a defect of who listens is none of who publishes."""
+        """Deliver a message. As on a wire, a subscriber's exception does not reach the publisher."""
         notices.hand_on(self.node.dropped, self._topic, self.received, message)
 
     def catch_up(self) -> None:

@@ -1,4 +1,4 @@
-"""What a transport says of its peers, in the same words on each wire: once, and not each time."""
+"""What a transport logs about its peers: the same text on every wire, once for each cause."""
 
 import logging
 from collections.abc import Callable
@@ -14,7 +14,7 @@ log = logging.getLogger(__name__)
 M = TypeVar("M", bound=Message)
 
 FAILURES = 5
-"""A transport whose reading fails so often in a row ends its thread, and with it the daemon."""
+"""After so many failed reads in a row a transport ends its thread, and with it the daemon."""
 NOT_HEARD = "a publisher is not heard"
 NOT_SERVED = "a subscription is not served"
 
@@ -29,7 +29,7 @@ def drop(dropped: dict[str, int], topic: AnyTopic, error: CdrError) -> None:
 def hand_on(
     dropped: dict[str, int], topic: Topic[M], received: Callable[[M], None], message: M
 ) -> None:
-    """Give a message to whoever subscribed. A defect there costs this message, never the thread."""
+    """Give a message to its subscriber. An exception there costs this message, never the thread."""
     try:
         received(message)
     except Exception as error:

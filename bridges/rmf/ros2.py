@@ -56,8 +56,8 @@ UNHEARD: Final = 256
 AGAIN_S: Final = 1.0
 """After a failure of rclpy's own, its executor is asked again."""
 YIELD_S: Final = 50e-6
-"""rclpy's executor goes on for a while in Python after a callback; whom the message has woken need
-not wait for that."""
+"""After a callback rclpy's executor keeps Python's lock for a while. This pause lets the thread that
+the message has woken run first."""
 
 
 class Ros2Transport:
@@ -131,7 +131,7 @@ class Ros2Transport:
 
     @property
     def lives(self) -> bool:
-        """It is on the graph, and its thread hears."""
+        """Is it on the graph, and is its thread running?"""
         return not self._closed and self._thread.is_alive()
 
     def heard_back(self, topic: Topic[Any]) -> "list[_Subscription[Any]]":
@@ -164,7 +164,8 @@ class Ros2Transport:
         self._leaving = self.node.create_guard_condition(lambda: None)
 
     def _spin(self) -> None:
-        """What rclpy raises ends nothing, unless it comes again and again or the context is gone."""
+        """Run the executor. An exception of rclpy ends the thread only if it keeps coming, or if the
+        context is gone."""
         failures = 0
         while not self._closed and self._context.ok() and failures < notices.FAILURES:
             try:
@@ -212,8 +213,7 @@ class _Publisher(Generic[M]):
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
     def matched(self) -> int:
-        """How many subscriptions are reached; 0 after close. Those of ours that do not want to hear
-        us are none of them."""
+        """How many subscriptions are reached, without our own that must not hear us; 0 after close."""
         try:
             count = int(self.end.get_subscription_count())
         except RuntimeError:

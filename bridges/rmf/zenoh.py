@@ -115,7 +115,7 @@ class ZenohTransport:
 
     @property
     def lives(self) -> bool:
-        """Its thread hears; whether a router answers is another matter."""
+        """Is its thread running? True without a router too."""
         return not self._closed and self._thread.is_alive()
 
     def close(self) -> None:
@@ -229,7 +229,7 @@ class ZenohTransport:
                 self._recover(error)
 
     def _recover(self, error: Exception) -> None:
-        """Something failed that nobody foresaw: say it once, and have a new session."""
+        """Something failed unexpectedly: log it once, and open a new session."""
         if not self._failed:
             log.exception(pairs("reader_failed", node=self.name, reason=error))
         self._failed = True
@@ -238,7 +238,7 @@ class ZenohTransport:
             self._join_anew()
 
     def _follow_network(self) -> None:
-        """Join anew when the addresses are others than those with which we joined."""
+        """Join again if the machine's addresses have changed since we joined."""
         now = time.monotonic()
         if self._loopback or now < self._look_at:
             return
@@ -256,7 +256,7 @@ class ZenohTransport:
         return not all(map(zenoh_config.is_local, endpoints))
 
     def _look(self) -> None:
-        """Say once that nobody answers, and once that somebody does."""
+        """Log once that no router or peer answers, and once that one does again."""
         neighbours = list(self._neighbours.values())
         routers = zenoh.WhatAmI.ROUTER in neighbours
         if self._loopback:
@@ -308,7 +308,7 @@ def _close(session: zenoh.Session, held: list[Any]) -> None:
 
 
 def _give_back() -> None:
-    """Opening a session leaves 2.5 MB of freed memory to this process: give it back to the machine."""
+    """Return freed memory to the machine: opening a session leaves 2.5 MB of it in this process."""
     with suppress(AttributeError):  # a C library other than glibc has no such call
         ctypes.CDLL(None).malloc_trim(0)
 

@@ -5,10 +5,9 @@ Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's D
 """
 
 import re
-from pathlib import Path
 from typing import Any, Final
 
-from bridges import secret_file
+from bridges import regular_file, secret_file
 from bridges.core.fields import Zenoh, ZenohTls
 from bridges.rmf.transport import TransportError
 
@@ -70,9 +69,9 @@ def on_the_site(zenoh: Zenoh) -> dict[str, Any]:
 
 
 def mode(zenoh: Zenoh) -> str:
-    """A router carries no messages from one peer to another, as peers meet directly. Where none could
-    reach us we are its client, for whom it does. With several routers too: a peer would be at all of
-    them, and what it says would come once by each."""
+    """`peer` or `client`. A router forwards no messages between peers, as they connect directly. If no
+    peer can reach us we must be its client. With several routers too: a peer connects to all of them,
+    and each message would arrive once through each."""
     if zenoh.mode != "auto":
         return zenoh.mode
     near = is_local(zenoh.connect[0]) or not all(map(is_local, zenoh.listen))
@@ -97,8 +96,8 @@ def _tls(tls: ZenohTls | None) -> dict[str, Any]:
 
 def _readable(name: str, file: str) -> str:
     try:
-        with Path(file).open("rb"):
-            return file
+        regular_file.read(file, 0)
+        return file
     except OSError as error:
         raise TransportError(f"{name} {file} cannot be read: {error.strerror}") from None
 

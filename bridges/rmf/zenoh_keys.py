@@ -56,7 +56,7 @@ class Keys(Protocol):
         """Matches the token of each end of this kind on a topic."""
 
     def end(self, token: str) -> End | None:
-        """What a token says; None for one that says nothing."""
+        """The end that a token describes; None for any other token."""
 
 
 class RmwZenoh:
@@ -152,7 +152,7 @@ def attachment(number: int, wall_ns: int, sender: bytes) -> bytes:
 
 
 def sender(attached: bytes) -> bytes | None:
-    """The gid in an attachment; None for what is no attachment of a ROS node."""
+    """The gid in an attachment; None if it is not a ROS node's attachment."""
     if len(attached) != _HEAD.size + GID_LENGTH or attached[_HEAD.size - 1] != GID_LENGTH:
         return None
     return attached[_HEAD.size :]

@@ -4,6 +4,7 @@
     points.py     contacts and relays by their spelling; registers.py: places of a map
     bus.py        the units of one connection or line: retries, pauses
     lines.py      one device's coils and registers: claim, read, write, read back, let go
+    rivals.py     two masters on one output: a fault by that name, and no relay that chatters
     dead_man.py   keeps the modules' watchdogs from tripping
     wire.py       a question and its answer; tcp.py and rtu.py carry them, frames.py spells them
 
@@ -15,7 +16,7 @@ from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.points import canonical, describe, wire_problems
-from drivers.hal.modbus.settings import Settings, warnings
+from drivers.hal.modbus.settings import Settings, unreachable, warnings, where
 
 __all__ = [
     "BUS",
@@ -40,8 +41,10 @@ BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
     fake="hal_fakes.modbus",
+    where=where,
     warnings=warnings,
     canonical=canonical,
     describe=describe,
     wire_problems=wire_problems,
+    unreachable=unreachable,
 )
