@@ -2,8 +2,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-# Byte code is kept, whatever this shell says: otherwise each worker and each daemon of `make test` compiles
-# every file anew.
+# Byte code is kept even if the shell says otherwise: without it each worker and each daemon of `make test`
+# compiles every file again.
 export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: help demo demo-charging test deep test-ros lint format bench flood soak torture mutate clean
@@ -40,11 +40,11 @@ SIDE_BY_SIDE := -n 8 --dist load --maxschedchunk 2
 test: .venv/ready lint
 	$(BIN)/pytest $(SIDE_BY_SIDE)
 
-# Walks to their full depth, and every example: before a release, and after a change to a core.
+# Walks to their full depth and every example. Run it before a release and after a change to a core.
 deep: .venv/ready
 	DEEP=1 $(BIN)/pytest $(SIDE_BY_SIDE)
 
-# rclpy belongs to ROS's own Python and needs its packages (numpy): an environment of its own, on top.
+# rclpy needs ROS's own Python and its packages (numpy), so these tests have an environment on top of it.
 ROS_BIN := .venv-ros/bin
 test-ros:
 	@$(PYTHON) -c 'import rclpy' || { \
@@ -78,8 +78,8 @@ soak: .venv/ready
 torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))
 
-# Mutants live in a copy; stopped and started again, only what is not known yet is run. Some of it:
-# make mutate ONLY='bridges.door.*' CHILDREN=1; everything afresh: rm -rf the directory first.
+# Mutants live in a copy. After an interruption only the missing results are computed. For a part:
+# make mutate ONLY='bridges.door.*' CHILDREN=1. To start again from nothing: rm -rf the directory first.
 MUTANTS ?= $(or $(TMPDIR),/tmp)/rmf-bridges-mutants-$(shell id -u)
 MUTATED := bridges config drivers hal_fakes tests pyproject.toml
 mutate: .venv/ready

@@ -269,7 +269,7 @@ def _send(channel: str) -> tuple[int, float]:
 
 
 def _bare_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
-    """What nothing but python-can costs: CPU seconds."""
+    """The CPU seconds that python-can alone takes."""
     bus = can.Bus(channel, interface="virtual")
     begun_s = time.thread_time()
     while not ended.wait(SCAN_S):
@@ -281,7 +281,7 @@ def _bare_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
 
 
 def _our_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
-    """What our bus costs, with four ids wanted: CPU seconds."""
+    """The CPU seconds that our bus takes, with four ids wanted."""
     settings = Settings(socketcan="can0", scan_s=SCAN_S)
     bus = CanBus(settings, vendor=lambda: can.Bus(channel, interface="virtual"))
 

@@ -135,7 +135,7 @@ def cost(command: list[str], log: Path, watched_s: float = 10.0) -> Row:
 
 
 def cost_of(pid: int, watched_s: float) -> Row:
-    """What it costs from now on."""
+    """What a process costs from now on."""
     before_s = cpu_s(pid)
     time.sleep(watched_s)
     used_s = cpu_s(pid) - before_s

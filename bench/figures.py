@@ -1,4 +1,4 @@
-"""Figures as tables: a title, rows by name, and columns by what they say; and how they come about."""
+"""Figures as tables: a title, named rows and named columns."""
 
 import statistics
 from collections.abc import Sequence

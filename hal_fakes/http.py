@@ -51,10 +51,10 @@ class Station(Protocol):
         """The body that a reading is answered with, now."""
 
     def obey(self, signal: str, asserted: bool) -> None:
-        """Somebody has asked for it."""
+        """A command for this signal has come."""
 
     def tick(self) -> None:
-        """Called often: what ends by itself, ends."""
+        """Called often: let timers run out."""
 
 
 class HttpServer:
@@ -121,7 +121,7 @@ class _Listener(ThreadingHTTPServer):
                 caller.shutdown(socket.SHUT_RDWR)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A caller that hung up is no news; anything else is a defect of this file."""
+        """Ignore a caller that has hung up; anything else is a defect of this file."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
@@ -199,14 +199,14 @@ class _Call(BaseHTTPRequestHandler):
             self.wfile.write(rest[n : n + 1])
 
     def _wait(self, seconds: float) -> None:
-        """Until then, or until the caller hangs up or the server closes (ConnectionError)."""
+        """Wait so long, or until the caller hangs up or the server closes (ConnectionError)."""
         end = time.monotonic() + seconds
         while (left_s := end - time.monotonic()) > 0:
             if select([self.connection], [], [], min(left_s, LOOK_S))[0]:
                 raise ConnectionAbortedError("the caller has hung up")
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Who calls is the daemon's log's business."""
+        """Log nothing: the daemon's log shows its requests."""
 
 
 FAKE = Outside(serve)

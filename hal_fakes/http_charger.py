@@ -47,14 +47,14 @@ class HttpCharger:
         return cast(Reading, self.plant.sense("reading"))
 
     def obey(self, signal: str, asserted: bool) -> None:
-        """Somebody has asked for it."""
+        """A command for this signal has come."""
         now, after_s = time.monotonic(), self._settings.switches_off_after_s
         if signal == "power":
             self._off_at = now + after_s if asserted and after_s else float("inf")
         self.plant.drive(signal, asserted, now)
 
     def tick(self) -> None:
-        """The timer of the power; and what nobody can clear clears itself."""
+        """Switch the power off when its timer has run out. Clear errors that have no clear command."""
         if time.monotonic() >= self._off_at:
             self.obey("power", False)
         faulty = self._settings.clear_error_path is None and self.reading().error_text

@@ -43,14 +43,14 @@ class HttpDoor:
         self._last: bytes | None = None
 
     def obey(self, signal: str, asserted: bool) -> None:
-        """The relay, and its timer."""
+        """Switch the relay, and start its timer again."""
         now, after_s = time.monotonic(), self._settings.switches_off_after_s
         self._on = asserted
         self._off_at = now + after_s if asserted and after_s else float("inf")
         self.plant.drive(signal, asserted, now)
 
     def tick(self) -> None:
-        """The timer."""
+        """Switch the relay off when its timer has run out."""
         if time.monotonic() >= self._off_at:
             self.obey(HOLD, False)
 

@@ -1,4 +1,4 @@
-"""Where a plant's signals meet a bus's points: levels and addresses on one side, meaning on the other.
+"""The wires between a plant's signals and a bus's points, which have addresses and levels.
 
 For buses with points (GPIO, Modbus). How wires fail is in `plants/contact.py`, below the plant.
 """

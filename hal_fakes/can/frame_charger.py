@@ -70,7 +70,7 @@ class FrameCharger:
         self.plant.drive("enable", self._fed(now), now)
 
     def tick(self, now: float, send: Send) -> None:
-        """Hunger, and the status."""
+        """Stop when the frames that keep it charging stay away, and send the status."""
         mode = self.plant.failures.get("node")
         self.plant.drive("enable", self._fed(now) and mode != "off", now)
         period_s = SLOW_S if mode == "slow" else STATUS_S
@@ -126,11 +126,11 @@ class FrameCharger:
         return values
 
     def _seen(self, reading: PadReading) -> int:
-        """Whose receiver it is; 0 where nobody stands there."""
+        """The id of the receiver on the pad; 0 if there is none."""
         return STRANGER if reading.stranger else self._receiver if reading.robot else 0
 
     def _code(self, reading: PadReading) -> int:
-        """The first number of what the plant does, or of what comes nearest to it."""
+        """The first code of the plant's activity, or of the nearest one that the map has."""
         lists = self._map.state.codes.lists()
         nearest = {
             Activity.HANDSHAKE: Activity.IDLE,

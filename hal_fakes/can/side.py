@@ -24,7 +24,7 @@ from drivers.hal.can import Settings
 from hal_fakes.plants.plant import FailureMode, Plant
 
 LOOK_S: Final = 0.02
-"""How soon a failure that is told shows, and heartbeats and status frames come on time."""
+"""The longest delay of an ordered failure, of heartbeats and of status frames."""
 BUS_OFF: Final = 0x40
 SLOWNESS: Final = 1.5
 """How many of the client's time limits a slow answer takes."""
@@ -47,7 +47,7 @@ class Medium(Protocol):
         """To the daemon; lost when nobody has it open."""
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Be well, or `off` or `garbage` or `wrong`, from now on. Called often."""
+        """Work (None), or be `off`, `garbage` or `wrong`, from now on. Called often."""
 
     def close(self) -> None:
         """End. May be called twice."""
@@ -87,7 +87,7 @@ class VirtualBus:
             self._bus.send(message)
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Noise while told so; bus-off once, and once that it is over."""
+        """Send noise while the mode is `garbage`. Report bus-off once, and its end once."""
         if mode == "garbage":
             self.send(any_frame(self._noise))
         if (mode == "wrong") != self._off_told:
@@ -103,7 +103,7 @@ class VirtualBus:
 
 
 def any_frame(noise: random.Random) -> can.Message:
-    """A frame of anybody."""
+    """A random frame."""
     extended = noise.random() < 0.5
     return can.Message(
         arbitration_id=noise.randrange(1 << (29 if extended else 11)),

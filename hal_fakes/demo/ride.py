@@ -37,7 +37,7 @@ def dawns(world: World) -> bool:
 
 
 def live(world: World) -> None:
-    """All of it."""
+    """The whole day."""
     robot = Robot(SESSION)
     world.join(LiftSupervisor(), DoorSupervisor(), robot)
     with world.leg("door"):

@@ -112,7 +112,7 @@ class World:
     # ---- what a day does
 
     def say(self, said: Iterable[Said]) -> None:
-        """Publish, and note what goes to a daemon."""
+        """Publish these messages, and note those to a daemon in the journal."""
         for topic, message in said:
             if topic in TO_DAEMONS:
                 self.journal.request(message, time.monotonic())  # type: ignore[arg-type]
@@ -157,7 +157,7 @@ class World:
             self._turn(LOOK_EVERY_S)
 
     def pause(self, seconds: float) -> None:
-        """So much time goes by."""
+        """Let so many seconds pass."""
         over_at = time.monotonic() + seconds
         while (left_s := over_at - time.monotonic()) > 0:
             self._turn(min(LOOK_EVERY_S, left_s))

@@ -10,7 +10,7 @@ COIL_VALUES: Final = (0xFF00, 0)
 
 
 class CoilRequest(WriteSingleCoilRequest):
-    """Function 5 with its value as it was sent; one that is no coil's asks `Units` for a flash."""
+    """Function 5 with its value as sent. A value other than on and off asks `Units` for a flash."""
 
     def decode(self, data: bytes) -> None:
         """Keep the value."""
@@ -18,7 +18,7 @@ class CoilRequest(WriteSingleCoilRequest):
         self.registers = [int.from_bytes(data[2:4], "big")]
 
     async def datastore_update(self, context: Any, device_id: int) -> ModbusPDU:
-        """Do it; a flash is answered by its echo."""
+        """Write the coil. The reply to a flash is its echo."""
         if self.registers[0] in COIL_VALUES:
             return await super().datastore_update(context, device_id)
         refusal = await context.flash(device_id, self.address, self.registers[0])
@@ -36,5 +36,5 @@ class FlashEcho(WriteSingleCoilRequest):
     """The reply."""
 
     def encode(self) -> bytes:
-        """What came."""
+        """The request's own bytes."""
         return struct.pack(">HH", self.address, *self.registers)

@@ -113,7 +113,7 @@ class Units:
         return next((mode for mode in modes if mode is not None), None)
 
     def has(self, unit: int) -> bool:
-        """Does anybody have this unit?"""
+        """Does this unit exist?"""
         return unit in self._plants
 
     async def async_getValues(

@@ -205,7 +205,7 @@ class ChargerPlant(Machine):
         self._enter(Activity.ERROR)
 
     def _ramp_down(self) -> None:
-        """The power was taken: what flows ramps down, what does not has ended."""
+        """The power is off: a current ramps down, any other activity ends."""
         if self.activity is Activity.CHARGING:
             self.battery = self._battery()
             self._enter(Activity.STOPPING, RAMP_DOWN_S)

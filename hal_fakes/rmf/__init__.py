@@ -22,7 +22,7 @@ NEVER: Final = float("inf")
 
 
 class Party(Protocol):
-    """Somebody on RMF's side."""
+    """A node on RMF's side."""
 
     subscribes: Sequence[AnyTopic]
 
