@@ -1,7 +1,7 @@
-"""What a driver is to everything that finds it by name: a `DRIVER` at the end of its file.
+"""The record that describes a driver: the `DRIVER` at the end of its file.
 
 `drivers/<kind>/<driver>.py` is named after the YAML's `kind:` and `driver:`; there is no table of
-drivers to edit. Only `bridges/settings/names.py` imports one by its name.
+drivers to edit. Only `bridges/settings/names.py` imports a driver by its name.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -24,19 +24,20 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     """One driver.
 
     `settings`: a struct that derives from the kind's (`bridges.lift.settings.LiftSettings`…) and adds
-    the wiring. `buses`: the bus types that it stands on, as the names of files in `drivers/hal/`.
-    `create(name, settings, bus)`: one device on its bus; nothing is sent before `open`.
+    the wiring. `buses`: the bus types that it works on, as the names of files in `drivers/hal/`.
+    `create(name, settings, bus)`: one device on its bus; sends nothing before `open`.
 
-    What a driver need not have:
+    The rest is optional:
     `wires(settings)`: the table that an electrician checks (`drivers/hal/points.py`).
     `debounce(settings)`: how long a change of each signal or group must last (s).
-    `describe(settings, bus's settings)`: where there are no wires, rows for `check` (what, meaning).
-    `claims(settings)`: (place, path) of what no other device of its bus may use, beside the wires'.
-    `warnings(settings)`: (path, text) of what is legal but worth a look.
-    `notes(settings)`: (path, text) of what a site may well want so, and should know.
-    `unwired(settings)`: signals without a wire of which `accept_unsafe` may speak as well.
-    `fake`: the module that stands in for the hardware in `run --simulate`, by its name, as nothing real
-    imports a fake (`hal_fakes/fake.py`); the plant of its kind, on its wires, where it names none.
+    `describe(settings, bus's settings)`: rows for `check` (what, meaning) where there are no wires.
+    `claims(settings)`: (place, path) of everything, besides the wires, that no other device of the bus
+    may use.
+    `warnings(settings)`: (path, text) of valid settings that deserve a second look.
+    `notes(settings)`: (path, text) of choices that a site may want and should know of.
+    `unwired(settings)`: signals without a wire that `accept_unsafe` may also name.
+    `fake`: the name of the module that replaces the hardware in `run --simulate` (`hal_fakes/fake.py`);
+    a name, because real code never imports a fake. By default the plant of its kind, on its wires.
     """
 
     settings: type[Settings]
@@ -53,4 +54,4 @@ class DriverType(Generic[Settings, Sample, Outputs]):
 
 
 AnyDriver: TypeAlias = DriverType[Any, Any, Any]
-"""One that was found by its name: its settings, sample and outputs are those of its kind."""
+"""A driver found by its name; its kind determines its settings, sample and outputs."""

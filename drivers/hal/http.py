@@ -92,7 +92,7 @@ class Settings(
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
-    """What is legal but worth a look: (path, text)."""
+    """Valid settings that deserve a second look: (path, text)."""
     if settings.token_file and base(settings.api_base).scheme == "http":
         text = (
             "the token goes over the network unencrypted: write https://… where the controller has"
