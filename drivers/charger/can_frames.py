@@ -33,7 +33,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
     `profile`: the name of a file in drivers/profiles/ that holds the map.
     `map`: the map, written here instead of a profile.
-    `setpoints`: name -> value, which the map leaves to the site: voltages and currents of its batteries.
+    `setpoints`: name -> value, for what the map leaves to the site: voltages and currents.
     """
 
     profile: Name | None = None

@@ -122,7 +122,7 @@ class DryContactCharger:
         self._enabled = False
 
     def open(self) -> None:
-        """Claim the contacts, and the relay switched off; after a failure the relay may stay as it was."""
+        """Claim every contact, and the relay, off; after a failure the relay may stay as it was."""
         self._points.open()
 
     def read(self) -> ChargerSample:
@@ -130,7 +130,7 @@ class DryContactCharger:
         return decode(self._points.read(), self._enabled)
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Set the relay; None leaves it as it is. Contacts can neither clear errors nor check the range."""
+        """Set the relay; None leaves it as it is. Clears and range checks do not exist on contacts."""
         if outputs.power is not None:
             self._enabled = outputs.power
         self._points.write({ENABLE: self._enabled})

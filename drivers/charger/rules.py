@@ -1,7 +1,7 @@
 """Rules for a charger's state, and its errors as numbers and bits: for HTTP, Modbus and CAN.
 
-A place is where a value is: a field of an HTTP answer, a name of `values` in a register map, or a signal
-of a CAN frame. Rules are tried before `codes`: the first rule whose tests all hold gives the state.
+A place is where a value is: a field of an HTTP answer, a name in a register map's `values`, a signal of
+a CAN frame. Rules are tried before `codes`: the first rule whose tests all hold gives the state.
 """
 
 from collections.abc import Callable, Iterator, Mapping

@@ -4,9 +4,9 @@
 clearing an error: an error ends by itself, or when the receiver's power is cycled.
 
 Facts: the maker's published ROS driver (`xnergy-charger-rcu`): state codes, error bits, addresses,
-scales, and the range check before a start. Not tried on the hardware. The maker's driver has faults that
-are not copied here: it decodes the high error word only when it is zero, never compares an SDO reply
-with its request, and shows an RCU that does not answer as state 250, which the RCU itself never sends.
+scales, and the range check before a start. Not tried on the hardware. Faults of the maker's driver are
+not copied: it decodes the high error word only when it is zero, never compares an SDO reply with its
+request, and shows an RCU that does not answer as state 250, which the RCU itself never sends.
 
 Each error has a side. Errors of the transmitter (TPU, on the wall) and objects on the pad are the
 station's; all others are the robot's: its receiver and its position.

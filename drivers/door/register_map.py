@@ -68,7 +68,7 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """The faults that the operator reports. They are shown only; no decision depends on them.
 
     `at`: `input register N` or `holding register N`.
-    `bits`: bit (0 is the least significant) -> fault; an unlisted bit is shown by its number.
+    `bits`: bit (0: least significant) -> fault; an unlisted bit is shown by its number.
     """
 
     at: Place

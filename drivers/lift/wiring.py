@@ -131,7 +131,7 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Where the car is.
 
-    `encoding`: how the lines show it; `one_hot` is one line for each landing.
+    `encoding`: how the lines show the landing; `one_hot` is one line for each.
     `bits`: the lines that show a number, least significant first.
     `codes`: number -> landing.
     `parity`: a parity line, which reveals a broken line.

@@ -132,7 +132,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
     try:
         point = parse(wire.point)
     except ValueError:
-        return  # reported where points are spelled
+        return  # the check of the point's spelling reports it
     if wire.pull is not None:
         yield "pull is for GPIO pins; the module has its own: leave it out"
     if wire.direction == "in":
