@@ -56,7 +56,7 @@ class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     closed_to: Percent = 5
 
     def problems(self) -> Problems:
-        """A place that is not a register; `open_from` not above `closed_to`; `unknown` within 0 to 100."""
+        """A place that is not a register; limits that overlap; `unknown` within 0 to 100."""
         yield from _place_problems(self.at, REGISTERS)
         if self.unknown is not None and self.unknown <= 100:
             yield ("unknown",), "0 to 100 are positions"

@@ -2,7 +2,7 @@
 
 Every call has one deadline from the lookup of the name to the last byte of the body
 (`drivers/hal/deadline.py`). The body has a size limit; proxies, redirects and compression are off. If
-the server has closed a kept connection, a reading is repeated once on a new one. A command, whatever its
+the server has closed a kept connection, a reading is repeated once on a new one. A command, with any
 method, is sent once, on a new connection, and never repeated.
 """
 

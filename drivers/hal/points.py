@@ -1,8 +1,8 @@
 """Points: the named contacts of a device, on any bus that has contacts.
 
 A driver works with signals that are asserted or not (`fire_alarm`, `call_L1`). This file knows their
-addresses and polarity; the bus (`drivers/hal/`) knows only levels. It treats GPIO pins and the coils and
-discrete inputs of a Modbus I/O module alike.
+addresses and polarity; the bus (`drivers/hal/`) knows only levels. GPIO pins and the coils and discrete
+inputs of a Modbus I/O module are treated alike.
 """
 
 from collections.abc import Mapping, Sequence

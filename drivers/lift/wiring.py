@@ -174,7 +174,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return None, "" if number in self.between_floors else f"code {number} is no floor's"
 
     def show(self, level: str | None) -> dict[str, bool]:
-        """Signal -> asserted at a landing (None: between floors). Raises ValueError if it has no code."""
+        """Signal -> asserted at a landing (None: between floors). ValueError if it has no code."""
         if self.encoding == "one_hot":
             return {f"floor_{name}": name == level for name in self.lines}
         numbers = [n for n, name in self.codes.items() if name == level]

@@ -1,8 +1,8 @@
 """The dead-man beside a loop: when its scans stop, the outputs drop and stay dropped.
 
-It needs outputs that another thread can write, so it is for GPIO. (A Modbus client cannot be pre-empted;
-Modbus modules have their own watchdog.) A thread that keeps Python's global lock stops the dead-man too;
-then systemd's watchdog acts.
+It needs outputs that another thread can write, so it is for GPIO. (A Modbus client cannot be
+pre-empted; Modbus modules have their own watchdog.) A thread that keeps Python's global lock stops the
+dead-man too; then systemd's watchdog acts.
 """
 
 import threading

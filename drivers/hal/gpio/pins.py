@@ -5,7 +5,7 @@ its level: an active-low relay clicks at each start. On close it claims a floati
 claim once, at the safe level, and stay at it after close: the kernel of Raspberry Pi OS keeps the level
 of a line that no process holds.
 
-lgpio creates a FIFO in the working directory when it is imported, so import it in the runtime directory.
+lgpio creates a FIFO in the working directory on import, so import it in the runtime directory.
 """
 
 import os

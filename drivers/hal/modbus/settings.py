@@ -27,7 +27,7 @@ class Settings(
     `timeout_s`: for one try of one request.
     `retries`: how many more tries a request gets.
     `scan_s`: how often every input is read.
-    `module_watchdog`: the modules' own dead-man switch for their outputs.
+    `module_watchdog`: the modules' own watchdog for their outputs.
     """
 
     tcp: Tcp | None = None
