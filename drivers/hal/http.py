@@ -277,7 +277,9 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     adapter = HTTPAdapter(pool_connections=1, pool_maxsize=1, max_retries=0)
     adapter.poolmanager.pool_classes_by_scheme = {"http": Pool, "https": TlsPool}
     if scheme == "https":
-        context = create_urllib3_context()  # trusts no authority yet: each call's `verify` adds them
+        context = (
+            create_urllib3_context()
+        )  # trusts no authority yet: each call's `verify` adds them
         context.sslsocket_class = tls_socket(dialler.deadline)
         adapter.poolmanager.connection_pool_kw["ssl_context"] = context
     return adapter
