@@ -1,9 +1,9 @@
 """A secret comes from a file that its daemon's user alone can read, never from a YAML."""
 
-import os
 import re
-from pathlib import Path
 from typing import Final
+
+from bridges import regular_file
 
 OTHERS: Final = 0o077
 LONGEST: Final = 4096
@@ -27,9 +27,7 @@ def one_line(name: str, file: str, what: str) -> str:
 def content(name: str, file: str) -> bytes:
     """What a private file holds, up to a little more than the longest secret."""
     try:
-        with Path(file).open("rb") as opened:
-            mode = os.fstat(opened.fileno()).st_mode
-            found = opened.read(LONGEST + 1)
+        found, mode = regular_file.read(file, LONGEST)
     except OSError as error:
         raise SecretError(f"{name} {file} cannot be read: {error.strerror}") from None
     if mode & OTHERS:

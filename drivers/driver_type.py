@@ -10,6 +10,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import msgspec
 
+from bridges.core.table import Table
 from drivers import Driver
 from drivers.hal import Remark
 from drivers.hal.points import Wire
@@ -30,14 +31,14 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     The rest is optional:
     `wires(settings)`: the table that an electrician checks (`drivers/hal/points.py`).
     `debounce(settings)`: how long a change of each signal or group must last (s).
-    `describe(settings, bus's settings)`: rows for `check` (what, meaning) where there are no wires.
-    `claims(settings)`: (place, path) of everything, besides the wires, that no other device of the bus
-    may use.
-    `warnings(settings)`: (path, text) of valid settings that deserve a second look.
-    `notes(settings)`: (path, text) of choices that a site may want and should know of.
-    `unwired(settings)`: signals without a wire that `accept_unsafe` may also name.
-    `fake`: the name of the module that replaces the hardware in `run --simulate` (`hal_fakes/fake.py`);
-    a name, because real code never imports a fake. By default the plant of its kind, on its wires.
+    `describe(settings, bus's settings)`: where there are no wires, rows for `check` (what, meaning).
+    `tables(settings)`: codes, pulses and frames, for `check` (`bridges/core/table.py`).
+    `claims(settings)`: (place, path) of what no other device of its bus may use, beside the wires'.
+    `warnings(settings)`: (path, text) of what is legal but worth a look.
+    `notes(settings)`: (path, text) of what a site may well want so, and should know.
+    `unwired(settings)`: signals without a wire of which `accept_unsafe` may speak as well.
+    `fake`: the module that stands in for the hardware in `run --simulate`, by its name, as nothing real
+    imports a fake (`hal_fakes/fake.py`); the plant of its kind, on its wires, where it names none.
     """
 
     settings: type[Settings]
@@ -46,6 +47,7 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     wires: Callable[[Settings], Iterable[Wire]] = lambda settings: ()
     debounce: Callable[[Settings], Mapping[str, float]] = lambda settings: {}
     describe: Callable[[Settings, Any], Iterable[tuple[str, str]]] = lambda settings, bus: ()
+    tables: Callable[[Settings], Iterable[Table]] = lambda settings: ()
     claims: Callable[[Settings], Iterable[tuple[str, tuple[str, ...]]]] = lambda settings: ()
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
     notes: Callable[[Settings], Iterable[Remark]] = lambda settings: ()

@@ -119,7 +119,8 @@ def _held(memory: Memory, holder: Session | None) -> Memory:
 
 def _watched(memory: Memory, now: float) -> Memory:
     """Note since when the station charges although it was told not to."""
-    charges = memory.sample and memory.sample.activity is Activity.CHARGING
+    sample = memory.sample
+    charges = sample and (sample.activity is Activity.CHARGING or sample.charges)
     if memory.power is not False or not charges:
         return replace(memory, disobeyed_since=None)
     since = memory.disobeyed_since

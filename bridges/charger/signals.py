@@ -56,7 +56,8 @@ class ChargerSample(msgspec.Struct, frozen=True):
     """One reading of one station.
 
     `code`: the vendor's number or word, for texts only. `error_text`: the station's own words,
-    printable and bounded. `side`: whose fault the error is.
+    printable and bounded. `side`: whose fault the error is. `charges`: it is at fault, and says all the
+    same that it charges.
     """
 
     activity: Activity
@@ -64,6 +65,7 @@ class ChargerSample(msgspec.Struct, frozen=True):
     error_text: str = ""
     measured: Measured = Measured()
     side: FaultSide = ""
+    charges: bool = False
 
 
 class ChargerOutputs(msgspec.Struct, frozen=True):

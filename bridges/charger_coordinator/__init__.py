@@ -3,7 +3,7 @@
 from bridges.charger_coordinator import core, keep, messages
 from bridges.charger_coordinator.memory import Memory, Site
 from bridges.charger_coordinator.report import SiteReport
-from bridges.charger_coordinator.settings import Settings, described, warnings
+from bridges.charger_coordinator.settings import Settings, speaks_of, tables, warnings
 from bridges.charger_coordinator.signals import (
     Dedicated,
     FleetSeen,
@@ -53,7 +53,8 @@ KIND: GraphKind[
     idle=core.idle,
     persist=keep.persist,
     restore=keep.restore,
-    described=described,
+    tables=tables,
     warnings=warnings,
+    speaks_of=speaks_of,
     on_map=lambda settings: settings.on_map(),
 )

@@ -1,6 +1,6 @@
 """The coordinator's section of its YAML: stations, and each fleet's waypoints and robots.
 
-`described` and `warnings` are what `check` says of it.
+`tables` and `warnings` are what `check` says of it.
 """
 
 import math
@@ -13,6 +13,7 @@ from msgspec import Meta
 from bridges.charger.settings import ReceiverId, Robot, StartTimeout
 from bridges.core.fields import GraphSettings, Name
 from bridges.core.kind import Place
+from bridges.core.table import Table
 from bridges.settings.building_map import CHARGER, WAYPOINT
 
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
@@ -160,26 +161,23 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         return {name: station.waypoint or name for name, station in self.stations.items()}
 
 
-HEADINGS = ("robot", "charges at", "waits at", "receivers")
+def tables(settings: Settings) -> Iterator[Table]:
+    """Each robot and its places, then each station and its waypoint."""
+    yield Table(
+        "robots",
+        ("robot", "charges at", "waits at", "receivers"),
+        tuple(
+            (str(who), ", ".join(r.stations), r.waits_at, ", ".join(r.receivers) or "-")
+            for who, r in settings.robots().items()
+        ),
+    )
+    yield Table("stations", ("charger", "at waypoint"), tuple(settings.places().items()))
 
 
-def described(settings: Settings) -> list[tuple[str, ...]]:
-    """Each robot and its places, then each station and its waypoint, then the numbers."""
-    places = settings.places()
-    rows: list[tuple[str, ...]] = [HEADINGS]
-    for who, robot in settings.robots().items():
-        stations, receivers = ", ".join(robot.stations), ", ".join(robot.receivers)
-        rows.append((str(who), stations, robot.waits_at, receivers or "-"))
-    rows += [("", "", "", ""), ("charger", "at waypoint", "", "")]
-    rows += [(name, place, "", "") for name, place in places.items()]
-    numbers = {
-        "start_timeout_s": f"{settings.start_timeout_s:g} s",
-        "near_m": f"{settings.near_m:g} m",
-        "full_percent": f"{settings.full_percent:g} %",
-        "again_percent": f"{settings.again_percent:g} %",
-        "quiet_start_s": f"{settings.quiet_start_s:g} s",
-    }
-    return [*rows, ("", "", "", ""), *((key, text, "", "") for key, text in numbers.items())]
+def speaks_of(settings: Settings) -> Iterator[Place]:
+    """Its stations are chargers' daemons."""
+    for name in settings.stations:
+        yield ("stations", name), CHARGER, name
 
 
 def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:

@@ -1,41 +1,34 @@
-"""`rmf-bridge check FILE...`: the problems of device YAMLs, or their wiring as a table.
+"""`rmf-bridge check FILE...`: what is wrong with device YAMLs, or all that an electrician signs.
 
-The table is for the person at the terminal block: each signal with every spelling of its point, its
-level at rest, and what it reads when its wire breaks.
+Each file is read and judged, then all of them together (`bridges/settings/across.py`). What is told of
+a file is gathered once (`sheets/told.py`): as text, as JSON, and as a sheet to print.
 """
 
 import argparse
 import os
 import sys
-import unicodedata
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
-from bridges.core.graph_kind import GraphKind
-from bridges.settings import names as named
-from bridges.settings.building_map import BuildingMap, load_map
+from bridges.commands.sheets import text
+from bridges.commands.sheets.told import Told, told, wrong
+from bridges.settings.across import Found, across
 from bridges.settings.load import Config, Problem, SettingsError, load
-from bridges.settings.map_names import mismatches, places
-from drivers.hal.points import Wire
 
-HEADINGS = (
-    "device",
-    "signal",
-    "point",
-    "direction",
-    "active",
-    "pull",
-    "debounce",
-    "at rest",
-    "wire broken",
+if TYPE_CHECKING:
+    from bridges.settings.building_map import BuildingMap
+
+EXIT_CODES = (
+    "Exit codes: 0 every file is right (warnings do not count); 78 a file, or the files together,"
+    " cannot be right; 73 the sheet cannot be written; 2 the command line cannot be read"
 )
-BROKEN = {True: "asserted", False: "not asserted", None: "floats"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `check`."""
+    parser.description = f"{parser.description} {EXIT_CODES}."
     parser.add_argument("files", nargs="+", metavar="FILE", help="a device YAML")
     parser.add_argument(
         "-q", "--quiet", action="store_true", help="print problems only: no table, no warning"
@@ -45,124 +38,135 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MAP",
         help="compare the names with RMF's: a *.building.yaml, or a navigation graph",
     )
+    parser.add_argument(
+        "--several-machines",
+        action="store_true",
+        help="the files run on several machines: the same pin or port in two of them is no mistake",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the same as JSON, and that alone"
+    )
+    parser.add_argument(
+        "--sheet", metavar="FILE.html", help="write the commissioning sheet: a page per controller"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check every file. Returns 0, or 78 (EX_CONFIG) if any has a problem."""
+    """Check every file. Returns one of EXIT_CODES."""
     try:
-        building = load_map(args.building_map) if args.building_map else None
+        building = _building(args.building_map)
     except SettingsError as error:
-        _print_problems(args.building_map, error.problems)
-        return os.EX_CONFIG
-    right = [_check(file, args.quiet, building) for file in args.files]
-    return 0 if all(right) else os.EX_CONFIG
+        return _tell([wrong(args.building_map, error.problems)], args)
+    right, found = _read(args.files, building)
+    together = across([config for config, _ in right.values()], not args.several_machines)
+    files = [_with(found[file], together) for file in args.files]
+    return _tell(files, args)
 
 
-def _check(file: str, quiet: bool, building: BuildingMap | None) -> bool:
-    try:
-        config = load(file)
-    except SettingsError as error:
-        _print_problems(file, error.problems)
-        return False
-    problems = mismatches(config, building) if building else []
-    if not quiet:
-        _complain(map(str, config.warnings))
-        lines = described(config)
-        if building and not problems:
-            lines += [_agreement(config, building), ""]
-        lines += map(str, config.notes)
-        sys.stdout.write("\n".join(lines) + "\n")
-    if problems:
-        _print_problems(file, problems)
-    return not problems
+def _building(file: str | None) -> "BuildingMap | None":
+    if file is None:
+        return None
+    from bridges.settings.building_map import load_map
+
+    return load_map(file)
 
 
-def _agreement(config: Config, building: BuildingMap) -> str:
+def _read(
+    files: Sequence[str], building: "BuildingMap | None"
+) -> tuple[dict[str, tuple[Config, Told]], dict[str, Told]]:
+    """Each file, once: those that could be read, and what is told of every one."""
+    right: dict[str, tuple[Config, Told]] = {}
+    found: dict[str, Told] = {}
+    for file in dict.fromkeys(files):
+        try:
+            config = load(file)
+        except SettingsError as error:
+            found[file] = wrong(file, error.problems)
+        else:
+            found[file] = told(config, *_against(config, building))
+            right[file] = config, found[file]
+    return right, found
+
+
+def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Problem], list[str]]:
+    """Its names beside the map's: (problems, what else is to be said)."""
+    if building is None:
+        return [], []
+    from bridges.settings.map_names import mismatches, places
+
+    problems = mismatches(config, building)
     names = ", ".join(dict.fromkeys(name for _, _, name in places(config)))
+    if problems:
+        return problems, []
     if not names:
-        return f"this file uses no names that {building.file} could confirm"
-    return f"same names as in {building.file}: {names}"
+        return [], [f"this file uses no names that {building.file} could confirm"]
+    return [], [f"same names as in {building.file}: {names}"]
 
 
-def _print_problems(file: str, problems: Sequence[Problem]) -> None:
-    many = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
-    _complain([*map(str, problems), f"{file}: {many}"])
+def _with(file: Told, together: Found) -> Told:
+    """A file with what was found about it among the others."""
+    return msgspec.structs.replace(
+        file,
+        errors=[*file.errors, *(p for p in together.errors if p.file == file.file)],
+        warnings=[*file.warnings, *(p for p in together.warnings if p.file == file.file)],
+    )
+
+
+def _tell(files: Sequence[Told], args: argparse.Namespace) -> int:
+    """Print it, write the sheet; the exit code."""
+    errors = sum(len(file.errors) for file in files)
+    code = os.EX_CONFIG if errors else 0
+    if args.json:
+        from bridges.commands.sheets.as_json import document
+
+        sys.stdout.write(document(files, *_counts(files)))
+    else:
+        for file in files:
+            _print(file, args.quiet)
+        _verdict(files, args.quiet)
+    return _write_sheet(files, args.sheet) or code if args.sheet and not errors else code
+
+
+def _counts(files: Sequence[Told]) -> tuple[int, int]:
+    return sum(len(f.errors) for f in files), sum(len(f.warnings) for f in files)
+
+
+def _print(file: Told, quiet: bool) -> None:
+    if not quiet:
+        _complain(map(str, file.warnings))
+        if file.kind:
+            sys.stdout.write("\n".join(text.lines(file)) + "\n")
+    _complain(map(str, file.errors))
+
+
+def _verdict(files: Sequence[Told], quiet: bool) -> None:
+    """The last line: that all is right, or how many errors there are."""
+    errors, warnings = _counts(files)
+    also = f", {_many(warnings, 'warning')}" if warnings else ""
+    if errors:
+        _complain([f"{_many(errors, 'error')}{also}"])
+    elif not quiet:
+        sys.stdout.write(f"OK{also}\n")
+
+
+def _many(number: int, what: str) -> str:
+    return f"1 {what}" if number == 1 else f"{number} {what}s"
 
 
 def _complain(lines: Iterable[str]) -> None:
-    """To stderr, in order with stdout: both often end in one log."""
+    """To stderr, after what was printed: the two often end in one log."""
     sys.stdout.flush()
     sys.stderr.writelines(f"{line}\n" for line in lines)
 
 
-def described(config: Config) -> list[str]:
-    """A valid file as lines: its kind and driver, and its wiring or what it talks to."""
-    if config.section is not None:
-        kind = named.kind_called(config.kind)
-        assert isinstance(kind, GraphKind)
-        rows = (kind.described or _numbers)(config.section)
-        return [f"{config.path}: {config.kind}", "", *aligned(rows), ""]
-    lines = [f"{config.path}: {config.kind}, driver {config.driver}"]
-    for bus in config.buses:
-        devices = config.devices_on(bus)
-        lines += ["", f"bus {bus} ({config.bus_types[bus]})", *_bus(config, bus, devices)]
-    return [*lines, ""]
+def _write_sheet(files: Sequence[Told], path: str) -> int:
+    """Write the commissioning sheet; 0, or the exit code when that fails."""
+    from bridges.commands.sheets.html import page
 
-
-def _numbers(section: Any) -> list[tuple[str, ...]]:
-    return [
-        (key, "-" if value is None else str(value))
-        for key, value in msgspec.to_builtins(section).items()
-    ]
-
-
-def _bus(config: Config, bus: str, devices: Sequence[str]) -> list[str]:
-    """The wires of its devices, and what those say that have none."""
-    wires = [(name, wire) for name in devices for wire in config.wires(name)]
-    point = config.bus_type(bus).describe
-    table = [_row(name, wire, point(wire.point)) for name, wire in wires]
-    rows = [row for name in devices for row in _described(config, name, bus)]
-    return [*aligned([HEADINGS, *table] if table else []), *aligned(rows)]
-
-
-def _described(config: Config, name: str, bus: str) -> list[tuple[str, str, str]]:
-    describe = config.driver_type(name).describe
-    rows = [(name, *row) for row in describe(config.devices[name], config.buses[bus])]
-    return rows if rows or config.wires(name) else [(name, "", "")]
-
-
-def _row(device: str, wire: Wire, point: str) -> tuple[str, ...]:
-    """One wire. `point`: as the bus describes it; the YAML's spelling is added if it differs."""
-    spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"
-    if wire.flash is not None:
-        spelled += f", {wire.flash.on_s:g} s by the module at {wire.flash.point}"
-    is_input = wire.direction == "in"
-    return (
-        device,
-        wire.signal,
-        spelled,
-        wire.direction,
-        wire.active,
-        wire.pull or "-",
-        _debounce(wire) if is_input else "-",
-        "-" if is_input else ("high" if wire.level(False) else "low"),
-        BROKEN[wire.broken_reads()],
-    )
-
-
-def _debounce(wire: Wire) -> str:
-    return "default" if wire.debounce_s is None else f"{wire.debounce_s:g} s"
-
-
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of equal length as lines with aligned columns."""
-    widths = [max(map(_width, column)) for column in zip(*rows, strict=True)]
-    return [
-        "".join(f"  {c}{' ' * (w - _width(c))}" for c, w in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-
-
-def _width(text: str) -> int:
-    """Columns on a terminal: 走 takes two."""
-    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
+    try:
+        with open(path, "w", encoding="utf-8") as sheet:
+            sheet.write(page(files))
+    except OSError as error:
+        _complain([f"{path} cannot be written: {error.strerror}"])
+        return os.EX_CANTCREAT
+    return 0

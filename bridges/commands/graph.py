@@ -124,9 +124,11 @@ class CommandLine:
 def command_line(args: argparse.Namespace) -> CommandLine:
     """From parsed arguments; `args.typed` is what `cli` was given."""
     options = ["--direct"] if getattr(args, "direct", False) else []
+    if args.config is not None:
+        options += ["--config", str(args.config)]
     if args.domain_id is not None:
         options += ["--domain-id", str(args.domain_id)]
-    if args.transport != "auto":
+    if args.transport is not None:
         options += ["--transport", args.transport]
     if args.localhost:
         options += ["--localhost"]

@@ -11,6 +11,7 @@ from typing import Any, Generic, Union
 
 from bridges.core.decision import Decision, M, OperatorReset, R
 from bridges.core.kind import AnyDeviceKind, E, L, Place, S
+from bridges.core.table import Table
 from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
 
@@ -56,8 +57,9 @@ class GraphKind(Generic[S, L, M, E, R]):
     same bytes while nothing worth keeping has changed, and `restore(kept, settings, now)`, which
     raises ValueError for bytes that are not that. What is kept is kept before it is told together.
 
-    For one whose settings are more than a few numbers: `described(settings)`, as rows for `check`, and
-    `warnings(settings)`, as (path, text) of what is legal but worth a look.
+    For one whose settings are more than a few numbers: `tables(settings)`, for `check`, and
+    `warnings(settings)`, as (path, text) of what is legal but worth a look. `speaks_of(settings)`: the
+    devices that it names, as (path, their kind, name): some file of the site has to have them.
     """
 
     name: str
@@ -77,9 +79,10 @@ class GraphKind(Generic[S, L, M, E, R]):
     together: Callable[[Mapping[str, M]], tuple[Topic[Message], Message]] | None = None
     persist: Callable[[Mapping[str, M]], bytes] | None = None
     restore: Callable[[bytes, S, float], Mapping[str, M]] | None = None
-    described: Callable[[S], list[tuple[str, ...]]] | None = None
+    tables: Callable[[S], Iterable[Table]] = lambda settings: ()
     warnings: Callable[[S], Iterable[tuple[tuple[str, ...], str]]] | None = None
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
+    speaks_of: Callable[[S], Iterable[Place]] = lambda settings: ()
     shown_by: Topic[Message] | None = None
     reserved: Callable[[S], Collection[str]] = lambda settings: ()
 

@@ -5,7 +5,7 @@ from bridges.core.graph_kind import GraphKind
 from bridges.door_supervisor import core, keep, messages, report
 from bridges.door_supervisor.memory import Limits, Memory
 from bridges.door_supervisor.report import DoorHoldReport
-from bridges.door_supervisor.settings import Settings
+from bridges.door_supervisor.settings import Settings, speaks_of
 from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
 from bridges.rmf.topics import (
     ADAPTER_DOOR_REQUESTS,
@@ -43,4 +43,5 @@ KIND: GraphKind[
     together=report.heartbeat,
     persist=keep.persist,
     restore=keep.restore,
+    speaks_of=speaks_of,
 )

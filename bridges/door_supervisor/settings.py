@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from bridges.core.fields import GraphSettings, Name, Patience
+from bridges.core.kind import Place
 
 
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -22,3 +23,9 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         """An empty list would serve nobody."""
         if self.doors == []:
             yield ("doors",), "is empty: name the doors, or leave it out to serve every door"
+
+
+def speaks_of(settings: Settings) -> Iterable[Place]:
+    """The doors that it is to serve."""
+    for i, name in enumerate(settings.doors or ()):
+        yield ("doors", str(i)), "door", name

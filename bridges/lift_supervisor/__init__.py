@@ -5,7 +5,7 @@ from bridges.core.graph_kind import GraphKind
 from bridges.lift_supervisor import core, messages
 from bridges.lift_supervisor.memory import Limits, Memory
 from bridges.lift_supervisor.report import SupervisorReport
-from bridges.lift_supervisor.settings import Settings
+from bridges.lift_supervisor.settings import Settings, speaks_of
 from bridges.lift_supervisor.signals import Ended, Requested, StateHeard
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES
 
@@ -33,6 +33,7 @@ KIND: GraphKind[
     stamped=messages.stamped,
     summary=messages.summary,
     idle=core.idle,
+    speaks_of=speaks_of,
     shown_by=LIFT_STATES,
     reserved=lambda settings: settings.lifts or (),
 )

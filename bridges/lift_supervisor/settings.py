@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from bridges.core.fields import GraphSettings, Name, Patience, Seconds
+from bridges.core.kind import Place
 
 
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -35,3 +36,9 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
             yield ("holder_ttl_s",), text
         if self.lifts == []:
             yield ("lifts",), "is empty: name the lifts, or leave it out to serve every lift"
+
+
+def speaks_of(settings: Settings) -> Iterable[Place]:
+    """The lifts that it is to serve."""
+    for i, name in enumerate(settings.lifts or ()):
+        yield ("lifts", str(i)), "lift", name

@@ -5,10 +5,9 @@ Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's D
 """
 
 import re
-from pathlib import Path
 from typing import Any, Final
 
-from bridges import secret_file
+from bridges import regular_file, secret_file
 from bridges.core.fields import Zenoh, ZenohTls
 from bridges.rmf.transport import TransportError
 
@@ -97,8 +96,8 @@ def _tls(tls: ZenohTls | None) -> dict[str, Any]:
 
 def _readable(name: str, file: str) -> str:
     try:
-        with Path(file).open("rb"):
-            return file
+        regular_file.read(file, 0)
+        return file
     except OSError as error:
         raise TransportError(f"{name} {file} cannot be read: {error.strerror}") from None
 

@@ -24,7 +24,7 @@ class Clock:
         """The stamp of a reading taken at `read_at` (monotonic s); 0 for never.
 
         It is the current wall clock minus the monotonic age, so that a step of the wall clock distorts
-        neither age nor order.
+        neither age nor order. Raises ClockError for a clock past 2038.
         """
         if read_at is None:
             return Time()

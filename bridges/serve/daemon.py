@@ -164,9 +164,9 @@ class Daemon:
         self._runtime.write_status(msgspec.json.encode({**daemon, "devices": devices}))
         if self._diagnostics is None:
             return
-        at = stamp(self._transport.wall())
-        found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
         try:
+            at = stamp(self._transport.wall())
+            found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
             self._diagnostics.publish(found)
         except (
             TransportError

@@ -26,6 +26,7 @@ from bridges.core.durations import AGES_AGO
 from bridges.core.kind import DeviceEvent, E, Kind, L, S
 from bridges.log import pairs, plain
 from bridges.rmf.definitions import Message
+from bridges.rmf.stamps import ClockError
 from bridges.rmf.topics import Topic
 from bridges.serve.clock import Clock, Pace
 from bridges.serve.contained import Contained
@@ -168,7 +169,11 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self.wake_at = min(subject.wake_at, self._pace.due_at(news))
 
     def _send(self, report: R) -> None:
-        at = self._clock.stamp(report.read_at)
+        try:
+            at = self._clock.stamp(report.read_at)
+        except ClockError as error:
+            log.error(pairs("not_published", topic=self._kind.states.name, reason=error))
+            return
         state = self._kind.state_message(self.name, self._settings, report, at)
         self._publish(self._kind.states, state)
 

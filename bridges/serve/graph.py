@@ -14,7 +14,7 @@ from bridges.core.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
 from bridges.core.kind import E, L, S
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
-from bridges.rmf.stamps import stamp
+from bridges.rmf.stamps import ClockError, stamp
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
 from bridges.serve.clock import Clock
@@ -25,15 +25,13 @@ from bridges.serve.presence import Presence
 from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Status, Subject
 
+log = logging.getLogger(__name__)
+
 MAX_SUBJECTS = 1000
 """More lifts or doors than any site has; more names must be invented ones."""
 MAX_UNSHOWN = 100
 """At most this many names that only requests mention, without a state of such a lift or door."""
-
-
 DEFECT = "a defect"
-
-log = logging.getLogger(__name__)
 
 
 def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> Core[M, GraphEvent[E], None, R]:
@@ -249,7 +247,12 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _publish(self, topic: Topic[Message], message: Message) -> None:
         """Publish a message, stamped now."""
-        self._outlet.publish(topic, self._kind.stamped(message, stamp(self._clock.wall())))
+        try:
+            stamped = self._kind.stamped(message, stamp(self._clock.wall()))
+        except ClockError as error:
+            log.error(pairs("not_published", topic=topic.name, reason=error))
+            return
+        self._outlet.publish(topic, stamped)
 
 
 AnyGraphNode = GraphNode[Any, Any, Any, Any, Any]

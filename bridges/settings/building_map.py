@@ -20,7 +20,8 @@ from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
 from bridges.settings.nodes import Page, Sort, compose, read
 
-MAP = Sort("building map or navigation graph", "levels: ...", 4 * 1024 * 1024, 400_000)
+MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)
+"""Some seconds' worth of reading: what is longer is refused at once."""
 
 FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
 """What a name on the map can name."""

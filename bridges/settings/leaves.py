@@ -28,6 +28,7 @@ from yaml import Node, ScalarNode, SequenceNode
 
 from bridges.settings.nodes import either, is_plain, nearest, shown
 from bridges.settings.scalars import TRUTHS, number, reads_as, whole_number
+from bridges.settings.slips import has_unit, number_meant
 
 Extra = Mapping[str, Any]
 
@@ -145,7 +146,7 @@ def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
         least, most = wanted.min_length or 0, wanted.max_length
         span = f"at least {least}" if most is None else f"{least} to {most}"
         return f"has {len(node.value)} characters: {span} are allowed"
-    form = extra.get("pattern", f"text like {wanted.pattern}")
+    form = extra.get("pattern", "text of another form")
     return f"is '{written}': write {form}"
 
 
@@ -164,9 +165,15 @@ def _check_text(node: ScalarNode, extra: Extra) -> None:
 def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> Wrong:
     """The error for a text that is not a plain number or boolean, with the way to write it."""
     text, asked = shown(node.value), wanted_text(wanted, extra)
+    whole = isinstance(wanted, IntType)
     if not is_plain(node):
-        meant = _READINGS[type(wanted)](node.value) is not None
-        return Wrong(f'is the text "{text}": write {asked}{", without quotes" if meant else ""}')
+        read = _READINGS[type(wanted)](node.value) is not None
+        return Wrong(f'is the text "{text}": write {asked}{", without quotes" if read else ""}')
+    meant = "" if isinstance(wanted, BoolType) else number_meant(node.value, whole)
+    if meant:
+        return Wrong(f"is written {text}: write {meant}, {asked}")
+    if extra.get("unit") and has_unit(node.value):
+        return Wrong(f"is written {text}: write the number alone, {asked}")
     reading = reads_as(node.value) or ""
     if isinstance(wanted, BoolType) and reading in ("true", "false"):
         return Wrong(f"is written {text}, which YAML versions read differently: write {reading}")

@@ -12,8 +12,7 @@ Structs define what a section may contain (`values.py`); this file and `wiring.p
 several sections. The daemon takes nothing else from the file, and checks nothing again.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from bridges.core.fields import DeviceSettings, Name, Rmf
 from bridges.core.graph_kind import AnyGraphKind, AnyKind, GraphKind
 from bridges.rmf import topics
 from bridges.settings import names as named
+from bridges.settings.config import Config
 from bridges.settings.nodes import (
     Page,
     Problem,
@@ -39,63 +39,12 @@ from bridges.settings.plausible import milliseconds, out_of_step
 from bridges.settings.values import BROKEN, Entry, Spot, Values, below, is_none, locate
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
 from drivers.driver_type import AnyDriver
-from drivers.hal import AnyBus, Bus
-from drivers.hal.points import Wire
+from drivers.hal import AnyBus
 
 __all__ = ["Config", "Problem", "SettingsError", "load"]
 
 TOPICS = [topic.name for topic in vars(topics).values() if isinstance(topic, topics.Topic)]
 MAPPING = "a mapping (key: value)"
-
-
-@dataclass(frozen=True)
-class Config:
-    """A valid file.
-
-    `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's
-    or driver's record. `bus_types`: name -> `type:`. `warnings`: legal but doubtful settings.
-    `notes`: settings that a site may want, and should know about.
-    `section`: the settings of a kind without devices (`bridges/core/graph_kind.py`), which has no
-    driver and no buses.
-    """
-
-    path: Path
-    text: bytes
-    kind: str
-    driver: str
-    rmf: Rmf
-    buses: Mapping[str, Any]
-    devices: Mapping[str, Any]
-    bus_types: Mapping[str, str] = field(default_factory=dict)
-    warnings: tuple[Problem, ...] = ()
-    notes: tuple[Problem, ...] = ()
-    section: Any = None
-
-    def bus_of(self, device_name: str) -> str:
-        """The name of the bus that a device is on."""
-        named_bus: str | None = self.devices[device_name].bus
-        return named_bus or next(iter(self.buses))
-
-    def devices_on(self, bus: str) -> list[str]:
-        """The names of the devices on this bus."""
-        return [name for name in self.devices if self.bus_of(name) == bus]
-
-    def driver_type(self, device_name: str) -> AnyDriver:
-        """The driver of a device: its own, or the file's."""
-        own: str | None = self.devices[device_name].driver
-        return named.driver_called(self.kind, own or self.driver)
-
-    def wires(self, device_name: str) -> list[Wire]:
-        """A device's wiring table; empty where its driver has none."""
-        return list(self.driver_type(device_name).wires(self.devices[device_name]))
-
-    def bus_type(self, name: str) -> AnyBus:
-        """The type of the bus of this name."""
-        return named.bus_called(self.bus_types[name])
-
-    def open_bus(self, name: str) -> Bus:
-        """The real bus of this name. Raises HalError."""
-        return self.bus_type(name).open_bus(self.buses[name])
 
 
 def load(path: Path | str) -> Config:
@@ -165,7 +114,7 @@ class _Reading:
         self._read_kind(below(self._top.node, "kind"))
         if not isinstance(self._kind, GraphKind):
             self._read_driver(below(self._top.node, "driver"))
-        sections = self._values.known(entries, self._top, self._keys())
+        sections = self._values.known(entries, self._top, self._keys(), self._elsewhere())
         if self._kind and self._kind.devices_key in sections:
             self._read_own_drivers(sections[self._kind.devices_key].value)
         if "rmf" in sections:
@@ -189,6 +138,18 @@ class _Reading:
             return {**keys, **sections, self._kind.devices_key: MAPPING}
         others = (named.kind_called(name).devices_key for name in named.kind_names())
         return {**keys, **sections, **dict.fromkeys(others)}
+
+    def _elsewhere(self) -> dict[str, str]:
+        """Keys that belong below the top: key -> what it stands below."""
+        below_top: dict[str, str] = {f.encode_name: "rmf" for f in msgspec.structs.fields(Rmf)}
+        if self._kind and self._driver:
+            place = f"{self._kind.devices_key}: <name>"
+            own = msgspec.structs.fields(self._driver.settings)
+            below_top |= {f.encode_name: place for f in own}
+        elif isinstance(self._kind, GraphKind):
+            own = msgspec.structs.fields(self._kind.settings)
+            below_top |= {f.encode_name: self._kind.devices_key for f in own}
+        return below_top
 
     def _read_kind(self, entry: Entry | None) -> None:
         name = self._word(entry, named.kind_names())
@@ -348,6 +309,7 @@ class _Reading:
         else:
             self._check_signals(settings, spot, wiring, driver)
             self._check_pace(settings, spot, bus)
+            self._check_reach(wiring, bus)
         if len(self._page.problems) == before:
             self._collect_warnings(settings, spot, driver)
             for node, text in wiring.warnings(driver.wires(settings), spot):
@@ -369,6 +331,15 @@ class _Reading:
         read = self._buses[bus].settings if bus else BROKEN
         for path, text in () if read is BROKEN else out_of_step(settings, read):
             self._page.note(locate(spot, path).where(), text)
+
+    def _check_reach(self, wiring: Wiring, bus: str | None) -> None:
+        """Points that no bus of these settings can have."""
+        read = self._buses[bus] if bus else None
+        for use in wiring.uses if read and read.hal and read.settings is not BROKEN else ():
+            assert read
+            assert read.hal
+            if reason := read.hal.unreachable(read.settings, use.point):
+                self._page.note(use.node, reason)
 
     def _collect_warnings(self, settings: Any, spot: Spot, driver: AnyDriver) -> None:
         """Collect the warnings about a valid device."""

@@ -55,8 +55,13 @@ def kind_called(name: str) -> AnyKind:
 
 def driver_called(kind: str, name: str) -> AnyDriver:
     """The driver that `kind:` and `driver:` name; one of `driver_names(kind)`."""
-    driver: AnyDriver = importlib.import_module(f"drivers.{kind}.{name}").DRIVER
+    driver: AnyDriver = driver_module(kind, name).DRIVER
     return driver
+
+
+def driver_module(kind: str, name: str) -> ModuleType:
+    """The file of a driver; one of `driver_names(kind)`."""
+    return importlib.import_module(f"drivers.{kind}.{name}")
 
 
 def bus_called(name: str) -> AnyBus:

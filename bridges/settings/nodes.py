@@ -15,6 +15,9 @@ import yaml
 from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNode, SequenceNode
 from yaml.reader import ReaderError
 
+from bridges import regular_file
+from bridges.settings import slips
+
 MAX_DEPTH = 32
 
 
@@ -29,23 +32,6 @@ class Sort:
 
 
 DEVICE = Sort("device YAML", "kind: ...", 256 * 1024, 20_000)
-
-FIXES = {
-    "found character '\\t' that cannot start any token": "a tab: YAML indents with spaces",
-    "mapping values are not allowed here": (
-        "a second ': ' here: indent the line like its neighbours, or put the text in quotes"
-    ),
-    "could not find expected ':'": "a key without ': ' after it, or a line indented wrongly",
-    "found unexpected end of stream": "the file ends inside a text: its closing quote is missing",
-    "but found another document": (
-        "a second document ('---') starts here: a file describes one daemon, so split it"
-    ),
-    "found duplicate anchor": "an anchor ('&name') whose name is already used",
-}
-FIXES |= {
-    f"found character '{c}' that cannot start any token": f"a text that begins with {c} needs quotes"
-    for c in "@`%"
-}
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -138,6 +124,7 @@ class _Composer(yaml.SafeLoader):
         self._page = page
         self._max_values = max_values
         self._depth = 0
+        self._count = 0
         self._sizes: dict[int, int] = {}
 
     def compose_node(self, parent: Node | None, index: int) -> Node | None:
@@ -145,14 +132,22 @@ class _Composer(yaml.SafeLoader):
         mark = cast(Mark, event.start_mark)
         if getattr(event, "tag", None) is not None:
             self._page.note(mark, "a tag ('!...') is not accepted: delete it, or quote the text")
+        self._count += 1
+        self._refuse_more_than_most(mark, self._count)
         with self._deeper(mark):
             node = super().compose_node(parent, index)
         if isinstance(event, AliasEvent) and id(node) not in self._sizes:
             raise _Refused(mark, "an alias ('*name') inside the value that it repeats")
         self._sizes[id(node)] = size = 1 + sum(self._sizes[id(n)] for n in _children(node))
-        if size > self._max_values:
-            raise _Refused(mark, f"more than {self._max_values} values, counting repeated aliases")
+        self._refuse_more_than_most(mark, size)
+        if isinstance(node, ScalarNode) and is_plain(node) and (odd := slips.odd_space(node.value)):
+            self._page.note(node, odd)
+            node.value = slips.cleaned(node.value)
         return node
+
+    def _refuse_more_than_most(self, mark: Mark, values: int) -> None:
+        if values > self._max_values:
+            raise _Refused(mark, f"more than {self._max_values} values, counting repeated aliases")
 
     @contextmanager
     def _deeper(self, mark: Mark) -> Iterator[None]:
@@ -174,8 +169,7 @@ def _children(node: Node | None) -> Iterator[Node]:
 def read(file: str, sort: Sort = DEVICE) -> bytes:
     """The file's bytes. Raises SettingsError if it is unreadable or too long."""
     try:
-        with open(file, "rb") as source:
-            text = source.read(sort.max_bytes + 1)
+        text = regular_file.read(file, sort.max_bytes).content
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SettingsError([Problem(file, 1, 1, f"cannot be read: {reason}")]) from None
@@ -216,7 +210,8 @@ def _root(page: Page, text: str, sort: Sort) -> Node | None:
         raise SettingsError([_problem_after(page, text[: error.position], reason)]) from None
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        raise SettingsError([*page.problems, page.problem(mark, _reason(error))]) from None
+        told = str(error.problem) if isinstance(error, _Refused) else slips.reason(error, text)
+        raise SettingsError([*page.problems, page.problem(mark, told)]) from None
     except (ValueError, OverflowError):
         # PyYAML raises these for numbers that no character or version has, as in "\U00110000".
         assert composer is not None
@@ -227,18 +222,6 @@ def _root(page: Page, text: str, sort: Sort) -> Node | None:
 def _problem_after(page: Page, before: str, text: str) -> Problem:
     lines = re.split(r"\r\n|\r|\n", before)
     return Problem(page.file, len(lines), len(lines[-1]) + 1, text)
-
-
-def _reason(error: MarkedYAMLError) -> str:
-    """PyYAML's text on one line, or the fix for a common cause."""
-    for usual, fix in FIXES.items():
-        if usual in (error.problem, (error.context or "").partition(" '")[0]):
-            return fix
-    if isinstance(error, _Refused):
-        return str(error.problem)
-    mark = error.context_mark
-    context = f" ({error.context}, from line {mark.line + 1})" if mark and error.context else ""
-    return f"not YAML: {error.problem}{context}"
 
 
 def is_plain(node: ScalarNode) -> bool:

@@ -16,6 +16,7 @@ from msgspec import inspect as mi
 from bridges.core.fields import Rmf
 from bridges.core.graph_kind import AnyGraphKind, GraphKind
 from bridges.settings import names as named
+from bridges.settings.examples import example, flow
 from bridges.settings.leaves import Extra, choices, wanted_text
 from drivers.driver_type import AnyDriver
 
@@ -143,21 +144,24 @@ def page() -> str:
 
 
 def _sections(title: str, struct: type) -> Iterator[str]:
-    """The struct's table, then the tables of the structs inside it, each once."""
-    todo, done = [(title, struct)], set()
-    level = "##"
+    """A struct's table, then those of the structs inside it, each once, by its path from the top."""
+    paths: dict[type, list[str]] = {struct: []}
+    todo = [(struct, "")]
     while todo:
-        name, current = todo.pop(0)
-        if current in done:
-            continue
-        done.add(current)
-        yield f"{level} {name}"
-        level = "###"
-        yield from _struct(current)
+        current, path = todo.pop(0)
         info = mi.type_info(current)
         assert isinstance(info, mi.StructType)
         for field in info.fields:
-            todo += [(f"`{field.encode_name}`", inner) for inner in _inner(field.type)]
+            for inner in parts(field.type):
+                inside = f"{path}{field.encode_name}"
+                if inner not in paths:
+                    todo.append((inner, f"{inside}."))
+                paths.setdefault(inner, []).append(inside)
+    for current, places in paths.items():
+        yield f"### {title}: `{places[0]}`" if places else f"## {title}"
+        if places[1:]:
+            yield f"Likewise {', '.join(f'`{place}`' for place in places[1:])}."
+        yield from _struct(current)
 
 
 def _struct(struct: type) -> Iterator[str]:
@@ -167,10 +171,17 @@ def _struct(struct: type) -> Iterator[str]:
     info = mi.type_info(struct)
     assert isinstance(info, mi.StructType)
     rows = [
-        f"| `{f.encode_name}` | {_type(f.type)} | {_default(f)} | {meanings.get(f.name, '')} |"
+        f"| `{f.encode_name}` | {_type(f.type)} | {_default(f)} | {_example(struct, f)} |"
+        f" {meanings.get(f.name, '')} |"
         for f in info.fields
     ]
-    yield "\n".join(["| key | value | default | meaning |", "|---|---|---|---|", *rows])
+    heading = ["| key | value | default | example | meaning |", "|---|---|---|---|---|"]
+    yield "\n".join([*heading, *rows])
+
+
+def _example(struct: type, field: mi.Field) -> str:
+    text = example(struct, field).replace("|", "\\|")
+    return f"`{text}`" if text else "below"
 
 
 def _docstring(struct: type) -> tuple[str, dict[str, str]]:
@@ -184,17 +195,17 @@ def _docstring(struct: type) -> tuple[str, dict[str, str]]:
     return lead, meanings
 
 
-def _inner(info: mi.Type) -> list[type]:
-    """The structs in a field's value."""
+def parts(info: mi.Type) -> list[type]:
+    """The structs that a field's value is made of."""
     match info:
         case mi.StructType(cls=cls):
             return [cls]
         case mi.UnionType(types=types):
-            return [cls for part in types for cls in _inner(part)]
+            return [cls for part in types for cls in parts(part)]
         case mi.DictType(value_type=part) | mi.ListType(item_type=part):
-            return _inner(part)
+            return parts(part)
         case mi.VarTupleType(item_type=part) | mi.Metadata(type=part):
-            return _inner(part)
+            return parts(part)
     return []
 
 
@@ -223,4 +234,4 @@ def _default(field: mi.Field) -> str:
     value = getattr(field.default, "value", field.default)
     if isinstance(value, msgspec.Struct):
         return "-"
-    return f"`{str(value).lower() if isinstance(value, bool) else value}`"
+    return f"`{flow(value)}`" if value not in ([], {}, ()) else "-"

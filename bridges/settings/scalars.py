@@ -70,9 +70,9 @@ def _reads_as_number(text: str) -> str | None:
         if form.fullmatch(text):
             try:
                 value = reading(text)
+                return value if isinstance(value, str) else f"the number {_short(value)}"
             except ValueError:  # only underscores, or more digits than Python converts
                 return "a number"
-            return value if isinstance(value, str) else f"the number {_short(value)}"
     return None
 
 

@@ -25,6 +25,9 @@ from bridges.settings.leaves import Extra, Wrong, leaf, looks, wanted_text
 from bridges.settings.nodes import Page, either, is_plain, nearest, shown, unknown
 from bridges.settings.scalars import is_null, is_null_word
 
+VERBS = ("is", "has", "needs", "must", "says")
+"""A problem that begins with one of these is said of the key that it points to."""
+
 BROKEN = object()
 """Stands for a value that could not be made."""
 
@@ -145,17 +148,23 @@ class Values:
         return list(seen.values())
 
     def known(
-        self, entries: list[Entry], spot: Spot, fields: Mapping[str, str | None]
+        self,
+        entries: list[Entry],
+        spot: Spot,
+        fields: Mapping[str, str | None],
+        elsewhere: Mapping[str, str] | None = None,
     ) -> dict[str, Entry]:
         """The entries that `fields` names: key -> what its value must be, or None if it is optional.
 
         An unknown key that resembles a missing one is taken for it: one slip is one problem.
+        `elsewhere`: key -> below what it belongs, where it is no key of this mapping.
         """
         found = {e.name: e for e in entries}
         near = {nearest(name, fields) for name in found if name not in fields}
-        for name, entry in found.items():
-            if name not in fields:
-                self._page.note(entry.key, unknown("key", name, fields))
+        for before, entry in zip([None, *entries], entries, strict=False):
+            if entry.name not in fields:
+                text = _misplaced(entry, before, elsewhere or {})
+                self._page.note(entry.key, text or unknown("key", entry.name, fields))
         for name, wanted in fields.items():
             if isinstance(spot.node, MappingNode) and wanted and name not in {*found, *near}:
                 self._page.note(spot.at, f"{spot.label} needs '{name}': {wanted}")
@@ -240,7 +249,8 @@ class Values:
         fields = {f.encode_name: f for f in wanted.fields}
         known = {n: wanted_text(f.type) if f.required else None for n, f in fields.items()}
         before = len(self._page.problems)
-        found = self.known(self.entries(spot), spot, {**dict.fromkeys(besides), **known})
+        fitting = {**dict.fromkeys(besides), **known}
+        found = self.known(self.entries(spot), spot, fitting, sections_of(wanted))
         broken = len(self._page.problems) > before
         values = {
             fields[name].name: self._value(fields[name].type, entry.spot(spot.path))
@@ -257,7 +267,11 @@ class Values:
     def _ask(self, made: object, spot: Spot) -> None:
         problems = getattr(made, "problems", None)
         for path, text in problems() if problems else ():
-            self._page.note(locate(spot, path).where(), text)
+            entry = locate(spot, path)
+            if text.partition(" ")[0] in VERBS:
+                subject = f"'{shown(entry.name)}'" if entry.name else spot.label
+                text = f"{subject} {text}"
+            self._page.note(entry.where(), text)
 
     def _miscounted(self, wanted: ListType | VarTupleType | DictType, spot: Spot, n: int) -> bool:
         least, most = wanted.min_length or 0, wanted.max_length
@@ -280,3 +294,37 @@ class Values:
             self._page.note(where, f"{spot.label} has no value: write {wanted}")
         else:
             self._page.note(where, f"{spot.label} is {looks(spot.node)}: write {wanted}")
+
+
+def sections_of(wanted: StructType) -> dict[str, str]:
+    """The keys of the sections of a struct, that are not its own: key -> its section."""
+    own = {field.encode_name for field in wanted.fields}
+    inner = [
+        (field.encode_name, part)
+        for field in wanted.fields
+        for part in (field.type.types if isinstance(field.type, UnionType) else (field.type,))
+        if isinstance(part, StructType)
+    ]
+    return {f.encode_name: name for name, part in inner for f in part.fields} | dict.fromkeys(
+        own, ""
+    )
+
+
+def _misplaced(entry: Entry, before: Entry | None, elsewhere: Mapping[str, str]) -> str:
+    """What slip of the keyboard makes an unknown key; "" where none is seen."""
+    empty = before is not None and _is_empty(before.value)
+    if before is not None and empty and not _is_empty(entry.value):
+        return (
+            f"'{shown(entry.name)}' stands beside '{before.name}', which is empty: indent it below"
+        )
+    if before is not None and entry.name.isdecimal() and _is_empty(entry.value):
+        written = before.value.value
+        if isinstance(before.value, ScalarNode) and written.isdecimal():
+            return f"a comma inside a number: write {written}.{entry.name}"
+    if section := elsewhere.get(entry.name):
+        return f"'{shown(entry.name)}' does not belong here: it stands below '{section}'"
+    return ""
+
+
+def _is_empty(node: Node) -> bool:
+    return isinstance(node, ScalarNode) and is_plain(node) and not node.value

@@ -15,11 +15,13 @@ import msgspec
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
 from bridges.core.fields import Name
+from bridges.core.table import Table
 from bridges.settings.nodes import unknown
 from drivers import DriverError
 from drivers.charger import dbc
-from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows
+from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows, tables
 from drivers.charger.rules import MEANINGS, UNKNOWN, judge, places
+from drivers.charger.state_codes import first_side
 from drivers.driver_type import DriverType
 from drivers.hal import can
 from drivers.hal.can.broadcasts import Broadcasts, Said
@@ -105,10 +107,15 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
     after = "a time to be asked of the maker" if stops_s is None else f"{stops_s:g} s"
     return [
         ("bus", can.describe(bus_settings)),
-        *rows(found, settings.setpoints),
+        *rows(found),
         ("end of the daemon", f"power off is sent; unfed it stops after {after}"),
         *found.state.codes.rows(),
     ]
+
+
+def frame_tables(settings: Settings) -> Iterator[Table]:
+    """The frames as bytes."""
+    return tables(frame_map(settings), settings.setpoints)
 
 
 def warnings(settings: Settings) -> Problems:
@@ -160,16 +167,17 @@ class FrameDriver:
         if self._undiagnosed(activity, values):
             state, *_ = self._map.frames()
             values = self._values(self._frames.read_after(state, self._map.error_frames()))
-        found = self._errors(values)
+        found = self._errors(values, activity)
         if rule and rule.text:
             found = [(side, rule.text), *found]
         self._seen = True
         return ChargerSample(
-            activity,
+            Activity.ERROR if found else activity,
             code,
             "; ".join(text for _, text in found),
             self._measured(values),
-            side=found[0][0] if found else side,
+            side=first_side([side, *(whose for whose, _ in found)]),
+            charges=bool(found) and activity is Activity.CHARGING,
         )
 
     def write(self, outputs: ChargerOutputs) -> None:
@@ -212,7 +220,7 @@ class FrameDriver:
         station's and take it out of service.
         """
         before, self._in_error = self._in_error, activity is Activity.ERROR
-        return self._in_error and not before and not self._errors(values)
+        return self._in_error and not before and not self._errors(values, activity)
 
     def _values(self, frames: Mapping[str, bytes]) -> dict[str, float]:
         """Every signal of these frames, by Frame.Signal. Raises DriverError."""
@@ -222,9 +230,14 @@ class FrameDriver:
             for signal, value in self._dbc.decode(frame, payload).items()
         }
 
-    def _errors(self, values: dict[str, float]) -> list[tuple[FaultSide, str]]:
-        """The errors in the frames that have come."""
-        return self._map.errors.found(values.get)
+    def _errors(self, values: dict[str, float], activity: Activity) -> list[tuple[FaultSide, str]]:
+        """What is wrong by the frames that are heard, whatever the state says.
+
+        The signal of `out_of_range` is an error in an error's state only; else it tells where
+        the robot is.
+        """
+        position = "" if activity is Activity.ERROR else self._map.out_of_range
+        return self._map.errors.found(lambda at: 0 if at == position else values.get(at))
 
     def _measured(self, values: dict[str, float]) -> Measured:
         found = self._map
@@ -276,6 +289,7 @@ DRIVER = DriverType(
     buses=("can",),
     create=create,
     describe=describe,
+    tables=frame_tables,
     claims=claims,
     warnings=warnings,
     fake="hal_fakes.can.frame_charger",

@@ -9,6 +9,7 @@ from typing import Annotated, Final
 import msgspec
 
 from bridges.core.fields import Name, Period
+from bridges.core.table import Table
 from bridges.settings.nodes import unknown
 from drivers.charger import dbc
 from drivers.charger import rules as by_rules
@@ -79,11 +80,12 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     `state_timeout_s`: the state is stale when its frame has not come for this long.
     `others_timeout_s`: the same for all other frames.
     `volts`, `amps`: at the battery.
-    `receiver`: the receiver's id as a number; 0 is none. Without its frame there is no reading.
-    `out_of_range`: not 0 while the robot stands where it cannot be charged.
-    `rules`: derive the state from other signals; tried before its codes.
-    `errors`: signals that mean an error.
-    `send`: the frames that the driver sends.
+    `receiver`: whose receiver it is, as a number; 0 is nobody's. Without its frame there is no reading.
+    `out_of_range`: not 0 while the robot stands where it cannot be charged. Among the `errors` too, it
+    is one only while the state says error: a robot that has yet to come is none.
+    `rules`: the state by other signals, before its codes; their places are signals.
+    `errors`: what is wrong, whatever the state; its places are signals.
+    `send`: what must be sent, and how often.
     """
 
     dbc: Name
@@ -152,8 +154,8 @@ def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") 
         yield path, unknown(f"signal of {frame}", signal, found.signals(frame))
 
 
-def rows(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    """Rows for `check`: the signals that are read, the frames that are sent: (what, meaning)."""
+def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
+    """For `check`: what is read where: (what, meaning)."""
     frames = dbc.load(found.dbc)
     yield "frames", str(dbc.path(found.dbc))
     for path, signal in found.signals():
@@ -164,9 +166,57 @@ def rows(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[tuple[str,
             text = getattr(found.errors, path[1])[signal]
             yield f"{path[1]}'s error", f"{signal} ({at}): {text}"
     yield from by_rules.rows(found.rules, Errors(codes=found.errors.codes, bits=found.errors.bits))
-    for sent in found.send:
-        where = f"{sent.frame} ({named(frames.id(sent.frame))}) every {sent.every_s:g} s"
-        for on in (True, False):
-            values = sent.values(on, setpoints)
-            said = (f"{signal} {value:g}" for signal, value in (values or {}).items())
-            yield f"sent, power {'on' if on else 'off'}", f"{where}: {', '.join(said) or 'nothing'}"
+
+
+def tables(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[Table]:
+    """The frames as bytes, to hold against `candump`: those that are sent, and samples of the read."""
+    frames = dbc.load(found.dbc)
+    yield Table(
+        "frames that are sent",
+        ("frame", "id", "while", "every", "bytes", "says"),
+        tuple(_sent(frames, sent, on, setpoints) for sent in found.send for on in (True, False)),
+    )
+    yield Table(
+        "frames that are read, by samples (other signals 0)",
+        ("frame", "id", "bytes", "reads as"),
+        tuple(_samples(found, frames)),
+    )
+
+
+def _sent(frames: dbc.Dbc, sent: Sent, on: bool, setpoints: Mapping[str, float]) -> tuple[str, ...]:
+    values = sent.values(on, setpoints)
+    first = (sent.frame, named(frames.id(sent.frame)), f"power {'on' if on else 'off'}")
+    if values is None:
+        return (*first, "-", "-", "is not sent")
+    says = (f"{name} {_physical(frames, sent.frame, name, v)}" for name, v in values.items())
+    payload = frames.encode(sent.frame, values)
+    return (*first, f"{sent.every_s:g} s", payload.hex(" ").upper(), ", ".join(says))
+
+
+def _samples(found: FrameMap, frames: dbc.Dbc) -> Iterator[tuple[str, ...]]:
+    """Each signal that is read at a value that shows its scale and byte order."""
+    for path, at in found.signals():
+        frame, signal = at.split(".")
+        for value, means in _values(found, path):
+            payload = frames.sample(frame, signal, value)
+            if payload is not None:
+                said = f"{signal} {_physical(frames, frame, signal, value)}{means}"
+                yield frame, named(frames.id(frame)), payload.hex(" ").upper(), said
+
+
+def _values(found: FrameMap, path: tuple[str, ...]) -> Iterator[tuple[float, str]]:
+    """What a signal is shown with, and what that means."""
+    if path[0] == "state":
+        for code, (activity, side) in found.state.codes.meanings().items():
+            yield float(code), f": {side or 'station'}'s error" if side else f": {activity}"
+    elif path[0] == "errors" and path[1] in ("station", "robot"):
+        yield 1.0, f": {path[1]}'s error"
+    else:
+        yield _SAMPLES.get(path[0], 1.0), ""
+
+
+_SAMPLES: Final = {"volts": 25.8, "amps": 12.9, "receiver": 4711.0}
+
+
+def _physical(frames: dbc.Dbc, frame: str, signal: str, value: float) -> str:
+    return f"{value:g} {frames.unit(frame, signal)}".rstrip()

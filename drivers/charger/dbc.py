@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from bridges import regular_file
 from drivers import DriverError
 from drivers.profiles import texts
 
@@ -70,6 +71,21 @@ class Dbc:
         except (Error, OverflowError) as error:
             raise ValueError(f"{frame}: {' '.join(str(error).split())}") from None
 
+    def unit(self, frame: str, signal: str) -> str:
+        """A signal's unit, or ""."""
+        return str(self._messages[frame].get_signal_by_name(signal).unit or "")
+
+    def sample(self, frame: str, signal: str, value: float) -> bytes | None:
+        """A frame whose one signal says this and all others 0; None where it has no such frame."""
+        from cantools.database.errors import Error
+
+        message = self._messages[frame]
+        values = dict.fromkeys(self.signals(frame), 0.0) | {signal: value}
+        try:
+            return bytes(message.encode(values, scaling=True, strict=False))
+        except (Error, OverflowError, KeyError):
+            return None
+
 
 def path(name: str) -> Path:
     """The path of a DBC file: `name` if it is an absolute path, else a file of drivers/profiles/."""
@@ -92,8 +108,7 @@ def _understood(file: Path, text: bytes) -> Dbc:
 
 def _read(file: Path) -> bytes:
     try:
-        with file.open("rb") as opened:
-            text = opened.read(SIZE_MAX + 1)
+        text = regular_file.read(file, SIZE_MAX).content
     except OSError as error:
         raise ValueError(f"{file} cannot be read: {error.strerror}") from None
     if len(text) > SIZE_MAX:

@@ -11,7 +11,7 @@ states mean; an unlisted state is an error. A maker's state is never passed on a
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 
@@ -21,13 +21,14 @@ from bridges.charger.signals import (
     Activity,
     ChargerOutputs,
     ChargerSample,
+    FaultSide,
     Measured,
 )
 from bridges.core.fields import Timeout
 from drivers import json_fields
 from drivers.charger import rules
 from drivers.charger.rules import Errors, Rule, judged
-from drivers.charger.state_codes import CODE_MAX, Code, Codes
+from drivers.charger.state_codes import CODE_MAX, Code, Codes, first_side
 from drivers.driver_type import DriverType
 from drivers.hal import http
 from drivers.http_call import Call, Calls, send, told
@@ -37,6 +38,7 @@ from drivers.unsafe import unaccepted
 POWER: Final = "power"
 WORD_MAX: Final = 64
 Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
+TextMeans = Literal["none", "station", "robot"]
 
 
 class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -57,9 +59,11 @@ InRange = Flag
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The fields of the answer to `state_path`: names with dots between them.
 
-    `state`: the station's state; `codes` says what it means.
-    `error_text`: the station's own text for an error.
-    `receiver_id`: the id of the receiver that it sees; null or "" when it sees none.
+    `state`: what the station does; `codes` says what it means.
+    `error_text`: the station's own words for an error: any text there is one, whatever `state` says.
+    `error_texts`: text -> whose error it is, `station` or `robot`; or `none` for a text that is none
+    (`OK`). Of others `codes` says it, or nobody.
+    `receiver_id`: whose receiver it sees; null or "" for nobody's.
     `in_range`: whether the robot stands where it can be charged.
     `volts`: the voltage at the battery.
     `amps`: the current into the battery.
@@ -69,6 +73,7 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     state: Field = "state"
     error_text: Field = "error_msg"
+    error_texts: dict[Word, TextMeans] = msgspec.field(default_factory=dict)
     receiver_id: Field | None = None
     in_range: InRange | None = None
     volts: Number | None = None
@@ -160,6 +165,11 @@ def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
     return HttpCharger(settings, bus)
 
 
+def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """The station's own state, which no other charger can have."""
+    yield f"{settings.fields.state} of {settings.state_path}", ("state_path",)
+
+
 def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str, str]]:
     """Rows that `check` prints instead of a wiring table: (what, meaning)."""
     api, fields = http.base(bus_settings.api_base), settings.fields
@@ -174,10 +184,13 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
         clear = f"POST {api.url(settings.clear_error_path)}, {_how_often(settings)}"
         rows.append(("clear error", clear))
     for name in fields.__struct_fields__ if fields != Fields() else ():
-        if name == "state" and settings.codes is None:
+        place = getattr(fields, name)
+        if place is fields.error_texts or (name == "state" and settings.codes is None):
             continue
-        if place := getattr(fields, name):
+        if place:
             rows.append((f"field {name}", _place(place)))
+    for text, means in fields.error_texts.items():
+        rows.append((f"text {text}", "no error" if means == "none" else f"{means}'s error"))
     rows += [(f"word {word}", str(code)) for word, code in settings.state_words.items()]
     rows += rules.rows(settings.rules, settings.errors)
     if settings.codes:
@@ -239,6 +252,7 @@ class HttpCharger:
         self._settings = settings
         self._bus = bus
         self._activity = Activity.UNKNOWN
+        self._at_fault = False
         self._power: bool | None = None
         self._cleared = 0
         self._checked = 0
@@ -254,10 +268,16 @@ class HttpCharger:
         if self._settings.codes is not None:
             code = _code(answer, fields.state, words)
         found = judged(self._settings, lambda at: json_fields.needed(answer, at), code)
-        self._activity = found.activity
-        said = "; ".join(filter(None, (found.text, json_fields.text(answer, fields.error_text))))
+        said, text_side = _error(answer, fields)
+        shown = Activity.ERROR if said else found.activity
+        self._activity, self._at_fault = found.does, shown in AT_FAULT
         return ChargerSample(
-            found.activity, found.code, said, _measured(answer, fields), found.side
+            shown,
+            found.code,
+            "; ".join(filter(None, (found.text, said))),
+            _measured(answer, fields),
+            first_side((found.side, text_side)),
+            charges=shown is Activity.ERROR and found.does is Activity.CHARGING,
         )
 
     def write(self, outputs: ChargerOutputs) -> None:
@@ -290,7 +310,7 @@ class HttpCharger:
     def _stop_if_needed(self) -> None:
         given, self._power = self._power, None
         on = self._activity in (Activity.HANDSHAKE, Activity.CHARGING)
-        if on or (given is not False and self._activity in AT_FAULT):
+        if on or (given is not False and self._at_fault):
             send(self._bus, self._settings.stop, safe=True)
 
     def _start_if_needed(self) -> None:
@@ -312,6 +332,15 @@ def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> in
     if not 0 <= code <= CODE_MAX:
         raise json_fields.wrong(field, code, f"0 to {CODE_MAX}")
     return code
+
+
+def _error(answer: Mapping[str, Any], fields: Fields) -> tuple[str, FaultSide]:
+    """The station's words for its error, and whose they say that it is."""
+    said = json_fields.text(answer, fields.error_text)
+    means = fields.error_texts.get(said)
+    if means == "none":
+        return "", ""
+    return said, means or ""
 
 
 def _measured(answer: Mapping[str, Any], fields: Fields) -> Measured:
@@ -342,6 +371,7 @@ DRIVER = DriverType(
     buses=("http",),
     create=create,
     describe=describe,
+    claims=claims,
     warnings=warnings,
     unwired=lambda settings: (POWER,) if settings.start else (),
     fake="hal_fakes.http_charger",

@@ -211,6 +211,7 @@ def decode(found: ChargerMap, values: Mapping[str, float]) -> ChargerSample:
             **{name: values[name] for name in MEASURED if name in values},
         ),
         said.side,
+        said.charges,
     )
 
 

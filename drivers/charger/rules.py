@@ -12,7 +12,7 @@ import msgspec
 
 from bridges.charger.signals import Activity, FaultSide
 from bridges.core.fields import Name
-from drivers.charger.state_codes import ROBOT_ERROR, Codes
+from drivers.charger.state_codes import ROBOT_ERROR, STATION_ERROR, Codes, first_side
 from drivers.json_fields import Value, same
 
 Problems = Iterator[tuple[tuple[str, ...], str]]
@@ -24,6 +24,7 @@ Found = list[tuple[FaultSide, str]]
 
 MEANINGS: Final[Mapping[str, Meaning]] = {
     **{str(a): (a, "") for a in Activity if a is not Activity.UNKNOWN},
+    "station_error": STATION_ERROR,
     "robot_error": ROBOT_ERROR,
 }
 UNKNOWN: Final[Meaning] = (Activity.UNKNOWN, "")
@@ -204,12 +205,21 @@ def judge(rules: list[Rule], read: Read) -> Rule | None:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """The station's activity, the side of its error, the code to show, and the errors' text."""
+    """What the station does, whose fault an error is, its code for texts, and what is wrong.
+
+    `does`: what it does beneath an error.
+    """
 
     activity: Activity
     side: FaultSide
     code: int | str
     text: str
+    does: Activity
+
+    @property
+    def charges(self) -> bool:
+        """It is at fault, and charges all the same."""
+        return self.activity is Activity.ERROR and self.does is Activity.CHARGING
 
 
 def judged(station: "Station", read: Read, code: int | str | None) -> Judged:
@@ -228,9 +238,9 @@ def judged(station: "Station", read: Read, code: int | str | None) -> Judged:
     wrong = station.errors.found(read)
     if rule is not None and rule.text:
         wrong = [(side, rule.text), *wrong]
-    if wrong:
-        activity, side = Activity.ERROR, wrong[0][0]
-    return Judged(activity, side, "" if code is None else code, said(wrong))
+    shown = Activity.ERROR if wrong else activity
+    side = first_side([side, *(whose for whose, _ in wrong)])
+    return Judged(shown, side, "" if code is None else code, said(wrong), activity)
 
 
 class Station(Protocol):

@@ -3,7 +3,7 @@
 An unlisted number is an error and is shown. A maker's number is never passed on as an RMF state.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Annotated
 
 import msgspec
@@ -12,6 +12,7 @@ from bridges.charger.signals import Activity, FaultSide
 
 CODE_MAX = 65535
 Code = Annotated[int, msgspec.Meta(ge=0, le=CODE_MAX)]
+STATION_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "station")
 ROBOT_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "robot")
 
 
@@ -23,8 +24,9 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     `handshake`: a robot is being recognised, no current yet.
     `stopping`: current still flows, ramping down.
     `released`: disconnected, and not ready for another robot yet.
-    `error`: out of service; manual operation counts as this too.
-    `robot_error`: an error on the robot's side, while the station itself has none.
+    `error`: out of service, manual operation too.
+    `station_error`: likewise, where the maker says that it is the station's own.
+    `robot_error`: an error of the robot's side: the station itself is well.
     """
 
     idle: Annotated[list[Code], msgspec.Meta(min_length=1)]
@@ -33,6 +35,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     stopping: list[Code] = []
     released: list[Code] = []
     error: list[Code] = []
+    station_error: list[Code] = []
     robot_error: list[Code] = []
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
@@ -49,10 +52,12 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         made: dict[int | str, tuple[Activity, FaultSide]] = {
             code: (activity, "") for activity, codes in self.lists().items() for code in codes
         }
-        return made | dict.fromkeys(self.robot_error, ROBOT_ERROR)
+        for side, codes in self._sides().items():
+            made |= dict.fromkeys(codes, (Activity.ERROR, side))
+        return made
 
     def lists(self) -> Mapping[Activity, list[Code]]:
-        """Activity -> its state numbers, without `robot_error`."""
+        """Each meaning with its states, the errors of a known side apart."""
         return {
             Activity.IDLE: self.idle,
             Activity.HANDSHAKE: self.handshake,
@@ -68,6 +73,18 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             (f"state {meaning}", ", ".join(map(str, codes)) or "no code")
             for meaning, codes in self.lists().items()
         ]
-        if self.robot_error:
-            rows.append(("robot's error", ", ".join(map(str, self.robot_error))))
+        rows += [
+            (f"{side}'s error", ", ".join(map(str, codes)))
+            for side, codes in self._sides().items()
+            if codes
+        ]
         return [*rows, ("any other state", "error, with its number")]
+
+    def _sides(self) -> Mapping[FaultSide, list[Code]]:
+        return {"station": self.station_error, "robot": self.robot_error}
+
+
+def first_side(sides: Collection[FaultSide]) -> FaultSide:
+    """Whose an error is that several places tell of: the station's if one says so, else the robot's."""
+    known: tuple[FaultSide, ...] = ("station", "robot")
+    return next((side for side in known if side in sides), "")

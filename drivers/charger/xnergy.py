@@ -89,11 +89,12 @@ def activity(code: int) -> Activity:
 def sample(words: Words, settled: bool = True) -> ChargerSample:
     """Decode one reading; never raises. `words` has at least state, error_low and error_high.
 
-    `settled`: the range result belongs to the last range check (see the function `settled`).
+    An error is one whatever the state says.
+    `settled`: the range check's result is that of the last check (`settled` below).
     """
-    found = errors(error_number(words))
+    found, does = errors(error_number(words)), activity(words["state"])
     return ChargerSample(
-        activity(words["state"]),
+        Activity.ERROR if found else does,
         words["state"],
         _text(words, found),
         Measured(
@@ -102,6 +103,7 @@ def sample(words: Words, settled: bool = True) -> ChargerSample:
             amps=_units(words.get("amps")),
         ),
         side=found[0][0] if found else "",
+        charges=bool(found) and does is Activity.CHARGING,
     )
 
 

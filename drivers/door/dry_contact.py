@@ -13,6 +13,7 @@ from typing import Final
 
 import msgspec
 
+from bridges.core.table import Table
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
 from drivers.door.closing import CLOSING
@@ -136,6 +137,17 @@ def debounce(settings: Settings) -> Mapping[str, float]:
     return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
 
 
+def tables(settings: Settings) -> Iterator[Table]:
+    """How the relay is driven."""
+    pulse = settings.pulse
+    driven = "on while RMF holds the door"
+    if pulse is not None:
+        by = "by the module" if settings.outputs.hold_open.flash else "by the daemon"
+        driven = f"{pulse.on_s:g} s every {pulse.every_s:g} s while RMF holds the door, timed {by}"
+    rows = (("hold_open", driven),)
+    yield Table("outputs", ("output", "how long"), rows)
+
+
 def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
     """Valid settings to review before the door goes into service: (path, text)."""
     for wire in wires(settings):
@@ -207,6 +219,7 @@ DRIVER = DriverType(
     create=create,
     wires=wires,
     debounce=debounce,
+    tables=tables,
     describe=lambda settings, bus: (CLOSING,),
     warnings=warnings,
 )

@@ -8,18 +8,30 @@ bus at most one timeout per backoff.
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
 from drivers.hal.points import HalError, Wire
 
-__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Remark"]
+__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Remark", "Where"]
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
 Remark = tuple[tuple[str, ...], str]
 """A remark on a setting: its path below the struct, and the text."""
+
+
+class Where(NamedTuple):
+    """What a bus is in the building, by which two files are seen to mean the same.
+
+    `text`: as a person says it. `local`: it is this machine's own, as a serial port is. `clients`: how
+    many daemons it takes at once; None where that depends on its make.
+    """
+
+    text: str
+    local: bool
+    clients: Literal["one", "many"] | None = "many"
 
 
 class Bus:
@@ -49,19 +61,22 @@ class BusType(Generic[Settings]):
 
     `settings`: the struct below the bus's name in the YAML, with `scan_s` (how often it is read).
     `open_bus(settings)`: raises HalError.
-    `warnings(settings)`: (path, text) of valid settings that deserve a second look.
-    `fake`: the name of the module that plays its far side (`hal_fakes/fake.py`); without one the bus
-    cannot be simulated. `fake_inside`: the fake must run in the daemon's process, as for pins.
+    `where(settings)`: what it is in the building; None where files never share it.
+    `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
+    far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it
+    cannot leave the daemon's process, as pins cannot.
 
     A bus with points also has
     `canonical(point)`: the one spelling of a point; ValueError says what to write instead;
     `describe(point)`: every spelling, for the table that an electrician reads;
-    `wire_problems(wire)`: what is wrong with this wire on this bus;
-    `wire_warnings(wire)`: what is valid about it but deserves a second look.
+    `wire_problems(wire)`: what cannot be right about this wire on this bus;
+    `wire_warnings(wire)`: what is legal about it but worth a look;
+    `unreachable(settings, point)`: why no such bus reaches this point, which is in its one spelling.
     """
 
     settings: type[Settings]
     open_bus: Callable[[Settings], Bus]
+    where: Callable[[Settings], Where | None] = lambda settings: None
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
     fake: str = ""
     fake_inside: bool = False
@@ -69,6 +84,7 @@ class BusType(Generic[Settings]):
     describe: Callable[[str], str] = str
     wire_problems: Callable[[Wire], Iterable[str]] = lambda wire: ()
     wire_warnings: Callable[[Wire], Iterable[str]] = lambda wire: ()
+    unreachable: Callable[[Settings, str], str | None] = lambda settings, point: None
 
 
 AnyBus: TypeAlias = BusType[Any]

@@ -6,6 +6,7 @@ name lookup, the connection, each send and each receive.
 """
 
 import ipaddress
+import os
 import queue
 import socket
 import threading
@@ -90,15 +91,24 @@ class Dialler:
         self._port = port
         self._resolve = resolve
         self._lookup: threading.Thread | None = None
+        self._last: socket.socket | None = None
 
     def dial(self) -> socket.socket:
         """A new connection; the addresses share the time that is left. Raises OSError."""
         self.dialled += 1
         try:
-            return self._first_of(self._addresses())
+            self._last = self._first_of(self._addresses())
+            return self._last
         except OSError as error:
             self.failure = error
             raise
+
+    def hang_up(self) -> None:
+        """End the last connection, whoever still holds a file of it."""
+        last, self._last = self._last, None
+        descriptor = -1 if last is None else last.detach()
+        if descriptor != -1:
+            os.close(descriptor)
 
     def _first_of(self, addresses: list[Any]) -> socket.socket:
         failure = OSError("the name has no address")

@@ -1,12 +1,11 @@
 """HTTP: one controller that answers requests, through requests; with TLS where its address says https.
 
 Every call has one deadline from the lookup of the name to the last byte of the body
-(`drivers/hal/deadline.py`). The body has a size limit; proxies, redirects and compression are off. If
-the server has closed a kept connection, a reading is repeated once on a new one. A command, with any
-method, is sent once, on a new connection, and never repeated.
+(`drivers/hal/deadline.py`). The body is capped; proxies, redirects and compression are off. Each call
+has a connection of its own: replies have no numbers in HTTP/1.1, so on a kept one a second reply to the
+last request, or a late one, would be taken for the next one's. A call is sent once, whatever happens.
 """
 
-import http.client
 import os
 import socket
 import time
@@ -18,7 +17,7 @@ import msgspec
 
 from bridges import secret_file
 from bridges.core.fields import AbsolutePath, Name, Period
-from drivers.hal import Bus, BusType, HalError
+from drivers.hal import Bus, BusType, HalError, Where
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
@@ -30,7 +29,12 @@ if TYPE_CHECKING:
     from requests.adapters import HTTPAdapter
 
 BODY_MAX = 64 * 1024
-HEADERS = {"Accept": "application/json", "Accept-Encoding": "identity", "User-Agent": "rmf-bridges"}
+HEADERS = {
+    "Accept": "application/json",
+    "Accept-Encoding": "identity",
+    "Connection": "close",
+    "User-Agent": "rmf-bridges",
+}
 JSON = {"Content-Type": "application/json"}
 
 Method = Literal["POST", "PUT", "GET"]
@@ -101,6 +105,11 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield ("token_file",), text
 
 
+def where(settings: Settings) -> Where:
+    """The controller's address."""
+    return Where(base(settings.api_base).url(""), local=False)
+
+
 def open_bus(settings: Settings) -> "HttpBus":
     """The bus for this controller; it sends nothing yet."""
     return HttpBus(settings)
@@ -128,7 +137,7 @@ class HttpBus(Bus):
         """GET `api_base` + `path`, which must answer 200 with one JSON object."""
         url = self._base.url(path)
         with self._attempt(self._backoff):
-            return json_object(url, *self._get(url))
+            return json_object(url, *self._call("GET", url, reads=True))
 
     def send(
         self, path: str, method: Method = "POST", body: str | None = None, safe: bool = False
@@ -140,7 +149,6 @@ class HttpBus(Bus):
         """
         url = self._base.url(path)
         with self._attempt(self._safe_backoff if safe else self._backoff):
-            self._adapter.close()  # a kept connection might be dead, and there is no second try
             self._call(method, url, body)
 
     def on_edge(self, wake: Callable[[], None]) -> None:
@@ -152,8 +160,7 @@ class HttpBus(Bus):
         self._safe_backoff.insist()
 
     def close(self) -> None:
-        """Close the connection."""
-        self._adapter.close()
+        """Nothing is kept between calls."""
 
     @contextmanager
     def _attempt(self, backoff: Backoff) -> Iterator[None]:
@@ -163,29 +170,19 @@ class HttpBus(Bus):
         try:
             yield
         except HalError as error:
-            self._adapter.close()
             backoff.failed(str(error))
             raise
         finally:
+            self._adapter.close()
+            self._dialler.hang_up()
             self.calls += 1
         backoff.mended()
-
-    def _get(self, url: str) -> tuple[str, bytes]:
-        dialled = self._dialler.dialled
-        try:
-            return self._call("GET", url, reads=True)
-        except _HungUp:
-            if self._dialler.dialled > dialled:
-                raise
-        self._adapter.close()  # the kept connection was dead: try a new one in the time left
-        return self._call("GET", url, reads=True)
 
     def _call(
         self, method: str, url: str, sent: str | None = None, reads: bool = False
     ) -> tuple[str, bytes]:
         """Content type and body of a good answer; a command's answer body is not read."""
         import requests
-        import urllib3
 
         self._dialler.failure = None
         verify = self._settings.ca_file or True
@@ -197,12 +194,9 @@ class HttpBus(Bus):
                 if not reads:
                     return "", b""
                 body = _capped(answer.raw)
-        except (
-            requests.RequestException,
-            urllib3.exceptions.HTTPError,
-            http.client.HTTPException,
-            OSError,
-        ) as error:
+        except HalError:
+            raise
+        except Exception as error:  # of a server's bytes the libraries make any, ValueError too
             raise self._explained(url, error) from error
         if len(body) > BODY_MAX:
             raise HalError(
@@ -240,11 +234,7 @@ class HttpBus(Bus):
             return HalError(f"{where} cannot be reached: {failure.strerror or failure}")
         if reason := _tls_failure(error, self._settings.ca_file):
             return HalError(f"TLS with {where} fails: {reason}: check ca_file and api_base")
-        return _HungUp(f"{url}: no whole HTTP answer ({_cause(error)}): is it an HTTP server?")
-
-
-class _HungUp(HalError):
-    """A connection was there and ended without an answer."""
+        return HalError(f"{url}: no whole HTTP answer ({_cause(error)}): is it an HTTP server?")
 
 
 def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
@@ -324,5 +314,6 @@ BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
     fake="hal_fakes.http",
+    where=where,
     warnings=warnings,
 )

@@ -12,6 +12,7 @@ from drivers.hal.points import Points, PointsBus, Wire
 from drivers.lift import checks as lift_checks
 from drivers.lift import codes
 from drivers.lift import table as lift_table
+from drivers.lift import tables as lift_tables
 from drivers.lift.wiring import Inputs, LiftWiring
 
 DOOR = {
@@ -181,6 +182,7 @@ DRIVER = DriverType(
     create=create,
     wires=wires,
     debounce=debounce,
+    tables=lift_tables.tables,
     warnings=warnings,
     notes=notes,
 )

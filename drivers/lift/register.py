@@ -101,7 +101,10 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
         yield name, f"{at(settings.unit, part.at)}{_meaning(part)}"
     commands = settings.map.commands
     for signal, _, command in commands.singles():
-        yield signal, f"{at(settings.unit, command.at)}: {command.on} on, {command.off} off"
+        yield (
+            signal,
+            f"{at(settings.unit, command.at)}: {command.ask} asks, {command.release} releases",
+        )
     if commands.call:
         codes = ", ".join(f"{number} {level}" for number, level in commands.call.codes.items())
         yield "call", f"{at(settings.unit, commands.call.at)}: {codes}, {commands.call.none} none"

@@ -154,24 +154,24 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One command to the lift. Off is its safe value.
+    """One thing that is asked of the lift.
 
-    `at`: `coil N` or `holding register N`. Commands may share a register: their values are combined
-    with OR.
-    `on`: the value that switches it on.
-    `off`: the value that switches it off.
+    `at`: `coil N` or `holding register N`. Commands may share a register: their values are joined,
+    bit by bit.
+    `ask`: the value that asks for it.
+    `release`: the value that does not; its safe value.
     """
 
     at: Place
-    on: Word = 1
-    off: Word = 0
+    ask: Word = 1
+    release: Word = 0
 
     def problems(self) -> Problems:
         """A place that cannot be written; values that it cannot hold."""
         yield from _misplaced(self.at, WRITABLE)
-        if self.on == self.off:
-            yield ("off",), "is the value of on"
-        for key in ("on", "off"):
+        if self.ask == self.release:
+            yield ("release",), "is the value of ask"
+        for key in ("ask", "release"):
             if getattr(self, key) > 1 and misplaced(self.at, ("coil",)) is None:
                 yield (key,), "a coil is 0 or 1"
 
@@ -225,7 +225,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def places(self) -> Iterator[tuple[tuple[str, ...], str, int]]:
         """Each command's path below this section, its place, and the bits that it uses there."""
         for _, path, command in self.singles():
-            yield path, command.at, command.on | command.off
+            yield path, command.at, command.ask | command.release
         if self.call:
             bits = functools.reduce(operator.or_, self.call.codes, self.call.none)
             yield ("call",), self.call.at, bits
@@ -234,7 +234,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """Place -> value, with these signals asserted and a call to this landing (None: no call)."""
         found: dict[str, int] = {}
         for signal, _, command in self.singles():
-            value = command.on if signal in asserted else command.off
+            value = command.ask if signal in asserted else command.release
             found[command.at] = found.get(command.at, 0) | value
         if self.call:
             codes = {level: number for number, level in self.call.codes.items()}
@@ -247,10 +247,15 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         if self.calls and self.call:
             yield ("calls",), "calls and call are two ways of calling: keep one"
         taken: dict[str, int] = {}
-        for path, at, bits in self.places():
-            if at in taken and (not bits or bits & taken[at]):
-                yield (*path, "at"), f"another command has these bits of {at} already"
-            taken[at] = taken.get(at, 0) | bits
+        values = [(p, c.at, {"ask": c.ask, "release": c.release}) for _, p, c in self.singles()]
+        values += [
+            (path, at, {"at": bits}) for path, at, bits in self.places() if path == ("call",)
+        ]
+        for path, at, words in values:
+            for key, bits in words.items():
+                if bits & taken.get(at, 0):
+                    yield (*path, key), f"another command has these bits of {at} already"
+            taken[at] = functools.reduce(operator.or_, words.values(), taken.get(at, 0))
 
 
 class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -96,7 +96,7 @@ class RegisterLift:
         commands = self._map.commands
         for signal, _, command in commands.singles():
             if at(self.unit, command.at) == point:
-                yield signal, value & (command.on | command.off) == command.on
+                yield signal, value & (command.ask | command.release) == command.ask
         if commands.call and at(self.unit, commands.call.at) == point:
             [bits] = [bits for path, _, bits in commands.places() if path == ("call",)]
             for number, level in commands.call.codes.items():

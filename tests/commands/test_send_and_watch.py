@@ -198,6 +198,22 @@ def test_a_command_line_that_contradicts_itself_exits_2(line: str) -> None:
     assert left.value.code == 2
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        "",
+        " --localhost",
+        " --direct --localhost",
+        " --transport auto",
+        " --config site.yaml --domain-id 7 --transport zenoh --localhost",
+    ],
+)
+def test_a_proposed_command_names_the_graph_as_the_typed_one_did(options: str) -> None:
+    request = send.request_of(parsed(f"lift Lift1 L3 --session me{options}"))
+    proposed = request.line.other("send", "lift", "Lift1", "--end")
+    assert proposed == f"rmf-bridge send lift Lift1 --end{options}"
+
+
 def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
     first, second = (send.request_of(parsed("charger a --robot f/r")) for _ in range(2))
     assert isinstance(first, Charge)

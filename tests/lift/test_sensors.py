@@ -31,6 +31,7 @@ def test_an_open_door_is_offered_when_every_input_confirms_it() -> None:
     ("inputs", "state", "faults"),
     [
         ({"door": Door.BOTH}, "AGV, moving at L1", ["DOOR_CONTACTS_CONTRADICT"]),
+        ({"door": Door.UNKNOWN}, "AGV, moving at L1", ["DOOR_CODE_ILLEGAL"]),
         ({"door": Door.BETWEEN}, "AGV, moving at L1", []),
         ({"door": Door.NOT_OPEN}, "AGV, moving at L1", []),
         ({"level": None}, "AGV, moving at ?", []),

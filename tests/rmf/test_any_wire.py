@@ -3,13 +3,11 @@
 import os
 import threading
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE
-from bridges.rmf.transport import Publisher, TransportError
 from tests.rmf import peer
 from tests.rmf.conftest import Join
 from tests.waiting import wait_until
@@ -22,23 +20,6 @@ def test_messages_arrive_on_the_thread_of_the_transport(join_any_wire: Join) -> 
     publisher = join_any_wire("speaker").publisher(LIFT_STATES)
     wait_until(lambda: threads or peer.sent(publisher, d.LiftState()), "a message arrives")
     assert {name.rpartition("-")[0] for name in threads} == {"listener"}
-
-
-def test_a_reader_thread_that_has_died_shows_at_the_next_publish(
-    join_any_wire: Join, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    died: list[Any] = []
-    monkeypatch.setattr(threading, "excepthook", died.append)
-
-    def broken(message: d.LiftState) -> None:
-        raise ArithmeticError
-
-    node = join_any_wire("broken")
-    node.subscribe(LIFT_STATES, broken)
-    publisher = node.publisher(LIFT_STATES)
-    wait_until(lambda: died or not _refuses(publisher), "the first message is sent")
-    wait_until(lambda: died, "the thread dies")
-    wait_until(lambda: _refuses(publisher), "publishing is refused")
 
 
 def test_nodes_that_come_and_go_leave_no_thread_no_file_and_no_complaint_behind(
@@ -71,14 +52,6 @@ def test_a_peer_whose_durability_does_not_fit_is_named_once(
         'misfit topic=fire_alarm_trigger reason="a subscription is not served:'
         ' its durability does not fit ours"',
     ]
-
-
-def _refuses(publisher: Publisher[d.LiftState]) -> bool:
-    try:
-        publisher.publish(d.LiftState())
-    except TransportError:
-        return True
-    return False
 
 
 def _threads_and_files() -> tuple[int, int]:

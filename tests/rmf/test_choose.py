@@ -188,8 +188,8 @@ def test_the_yamls_zenoh_section_reaches_the_transport(tmp_path: Path) -> None:
     [
         ("{}", []),
         ("{connect: [tcp/10.0.0.5:7447, 'tls/[::1]:7447'], tls: {ca: /ca.pem}}", []),
-        ("{connect: []}", ["'connect' has 0 entries: at least 1 are wanted"]),
-        ("{connect: [10.0.0.5]}", ["item 1 of 'connect' is '10.0.0.5': protocol/host:port"]),
+        ("{connect: []}", ["'connect' has 0 entries: at least 1 are needed"]),
+        ("{connect: [10.0.0.5]}", ["item 1 of 'connect' is '10.0.0.5': write protocol/host:port"]),
         ("{password: x}", ["unknown key 'password'"]),
         ("{user: lift}", ["user and password_file go together: give both, or none"]),
         ("{tls: {}}", ["no endpoint is encrypted: write connect: [tls/host:port]"]),

@@ -241,7 +241,7 @@ def test_a_file_that_is_not_a_map_is_refused_at_the_place_that_is_wrong(
     assert capsys.readouterr() == (
         "",
         "device.yaml:1:1: this is not a building map or navigation graph: it has no 'levels:'\n"
-        "device.yaml: 1 problem\n",
+        "1 error\n",
     )
 
 
@@ -270,7 +270,7 @@ def test_every_odd_form_is_named_with_its_place() -> None:
         ("levels: !!python/name:os.system x", "map.yaml:1:9: a tag ('!...') is not acce"),
         (
             b" " * (MAP.max_bytes + 1),
-            "map.yaml:1:1: longer than 4096 KiB: this is not a building map",
+            "map.yaml:1:1: longer than 1024 KiB: this is not a building map",
         ),
     ],
 )
@@ -282,5 +282,5 @@ def test_values_that_multiply_by_aliases_are_not_written_out() -> None:
     lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 8)]
     assert problems_of("\n".join(lines)) == [
-        f"map.yaml:6:5: more than {MAP.max_values} values, counting repeated aliases"
+        f"map.yaml:5:5: more than {MAP.max_values} values, counting repeated aliases"
     ]

@@ -1,5 +1,7 @@
 """`rmf-bridge check`: problems or the wiring table, as a person sees them."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -17,6 +19,20 @@ bus header (pins)
   north   closed  A1 = 1A  in         low     none  0.01 s    -        floats
   north   hold    A2 = 2A  out        low     -     -         high     not asserted
 
+north: settings
+  setting         value          not the default
+  lanes           in, out
+  codes           1: in, 2: out
+  limits.open_s   3 s            default: 5 s
+  limits.close_s  -
+  limits.tries    2              default: 3
+  limits.even     2
+  limits.gain     1
+  limits.loud     no
+  limits.baud     9600
+  limits.label    0
+
+OK
 """
 
 
@@ -49,8 +65,8 @@ def test_each_bus_has_its_table(capsys: pytest.CaptureFixture[str]) -> None:
     Path("gate.yaml").write_text(text)
     assert check("gate.yaml") == 0
     out = capsys.readouterr().out
-    assert out[out.index("bus box") :] == (
-        "bus box (module)\n"
+    assert out[out.index("bus box") : out.index("north: settings")] == (
+        "bus box (module): host h, port 502\n"
         "  device  signal  point   direction  active  pull  debounce  at rest  wire broken\n"
         "  走廊    hold    coil 7  out        high    -     -         low      not asserted\n"
         "\n"
@@ -63,12 +79,22 @@ def test_a_driver_without_wires_says_what_it_talks_to(capsys: pytest.CaptureFixt
     assert capsys.readouterr() == (
         "gate.yaml: gate, driver web\n"
         "\n"
-        "bus server (web)\n"
-        "  north  polls     http://192.168.1.7/side\n"
-        "  north  identity  not verified\n"
-        "  south  polls     http://192.168.1.7/gate\n"
-        "  south  identity  not verified\n"
-        "\n",
+        "bus server (web): host 192.168.1.7\n"
+        "  device  what      meaning\n"
+        "  north   polls     http://192.168.1.7/side\n"
+        "  north   identity  not verified\n"
+        "  south   polls     http://192.168.1.7/gate\n"
+        "  south   identity  not verified\n"
+        "\n"
+        "north: settings\n"
+        "  setting  value  not the default\n"
+        "  page     side   default: gate\n"
+        "\n"
+        "south: settings\n"
+        "  setting  value\n"
+        "  page     gate\n"
+        "\n"
+        "OK\n",
         "",
     )
 
@@ -81,7 +107,7 @@ def test_problems_go_to_stderr_with_their_number(capsys: pytest.CaptureFixture[s
         "gate.yaml:15:32: 'tries' is 0: write a whole number of at least 1\n"
         "gate.yaml:15:35: unknown key 'gian': did you mean 'gain'? known here: "
         "open_s, close_s, tries, even, gain, loud, baud, label\n"
-        "gate.yaml: 2 problems\n",
+        "2 errors\n",
     )
 
 
@@ -90,7 +116,7 @@ def test_one_wrong_file_among_several_is_wrong(capsys: pytest.CaptureFixture[str
     assert check("no.yaml", "gate.yaml") == 78
     out, err = capsys.readouterr()
     assert out.startswith("gate.yaml: gate, driver contact\n")
-    assert err == ("no.yaml:1:1: cannot be read: No such file or directory\nno.yaml: 1 problem\n")
+    assert err == ("no.yaml:1:1: cannot be read: No such file or directory\n1 error\n")
 
 
 def test_warnings_do_not_make_a_file_wrong(capsys: pytest.CaptureFixture[str]) -> None:
@@ -99,11 +125,25 @@ def test_warnings_do_not_make_a_file_wrong(capsys: pytest.CaptureFixture[str]) -
     assert check("gate.yaml") == 0
     out, err = capsys.readouterr()
     assert out.startswith("gate.yaml: gate, driver contact\n")
+    assert out.endswith("\nOK, 2 warnings\n")
     assert err == (
         "gate.yaml:15:21: warning: 'north': unsafe wiring of 'hold' is accepted: "
         "the door is light\n"
         "gate.yaml:16:31: warning: 'north': it will be loud\n"
     )
+
+
+def test_check_loads_no_library_of_a_bus_that_is_not_asked() -> None:
+    lift = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
+    libraries = (
+        "cantools can canopen pymodbus serial requests gpiozero cyclonedds zenoh rclpy jinja2"
+    )
+    program = (
+        "import sys; from bridges.cli import main; main(['check', '-q', sys.argv[1]]);"
+        f"print(sorted(set('{libraries}'.split()) & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program, lift], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("[]\n", "")
 
 
 def test_quiet_prints_problems_only(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,5 +1,7 @@
 """Files that are no device YAML at all: one clear problem each, at the place."""
 
+import os
+import socket
 from pathlib import Path
 
 import pytest
@@ -20,6 +22,16 @@ def test_a_file_that_is_not_there_is_one_problem(tmp_path: Path) -> None:
 
 def test_a_folder_is_one_problem(tmp_path: Path) -> None:
     assert why_not(tmp_path) == ["1:1: cannot be read: Is a directory"]
+
+
+def test_a_pipe_a_device_and_a_socket_are_one_problem_and_no_wait(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    wrong = "1:1: cannot be read: it is no file but a pipe, a socket or a device"
+    assert why_not(tmp_path / "pipe") == [wrong]
+    assert why_not(Path("/dev/zero")) == [wrong]
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(tmp_path / "socket"))
+        assert why_not(tmp_path / "socket") == ["1:1: cannot be read: No such device or address"]
 
 
 def test_a_name_that_no_file_can_have_is_one_problem() -> None:
@@ -75,10 +87,7 @@ SYNTAX = {
     "kind: gate\n---\nkind: gate\n": (
         "2:1: a second document ('---') starts here: a file describes one daemon, so split it"
     ),
-    "kind: [a, b\nc: d\n": (
-        "2:2: not YAML: expected ',' or ']', but got ':' (while parsing a flow sequence, "
-        "from line 1)"
-    ),
+    "kind: [a, b\nc: d\n": ("2:2: a ',' is missing before this, or the '[' of line 1 is open"),
     "kind: gate\n- a\n": (
         "2:1: not YAML: expected <block end>, but found '-' (while parsing a block mapping, "
         "from line 1)"

@@ -54,6 +54,14 @@ REFUSED = {
         door(rmf="{topics: {dor_states: x}}"),
         "3:16: unknown topic 'dor_states': did you mean 'door_states'? known here: ",
     ),
+    "a unit that is everybody": (
+        door(LINE).replace("unit 1 coil", "unit 0 coil"),
+        "12:26: unit 0 is everybody at once, and nobody answers: units on a serial line are 1 to 247",
+    ),
+    "a unit that only TCP has": (
+        door(LINE).replace("unit 1 coil", "unit 255 coil"),
+        "12:26: unit 255 is for Modbus TCP: units on a serial line are 1 to 247",
+    ),
     "a rate that no unit has": (
         door(LINE.replace("9600", "9800")),
         "5:72: 9800 is no rate that units have: 300, 600, 1200, 2400, 4800, 9600, ",
@@ -81,6 +89,39 @@ WARNED = {
         " write 7.2",
     ),
 }
+
+
+HEADER = """\
+kind: door
+driver: dry_contact
+buses: {header: {type: gpio}}
+doors:
+  ward:
+    inputs:
+      opened: {point: BCM4, active: high, pull: down}
+      closed: {point: PIN, active: low, pull: up}
+    outputs:
+      hold_open: {point: BCM18, active: high}
+"""
+OFF = "see that it is switched off in config.txt, or use another pin"
+PINS = {
+    "BCM2": "BCM2 is for I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
+    "J8:5": "BCM3 is for I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
+    "BCM0": "BCM0 is for a HAT's EEPROM, which the firmware reads at boot",
+    "BCM14": "BCM14 is for the serial console, which sends and switches it at boot (enable_uart=1)",
+    "BCM15": "BCM15 is for the serial console (enable_uart=1)",
+}
+
+
+@pytest.mark.parametrize("pin", PINS)
+def test_a_pin_that_the_firmware_uses_is_warned_of_by_name(file: Path, pin: str) -> None:
+    assert warnings_of(file, HEADER.replace("PIN", f'"{pin}"')) == [
+        f"8:7: warning: 'ward': 'closed': {PINS[pin]}; {OFF}"
+    ]
+
+
+def test_a_pin_that_is_nobodys_is_not(file: Path) -> None:
+    assert warnings_of(file, HEADER.replace("PIN", "BCM5")) == []
 
 
 @pytest.mark.parametrize("what", WARNED)

@@ -56,6 +56,14 @@ def test_the_same_name_in_quotes_is_that_name(file: Path, text: str) -> None:
         assert config.devices["north"].lanes == ["in", "out", text]
 
 
+@pytest.mark.parametrize("begin", ["", "-", "0x", "0o", "0b", "0", "1e", "."])
+def test_thousands_of_digits_are_a_problem_at_their_place(file: Path, begin: str) -> None:
+    text = begin + "1" * 9000
+    (problem,) = problems_of(file, changed("[in, out]", f"[in, out, {text}]"))
+    assert problem.startswith("8:22: item 3 of 'lanes' is written ")
+    assert len(problem) < 300
+
+
 @pytest.mark.parametrize("name", ["L1", "B1", "8F_r", "nO", "1.2.3", "-", "L-1", "走廊", "a b"])
 def test_an_ordinary_name_needs_no_quotes(file: Path, name: str) -> None:
     config = config_of(file, changed("[in, out]", f"[in, out, {name}]"))
@@ -101,8 +109,8 @@ NO_SECONDS = {
     "-1": f"is -1: {SECONDS}",
     "60.01": f"is 60.01: {SECONDS}",
     "1e3": f"is 1e3: {SECONDS}",
-    "5 s": f"is the text '5 s': {SECONDS}",
-    "0.2s": f"is the text '0.2s': {SECONDS}",
+    "5 s": f"is written 5 s: write the number alone, {SECONDS[6:]}",
+    "0.2s": f"is written 0.2s: write the number alone, {SECONDS[6:]}",
     '"5"': f'is the text "5": {SECONDS}, without quotes',
     "fast": f"is the text 'fast': {SECONDS}",
     "yes": f"is true (yes): {SECONDS}",

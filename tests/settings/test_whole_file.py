@@ -57,7 +57,7 @@ if the text is meant, write "~" in quotes
 15:52: 'debounce_s' is 20: write a number from 0 to 10 s
 16:7: the key 'closed' is already on line 15: delete one of the two
 17:22: 1A (A1) is used by north inputs.closed on line 15: north inputs.other needs a point of its own
-17:52: 'debounce_s' is the text '20 ms': write a number from 0 to 10 s
+17:52: 'debounce_s' is written 20 ms: write the number alone, a number from 0 to 10 s
 18:7: 'last': pull is missing
 20:7: 'hold' needs 'active': high or low
 20:21: A1 is used by north inputs.closed on line 15: north outputs.hold needs a point of its own
@@ -82,7 +82,7 @@ write a whole number from 0 to 15 plainly
 27:3: 'west' needs 'bus': header, spare or box
 27:21: 'inputs' is a list: write a mapping (key: value)
 27:33: unknown key 'acept_unsafe': did you mean 'accept_unsafe'? known here: \
-bus, accept_unsafe, lanes, inputs, outputs, bits, codes, limits
+bus, driver, accept_unsafe, lanes, inputs, outputs, bits, codes, limits
 28:3: this name is written no, which YAML may read as false: \
 if the text is meant, write "no" in quotes
 28:7: 'no' is the number 3: write a mapping (key: value)

@@ -13,7 +13,7 @@ Only link.py and sdo.py import a library, and they are imported when a bus or a 
 from drivers.hal import BusType
 from drivers.hal.can.bus import CanBus
 from drivers.hal.can.frames import EXTENDED, Frame, Wanted, named
-from drivers.hal.can.settings import Settings, Slcan, describe, warnings
+from drivers.hal.can.settings import Settings, Slcan, describe, warnings, where
 
 __all__ = [
     "BUS",
@@ -39,5 +39,6 @@ BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
     fake="hal_fakes.can",
+    where=where,
     warnings=warnings,
 )

@@ -6,6 +6,7 @@ from typing import Annotated, Final
 import msgspec
 
 from bridges.core.fields import Name, Period
+from drivers.hal import Where
 
 BITRATES: Final = (
     10_000,
@@ -84,6 +85,13 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         port = settings.slcan.port
         text = f"{port} may be another adapter after a reboot: use a path of /dev/serial/by-id"
         yield ("slcan", "port"), text
+
+
+def where(settings: Settings) -> Where:
+    """The kernel's interface, which many may use, or an adapter's port."""
+    if settings.slcan:
+        return Where(settings.slcan.port, local=True, clients="one")
+    return Where(str(settings.socketcan), local=True)
 
 
 def describe(settings: Settings) -> str:

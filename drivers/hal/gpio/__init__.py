@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import msgspec
 
 from bridges.core.fields import Period
-from drivers.hal import BusType, HalError
+from drivers.hal import BusType, HalError, Where
 from drivers.hal.gpio.bus import GpioBus
 from drivers.hal.gpio.header import (
     J8,
@@ -59,6 +59,11 @@ class Settings(
     scan_s: Period = 0.05
 
 
+def where(settings: Settings) -> Where:
+    """The header, or another chip."""
+    return Where("the header" if settings.chip is None else f"gpiochip{settings.chip}", local=True)
+
+
 def open_bus(
     settings: Settings, factory: Any = None, clock: Callable[[], float] = time.monotonic
 ) -> "GpioBus":
@@ -87,6 +92,7 @@ def _lgpio_factory(chip: int | None) -> Any:
 BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
+    where=where,
     fake="hal_fakes.gpio",
     fake_inside=True,
     canonical=canonical,

@@ -3,9 +3,10 @@
     settings.py   settings of the YAML; places.py: address or line; watchdog.py: the modules' watchdogs
     points.py     spelling of contacts and relays; registers.py: spelling of a map's places
     bus.py        the units of one connection or line: retries, pauses
-    lines.py      one device's coils and registers: claim, read, write, read back, switch off
-    dead_man.py   arms and refreshes the modules' watchdogs
-    wire.py       a request and its reply; tcp.py and rtu.py carry them, frames.py encodes them
+    lines.py      one device's coils and registers: claim, read, write, read back, let go
+    rivals.py     two masters on one output: a fault by that name, and no relay that chatters
+    dead_man.py   keeps the modules' watchdogs from tripping
+    wire.py       a question and its answer; tcp.py and rtu.py carry them, frames.py spells them
 
 Only frames.py (pymodbus) and rtu.py (pyserial) import a library. They are imported when a bus needs
 them.
@@ -15,7 +16,7 @@ from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.points import canonical, describe, wire_problems
-from drivers.hal.modbus.settings import Settings, warnings
+from drivers.hal.modbus.settings import Settings, unreachable, warnings, where
 
 __all__ = [
     "BUS",
@@ -40,8 +41,10 @@ BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
     fake="hal_fakes.modbus",
+    where=where,
     warnings=warnings,
     canonical=canonical,
     describe=describe,
     wire_problems=wire_problems,
+    unreachable=unreachable,
 )

@@ -1,9 +1,10 @@
 """One device's coils and registers: the same claim, read, write, read-back and close for each driver.
 
-An output is written only after it has been read once. Each write is read back, and every later reading
-compares it again: this reveals a module that has restarted with its outputs off, or whose watchdog has
-tripped. A write of a safe value is tried for each output, whatever else fails: another output, an input
-or the unit's watchdog.
+Nothing is written before a first good reading of what is written. What is written is read back, and
+looked at again in each reading: a module that restarts with its outputs off, or whose watchdog has
+tripped, is noticed; so is another master (`rivals.py`).
+What goes to its safe value is tried for each output, whatever fails meanwhile:
+another output, an input, the unit's watchdog.
 """
 
 from collections.abc import Iterable, Mapping
@@ -14,6 +15,7 @@ from drivers.hal import HalError
 from drivers.hal.every import Every
 from drivers.hal.modbus.dead_man import Guard
 from drivers.hal.modbus.points import Point, Range, parse, pieces, ranges
+from drivers.hal.modbus.rivals import Rivals
 from drivers.hal.modbus.wire import ILLEGAL_ADDRESS, Refused
 from drivers.hal.points import Flash
 
@@ -35,6 +37,9 @@ class Units(Protocol):
 
     def insist(self) -> None:
         """Try at once what is asked next."""
+
+    def now(self) -> float:
+        """Monotonic seconds."""
 
 
 class Image:
@@ -97,6 +102,7 @@ class Lines:
         self._set: dict[str, int] = {}
         self._touched = False
         self._claimed = False
+        self._rivals = Rivals(units.now)
         self._guard = units.guard(point.unit for point in outputs.values())
 
     def claim(self) -> None:
@@ -132,9 +138,13 @@ class Lines:
         return {name: p.of(image[p.cell]) for name, p in self._inputs.items()}
 
     def bring(self, values: Mapping[str, int]) -> None:
-        """Set the outputs that are not known to have these values; all if they cannot be read back."""
+        """Set those of these outputs that are not known to be so. Raises HalError.
+
+        Also while another master writes one of the device's outputs.
+        """
         changed = {n: value for n, value in values.items() if self._set.get(n) != value}
         self.write(changed if self._readable else values)
+        self._rivals.check(map(str, self._outputs.values()))
 
     def write(self, values: Mapping[str, int]) -> None:
         """Set these outputs, and read them back. Raises HalError; then they are unknown."""
@@ -176,6 +186,8 @@ class Lines:
             self._set.pop(name, None)
             if name in safe or not every.failure:
                 with every.one():
+                    if name not in safe:
+                        self._rivals.check([str(self._outputs[name])])
                     self._units.write(self._outputs[name], values[name], safe=name in safe)
                     written[name] = values[name]
         self._read_back(written, safe=len(safe) == len(values), every=every)
@@ -190,6 +202,8 @@ class Lines:
         for name, value in written.items():
             point = self._outputs[name]
             if image.get(point, value) != value:
+                self._rivals.contradicted(str(point))
+                self._rivals.check([str(point)])
                 raise HalError(
                     f"{point} reads {image[point]} after {value:d} was written: the module has"
                     " restarted, its watchdog has tripped, or somebody else writes it"

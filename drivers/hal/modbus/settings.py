@@ -6,6 +6,7 @@ from typing import Annotated
 import msgspec
 
 from bridges.core.fields import Period
+from drivers.hal import Where
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.watchdog import Watchdog
 
@@ -51,3 +52,20 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield ("serial", *path), text
     for path, text in settings.module_watchdog.warnings() if settings.module_watchdog else ():
         yield ("module_watchdog", *path), text
+
+
+def unreachable(settings: Settings, point: str) -> str | None:
+    """On a serial line units are 1 to 247 (Modbus over Serial Line V1.02, 2.2)."""
+    unit = int(point.split()[1])
+    if settings.serial is None or 1 <= unit <= 247:
+        return None
+    why = "is everybody at once, and nobody answers" if unit == 0 else "is for Modbus TCP"
+    return f"unit {unit} {why}: units on a serial line are 1 to 247"
+
+
+def where(settings: Settings) -> Where:
+    """The gateway or module, or the port of the line, which has one owner."""
+    if settings.serial:
+        return Where(settings.serial.port, local=True, clients="one")
+    assert settings.tcp  # or `problems` has said so
+    return Where(f"{settings.tcp.host}:{settings.tcp.port}", local=False, clients=None)

@@ -8,7 +8,16 @@ import can
 import msgspec
 import pytest
 
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
+from bridges.charger import core
+from bridges.charger.memory import ChargerLimits
+from bridges.charger.signals import (
+    Activity,
+    ChargerOutputs,
+    ChargerSample,
+    Measured,
+    Requested,
+)
+from bridges.core.decision import Sampled
 from bridges.settings.load import SettingsError, load
 from drivers.charger import dbc
 from drivers.charger.can_frames import (
@@ -17,6 +26,7 @@ from drivers.charger.can_frames import (
     Settings,
     create,
     describe,
+    frame_tables,
     warnings,
 )
 from drivers.charger.can_map import PROFILE, FrameMap
@@ -147,6 +157,57 @@ def test_the_signals_of_an_error_are_waited_for_once(charger: Charger) -> None:
         begun_at = charger.far.now
         assert charger.driver.read().side == ""
         assert (charger.far.now - begun_at > 0.04) == waits
+
+
+@pytest.mark.parametrize("state", range(16))
+@pytest.mark.parametrize(
+    ("payload", "side", "text"),
+    [
+        ("0008000000000000", "robot", "the receiver is too hot"),
+        ("0000000000000800", "station", "the station is too hot"),
+    ],
+)
+def test_an_error_bit_is_an_error_whatever_the_state_says(
+    charger: Charger, payload: str, side: str, text: str, state: int
+) -> None:
+    charger.says(0x1FFD2304, payload)
+    charger.status(state)
+    made = charger.driver.read()
+    assert (made.activity, made.side, made.error_text) == (Activity.ERROR, side, text)
+    assert made.charges == (state in (1, 2, 3, 4, 5))
+
+
+def test_a_charger_with_an_error_bit_is_sent_off_and_neither_volts_nor_amps(
+    charger: Charger,
+) -> None:
+    limits, memory = ChargerLimits(), core.initial(ChargerLimits(), 0.0)
+    request = Requested("r1", "tinyRobot", "r1")
+    memory = core.decide(memory, Sampled(_idle(charger)), 0.0, limits).memory
+    memory = core.decide(memory, request, 0.1, limits).memory
+    charger.says(0x1FFD2304, "0000000000000800")
+    charger.status(0)
+    decision = core.decide(memory, Sampled(charger.driver.read()), 0.2, limits)
+    charger.driver.write(decision.outputs)
+    assert charger.got == KEPT_OFF
+    assert decision.report.error_message == "station: the station is too hot"
+
+
+def _idle(charger: Charger) -> ChargerSample:
+    charger.status(0)
+    return charger.driver.read()
+
+
+def test_a_robot_that_has_yet_to_come_is_no_error_though_its_position_is_not_right(
+    charger: Charger,
+) -> None:
+    charger.says(0x1FFD2304, "0000000000004000")
+    charger.status(0)
+    idle = charger.driver.read()
+    charger.status(8)
+    assert [(made.activity, made.side) for made in (idle, charger.driver.read())] == [
+        (Activity.IDLE, ""),
+        (Activity.ERROR, "robot"),
+    ]
 
 
 def test_bad_positioning_is_out_of_range(charger: Charger) -> None:
@@ -376,12 +437,23 @@ def test_check_prints_frames_bytes_and_meanings() -> None:
     settings = Settings(profile="wiferion", setpoints=SETPOINTS)
     rows = describe(settings, hal.Settings(socketcan="can0"))
     assert ("state", "ChargerStatus.ChargerState (0x18FF50E5)") in rows
-    assert (
-        "sent, power on",
-        "ChargerControl (0x1806E5F4) every 0.5 s: MaxVoltage 29.4, RefCurrent 30, RefVoltage 29.2",
-    ) in rows
-    assert ("sent, power off", "DisableCharging (0x1806E6F4) every 0.5 s: Signature 170") in rows
     assert ("state charging", "1, 2, 3, 4, 5") in rows
+    sent, read = frame_tables(settings)
+    control, disable = ("ChargerControl", "0x1806E5F4"), ("DisableCharging", "0x1806E6F4")
+    volts = "MaxVoltage 29.4 V, RefCurrent 30 A, RefVoltage 29.2 V"
+    none = "MaxVoltage 0 V, RefCurrent 0 A, RefVoltage 0 V"
+    assert sent.rows == (
+        (*control, "power on", "0.5 s", "01 26 01 2C 01 24 00 00", volts),
+        (*control, "power off", "0.5 s", "00 00 00 00 00 00 00 00", none),
+        (*disable, "power on", "0.5 s", "00 00 00 00 00 00 00 00", "Signature 0"),
+        (*disable, "power off", "0.5 s", "AA 00 00 00 00 00 00 00", "Signature 170"),
+    )
+    status = ("ChargerStatus", "0x18FF50E5")
+    assert read.rows[2] == (*status, "00 00 00 00 00 00 00 01", "ChargerState 1: charging")
+    assert read.rows[9:11] == (
+        (*status, "01 02 00 00 00 00 00 00", "OutputVoltage 25.8 V"),
+        (*status, "00 00 00 81 00 00 00 00", "OutputCurrent 12.9 A"),
+    )
 
 
 def test_a_map_without_a_receiver_verifies_nobody() -> None:

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -15,10 +16,11 @@ from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from bridges.settings.load import load
 from drivers import DriverError
-from drivers.charger.http import DRIVER, Settings, create, describe, warnings
+from drivers.charger.http import DRIVER, Fields, Settings, create, describe, warnings
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
 from drivers.hal import http as bus_file
+from drivers.http_call import Call
 from tests.depth import examples
 
 CODES = Codes(idle=[0], handshake=[1, 2], charging=[5], stopping=[11], released=[7], error=[238])
@@ -129,6 +131,79 @@ def test_an_answer_without_a_meaning_is_an_error_that_names_the_field(
 )
 def test_the_stations_words_are_printable_on_one_line_and_not_long(said: Any, text: str) -> None:
     assert read({"state": 238, "error_msg": said}).error_text == text
+
+
+@pytest.mark.parametrize("code", [0, 1, 5, 11, 7, 238, 6])
+def test_the_stations_words_are_an_error_whatever_its_state_says(code: int) -> None:
+    assert read({"state": code, "error_msg": "foreign object"}) == ChargerSample(
+        Activity.ERROR, code, "foreign object", charges=code == 5
+    )
+
+
+SIDED = Settings(
+    codes=Codes(idle=[0], charging=[5], error=[238], station_error=[239], robot_error=[240]),
+    fields=Fields(error_texts={"OK": "none", "coil hot": "station", "too far": "robot"}),
+)
+
+
+@pytest.mark.parametrize(
+    ("code", "said", "activity", "side"),
+    [
+        (0, "OK", Activity.IDLE, ""),
+        (5, "OK", Activity.CHARGING, ""),
+        (0, "coil hot", Activity.ERROR, "station"),
+        (5, "too far", Activity.ERROR, "robot"),
+        (5, "tilted", Activity.ERROR, ""),
+        (239, "OK", Activity.ERROR, "station"),
+        (239, "too far", Activity.ERROR, "station"),
+        (240, "", Activity.ERROR, "robot"),
+        (240, "tilted", Activity.ERROR, "robot"),
+        (240, "coil hot", Activity.ERROR, "station"),
+        (238, "too far", Activity.ERROR, "robot"),
+        (238, "", Activity.ERROR, ""),
+    ],
+)
+def test_whose_an_error_is_comes_from_its_text_or_its_code_and_the_station_comes_first(
+    code: int, said: str, activity: Activity, side: str
+) -> None:
+    made = create("a", SIDED, Station({"state": code, "error_msg": said})).read()
+    assert (made.activity, made.side) == (activity, side)
+
+
+def test_check_says_what_texts_and_codes_of_a_side_mean() -> None:
+    rows = describe(SIDED, bus_file.Settings(api_base="192.168.1.60/api"))
+    assert [row for row in rows if "error" in row[1] or "'s error" in row[0]] == [
+        ("clear error", "POST http://192.168.1.60/api/clear_error, when an operator resets"),
+        ("field error_text", "error_msg"),
+        ("text OK", "no error"),
+        ("text coil hot", "station's error"),
+        ("text too far", "robot's error"),
+        ("station's error", "239"),
+        ("robot's error", "240"),
+        ("any other state", "error, with its number"),
+    ]
+
+
+def test_a_station_that_charges_on_with_an_error_is_told_to_stop_again_and_again() -> None:
+    station = Station({"state": 5, "error_msg": "foreign object"})
+    made = create("a", msgspec.structs.replace(SETTINGS, stop=Call(path="/stop")), station)
+    for _ in range(3):
+        made.read()
+        made.write(ChargerOutputs(power=False))
+    assert station.calls == ["GET /state", "POST /stop"] * 3
+
+
+def test_a_station_that_disobeys_with_an_error_is_named_as_one_that_disobeys() -> None:
+    limits = ChargerLimits.of(msgspec.structs.replace(SETTINGS, stop=Call(path="/stop")))
+    memory = core.initial(limits, 0.0)
+    said = read({"state": 5, "error_msg": "foreign object"})
+    for now in (0.0, 1.0, 1000.0):
+        decision = core.decide(memory, Sampled(said), now, limits)
+        memory = decision.memory
+    assert [fault.detail for fault in decision.report.faults] == [
+        "foreign object",
+        "out of service after: station: it goes on charging though it was told to stop; cut its supply",
+    ]
 
 
 def test_the_error_text_may_be_missing() -> None:

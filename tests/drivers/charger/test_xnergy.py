@@ -84,6 +84,17 @@ def test_an_error_that_has_gone_is_told_by_the_latched_words_while_the_state_is_
     assert xnergy.sample(words(state=0) | latched).error_text == ""
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "side"), [(0x4000, 0, "robot"), (0, 1, "station"), (0x0400, 0, "")]
+)
+@pytest.mark.parametrize("state", sorted(xnergy.CODES))
+def test_an_error_bit_is_an_error_whatever_the_state_says(
+    state: int, low: int, high: int, side: str
+) -> None:
+    made = xnergy.sample(words(state=state, error_low=low, error_high=high))
+    assert (made.activity, made.side, made.charges) == (Activity.ERROR, side, state == 5)
+
+
 @pytest.mark.parametrize("result", [0, 2, 3, 240])
 def test_only_the_answer_yes_is_in_range_and_only_when_it_is_the_last_checks(result: int) -> None:
     assert xnergy.sample(words(range=result)).measured.in_range is False
@@ -97,15 +108,19 @@ any_word = st.integers(0, 0xFFFF)
 @settings(derandomize=True, max_examples=examples(300), deadline=None)
 @given(
     st.fixed_dictionaries(
-        dict.fromkeys(("state", "error_low", "error_high"), any_word),
+        dict.fromkeys(("error_low", "error_high"), st.just(0) | any_word)
+        | {"state": st.sampled_from(sorted(xnergy.CODES)) | any_word},
         optional=dict.fromkeys(
             {*xnergy.ALWAYS, *xnergy.IN_ERROR} - {"state", "error_low", "error_high"}, any_word
         ),
     )
 )
-def test_whatever_the_words_are_only_state_5_is_charging(found: dict[str, int]) -> None:
+def test_whatever_the_words_are_only_state_5_without_an_error_is_charging(
+    found: dict[str, int],
+) -> None:
     made = xnergy.sample(found)
-    assert (made.activity is Activity.CHARGING) == (found["state"] == 5)
+    well = found["error_low"] == found["error_high"] == 0
+    assert (made.activity is Activity.CHARGING) == (found["state"] == 5 and well)
     assert made.code == found["state"]
 
 

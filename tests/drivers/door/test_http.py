@@ -169,9 +169,9 @@ WRONG = {
     ),
     '      closed: {field: "input:1.state"} ': (
         "",
-        "needs 'closed'; where nothing says so, write feedback: estimated",
+        "'inputs' needs 'closed'; where nothing says so, write feedback: estimated",
     ),
-    "on=false": ("on=true&toggle_after=10", "is the command of hold"),
+    "on=false": ("on=true&toggle_after=10", "'release' is the command of hold"),
 }
 
 

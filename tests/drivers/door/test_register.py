@@ -180,7 +180,7 @@ PROFILED = YAML[: YAML.index("    map:")] + "    profile: generic-register-door\
     [
         ("{command: {at: coil 4, hold: 1, release: 0}}", []),
         ("{command: {at: coil 4, hold: 1}}", ["9:15: 'command' needs 'release'"]),
-        ("{command: {at: coil 4, hold: 1, release: 1}}", ["9:55: is the value of hold"]),
+        ("{command: {at: coil 4, hold: 1, release: 1}}", ["9:55: 'release' is the value of hold"]),
         ("{commands: {at: coil 4}}", ["9:15: unknown key 'commands': did you mean 'command'?"]),
     ],
 )
@@ -194,7 +194,7 @@ def test_what_a_device_changes_is_judged_where_it_stands(
 def test_a_map_that_is_written_out_has_no_changes_beside_it(tmp_path: Path) -> None:
     text = "    changes: {command: {at: coil 4, hold: 1, release: 0}}\n"
     assert settings_problems(tmp_path / "door.yaml", YAML + text) == [
-        "11:5: is for a profile: change the map that is written here"
+        "11:5: 'changes' is for a profile: change the map that is written here"
     ]
 
 
@@ -233,7 +233,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
                 " register 0; or 0x7531 if 30001 really is the address on the wire"
             ],
         ),
-        ("hold: 1, release: 0", "hold: 1, release: 1", ["10:47: is the value of hold"]),
+        ("hold: 1, release: 0", "hold: 1, release: 1", ["10:47: 'release' is the value of hold"]),
         ("hold: 1", "hold: 2", ["10:35: a coil is 0 or 1"]),
         (
             "unit: 1",

@@ -7,7 +7,7 @@ import pytest
 
 from bridges.lift.signals import Hazard
 from bridges.settings.load import load
-from drivers.lift.dry_contact import Settings, warnings
+from drivers.lift.dry_contact import Settings, notes, warnings
 from tests.drivers.lift.wirings import alarm, bits, coil, inputs, line, settings, whole
 
 CONFIG = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
@@ -388,4 +388,41 @@ def test_agv_mode_that_no_output_asks_for_is_warned_of() -> None:
             "outputs",
             "no agv_mode_request asks for AGV mode, and it is awaited: the lift must grant it alone",
         )
+    ]
+
+
+BY_CALL = {"agv_mode": "by_call", "outputs": {"door_open": coil(1)}}
+
+
+def test_agv_mode_by_call_is_told_by_the_lift_and_asked_for_by_calls_alone() -> None:
+    assert (found(settings(**BY_CALL)), warned(settings(**BY_CALL))) == ([], [])
+    assert found(settings(**BY_CALL, inputs=inputs(agv_mode=None))) == [
+        ("agv_mode", "by_call needs an agv_mode input: nothing else tells that a call was taken")
+    ]
+    assert found(settings(agv_mode="by_call")) == [
+        (
+            "outputs.agv_mode_request",
+            "agv_mode is by_call, so calls ask for AGV mode: delete one of the two",
+        )
+    ]
+    assert warned(settings(agv_mode="by_call", outputs={})) == [
+        (
+            "inputs",
+            "no door_open: with by_call nothing keeps AGV mode on while a robot goes through",
+        )
+    ]
+
+
+def test_a_fire_that_no_topic_tells_of_is_noted_and_not_warned_of() -> None:
+    silent = [
+        (
+            ("alarm",),
+            "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)",
+        )
+    ]
+    assert (list(notes(settings())), warned(settings())) == (silent, [])
+    assert list(notes(settings(alarm="fire_alarm_trigger"))) == []
+    assert list(notes(settings(inputs=inputs(fire_alarm=None)))) == []
+    assert [str(note).partition("note: ")[2] for note in load(CONFIG).notes] == [
+        f"'Lift1': {silent[0][1]}"
     ]

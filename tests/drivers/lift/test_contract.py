@@ -61,7 +61,7 @@ def flag(register: int, bit: int, active: str = "high") -> dict[str, Any]:
 
 
 def word(on: int) -> dict[str, Any]:
-    return {"at": "holding register 10", "on": on, "off": 0}
+    return {"at": "holding register 10", "ask": on, "release": 0}
 
 
 NUMBERS: dict[str, Any] = {

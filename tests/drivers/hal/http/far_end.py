@@ -121,10 +121,3 @@ def once(*parts: bytes) -> Conversation:
         caller.send(*parts)
 
     return talk
-
-
-def hangs_up_at_the_second_request(caller: Caller) -> None:
-    """A kept connection that breaks just when it is used again."""
-    caller.request()
-    caller.send(answer())
-    caller.request()

@@ -95,7 +95,7 @@ def test_a_maker_with_few_numbers_shows_the_nearest() -> None:
         it.press("robot", True)
         assert 4 in it.read_until(Activity.CHARGING) <= {3, 4}
         it.press("foreign_object", True)
-        assert it.driver.read() == ChargerSample(Activity.UNKNOWN, 100, "foreign object detected")
+        assert it.driver.read() == ChargerSample(Activity.ERROR, 100, "foreign object detected")
 
 
 @pytest.mark.parametrize(

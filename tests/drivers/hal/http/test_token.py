@@ -1,5 +1,6 @@
 """A bearer token from a file: read for each call, kept from others, and never shown."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,17 @@ def test_a_token_file_that_holds_none_is_an_error_that_does_not_show_it(
     with pytest.raises(HalError, match="token_file") as caught:
         bus.get_json("/state")
     assert "words" not in str(caught.value)
+
+
+def test_a_pipe_in_place_of_a_token_file_keeps_nobody_waiting(tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    os.mkfifo(file, 0o600)
+    bus = HttpBus(Settings(api_base="127.0.0.1:1", token_file=str(file)), Clock())
+    with pytest.raises(HalError) as caught:
+        bus.get_json("/state")
+    assert str(caught.value) == (
+        f"token_file {file} cannot be read: it is no file but a pipe, a socket or a device"
+    )
 
 
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o620, 0o644])

@@ -1,0 +1,6 @@
+"""What `check` tells of a file: gathered once (`told.py`), and said in three ways.
+
+text.py      for a terminal
+as_json.py   for a program
+html.py      the commissioning sheet: a page for each controller, with boxes to tick
+"""

@@ -1,0 +1,33 @@
+"""What is told of files, as JSON: each row of a table is an object, by the table's headings."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+
+from bridges.commands.sheets.told import Told
+from bridges.core.table import Table
+
+
+def document(files: Sequence[Told], errors: int, warnings: int) -> str:
+    """`{"ok": true, "errors": 0, "warnings": 0, "files": [...]}`, with a newline at its end."""
+    found = {
+        "ok": not errors,
+        "errors": errors,
+        "warnings": warnings,
+        "files": [*map(_file, files)],
+    }
+    return msgspec.json.format(msgspec.json.encode(found), indent=2).decode() + "\n"
+
+
+def _file(told: Told) -> dict[str, Any]:
+    parts = [
+        {"device": part.device, "bus": part.bus, "tables": [*map(_table, part.tables)]}
+        for part in told.parts
+    ]
+    return {**msgspec.structs.asdict(told), "parts": parts}
+
+
+def _table(table: Table) -> dict[str, Any]:
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    return {"title": table.title, "rows": rows}

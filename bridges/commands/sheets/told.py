@@ -1,0 +1,138 @@
+"""All that `check` tells of one file, as tables: the text, the JSON and the sheet are made of this."""
+
+import hashlib
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+
+from bridges.core.graph_kind import GraphKind
+from bridges.core.table import Table
+from bridges.settings import names as named
+from bridges.settings.load import Config
+from bridges.settings.nodes import Problem
+from bridges.settings.shown import choices_of, plain
+from drivers.hal.points import Wire
+
+HEADINGS = ("signal", "point", "direction", "active", "pull", "debounce", "at rest", "wire broken")
+BROKEN = {True: "asserted", False: "not asserted", None: "floats"}
+WIRES, MEANINGS = "wires", "meanings"
+"""The tables that say what is on the bus."""
+SETTINGS = ("setting", "value", "not the default")
+
+
+class Part(msgspec.Struct, frozen=True, kw_only=True):
+    """One controller: its wires, or what it is asked and told, and its tables.
+
+    `device`: its name; a kind's without devices. `bus`: its bus's name, or "". `tables`: how it is
+    wired and what it talks to come first.
+    """
+
+    device: str
+    bus: str
+    tables: list[Table]
+
+
+class BusTold(msgspec.Struct, frozen=True, kw_only=True):
+    """One bus and how it is set."""
+
+    name: str
+    type: str
+    settings: dict[str, str]
+
+
+class Told(msgspec.Struct, frozen=True, kw_only=True):
+    """One file: what it says where it is right, and what is wrong with it where it is not.
+
+    `sha256`: of its bytes, so that a signed sheet says which file it was. `notes`: what else is good
+    to know. Errors and warnings have file, line, column and text.
+    """
+
+    file: str
+    kind: str = ""
+    driver: str = ""
+    sha256: str = ""
+    buses: list[BusTold] = []
+    parts: list[Part] = []
+    notes: list[str] = []
+    errors: list[Problem] = []
+    warnings: list[Problem] = []
+
+
+def wrong(file: str, errors: Sequence[Problem]) -> Told:
+    """A file that cannot be read as one."""
+    return Told(file=file, errors=list(errors))
+
+
+def told(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = ()) -> Told:
+    """A file that could be read. `errors`: against RMF's map."""
+    return Told(
+        file=str(config.path),
+        kind=config.kind,
+        driver=config.driver,
+        sha256=hashlib.sha256(config.text).hexdigest(),
+        buses=[_bus(config, bus) for bus in config.buses],
+        parts=[_graph(config)] if config.section is not None else _devices(config),
+        notes=[*notes, *map(str, config.notes)],
+        errors=list(errors),
+        warnings=list(config.warnings),
+    )
+
+
+def _bus(config: Config, name: str) -> BusTold:
+    settings = {key: text for key, text, _ in plain(config.buses[name]) if text != "-"}
+    return BusTold(name=name, type=config.bus_types[name], settings=settings)
+
+
+def _graph(config: Config) -> Part:
+    """A kind without devices: what it says of itself, and its settings."""
+    kind = named.kind_called(config.kind)
+    assert isinstance(kind, GraphKind)
+    tables = [*kind.tables(config.section), _settings(config.section)]
+    return Part(device=config.kind, bus="", tables=tables)
+
+
+def _devices(config: Config) -> list[Part]:
+    return [_device(config, name) for bus in config.buses for name in config.devices_on(bus)]
+
+
+def _device(config: Config, name: str) -> Part:
+    settings, bus, driver = config.devices[name], config.bus_of(name), config.driver_type(name)
+    point = config.bus_type(bus).describe
+    wires = tuple(_row(wire, point(wire.point)) for wire in config.wires(name))
+    meanings = tuple(driver.describe(settings, config.buses[bus]))
+    tables = [
+        Table(WIRES, HEADINGS, wires),
+        Table(MEANINGS, ("what", "meaning"), meanings),
+        *driver.tables(settings),
+        _settings(settings),
+    ]
+    return Part(device=name, bus=bus, tables=[table for table in tables if table.rows])
+
+
+def _settings(settings: Any) -> Table:
+    """Durations and choices; the bus is told already, and accepted wires by a warning."""
+    rows = (row for row in choices_of(settings) if row[0] not in ("bus", "driver", "accept_unsafe"))
+    return Table("settings", SETTINGS, tuple(rows))
+
+
+def _row(wire: Wire, point: str) -> tuple[str, ...]:
+    """One wire. `point`: as the bus describes it; how the YAML spells it is put beside."""
+    spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"
+    if wire.flash is not None:
+        spelled += f", {wire.flash.on_s:g} s by the module at {wire.flash.point}"
+    is_input = wire.direction == "in"
+    return (
+        wire.signal,
+        spelled,
+        wire.direction,
+        wire.active,
+        wire.pull or "-",
+        _debounce(wire) if is_input else "-",
+        "-" if is_input else ("high" if wire.level(False) else "low"),
+        BROKEN[wire.broken_reads()],
+    )
+
+
+def _debounce(wire: Wire) -> str:
+    return "default" if wire.debounce_s is None else f"{wire.debounce_s:g} s"

@@ -1,0 +1,178 @@
+"""What no file shows alone: one place or name that two files use, domains that differ, names that no
+file has.
+
+Files that are checked together belong to one site, and unless told otherwise run on one machine.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from bridges.core.graph_kind import GraphKind
+from bridges.settings import names as named
+from bridges.settings.load import Config
+from bridges.settings.nodes import Page, Problem, compose, unknown
+from bridges.settings.values import Spot, locate
+from drivers.hal import Where
+
+Path = tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Errors and warnings, in the order of the files."""
+
+    errors: list[Problem]
+    warnings: list[Problem]
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """That a file uses something that one file alone may use: what it is, and where it says so."""
+
+    config: Config
+    what: str
+    path: Path
+
+    def place(self) -> Problem:
+        """Where that stands; without a text."""
+        page = Page(str(self.config.path))
+        root = compose(page, self.config.text)
+        return page.problem(locate(Spot(root, root, ""), self.path).where(), "")
+
+
+def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
+    """What is wrong or worth a look about these files together."""
+    lines = [claim for config in configs for claim in _lines(config, one_machine)]
+    claims = [claim for config in configs for claim in _claims(config, one_machine)]
+    busy = {claim.what for claim, _ in _twice(lines)}
+    errors = [
+        *_domains(configs),
+        *map(_taken, _twice(lines)),
+        *map(
+            _taken, _twice(c for c in claims if not any(c.what.endswith(f" of {b}") for b in busy))
+        ),
+        *_nowhere(configs),
+    ]
+    gateways = [claim for config in configs for claim in _gateways(config)]
+    warnings = [_shared(pair, claims) for pair in _twice(gateways)]
+    return Found(errors, [*warnings, *_unspoken(configs)])
+
+
+def _twice(claims: Iterable[Claim]) -> Iterator[tuple[Claim, Claim]]:
+    """(the later, the first) of what two files claim; within a file the loader has judged."""
+    first: dict[str, Claim] = {}
+    for claim in claims:
+        other = first.setdefault(claim.what, claim)
+        if other.config is not claim.config:
+            yield claim, other
+
+
+def _said(claim: Claim, text: str) -> Problem:
+    place = claim.place()
+    return Problem(place.file, place.line, place.column, text)
+
+
+def _taken(pair: tuple[Claim, Claim]) -> Problem:
+    claim, other = pair
+    first = other.place()
+    return _said(claim, f"{claim.what} is used in {first.file} too, on line {first.line}")
+
+
+def _buses(config: Config) -> Iterator[tuple[str, Where]]:
+    for name, settings in config.buses.items():
+        where = config.bus_type(name).where(settings)
+        if where is not None:
+            yield name, where
+
+
+def _lines(config: Config, one_machine: bool) -> Iterator[Claim]:
+    """Ports that one daemon alone can have."""
+    for name, where in _buses(config):
+        if where.clients == "one" and one_machine:
+            yield Claim(config, where.text, ("buses", name))
+
+
+def _gateways(config: Config) -> Iterator[Claim]:
+    """Where it depends on the make how many may ask."""
+    for name, where in _buses(config):
+        if where.clients is None:
+            yield Claim(config, where.text, ("buses", name))
+
+
+def _claims(config: Config, one_machine: bool) -> Iterator[Claim]:
+    """Names on RMF's graph, and places on buses."""
+    kind = named.kind_called(config.kind)
+    if isinstance(kind, GraphKind):
+        yield Claim(config, f"kind: {kind.name}", ("kind",))
+        return
+    for name in config.devices:
+        yield Claim(config, f"the {kind.name} '{name}'", (kind.devices_key, name))
+    for bus, where in _buses(config):
+        if one_machine or not where.local:
+            for device in config.devices_on(bus):
+                for place, path in _places(config, bus, device):
+                    what = f"{place} of {where.text}"
+                    yield Claim(config, what, (kind.devices_key, device, *path))
+
+
+def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]:
+    """Every point and claim of a device, in its bus's one spelling."""
+    canonical = config.bus_type(bus).canonical
+    for wire in config.wires(device):
+        yield canonical(wire.point), (*wire.path, "point")
+    yield from config.driver_type(device).claims(config.devices[device])
+
+
+def _shared(pair: tuple[Claim, Claim], claims: Sequence[Claim]) -> Problem:
+    """One gateway in two files; the units that both ask are named."""
+    claim, other = pair
+    both = _units(claim.config, claim.what, claims) & _units(other.config, claim.what, claims)
+    units = f" for unit {', '.join(sorted(both))}" if both else ""
+    text = f"warning: {claim.what} is asked in {other.config.path} too{units}"
+    return _said(claim, f"{text}: many take one client; best have one file for one gateway")
+
+
+def _units(config: Config, gateway: str, claims: Sequence[Claim]) -> set[str]:
+    ours = (c.what.split() for c in claims if c.config is config and c.what.endswith(gateway))
+    return {words[1] for words in ours if words[0] == "unit"}
+
+
+def _domains(configs: Sequence[Config]) -> Iterator[Problem]:
+    for config in configs[1:]:
+        ours, first = (c.rmf.domain_id or 0 for c in (config, configs[0]))
+        if ours != first:
+            text = f"DDS domain {ours}, and {configs[0].path} is in domain {first}"
+            yield _said(Claim(config, "", ("rmf", "domain_id")), f"{text}: neither hears the other")
+
+
+def _devices(configs: Sequence[Config], kind: str) -> dict[str, Config]:
+    return {name: c for c in configs if c.kind == kind for name in c.devices}
+
+
+def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
+    """Devices that a kind without hardware names, and that none of the files of their kind has."""
+    for claim, kind, name in _spoken(configs):
+        known = _devices(configs, kind)
+        if known and name not in known:
+            yield _said(claim, unknown(kind, name, known))
+
+
+def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
+    """Devices that it does not name, where it names others of their kind."""
+    spoken = [(kind, name, claim) for claim, kind, name in _spoken(configs)]
+    for kind in sorted({kind for kind, _, _ in spoken}):
+        names = {name for k, name, _ in spoken if k == kind}
+        speaker = next(claim.config for k, _, claim in spoken if k == kind)
+        for name, config in _devices(configs, kind).items():
+            if name not in names:
+                key = named.kind_called(kind).devices_key
+                text = f"warning: '{name}' is not served: {speaker.path} does not name it"
+                yield _said(Claim(config, "", (key, name)), text)
+
+
+def _spoken(configs: Sequence[Config]) -> Iterator[tuple[Claim, str, str]]:
+    for config in configs:
+        kind = named.kind_called(config.kind)
+        if isinstance(kind, GraphKind):
+            for path, what, name in kind.speaks_of(config.section):
+                yield Claim(config, name, (kind.devices_key, *path)), what, name

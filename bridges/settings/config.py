@@ -1,0 +1,63 @@
+"""What a device YAML that is right has become; the daemon and `check` know no other."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from bridges.core.fields import Rmf
+from bridges.settings import names as named
+from bridges.settings.nodes import Problem
+from drivers.driver_type import AnyDriver
+from drivers.hal import AnyBus, Bus
+from drivers.hal.points import Wire
+
+
+@dataclass(frozen=True)
+class Config:
+    """A valid file.
+
+    `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's
+    or driver's record. `bus_types`: name -> `type:`. `warnings`: legal but doubtful settings.
+    `notes`: settings that a site may want, and should know about.
+    `section`: the settings of a kind without devices (`bridges/core/graph_kind.py`), which has no
+    driver and no buses.
+    """
+
+    path: Path
+    text: bytes
+    kind: str
+    driver: str
+    rmf: Rmf
+    buses: Mapping[str, Any]
+    devices: Mapping[str, Any]
+    bus_types: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[Problem, ...] = ()
+    notes: tuple[Problem, ...] = ()
+    section: Any = None
+
+    def bus_of(self, device_name: str) -> str:
+        """The name of the bus that a device is on."""
+        named_bus: str | None = self.devices[device_name].bus
+        return named_bus or next(iter(self.buses))
+
+    def devices_on(self, bus: str) -> list[str]:
+        """The names of the devices on this bus."""
+        return [name for name in self.devices if self.bus_of(name) == bus]
+
+    def driver_type(self, device_name: str) -> AnyDriver:
+        """The driver of a device: its own, or the file's."""
+        own: str | None = self.devices[device_name].driver
+        return named.driver_called(self.kind, own or self.driver)
+
+    def wires(self, device_name: str) -> list[Wire]:
+        """A device's wiring table; empty where its driver has none."""
+        return list(self.driver_type(device_name).wires(self.devices[device_name]))
+
+    def bus_type(self, name: str) -> AnyBus:
+        """The type of the bus of this name."""
+        return named.bus_called(self.bus_types[name])
+
+    def open_bus(self, name: str) -> Bus:
+        """The real bus of this name. Raises HalError."""
+        return self.bus_type(name).open_bus(self.buses[name])

@@ -1,0 +1,163 @@
+"""An example for each key of the reference: from the shipped files, else its default, else by its type.
+
+A file in `config/` or a profile shows a value that works at a site; so examples cannot grow stale.
+"""
+
+import functools
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import yaml
+from msgspec import inspect as mi
+
+import drivers
+from bridges.settings import names as named
+from bridges.settings.leaves import choices
+from bridges.settings.load import load
+from drivers.profiles import Profile
+
+CONFIG = Path(drivers.__file__).parents[1] / "config"
+LONGEST = 72
+
+WRITTEN: dict[str, Any] = {
+    "topics": {"lift_states": "ward/lift_states"},
+    "connect": ["tcp/192.168.1.10:7447"],
+    "listen": ["tcp/0.0.0.0:7447"],
+    "user": "lift1",
+    "password_file": "/etc/rmf-bridges/zenoh.password",
+    "ca": "/etc/rmf-bridges/ca.pem",
+    "certificate": "/etc/rmf-bridges/lift1.pem",
+    "private_key": "/etc/rmf-bridges/lift1.key",
+    "token_file": "/etc/rmf-bridges/charger.token",
+    "token_header": "X-API-Key",
+    "ca_file": "/etc/rmf-bridges/ca.pem",
+    "driver": "register",
+    "bus": "module",
+    "accept_unsafe": {"fire_alarm": "the panel supervises its own loop"},
+    "station": {"MobileErrors.GridError": "the grid supply is not right"},
+    "robot": {"MobileErrors.OverTemperature": "the receiver is too hot"},
+    "state_words": {"READY": 0, "CHARGING": 2},
+    "doors": ["ward_door"],
+    "lifts": ["Lift1"],
+}
+"""For texts that no shipped file has: by their keys, of which each means one thing everywhere."""
+
+Found = dict[tuple[type, str], str]
+
+
+def example(struct: type, field: mi.Field) -> str:
+    """`key: value` as a YAML has it; "" for a section, whose keys have their own."""
+    if _is_section(field.type):
+        return ""
+    shown = next(
+        (_shown()[c, field.name] for c in struct.__mro__ if (c, field.name) in _shown()), ""
+    )
+    if not shown:
+        shown = flow(WRITTEN[field.name] if field.name in WRITTEN else _by_type(field))
+    return f"{field.encode_name}: {shown}"
+
+
+@functools.cache
+def _shown() -> Found:
+    """What shipped files have at each field of each struct: the shortest that is no default."""
+    found: Found = {}
+    for file in sorted(CONFIG.glob("*.yaml")):
+        config = load(file)
+        tops = [config.rmf, *config.buses.values(), *config.devices.values(), config.section]
+        for top in tops:
+            _collect(top, found)
+    for profile in _profiles():
+        for name in profile.names():
+            _collect(profile.load(name), found)
+    return found
+
+
+def _profiles() -> Iterator[Profile]:
+    """Every sort of profile that a driver reads."""
+    for kind in named.kind_names():
+        for driver in named.driver_names(kind):
+            found = vars(named.driver_module(kind, driver)).get("PROFILE")
+            if isinstance(found, Profile):
+                yield found
+
+
+def _collect(value: object, found: Found) -> None:
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list | tuple):
+        for item in value:
+            _collect(item, found)
+    if isinstance(value, msgspec.Struct):
+        for field in msgspec.structs.fields(value):
+            inner = getattr(value, field.name)
+            _collect(inner, found)
+            if inner not in (None, [], {}, field.default):
+                _note(found, type(value), field.name, flow(msgspec.to_builtins(inner)))
+
+
+def _note(found: Found, struct: type, name: str, text: str) -> None:
+    for base in struct.__mro__:
+        if len(text) <= LONGEST and name in _names(base):
+            found[base, name] = min(found.get((base, name), text), text, key=len)
+
+
+def _names(base: type) -> tuple[str, ...]:
+    """The fields of a struct; none of what structs are made of."""
+    if not issubclass(base, msgspec.Struct) or base is msgspec.Struct:
+        return ()
+    return base.__struct_fields__
+
+
+def flow(value: object) -> str:
+    """On one line, as a person writes it."""
+    text = yaml.safe_dump(
+        value, default_flow_style=True, width=10**6, allow_unicode=True, sort_keys=False
+    )
+    return text.removesuffix("\n...\n").strip()
+
+
+def _is_section(info: mi.Type) -> bool:
+    if isinstance(info, mi.UnionType):
+        return all(_is_section(t) for t in info.types if not isinstance(t, mi.NoneType))
+    if isinstance(info, mi.Metadata):
+        return _is_section(info.type)
+    if isinstance(info, mi.ListType | mi.VarTupleType):
+        return _is_section(info.item_type)
+    if isinstance(info, mi.DictType):
+        return _is_section(info.value_type)
+    return isinstance(info, mi.StructType)
+
+
+def _by_type(field: mi.Field) -> Any:
+    if isinstance(field.default, str | int | float) and not isinstance(field.default, bool):
+        return field.default
+    return _any_of(field.type, field)
+
+
+def _any_of(info: mi.Type, field: mi.Field) -> Any:
+    """Some value that may stand there."""
+    match info:
+        case mi.Metadata(type=part):
+            return _any_of(part, field)
+        case mi.UnionType(types=types):
+            return _any_of(next(t for t in types if not isinstance(t, mi.NoneType)), field)
+        case mi.DictType(key_type=key, value_type=part):
+            return {_any_of(key, field): _any_of(part, field)}
+        case mi.ListType(item_type=part) | mi.VarTupleType(item_type=part):
+            return [_any_of(part, field)]
+        case mi.LiteralType() | mi.EnumType():
+            return list(choices(info).values())[-1]
+        case mi.BoolType():
+            return field.default is not True
+        case mi.FloatType() | mi.IntType():
+            return _number(info)
+    return "text"
+
+
+def _number(info: mi.FloatType | mi.IntType) -> float:
+    """A plain one within its bounds."""
+    least = info.ge if info.ge is not None else 1
+    most = info.le if info.le is not None else least + 10
+    return next(n for n in (5, 1, 10, least, most) if least <= n <= most)

@@ -1,0 +1,94 @@
+"""A struct's plain settings as a person reads them: numbers with units, and what a default would be.
+
+Wires, maps and code tables are left out: their drivers tell them (`drivers/driver_type.py`).
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+from msgspec import inspect as mi
+
+Row = tuple[str, str, str]
+"""Its key (with dots), its value with the unit, and what the default is where it is not that."""
+
+_LEAVES = (str, int, float, bool, type(None))
+
+
+def plain(struct: object) -> list[Row]:
+    """Every setting that is a number, a word or a list of them, at any depth."""
+    return list(_rows(struct, (), deep=True))
+
+
+def choices_of(device: object) -> list[Row]:
+    """A device's own numbers and words, and those of its sections that hold nothing else."""
+    return list(_rows(device, (), deep=False))
+
+
+def _rows(struct: object, path: tuple[str, ...], deep: bool) -> Iterator[Row]:
+    for field in _fields(type(struct)):
+        value = getattr(struct, field.name)
+        here = (*path, field.encode_name)
+        if isinstance(value, msgspec.Struct):
+            if deep or not any(_holds_struct(f.type) for f in _fields(type(value))):
+                yield from _rows(value, here, deep)
+        elif _is_plain(value) and not _holds_struct(field.type):
+            unit = _unit(field.type)
+            yield ".".join(here), _text(value, unit), _instead(field, value, unit)
+
+
+def _fields(struct: type) -> tuple[mi.Field, ...]:
+    info = mi.type_info(struct)
+    assert isinstance(info, mi.StructType)
+    return info.fields
+
+
+def _holds_struct(info: mi.Type) -> bool:
+    """Whether whatever stands there is a section of its own, or is made of such."""
+    match info:
+        case mi.UnionType(types=types):
+            return all(_holds_struct(t) for t in types if not isinstance(t, mi.NoneType))
+        case mi.Metadata(type=part) | mi.ListType(item_type=part) | mi.DictType(value_type=part):
+            return _holds_struct(part)
+    return isinstance(info, mi.StructType)
+
+
+def _is_plain(value: object) -> bool:
+    """Whether it is a word, a number, or some of them."""
+    value = getattr(value, "value", value)
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list | tuple):
+        return all(isinstance(item, _LEAVES) for item in value)
+    return isinstance(value, _LEAVES)
+
+
+def _unit(info: mi.Type) -> str:
+    """The unit of a number; "" where it has none."""
+    if isinstance(info, mi.Metadata):
+        return (info.extra or {}).get("unit", "") or _unit(info.type)
+    if isinstance(info, mi.UnionType):
+        return next(filter(None, map(_unit, info.types)), "")
+    return ""
+
+
+def _text(value: Any, unit: str) -> str:
+    value = getattr(value, "value", value)
+    if value is None or value in ([], {}):
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        value = f"{value:.10g}"
+    if isinstance(value, list | tuple):
+        return ", ".join(_text(item, unit) for item in value)
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {_text(item, unit)}" for key, item in value.items())
+    return f"{value} {unit}".rstrip()
+
+
+def _instead(field: mi.Field, value: object, unit: str) -> str:
+    """What the default is, where this is another value."""
+    if field.required or field.default in (msgspec.NODEFAULT, None, value):
+        return ""
+    return f"default: {_text(field.default, unit)}"

@@ -1,0 +1,126 @@
+"""Slips that YAML's own parser does not name: indents, commas, spaces that cannot be seen.
+
+`reason` says again what PyYAML says of a file that is no YAML; the others look at one scalar.
+"""
+
+import re
+import unicodedata
+
+from yaml import Mark, MarkedYAMLError
+
+_SECOND = "mapping values are not allowed here"
+FIXES = {
+    "found character '\\t' that cannot start any token": "a tab: YAML indents with spaces",
+    _SECOND: ("a second ': ' here: indent the line like its neighbours, or put the text in quotes"),
+    "could not find expected ':'": "a key without ': ' after it, or a line indented wrongly",
+    "found unexpected end of stream": "the file ends inside a text: its closing quote is missing",
+    "but found another document": (
+        "a second document ('---') starts here: a file describes one daemon, so split it"
+    ),
+    "found duplicate anchor": "an anchor ('&name') whose name is already used",
+    "expected <block end>, but found '}'": "a '}' without a '{' before it",
+    "expected <block end>, but found ']'": "a ']' without a '[' before it",
+    "expected <block end>, but found '<scalar>'": (
+        "more text after a text that has ended: put all of it in one pair of quotes"
+    ),
+}
+FIXES |= {
+    f"found character '{c}' that cannot start any token": f"a text that begins with {c} needs quotes"
+    for c in "@`%"
+}
+
+_OPEN = {"expected ',' or '}'": "{", "expected ',' or ']'": "["}
+_INDENT = re.compile(r"expected <block end>, but found '<block (mapping|sequence) start>'")
+_ODD = re.compile("[\u00a0\u00ad\u1680\u2000-\u200f\u2028-\u202f\u205f\u2060\u3000\ufeff]")
+_CURLY = ("\u201c", "\u201d", "\u201e", "\u2018", "\u2019", "\u201a", "\u00ab", "\u00bb")
+
+
+def reason(error: MarkedYAMLError, text: str) -> str:
+    """PyYAML's text on one line, with the fix where the cause is a usual one."""
+    problem, where = str(error.problem), error.problem_mark or error.context_mark
+    lines = text.splitlines()
+    since = error.context_mark or where
+    if where and since and (odd := _odd_in(lines, since.line, where.line)):
+        return odd
+    if where and (_INDENT.search(problem) or _SECOND in problem) and _follows_no_key(lines, where):
+        return "the line above has no ': ': a key is followed by a colon and a space"
+    if where and _INDENT.search(problem):
+        return _indent(lines, where, since or where)
+    for expected, bracket in _OPEN.items():
+        if problem.startswith(expected) and since:
+            return (
+                f"a ',' is missing before this, or the '{bracket}' of line {since.line + 1} is open"
+            )
+    for usual, fix in FIXES.items():
+        if usual in (problem, (error.context or "").partition(" '")[0]):
+            return fix
+    context = f" ({error.context}, from line {since.line + 1})" if since and error.context else ""
+    return f"not YAML: {problem}{context}"
+
+
+def _odd_in(lines: list[str], first: int, last: int) -> str:
+    """Where these lines hold a space that looks like another; "" where they do not."""
+    for number, line in enumerate(lines[first : last + 1], first + 1):
+        if found := _ODD.search(line.partition(" #")[0]):
+            where = f"line {number}, column {found.start() + 1}"
+            return f"{named(found[0])} on {where}: write an ordinary space"
+    return ""
+
+
+def _indent(lines: list[str], where: Mark, since: Mark) -> str:
+    above = [line for line in lines[since.line : where.line] if line.strip(" ")]
+    indents = sorted({_spaces(line) for line in above if not line.lstrip(" ").startswith("#")})
+    begin = " or ".join(map(str, indents))
+    ours = _spaces(lines[where.line])
+    return f"wrong indent: {ours} before this line, {begin} before those above it (in spaces)"
+
+
+def _spaces(line: str) -> int:
+    return len(line) - len(line.lstrip(" "))
+
+
+def _follows_no_key(lines: list[str], where: Mark) -> bool:
+    """Whether the line above stands beside this one and is no key."""
+    above, line = lines[max(where.line - 1, 0)], lines[where.line]
+    return _spaces(above) == _spaces(line) and ": " not in f"{above} " and where.line > 0
+
+
+def named(character: str) -> str:
+    """A character that cannot be seen, by its name: `a no-break space (U+00A0)`."""
+    name = unicodedata.name(character, "character that cannot be seen").lower()
+    article = "an" if name[0] in "aeiou" else "a"
+    return f"{article} {name} (U+{ord(character):04X})"
+
+
+def odd_space(text: str) -> str:
+    """What is wrong with the looks of a text without quotes; "" where nothing is."""
+    if found := _ODD.search(text):
+        return (
+            f"{named(found[0])}: write an ordinary space, or put the text in quotes if it is meant"
+        )
+    if text.startswith(_CURLY):
+        return f"{text[0]} is no quote to YAML: write \" or '"
+    return ""
+
+
+def cleaned(text: str) -> str:
+    """What was probably meant by a text with an odd space or quote."""
+    joined = re.sub(f"(?<=[0-9]){_ODD.pattern}(?=[0-9])", "", text)
+    return _ODD.sub(" ", joined).strip("".join((" ", *_CURLY)))
+
+
+def number_meant(text: str, whole: bool) -> str:
+    """How to write a number that a person can read and YAML cannot; "" where it is none."""
+    digits = "".join(str(unicodedata.digit(c, c)) for c in text)
+    plain = re.sub(r"(?<=\d)['\u2019 ](?=\d{3}(\D|$))", "", digits)
+    grouped = re.fullmatch(r"[-+]?\d{1,3}([.,]\d{3})+", plain)
+    if grouped and (whole or plain.count(",") > 1):
+        return re.sub(r"[.,]", "", plain)
+    if re.fullmatch(r"[-+]?\d+,\d+", plain):
+        return plain.replace(",", ".") + (f", or {plain.replace(',', '')}" if grouped else "")
+    return plain if plain != text and re.fullmatch(r"[-+]?\d+(\.\d+)?", plain) else ""
+
+
+def has_unit(text: str) -> bool:
+    """Whether a number is written with its unit: `10 s`, `10ms`, `80%`."""
+    return bool(re.fullmatch(r"[-+]?\d+([.,]\d+)? ?[A-Za-z%\u00b0\u00b5\u03a9/]+", text))

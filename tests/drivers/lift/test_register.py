@@ -1,0 +1,148 @@
+"""What a gateway's numbers mean, what a map is refused for, and what is written for each command."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.settings.load import load
+from drivers.lift.register import Settings, decode, encode, warnings
+from tests.settings.reading import problems_of
+
+CONFIG = Path(__file__).parents[3] / "config" / "lift_gateway.yaml"
+
+
+def shipped() -> Settings:
+    settings = load(CONFIG).devices["Lift1"]
+    assert isinstance(settings, Settings)
+    return settings
+
+
+def sample(**words: int) -> LiftSample:
+    """The shipped gateway in AGV mode at L1, with these words otherwise."""
+    plain = {"floor": 1, "motion": 1, "door": 0, "service": 1, "overload": 0}
+    return decode(shipped().map, plain | words)
+
+
+AT_L1 = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=True)
+
+
+def test_a_car_at_a_landing() -> None:
+    assert sample() == AT_L1
+
+
+@pytest.mark.parametrize(
+    ("words", "changes"),
+    [
+        ({"floor": 0}, {"level": None}),
+        ({"floor": 9}, {"level": None, "code_fault": "code 9 is no floor's"}),
+        ({"floor": 0xFF03}, {"level": "L3"}),
+        ({"motion": 0x0100}, {"motion": Motion.UP}),
+        ({"motion": 0x0300}, {"motion": Motion.CONTRADICTORY}),
+        ({"door": 2}, {"door": Door.OPEN}),
+        ({"door": 3}, {"door": Door.BETWEEN}),
+        ({"door": 9}, {"door": Door.UNKNOWN}),
+        ({"overload": 1}, {"hazards": frozenset({Hazard.OVERLOAD})}),
+        ({"overload": 0xFFFE}, {}),
+    ],
+)
+def test_each_number_means_what_the_map_says_and_others_are_faults(
+    words: dict[str, int], changes: dict[str, Any]
+) -> None:
+    assert sample(**words) == msgspec.structs.replace(AT_L1, **changes)
+
+
+@pytest.mark.parametrize(
+    ("service", "hazards"),
+    [(0, set()), (2, {Hazard.FIRE}), (3, {Hazard.EMERGENCY}), (99, {Hazard.OUT_OF_SERVICE})],
+)
+def test_outside_agv_mode_the_floor_means_nothing(service: int, hazards: set[Hazard]) -> None:
+    assert sample(service=service) == LiftSample(
+        None,
+        Door.CLOSED,
+        motion=Motion.STOPPED,
+        agv=False,
+        hazards=frozenset(hazards),
+        floor_valid=False,
+    )
+
+
+def test_commands_that_share_a_register_are_joined_in_it() -> None:
+    commands, calls = "holding register 10", "holding register 11"
+    written = [
+        encode(shipped().map, outputs)
+        for outputs in (
+            LiftOutputs(),
+            LiftOutputs(agv_request=True, call="L3"),
+            LiftOutputs(agv_request=True, hold_door=Side.FRONT),
+        )
+    ]
+    assert written == [
+        {commands: 0, calls: 0},
+        {commands: 1, calls: 3},
+        {commands: 3, calls: 0},
+    ]
+
+
+MODEL = "looks like a number of the data model, which begins at 1"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("4: L4}\n        between", "4: L1}\n        between", "28:9: no code for L4"),
+        ("between_floors: [0]", "between_floors: [1]", "28:20: 1 means between floors as well"),
+        (
+            "at: input register 1\n",
+            "at: input register 30002\n",
+            f"36:13: 30002 {MODEL}: write input register 1; or 0x7532 if 30002 really is the address"
+            " on the wire",
+        ),
+        (
+            "input register 0\n        bits: [8",
+            "coil 0\n        bits: [8",
+            "32:13: 'coil 0': write 'holding register 0' or 'input register 0'; addresses begin at 0",
+        ),
+        ("bits: [8, 9]", "bits: [8, 8]", "33:9: a bit stands here twice"),
+        ("2: down}", "4: down}", "34:39: 4 does not fit on 2 bits"),
+        (
+            "0: closed, 1: moving, 2: open",
+            "0: moving, 1: moving, 2: open",
+            "37:9: needs a code for open and one for closed",
+        ),
+        ("bit: 0, active", "active", "41:7: a flag is one bit of a register: say which"),
+        (
+            "ask: 2, release: 0",
+            "ask: 3, release: 0",
+            "44:51: another command has these bits of holding register 10 already",
+        ),
+        ("none: 0", "none: 4", "47:43: 4 is no call, as none says"),
+        (", 4: L4}\n          none", "}\n          none", "47:11: no code for L4"),
+        (
+            "    floors:",
+            "    agv_mode: by_call\n    floors:",
+            "44:9: agv_mode is by_call, so calls ask for AGV mode: delete one of the two",
+        ),
+    ],
+)
+def test_a_map_that_cannot_be_right_is_refused_where_it_stands(
+    tmp_path: Path, old: str, new: str, problem: str
+) -> None:
+    text = CONFIG.read_text()
+    assert old in text
+    assert problems_of(tmp_path / "lift.yaml", text.replace(old, new, 1)) == [problem]
+
+
+def test_commands_that_cannot_be_read_back_are_warned_of() -> None:
+    plain = msgspec.to_builtins(shipped(), str_keys=True)
+    plain["map"]["commands"]["read_back"] = False
+    settings = msgspec.convert(plain, Settings, strict=False)
+    assert list(warnings(shipped())) == []
+    assert list(warnings(settings)) == [
+        (
+            ("map", "commands", "read_back"),
+            "commands cannot be read back: that they are off is not verified",
+        )
+    ]

@@ -1,0 +1,141 @@
+"""Files that are checked together: what none of them shows alone."""
+
+from pathlib import Path
+
+import pytest
+
+from bridges.cli import main
+
+CONFIG = Path(__file__).parents[2] / "config"
+
+DOOR = """\
+kind: door
+driver: dry_contact
+rmf: {domain_id: 3}
+buses:
+  b: {type: modbus, tcp: {host: 192.168.1.50}}
+doors:
+  ward:
+    inputs:
+      opened: {point: unit 1 discrete input 0, active: high}
+      closed: {point: unit 1 discrete input 1, active: high}
+    outputs:
+      hold_open: {point: unit 1 coil 0, active: high}
+"""
+SECOND = (
+    DOOR.replace("ward:", "lab:")
+    .replace("input 0", "input 4")
+    .replace("input 1", "input 5")
+    .replace("coil 0", "coil 4")
+)
+TCP = "tcp: {host: 192.168.1.50}"
+SERIAL = "serial: {port: /dev/serial/by-id/x, baudrate: 9600, parity: none, stopbits: 1}"
+GPIO = (
+    DOOR.replace(f"modbus, {TCP}", "gpio")
+    .replace("unit 1 discrete input 0, active: high", '"J8:29", active: high, pull: down')
+    .replace("unit 1 discrete input 1, active: high", '"J8:31", active: high, pull: down')
+    .replace("unit 1 coil 0", "BCM18")
+)
+GATEWAY = (
+    "b.yaml:5:3: warning: 192.168.1.50:502 is asked in a.yaml too for unit 1: many take one client;"
+    " best have one file for one gateway"
+)
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def said(
+    capsys: pytest.CaptureFixture[str], first: str, second: str, *options: str
+) -> tuple[int, list[str]]:
+    """The exit code of `check a.yaml b.yaml`, and what it complains of."""
+    Path("a.yaml").write_text(first)
+    Path("b.yaml").write_text(second)
+    code = main(["check", "a.yaml", "b.yaml", *options])
+    return code, capsys.readouterr().err.splitlines()
+
+
+def test_two_files_that_share_nothing_are_right(capsys: pytest.CaptureFixture[str]) -> None:
+    other = SECOND.replace("192.168.1.50", "192.168.1.51")
+    assert said(capsys, DOOR, other) == (0, [])
+
+
+def test_one_gateway_in_two_files_is_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
+    assert said(capsys, DOOR, SECOND) == (0, [GATEWAY])
+
+
+def test_one_coil_and_one_name_in_two_files_are_errors(capsys: pytest.CaptureFixture[str]) -> None:
+    assert said(capsys, DOOR, SECOND.replace("lab:", "ward:").replace("coil 4", "coil 0")) == (
+        78,
+        [
+            GATEWAY,
+            "b.yaml:7:3: the door 'ward' is used in a.yaml too, on line 7",
+            "b.yaml:12:26: unit 1 coil 0 of 192.168.1.50:502 is used in a.yaml too, on line 12",
+            "2 errors, 1 warning",
+        ],
+    )
+
+
+def test_one_serial_port_in_two_files_is_one_error(capsys: pytest.CaptureFixture[str]) -> None:
+    code, lines = said(capsys, DOOR.replace(TCP, SERIAL), SECOND.replace(TCP, SERIAL))
+    assert (code, lines) == (
+        78,
+        ["b.yaml:5:3: /dev/serial/by-id/x is used in a.yaml too, on line 5", "1 error"],
+    )
+
+
+def test_one_pin_is_found_however_it_is_spelt(capsys: pytest.CaptureFixture[str]) -> None:
+    second = GPIO.replace("ward:", "lab:").replace("BCM18", "J8:12")
+    second = second.replace("J8:29", "J8:32").replace("J8:31", "BCM13")
+    assert said(capsys, GPIO, second) == (
+        78,
+        ["b.yaml:12:26: BCM18 of the header is used in a.yaml too, on line 12", "1 error"],
+    )
+    assert said(capsys, GPIO, second, "--several-machines") == (0, [])
+
+
+def test_domains_that_differ_are_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    second = SECOND.replace("192.168.1.50", "192.168.1.51")
+    assert said(capsys, DOOR, second.replace("domain_id: 3", "domain_id: 4")) == (
+        78,
+        [
+            "b.yaml:3:18: DDS domain 4, and a.yaml is in domain 3: neither hears the other",
+            "1 error",
+        ],
+    )
+    assert said(capsys, DOOR, second.replace("{domain_id: 3}", "{}")) == (
+        78,
+        ["b.yaml:3:1: DDS domain 0, and a.yaml is in domain 3: neither hears the other", "1 error"],
+    )
+
+
+def test_a_supervisor_of_a_door_that_no_file_has(capsys: pytest.CaptureFixture[str]) -> None:
+    supervisor = "kind: door_supervisor\nrmf: {domain_id: 3}\nsupervisor: {doors: [wart]}\n"
+    assert said(capsys, DOOR, supervisor) == (
+        78,
+        [
+            "a.yaml:7:3: warning: 'ward' is not served: b.yaml does not name it",
+            "b.yaml:3:22: unknown door 'wart': did you mean 'ward'? known here: ward",
+            "1 error, 1 warning",
+        ],
+    )
+
+
+def test_a_second_supervisor_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    supervisor = "kind: door_supervisor\n"
+    assert said(capsys, supervisor, supervisor) == (
+        78,
+        ["b.yaml:1:7: kind: door_supervisor is used in a.yaml too, on line 1", "1 error"],
+    )
+
+
+def test_a_coordinators_station_that_no_charger_has(capsys: pytest.CaptureFixture[str]) -> None:
+    coordinator = (CONFIG / "charger_coordinator.yaml").read_text()
+    code, lines = said(capsys, (CONFIG / "charger_http.yaml").read_text(), coordinator, "-q")
+    assert code == 78
+    assert [line.partition(": ")[2] for line in lines] == [
+        "unknown charger 'charger_b': did you mean 'charger_a'? known here: charger_a",
+        "",
+    ]
