@@ -231,10 +231,10 @@ class FrameDriver:
         }
 
     def _errors(self, values: dict[str, float], activity: Activity) -> list[tuple[FaultSide, str]]:
-        """What is wrong by the frames that are heard, whatever the state says.
+        """The errors in the frames that have come, whatever the state is.
 
-        The signal of `out_of_range` is an error in an error's state only; else it tells where
-        the robot is.
+        The signal of `out_of_range` is an error only in an error state; otherwise it tells where the
+        robot is.
         """
         position = "" if activity is Activity.ERROR else self._map.out_of_range
         return self._map.errors.found(lambda at: 0 if at == position else values.get(at))

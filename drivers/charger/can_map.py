@@ -80,12 +80,12 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     `state_timeout_s`: the state is stale when its frame has not come for this long.
     `others_timeout_s`: the same for all other frames.
     `volts`, `amps`: at the battery.
-    `receiver`: whose receiver it is, as a number; 0 is nobody's. Without its frame there is no reading.
-    `out_of_range`: not 0 while the robot stands where it cannot be charged. Among the `errors` too, it
-    is one only while the state says error: a robot that has yet to come is none.
-    `rules`: the state by other signals, before its codes; their places are signals.
-    `errors`: what is wrong, whatever the state; its places are signals.
-    `send`: what must be sent, and how often.
+    `receiver`: the receiver's id as a number; 0 is none. Without its frame there is no reading.
+    `out_of_range`: not 0 while the robot stands where it cannot be charged. If it is in `errors` too,
+    it counts as an error only in an error state: a robot that has not arrived yet is no error.
+    `rules`: derive the state from other signals; tried before its codes.
+    `errors`: signals that mean an error, whatever the state is.
+    `send`: the frames that the driver sends.
     """
 
     dbc: Name
@@ -155,7 +155,7 @@ def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") 
 
 
 def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
-    """For `check`: what is read where: (what, meaning)."""
+    """Rows for `check`: the signals that are read: (what, meaning)."""
     frames = dbc.load(found.dbc)
     yield "frames", str(dbc.path(found.dbc))
     for path, signal in found.signals():

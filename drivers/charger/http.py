@@ -59,11 +59,11 @@ InRange = Flag
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The fields of the answer to `state_path`: names with dots between them.
 
-    `state`: what the station does; `codes` says what it means.
-    `error_text`: the station's own words for an error: any text there is one, whatever `state` says.
-    `error_texts`: text -> whose error it is, `station` or `robot`; or `none` for a text that is none
-    (`OK`). Of others `codes` says it, or nobody.
-    `receiver_id`: whose receiver it sees; null or "" for nobody's.
+    `state`: the station's state; `codes` says what it means.
+    `error_text`: the station's own text for an error: any text means an error, whatever `state` is.
+    `error_texts`: text -> the side of the error, `station` or `robot`; or `none` for a text that means
+    no error (`OK`). For other texts `codes` gives the side, if it can.
+    `receiver_id`: the id of the receiver that it sees; null or "" when it sees none.
     `in_range`: whether the robot stands where it can be charged.
     `volts`: the voltage at the battery.
     `amps`: the current into the battery.
