@@ -1,7 +1,7 @@
-"""Drivers: what a controller's signals mean. One file for each way of wiring a device.
+"""Drivers: what a controller's signals mean. One file for each way of connecting a device.
 
-A driver file is `drivers/<kind>/<driver>.py`, after the YAML's `kind:` and `driver:`, and ends with a
-`DRIVER` (`drivers/driver_type.py`), by which everything else knows it.
+A driver is the file `drivers/<kind>/<driver>.py`, named after the YAML's `kind:` and `driver:`. It ends
+with a `DRIVER` (`drivers/driver_type.py`); the rest of the code uses nothing else of the file.
 """
 
 from typing import Protocol, TypeVar
@@ -11,27 +11,27 @@ Outputs = TypeVar("Outputs", contravariant=True)
 
 
 class DriverError(Exception):
-    """The controller did not answer, or not with a meaning. The text says what to look at."""
+    """The controller did not answer, or its answer makes no sense. The text says what to check."""
 
 
 class Driver(Protocol[Sample, Outputs]):
-    """One device on one bus. Called from the thread that owns the bus, and from no other.
+    """One device on one bus. Only the thread that owns the bus calls it.
 
     No call blocks longer than the bus's I/O timeout. Every method may raise DriverError and nothing
     else; the next call tries again, with the HAL's backoff.
     """
 
     def open(self) -> None:
-        """Claim every output at its safe level. Called once; again after a DriverError."""
+        """Claim every output at its safe level. Called once, and again after a DriverError."""
 
     def read(self) -> Sample:
-        """Read every input once and decode it. Never an old value: it is read, or it raises."""
+        """Read every input once and decode it. Never an old value: it reads anew or raises."""
 
     def write(self, outputs: Outputs) -> None:
-        """Bring every output to this level. Cheap when nothing differs from what was written."""
+        """Set every output to this level. Cheap when nothing has changed since the last write."""
 
     def make_safe(self) -> None:
-        """Every output off, whatever was known. Returns when done and verified where it can be."""
+        """Switch every output off, even one believed off, and verify it where possible."""
 
     def close(self) -> None:
-        """Outputs off and let go. Does not raise."""
+        """Switch every output off and release it. Does not raise."""

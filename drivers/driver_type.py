@@ -1,7 +1,7 @@
-"""What a driver is to everything that finds it by name: a `DRIVER` at the end of its file.
+"""The record that describes a driver: the `DRIVER` at the end of its file.
 
 `drivers/<kind>/<driver>.py` is named after the YAML's `kind:` and `driver:`; there is no table of
-drivers to edit. Only `bridges/settings/names.py` imports one by its name.
+drivers to edit. Only `bridges/settings/names.py` imports a driver by its name.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -25,10 +25,10 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     """One driver.
 
     `settings`: a struct that derives from the kind's (`bridges.lift.settings.LiftSettings`…) and adds
-    the wiring. `buses`: the bus types that it stands on, as the names of files in `drivers/hal/`.
-    `create(name, settings, bus)`: one device on its bus; nothing is sent before `open`.
+    the wiring. `buses`: the bus types that it works on, as the names of files in `drivers/hal/`.
+    `create(name, settings, bus)`: one device on its bus; sends nothing before `open`.
 
-    What a driver need not have:
+    The rest is optional:
     `wires(settings)`: the table that an electrician checks (`drivers/hal/points.py`).
     `debounce(settings)`: how long a change of each signal or group must last (s).
     `describe(settings, bus's settings)`: where there are no wires, rows for `check` (what, meaning).
@@ -56,4 +56,4 @@ class DriverType(Generic[Settings, Sample, Outputs]):
 
 
 AnyDriver: TypeAlias = DriverType[Any, Any, Any]
-"""One that was found by its name: its settings, sample and outputs are those of its kind."""
+"""A driver found by its name; its kind determines its settings, sample and outputs."""

@@ -1,4 +1,4 @@
-"""Commands over HTTP, as a YAML writes them down and as a driver sends them."""
+"""Commands over HTTP: their settings in the YAML, and how a driver sends them."""
 
 from collections.abc import Iterable
 from typing import Annotated, Any, Protocol
@@ -12,8 +12,8 @@ class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """One command to a controller.
 
     `path`: below the bus's `api_base`.
-    `method`: how it is sent.
-    `body`: JSON that is sent along, in quotes; nothing when absent.
+    `method`: the HTTP method.
+    `body`: the JSON body, as a quoted string; no body when absent.
     """
 
     path: http.Path
@@ -29,7 +29,7 @@ class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Calls(Protocol):
-    """What a driver needs of an HTTP bus."""
+    """What a driver needs from an HTTP bus."""
 
     def get_json(self, path: str) -> dict[str, Any]:
         """One JSON object. Raises HalError."""
@@ -37,22 +37,22 @@ class Calls(Protocol):
     def send(
         self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
     ) -> None:
-        """Once; `safe` where it takes power away. Raises HalError."""
+        """Send one request, without retry; `safe` when it switches an output off. Raises HalError."""
 
 
 class InsistentCalls(Calls, Protocol):
-    """The same, for who must be heard at the end."""
+    """An HTTP bus that can also skip its backoff, for the last command before the daemon ends."""
 
     def insist(self) -> None:
-        """Try at once what comes next."""
+        """Send the next request at once, without waiting for the backoff."""
 
 
 def send(bus: Calls, call: Call | None, safe: bool = False) -> None:
-    """This command, where there is one. Raises HalError."""
+    """Send this command; None sends nothing. Raises HalError."""
     if call:
         bus.send(call.path, call.method, call.body, safe)
 
 
 def told(call: Call, api: http.Base) -> str:
-    """For `check`: method, address and body."""
+    """The command as `check` prints it: method, address and body."""
     return f"{call.method} {api.url(call.path)}{f' {call.body}' if call.body else ''}"

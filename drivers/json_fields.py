@@ -1,6 +1,6 @@
-"""Typed values out of one JSON object: a field's place is spelled with dots (`pad.receiver.id`).
+"""Typed values from one JSON object: a field is addressed by names with dots (`pad.receiver.id`).
 
-Whatever JSON comes, a value is of the sort that is wanted, or DriverError names the field.
+For any JSON, a value has the type that the caller asks for, or DriverError names the field.
 """
 
 import math
@@ -23,18 +23,19 @@ Field = Annotated[
         extra={"pattern": "names with dots between them (status.code)"},
     ),
 ]
-"""Where a value is: names of objects, and numbers of list items (from 0), with dots between them."""
+"""The path to a value: object keys and list indexes (from 0), with dots between them."""
 
 
 Value = bool | int | float | str
-"""What may stand there: true, 3, 0.5 or a word."""
+"""A value that a field may hold: true, 3, 0.5 or a word."""
 
 
 class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A yes or no of the answer.
+    """A yes or no in the answer.
 
-    `field`: where it is: names with dots between them.
-    `when`: the values that are a yes, every other is a no; without them it must be true or false.
+    `field`: the field that holds it: names with dots between them.
+    `when`: the values that mean yes; every other value means no. Without it the field must be true or
+    false.
     """
 
     field: Field
@@ -42,7 +43,7 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 def flag(answer: Mapping[str, Any], place: Flag) -> bool:
-    """Yes or no; null is a no. Raises DriverError where it is absent, or neither."""
+    """Yes or no; null means no. Raises DriverError for an absent field or a value of the wrong type."""
     value = needed(answer, place.field)
     if value is None:
         return False
@@ -54,13 +55,13 @@ def flag(answer: Mapping[str, Any], place: Flag) -> bool:
 
 
 def place_text(place: Flag) -> str:
-    """For `check`: where it is, and what is a yes."""
+    """The flag as `check` prints it: its field, and the values that mean yes."""
     values = (str(yes).lower() if isinstance(yes, bool) else str(yes) for yes in place.when)
     return f"{place.field} is {', '.join(values) or 'true'}"
 
 
 def value_of(place: Flag, yes: bool) -> Value:
-    """What who answers writes there for a yes or a no."""
+    """The value that means yes or no, for a fake controller that writes the answer."""
     if not place.when:
         return yes
     if yes:
@@ -70,7 +71,7 @@ def value_of(place: Flag, yes: bool) -> Value:
 
 
 def put(answer: dict[str, Any], field: str, value: Any) -> None:
-    """A value at its place, for who answers; list items have no place here."""
+    """Put a value at its field, for a fake controller; list items are not supported."""
     *above, last = field.split(".")
     for part in above:
         answer = answer.setdefault(part, {})
@@ -78,12 +79,12 @@ def put(answer: dict[str, Any], field: str, value: Any) -> None:
 
 
 def same(value: object, given: Value) -> bool:
-    """Is it this? In JSON true is no 1, and 1.0 is 1."""
+    """Are they the same JSON value? true differs from 1; 1.0 equals 1."""
     return isinstance(value, bool) == isinstance(given, bool) and value == given
 
 
 def is_field(text: str) -> bool:
-    """Is it spelled as a place of an answer?"""
+    """Is this a valid path to a field of an answer?"""
     try:
         msgspec.convert(text, Field)
     except msgspec.ValidationError:
@@ -92,7 +93,7 @@ def is_field(text: str) -> bool:
 
 
 def found(answer: Any, field: str) -> Any:
-    """What stands there, or ABSENT."""
+    """The field's value, or ABSENT."""
     for part in field.split("."):
         if isinstance(answer, dict):
             answer = answer.get(part, ABSENT)
@@ -104,7 +105,7 @@ def found(answer: Any, field: str) -> Any:
 
 
 def needed(answer: Mapping[str, Any], field: str) -> Any:
-    """What stands there. Raises DriverError with what there is instead."""
+    """The field's value. Raises DriverError that lists the fields that there are."""
     value = found(answer, field)
     if value is ABSENT:
         names = ", ".join(clean(name) for name in list(answer)[:5]) or "nothing"
@@ -113,7 +114,7 @@ def needed(answer: Mapping[str, Any], field: str) -> Any:
 
 
 def text(answer: Mapping[str, Any], field: str) -> str:
-    """A text, on one line and printable; "" where it is absent or null."""
+    """A text, made printable and put on one line; "" when absent or null."""
     value = found(answer, field)
     if value is ABSENT or value is None:
         return ""
@@ -123,7 +124,7 @@ def text(answer: Mapping[str, Any], field: str) -> str:
 
 
 def number(answer: Mapping[str, Any], field: str, scale: float) -> float | None:
-    """A number times `scale`; None where it is absent or null."""
+    """A number times `scale`; None when absent or null. Raises DriverError for anything else."""
     value = found(answer, field)
     if value is ABSENT or value is None:
         return None
@@ -139,7 +140,7 @@ def number(answer: Mapping[str, Any], field: str, scale: float) -> float | None:
 
 
 def name(answer: Mapping[str, Any], field: str) -> str:
-    """An id as text, "" for null; it must be there."""
+    """An id as text; "" for null. Raises DriverError when it is absent or no id."""
     value = needed(answer, field)
     if value is None:
         return ""
@@ -149,12 +150,12 @@ def name(answer: Mapping[str, Any], field: str) -> str:
 
 
 def wrong(field: str, value: Any, wanted: str) -> DriverError:
-    """The error that says what stands there and what is expected."""
+    """The error that names the field, its value and what is expected."""
     return DriverError(f"'{field}' is {clean(reprlib.repr(value), 40)}, and {wanted} is expected")
 
 
 def clean(said: str, longest: int = TEXT_MAX) -> str:
-    """On one line, printable, and not long: it goes into a message and into the log."""
+    """The text made printable, on one line and cut to `longest`, for messages and the log."""
     said = "".join(c if c.isprintable() else " " for c in said[: 4 * longest])
     said = " ".join(said.split())
     return said if len(said) <= longest else f"{said[: longest - 1]}…"

@@ -1,6 +1,6 @@
-"""Wiring that works and is not safe: what a cut wire is taken for, and relays that pull in at boot.
+"""Wiring that works but is unsafe: a cut wire that reads as safe, a relay that energises at boot.
 
-An unsafe choice is a problem unless `accept_unsafe: {signal: reason}` accepts it.
+The daemon does not start with an unsafe choice unless `accept_unsafe: {signal: reason}` accepts it.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -10,14 +10,14 @@ from drivers.hal import gpio
 from drivers.hal.points import Wire
 
 ALARM_WITHIN_S: Final = 1.0
-"""An alarm that is believed later than this deserves a look."""
+"""`check` warns of an alarm whose debounce is longer than this (s)."""
 
 Unsafe = tuple[str, tuple[str, ...], str]
-"""A signal, where the YAML has it, and what is unsafe about it."""
+"""A signal, its path in the YAML, and what is unsafe about it."""
 
 
 def cut_must_read(wire: Wire, asserted: bool, meaning: str) -> Iterator[Unsafe]:
-    """Unsafe unless a cut wire reads as this; `meaning` is what is said of one that does not."""
+    """Unsafe unless a cut wire reads as `asserted`; `meaning` says what it is taken for otherwise."""
     reads = wire.broken_reads()
     if reads is None:
         yield wire.signal, wire.path, f"a cut wire floats (pull: none), and {meaning}"
@@ -26,7 +26,7 @@ def cut_must_read(wire: Wire, asserted: bool, meaning: str) -> Iterator[Unsafe]:
 
 
 def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
-    """Outputs whose relay would be on from power-on until the daemon claims them."""
+    """Outputs whose relay is energised from power-on until the daemon claims them."""
     for wire in wires:
         if wire.direction == "in":
             continue
@@ -45,7 +45,7 @@ def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
 
 
 def slow_alarms(wires: Iterable[Wire]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Alarms that must last long before they are believed, as (path, text)."""
+    """Alarms with a long debounce, as (path, text)."""
     for wire in wires:
         if wire.debounce_s is not None and wire.debounce_s > ALARM_WITHIN_S:
             text = f"{wire.signal} is believed only after {wire.debounce_s:g} s"
@@ -55,7 +55,7 @@ def slow_alarms(wires: Iterable[Wire]) -> Iterator[tuple[tuple[str, ...], str]]:
 def unaccepted(
     found: Iterable[Unsafe], accepted: Mapping[str, str]
 ) -> Iterator[tuple[tuple[str, ...], str]]:
-    """The unsafe choices that nobody has taken responsibility for, each with the two ways out."""
+    """The unsafe choices that `accept_unsafe` does not name, each with the two ways to resolve it."""
     for signal, path, text in found:
         if signal not in accepted:
             yield path, f"unsafe: {text}; or accept_unsafe: {{{signal}: <why it is safe here>}}"

@@ -1,9 +1,9 @@
-"""A wireless charger on CAN that speaks frames of its maker's: read as they come, fed from the scan.
+"""A wireless charger on CAN with its maker's own frames: it broadcasts, and needs periodic frames.
 
-A map says what the frames mean (`can_map.py`). The charger charges while it is sent
-what the map says, at the pace that the map says, and stops by itself when that stays away. So every
-frame is sent by a scan of ours, never by a cyclic sender: a daemon that hangs stops feeding. A charger
-that is not seen is not fed either; only the frames that take its power away are sent to it.
+A map says what the frames mean (`can_map.py`). The charger charges while it receives the frames of the
+map at the map's periods, and stops by itself when they cease. So each frame is sent from a scan, never
+by a cyclic sender: when the daemon hangs, the frames cease. While the charger's own frames are missing,
+the driver sends only the frames that switch its power off.
 """
 
 import functools
@@ -33,9 +33,9 @@ Volume = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One charger.
 
-    `profile`: a file of drivers/profiles/ that has the map.
-    `map`: the map, written here.
-    `setpoints`: what the map leaves to the site: voltages and currents of its batteries.
+    `profile`: the name of a file in drivers/profiles/ that holds the map.
+    `map`: the map, written here instead of a profile.
+    `setpoints`: name -> value, for what the map leaves to the site: voltages and currents.
     """
 
     profile: Name | None = None
@@ -43,7 +43,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     setpoints: dict[Name, Volume] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Problems:
-        """What the fields cannot say one by one."""
+        """Problems that involve more than one field."""
         yield from super().problems()
         if self.on_death == "keep":
             yield (
@@ -56,12 +56,12 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
             yield from _setpoint_problems(self)
 
     def can_stop(self) -> bool:
-        """By what it is sent, and by silence."""
+        """Always: by a frame, or when its frames cease."""
         return True
 
 
 def frame_map(settings: Settings) -> FrameMap:
-    """The map, from wherever it is."""
+    """The map: the one in the YAML, or the profile's."""
     found: FrameMap = settings.map or PROFILE.load(settings.profile or "")
     return found
 
@@ -89,7 +89,7 @@ def _encoding_problems(settings: Settings, sent: Sent, on: bool) -> Problems:
 
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """The frames, which no other device of the bus may use: (place, path); nothing while not right."""
+    """(place, path) of the frames, for this device alone; nothing while the map has problems."""
     if any(profile_problems(PROFILE, settings.profile, settings.map)):
         return
     found = frame_map(settings)
@@ -101,7 +101,7 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, str]]:
-    """What `check` prints in place of a wiring table: (what, meaning)."""
+    """Rows that `check` prints instead of a wiring table: (what, meaning)."""
     found = frame_map(settings)
     stops_s = settings.limits.peer_internal_timeout_s
     after = "a time to be asked of the maker" if stops_s is None else f"{stops_s:g} s"
@@ -119,7 +119,7 @@ def frame_tables(settings: Settings) -> Iterator[Table]:
 
 
 def warnings(settings: Settings) -> Problems:
-    """What is legal but worth a look: (path, text)."""
+    """Valid settings that deserve a second look: (path, text)."""
     if settings.profile and PROFILE.untried(settings.profile):
         text = (
             f"nobody has tried the profile {settings.profile} on hardware: watch the first charge"
@@ -134,12 +134,12 @@ def warnings(settings: Settings) -> Problems:
 
 
 def create(name: str, settings: Settings, bus: can.CanBus) -> "FrameDriver":
-    """The charger on its bus; nothing is sent before the first reading."""
+    """The charger's driver on its bus; it sends nothing before the first reading."""
     return FrameDriver(settings, bus)
 
 
 class FrameDriver:
-    """`drivers.Driver` of one charger."""
+    """`drivers.Driver` for one charger."""
 
     def __init__(self, settings: Settings, bus: can.CanBus) -> None:
         self._setpoints = settings.setpoints
@@ -153,12 +153,12 @@ class FrameDriver:
         self._touched = False
 
     def open(self) -> None:
-        """See that the scan can keep the pace; nothing is sent. Raises DriverError."""
+        """Check that scans are frequent enough for each period; send nothing. Raises DriverError."""
         for sent in self._map.send:
             self._frames.check_pace(sent.frame, sent.every_s)
 
     def read(self) -> ChargerSample:
-        """The charger now. Raises DriverError."""
+        """Read and decode the charger's fresh frames. Raises DriverError."""
         self._seen = False
         values = self._values(self._frames.read())
         code = int(values.get(self._map.state.at, -1))
@@ -181,7 +181,7 @@ class FrameDriver:
         )
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Feed it, or keep it off: each frame that is due. Raises DriverError."""
+        """Send each frame that is due, for power on or off. Raises DriverError."""
         if outputs.power is not None:
             if outputs.power != self._power:
                 self._frames.feed_at_once()
@@ -190,19 +190,19 @@ class FrameDriver:
             self._feed(self._power)
 
     def make_safe(self) -> None:
-        """What takes its power away, now. Silence does the rest. Raises DriverError."""
+        """Send the frames for power off at once; the other frames cease. Raises DriverError."""
         self._power = False
         self._frames.feed_at_once()
         self._feed(on=False)
         self._touched = False
 
     def close(self) -> None:
-        """Off, if it was ever fed; and let go."""
+        """Switch the power off, if it was ever on. Does not raise."""
         if self._touched:
             try:
                 self.make_safe()
             except DriverError:
-                return  # it is not fed any more, and stops by itself
+                return  # its frames cease, so it stops by itself
 
     def _feed(self, on: bool) -> None:
         for sent in self._map.send:
@@ -214,9 +214,10 @@ class FrameDriver:
             self._frames.feed(self._dbc.id(sent.frame), sent.every_s, payload)
 
     def _undiagnosed(self, activity: Activity, values: dict[str, float]) -> bool:
-        """An error's signals may come a moment after its state: they are awaited, once for an error.
+        """Has an error just begun whose signals have not come yet? They may follow the state's frame.
 
-        An error of no side counts as the station's, and takes it out of service.
+        `read` then waits for them, once for each error: an error without a side would count as the
+        station's and take it out of service.
         """
         before, self._in_error = self._in_error, activity is Activity.ERROR
         return self._in_error and not before and not self._errors(values, activity)
@@ -230,10 +231,10 @@ class FrameDriver:
         }
 
     def _errors(self, values: dict[str, float], activity: Activity) -> list[tuple[FaultSide, str]]:
-        """What is wrong by the frames that are heard, whatever the state says.
+        """The errors in the frames that have come, whatever the state is.
 
-        The signal of `out_of_range` is an error in an error's state only; else it tells where
-        the robot is.
+        The signal of `out_of_range` is an error only in an error state; otherwise it tells where the
+        robot is.
         """
         position = "" if activity is Activity.ERROR else self._map.out_of_range
         return self._map.errors.found(lambda at: 0 if at == position else values.get(at))
@@ -251,7 +252,7 @@ class FrameDriver:
 
 
 def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
-    """What is heard. Without its state, and who is there, there is no reading."""
+    """The frames to receive. A reading needs those of the state, the receiver and the rules."""
     state, *_ = found.frames()
     receiver = (found.receiver or "").split(".")[0]
     ruled = {signal.split(".")[0] for _, signal in places(found.rules)}
@@ -274,12 +275,12 @@ def _heard(values: Mapping[str, float], signal: str) -> float:
 
 
 def _receiver(number: float | None) -> str | None:
-    """None where the map has none; 0 is nobody."""
+    """The receiver's id as text: "" for 0, no receiver; None where the map has no such signal."""
     return None if number is None else str(int(number)) if number else ""
 
 
 def _rounded(value: float | None) -> float | None:
-    """Without what scaling by 0.1 leaves behind."""
+    """Rounded to 3 decimals, which removes the float error of scaling by 0.1."""
     return None if value is None else round(value, 3)
 
 

@@ -1,6 +1,6 @@
-"""What a charger's frames mean: a DBC file says where the signals are, this what they are for.
+"""What a charger's CAN frames mean: a DBC file defines the signals, this map says what each is for.
 
-It stands in a device YAML as `map:`, or in a file of `drivers/profiles/`.
+The map is in a device YAML as `map:`, or in a file of `drivers/profiles/`.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -31,9 +31,9 @@ Fresh = Annotated[float, msgspec.Meta(ge=0.05, le=60, extra={"unit": "s"})]
 
 
 class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the charger does, as one number.
+    """The charger's state, as one number.
 
-    `at`: its signal.
+    `at`: the signal that holds it.
     `codes`: what its numbers mean.
     """
 
@@ -42,13 +42,13 @@ class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A frame that the charger must be sent again and again; at least one of `on` and `off`.
+    """A frame that the driver sends periodically. Give `on`, `off` or both.
 
     `frame`: its name in the DBC file.
-    `every_s`: how often.
-    `on`: signal -> value, while the charger may charge; without it the frame is not sent then.
-    `setpoints`: signal -> which of the device's `setpoints` it takes while the charger may charge.
-    `off`: signal -> value, while it must not; without it the frame is not sent then.
+    `every_s`: its period.
+    `on`: signal -> value while the charger may charge; without it the frame is not sent then.
+    `setpoints`: signal -> the name of the device's setpoint that it carries while it may charge.
+    `off`: signal -> value while the charger must not charge; without it the frame is not sent then.
     """
 
     frame: Name
@@ -63,7 +63,7 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             yield (), "is never sent: give on, or off, or both"
 
     def values(self, on: bool, setpoints: Mapping[str, float]) -> dict[str, float] | None:
-        """What it says when the charger may charge or must not; None where it is not sent."""
+        """Its signals while the charger may charge (`on`) or must not; None when it is not sent."""
         if not on:
             return self.off
         if self.on is None:
@@ -75,17 +75,17 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """A make's frames.
 
     `dbc`: the DBC file, in drivers/profiles/ or by its absolute path.
-    `masks`: frame -> the bits of its id that are compared, for ids that hold a node's number.
-    `state`: what the charger does.
-    `state_timeout_s`: a state that was not sent again for so long is none any more.
-    `others_timeout_s`: likewise for all other frames.
+    `masks`: frame -> the bits of its id that are compared, for ids that contain a node id.
+    `state`: the charger's state.
+    `state_timeout_s`: the state is stale when its frame has not come for this long.
+    `others_timeout_s`: the same for all other frames.
     `volts`, `amps`: at the battery.
-    `receiver`: whose receiver it is, as a number; 0 is nobody's. Without its frame there is no reading.
-    `out_of_range`: not 0 while the robot stands where it cannot be charged. Among the `errors` too, it
-    is one only while the state says error: a robot that has yet to come is none.
-    `rules`: the state by other signals, before its codes; their places are signals.
-    `errors`: what is wrong, whatever the state; its places are signals.
-    `send`: what must be sent, and how often.
+    `receiver`: the receiver's id as a number; 0 is none. Without its frame there is no reading.
+    `out_of_range`: not 0 while the robot stands where it cannot be charged. If it is in `errors` too,
+    it counts as an error only in an error state: a robot that has not arrived yet is no error.
+    `rules`: derive the state from other signals; tried before its codes.
+    `errors`: signals that mean an error, whatever the state is.
+    `send`: the frames that the driver sends.
     """
 
     dbc: Name
@@ -102,7 +102,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     send: Annotated[list[Sent], msgspec.Meta(min_length=1)]
 
     def problems(self) -> Problems:
-        """A DBC file that is none, or that lacks what is spoken of."""
+        """A DBC file that cannot be read; a frame or signal that it lacks."""
         try:
             found = dbc.load(self.dbc)
         except ValueError as error:
@@ -132,15 +132,15 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield ("rules", *path), signal
 
     def error_frames(self) -> set[str]:
-        """The frames that errors are in."""
+        """The frames that carry errors."""
         return {signal.split(".")[0] for _, signal in self.errors.places()}
 
     def frames(self) -> list[str]:
-        """The frames that are read, that of the state first."""
+        """The frames that are read, the state's first."""
         return list(dict.fromkeys(signal.split(".")[0] for _, signal in self.signals()))
 
     def wanted_setpoints(self) -> set[str]:
-        """What a device's `setpoints` must give."""
+        """The names that a device's `setpoints` must give."""
         return {name for sent in self.send for name in sent.setpoints.values()}
 
 
@@ -155,7 +155,7 @@ def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") 
 
 
 def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
-    """For `check`: what is read where: (what, meaning)."""
+    """Rows for `check`: the signals that are read: (what, meaning)."""
     frames = dbc.load(found.dbc)
     yield "frames", str(dbc.path(found.dbc))
     for path, signal in found.signals():

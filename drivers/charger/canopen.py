@@ -1,7 +1,7 @@
 """Xnergy's receiver (`xnergy.py`) on CANopen: its objects, read and written by SDO.
 
-Bitrate 250 kbit/s and node 10 are the maker's; the node says each 100 ms that it lives (operational),
-and one whose heartbeat stays away is not read at all. Old firmware has no heartbeat.
+The maker's defaults are 250 kbit/s and node id 10. The node sends a heartbeat (operational) every
+100 ms; without a heartbeat it is not read. Old firmware sends no heartbeat.
 """
 
 from collections.abc import Iterable, Mapping
@@ -23,7 +23,7 @@ BeatTimeout = Annotated[float, msgspec.Meta(ge=0.15, le=10, extra={"unit": "s"})
 
 @dataclass(frozen=True, slots=True)
 class Object:
-    """A CANopen object, by SDO: `octets` is its width, unsigned and little-endian."""
+    """An unsigned little-endian CANopen object, read by SDO; `octets` is its width."""
 
     index: int
     subindex: int
@@ -50,9 +50,9 @@ OBJECTS: Final[Mapping[str, Object]] = {
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One receiver.
 
-    `node`: its CANopen node number; the maker's is 10.
+    `node`: its CANopen node id; the maker's default is 10.
     `heartbeat`: `none` for a receiver whose old firmware sends none.
-    `heartbeat_timeout_s`: a receiver that has not been heard for so long does not live.
+    `heartbeat_timeout_s`: the receiver counts as lost this long after its last heartbeat.
     """
 
     node: Annotated[int, msgspec.Meta(ge=1, le=127)]
@@ -61,12 +61,12 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def claims(settings: Settings) -> Iterable[tuple[str, tuple[str, ...]]]:
-    """What no other device of the bus may use: (place, path)."""
+    """(place, path) of the node, which no other device of the bus may use."""
     yield f"node {settings.node}", ("node",)
 
 
 def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, str]]:
-    """What `check` prints in place of a wiring table: (what, meaning)."""
+    """Rows that `check` prints instead of a wiring table: (what, meaning)."""
     rows = [("bus", f"{can.describe(bus_settings)}; node {settings.node}")]
     if settings.heartbeat == "required":
         lost = f"lost after {settings.heartbeat_timeout_s:g} s"
@@ -75,7 +75,7 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
-    """What is legal but worth a look: (path, text)."""
+    """Valid settings that deserve a second look: (path, text)."""
     found = list(xnergy.warnings(settings, "CAN"))
     if settings.heartbeat == "none":
         found.append((("heartbeat",), "without it a receiver that restarts is not noticed"))
@@ -83,12 +83,12 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
 
 
 def create(name: str, settings: Settings, bus: can.CanBus) -> xnergy.Receiver:
-    """The receiver on its bus; nothing is sent before the first reading."""
+    """The receiver's driver on its bus; it sends nothing before the first reading."""
     return xnergy.Receiver(settings, Objects(settings, bus))
 
 
 class Objects:
-    """`xnergy.Wire` by the objects of one node."""
+    """`xnergy.Wire` on the objects of one node."""
 
     def __init__(self, settings: Settings, bus: can.CanBus) -> None:
         limit_s = settings.heartbeat_timeout_s if settings.heartbeat == "required" else None
@@ -98,18 +98,18 @@ class Objects:
         self.now = bus.now
 
     def alive(self) -> bool:
-        """Its heartbeat is there; True when it has started anew."""
+        """Check its heartbeat. True if it has restarted since the last call. Raises HalError."""
         self._node.alive()
         before, self._starts = self._starts, self._node.starts
         return before != self._starts
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
-        """One question for each object."""
+        """Read these objects, with one SDO request each. Raises HalError."""
         objects = ((name, OBJECTS[name]) for name in names)
         return {name: self._node.read(o.index, o.subindex, o.octets) for name, o in objects}
 
     def write(self, name: str, value: int, safe: bool = False) -> None:
-        """Acknowledged, or it raises."""
+        """Write an object by SDO. Raises HalError unless the node acknowledges it."""
         found = OBJECTS[name]
         self._node.write(found.index, found.subindex, found.octets, value, safe=safe)
 

@@ -1,7 +1,7 @@
 """DBC files, by cantools: a maker's frames and the signals in them.
 
-`named` frames and signals are the file's. Values are physical: scaled, in the signal's unit; an
-enumerated signal is its number.
+Frames and signals have the names of the file. Values are physical: scaled, in the signal's unit. An
+enumerated signal has its number as value.
 """
 
 import functools
@@ -19,7 +19,7 @@ SIZE_MAX: Final = 4 << 20
 
 
 class Dbc:
-    """One file. Raises ValueError, with what is wrong with it."""
+    """One DBC file. Raises ValueError that says what is wrong with it."""
 
     def __init__(self, text: str) -> None:
         import cantools
@@ -32,7 +32,7 @@ class Dbc:
         self._messages: dict[str, Any] = {message.name: message for message in database.messages}
 
     def frames(self) -> list[str]:
-        """Their names."""
+        """The names of its frames."""
         return list(self._messages)
 
     def signals(self, frame: str) -> list[str]:
@@ -40,16 +40,16 @@ class Dbc:
         return [signal.name for signal in self._messages[frame].signals]
 
     def id(self, frame: str) -> int:
-        """Its id, with EXTENDED where that has 29 bits."""
+        """A frame's id, with EXTENDED set if it has 29 bits."""
         message = self._messages[frame]
         return int(message.frame_id) | (EXTENDED if message.is_extended_frame else 0)
 
     def length(self, frame: str) -> int:
-        """How many bytes it has."""
+        """A frame's length in bytes."""
         return int(self._messages[frame].length)
 
     def decode(self, frame: str, payload: bytes) -> dict[str, float]:
-        """Each signal's value, those left out that are no numbers. Raises DriverError."""
+        """Signal -> value, for each signal with a finite number. Raises DriverError."""
         from cantools.database.errors import Error
 
         try:
@@ -63,7 +63,7 @@ class Dbc:
         }
 
     def encode(self, frame: str, values: Mapping[str, float]) -> bytes:
-        """A frame that says this; every signal must be given. Raises ValueError."""
+        """The payload with these values; every signal must be given. Raises ValueError."""
         from cantools.database.errors import Error
 
         try:
@@ -88,12 +88,12 @@ class Dbc:
 
 
 def path(name: str) -> Path:
-    """Where a DBC file is: an absolute path as it is, else a file of drivers/profiles/."""
+    """The path of a DBC file: `name` if it is an absolute path, else a file of drivers/profiles/."""
     return texts.FOLDER / name
 
 
 def load(name: str) -> Dbc:
-    """A file by its name (`path`). Raises ValueError, with what is wrong."""
+    """Load a file by its name (see `path`). Raises ValueError that says what is wrong."""
     file = path(name)
     return _understood(file, texts.text(file, lambda: _read(file)))
 

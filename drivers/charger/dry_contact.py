@@ -1,7 +1,7 @@
-"""A charging station on contacts: a relay that enables it, and contacts that say what it does.
+"""A charging station on dry contacts: a relay enables it, contacts show what it does.
 
-They stand on the GPIO header, or at a Modbus I/O module (coils and discrete inputs). The relay is off
-before the daemon starts, so a charge ends with its daemon.
+They are on the GPIO header or on a Modbus I/O module (coils and discrete inputs). The relay is off
+whenever the daemon does not run, so a charge ends with the daemon.
 """
 
 from collections.abc import Iterator, Mapping
@@ -19,7 +19,7 @@ CUT_MUST_READ: Final = {
     "fault": (True, "a fault of the station is not seen"),
     "ready": (False, "a station that is not ready reads ready"),
 }
-"""What a cut wire has to read as, and what it would mean if it did not."""
+"""Signal -> (the level that a cut wire must read as, what goes wrong if it does not)."""
 ENABLE: Final = "enable"
 Problems = Iterator[tuple[tuple[str, ...], str]]
 
@@ -27,8 +27,8 @@ Problems = Iterator[tuple[tuple[str, ...], str]]
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The contacts that are read.
 
-    `charging`: current flows, ramping down too.
-    `ready`: the station could charge whoever comes; without it, it counts as ready.
+    `charging`: current flows, also while it ramps down.
+    `ready`: the station can charge the next robot; without this contact it always counts as ready.
     `fault`: the station is out of order.
     """
 
@@ -38,9 +38,9 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the station is told.
+    """The command to the station.
 
-    `enable`: it may charge while this relay is on.
+    `enable`: the station may charge while this relay is on.
     """
 
     enable: Output
@@ -57,7 +57,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     outputs: Outputs
 
     def problems(self) -> Problems:
-        """What the fields cannot say one by one."""
+        """Problems that involve more than one field."""
         yield from super().problems()
         if self.on_death == "keep":
             yield ("on_death",), "its relay is off without the daemon: leave this out"
@@ -95,7 +95,7 @@ def _unsafe(settings: Settings) -> Iterator[Unsafe]:
 
 
 def warnings(settings: Settings) -> Problems:
-    """What is legal, but should be read before the station is put into service: (path, text)."""
+    """Valid settings to review before the station goes into service: (path, text)."""
     for wire in wires(settings):
         if wire.debounce_s is not None:
             text = "contacts of a charger are not debounced: the next scan corrects a bounce"
@@ -110,19 +110,19 @@ def warnings(settings: Settings) -> Problems:
 
 
 def create(name: str, settings: Settings, bus: PointsBus) -> "DryContactCharger":
-    """The station on its bus; nothing is touched before `open`."""
+    """The station's driver on its bus; it touches nothing before `open`."""
     return DryContactCharger(Points(wires(settings), bus))
 
 
 class DryContactCharger:
-    """`drivers.Driver` of one station."""
+    """`drivers.Driver` for one station."""
 
     def __init__(self, points: Points) -> None:
         self._points = points
         self._enabled = False
 
     def open(self) -> None:
-        """Claim every contact; the relay is off, or as it was after a failure."""
+        """Claim every contact, and the relay, off; after a failure the relay may stay as it was."""
         self._points.open()
 
     def read(self) -> ChargerSample:
@@ -130,24 +130,24 @@ class DryContactCharger:
         return decode(self._points.read(), self._enabled)
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """The relay to this; None leaves it as it is. Nothing can be cleared or checked."""
+        """Set the relay; None leaves it as it is. Clears and range checks do not exist on contacts."""
         if outputs.power is not None:
             self._enabled = outputs.power
         self._points.write({ENABLE: self._enabled})
 
     def make_safe(self) -> None:
-        """The relay off, and seen to be off."""
+        """Switch the relay off and verify it."""
         self._enabled = False
         self._points.make_safe()
 
     def close(self) -> None:
-        """The relay off, and let go."""
+        """Switch the relay off and release the lines."""
         self._enabled = False
         self._points.close()
 
 
 def decode(shown: Mapping[str, bool], enabled: bool) -> ChargerSample:
-    """What these contacts say; `enabled`: the relay is on."""
+    """Decode the contacts; `enabled`: the relay is on."""
     activity, text = Activity.IDLE, ""
     side: FaultSide = ""
     if shown.get("fault"):

@@ -1,13 +1,13 @@
-"""A charging station that answers HTTP with JSON.
+"""A charging station that speaks HTTP and JSON.
 
-The contract of the first station (a wall-mounted transmitter, TPU):
+The interface of the first station (a wall-mounted transmitter, TPU):
 
     GET  http://{api_base}/state        ->  200 {"state": 238, "error_msg": "foreign object"}
     POST http://{api_base}/clear_error  ->  2xx
 
-It has no start, no stop and no receiver's id, so that profile is observe-only: the station decides
-itself whom it charges. Another make's paths and fields are YAML. `codes` says what the maker's states
-mean; one that is in no list is an error, and none is ever passed on as if it were RMF's.
+It has no start, no stop and no receiver id, so it can only be observed: the station itself decides
+which robot it charges. For other makes the YAML gives paths and fields. `codes` says what the maker's
+states mean; an unlisted state is an error. A maker's state is never passed on as an RMF state.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -44,8 +44,8 @@ TextMeans = Literal["none", "station", "robot"]
 class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A measurement.
 
-    `field`: where it is in the answer.
-    `scale`: what one of the maker's units is in ours (0.001 for mV).
+    `field`: the field of the answer that holds it.
+    `scale`: the factor from the maker's unit to ours (0.001 for mV).
     """
 
     field: Field
@@ -53,22 +53,22 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 InRange = Flag
-"""Whether the robot's coil is where it can be charged."""
+"""Whether the robot's coil is in charging range."""
 
 
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the answer to `state_path` has what: names with dots between them.
+    """The fields of the answer to `state_path`: names with dots between them.
 
-    `state`: what the station does; `codes` says what it means.
-    `error_text`: the station's own words for an error: any text there is one, whatever `state` says.
-    `error_texts`: text -> whose error it is, `station` or `robot`; or `none` for a text that is none
-    (`OK`). Of others `codes` says it, or nobody.
-    `receiver_id`: whose receiver it sees; null or "" for nobody's.
+    `state`: the station's state; `codes` says what it means.
+    `error_text`: the station's own text for an error: any text means an error, whatever `state` is.
+    `error_texts`: text -> the side of the error, `station` or `robot`; or `none` for a text that means
+    no error (`OK`). For other texts `codes` gives the side, if it can.
+    `receiver_id`: the id of the receiver that it sees; null or "" when it sees none.
     `in_range`: whether the robot stands where it can be charged.
-    `volts`: at the battery.
-    `amps`: into the battery.
-    `battery_percent`: how full the battery is, 0 to 100.
-    `time_to_full_s`: how long it still takes (s).
+    `volts`: the voltage at the battery.
+    `amps`: the current into the battery.
+    `battery_percent`: the battery's charge, 0 to 100.
+    `time_to_full_s`: the time until the battery is full (s).
     """
 
     state: Field = "state"
@@ -86,17 +86,17 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     """One station. The paths follow the bus's `api_base`.
 
     `codes`: what the maker's state numbers mean; not needed with `rules`.
-    `rules`: the state by what else the answer says, before `codes`; their places are fields.
-    `errors`: what is an error whatever the state says; its places are fields.
-    `state_words`: word -> the number that stands for it in `codes`, where the maker says words.
-    `state_path`: where GET answers the station's state.
-    `fields`: where that answer has what.
-    `clear_error_path`: where POST clears the station's error; `null` where nothing does.
-    `start`: begins to charge who is on the pad.
-    `switches_off_after_s`: the timer that `start` sets, by which the power is off without a new one:
-    `start` is then sent in every scan while the power is on.
-    `stop`: takes the power away.
-    `range_check`: has the station look where the robot stands, where it does not by itself.
+    `rules`: derive the state from other fields of the answer; tried before `codes`.
+    `errors`: fields that mean an error, whatever the state is.
+    `state_words`: word -> its number in `codes`, for a maker whose states are words.
+    `state_path`: the path that GET reads the station's state from.
+    `fields`: the fields of that answer.
+    `clear_error_path`: the path where POST clears the station's error; `null` where there is none.
+    `start`: switches the power on for the robot on the pad.
+    `switches_off_after_s`: the timer that `start` sets; the power goes off this long after the last
+    `start`, so `start` is sent in every scan while the power is on.
+    `stop`: switches the power off.
+    `range_check`: makes the station check where the robot stands, if it does not do so by itself.
     """
 
     codes: Codes | None = None
@@ -112,16 +112,16 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     range_check: Call | None = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """The timer of its power."""
+        """The power's timer (s) and its path in the YAML; None where it has none."""
         path = ("switches_off_after_s",)
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
     def can_stop(self) -> bool:
-        """Only where the YAML says how."""
+        """Can the driver switch the power off? Only if the YAML has `stop`."""
         return self.stop is not None
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """What the fields cannot say one by one."""
+        """Problems that involve more than one field."""
         yield from super().problems()
         yield from rules.problems(self.rules, self.codes is not None)
         yield from _place_problems(self)
@@ -161,7 +161,7 @@ def _timer_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]
 
 
 def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
-    """The driver of one station."""
+    """The station's driver on its bus; it sends nothing before the first reading."""
     return HttpCharger(settings, bus)
 
 
@@ -171,7 +171,7 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str, str]]:
-    """What `check` prints in place of a wiring table: (what, meaning)."""
+    """Rows that `check` prints instead of a wiring table: (what, meaning)."""
     api, fields = http.base(bus_settings.api_base), settings.fields
     rows = [("state", f"GET {api.url(settings.state_path)} every {bus_settings.scan_s:g} s")]
     for what in ("start", "stop", "range_check"):
@@ -210,7 +210,7 @@ def _place(place: str | Number | InRange) -> str:
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
-    """What this profile cannot do, as (path, text)."""
+    """What the station cannot do with these settings, and what deserves a second look: (path, text)."""
     missing = [name for name in ("receiver_id", "stop") if _lacks(settings, name)]
     consequences = {
         "receiver_id": "the robot on the pad is not verified, a robot at the wrong station is not"
@@ -243,9 +243,9 @@ def _how_often(settings: Settings) -> str:
 
 
 class HttpCharger:
-    """One station, read by polling.
+    """`drivers.Driver` for one station.
 
-    Power is a level: a start is repeated while the station stays idle, a stop while it goes on.
+    Power is a level: `start` is repeated while the station stays idle, `stop` while it still charges.
     """
 
     def __init__(self, settings: Settings, bus: Calls) -> None:
@@ -258,10 +258,10 @@ class HttpCharger:
         self._checked = 0
 
     def open(self) -> None:
-        """Nothing to claim: a charge under way is not ours to end before it has been read."""
+        """Do nothing: a restart must not end a charge."""
 
     def read(self) -> ChargerSample:
-        """The station's state now. Raises DriverError for an answer that has no meaning."""
+        """Read and decode the station's state. Raises DriverError for an answer that makes no sense."""
         answer = self._bus.get_json(self._settings.state_path)
         fields = self._settings.fields
         words, code = self._settings.state_words, None
@@ -281,10 +281,10 @@ class HttpCharger:
         )
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Bring the station to this level. Power that is taken goes first.
+        """Set the power, off first.
 
-        A clearing or a range check counts as done before it is sent: if its answer is lost, it is not
-        sent again.
+        A clear or a range check counts as done before it is sent: if its answer is lost, it is not sent
+        again.
         """
         if outputs.power is False:
             self._stop_if_needed()
@@ -300,12 +300,12 @@ class HttpCharger:
         self._power = outputs.power
 
     def make_safe(self) -> None:
-        """No power; a station that may go on charging without us is left as it is."""
+        """Switch the power off; with `on_death: keep` do nothing."""
         if self._settings.on_death == "stop":
             send(self._bus, self._settings.stop, safe=True)
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """Do nothing: the driver holds no resource."""
 
     def _stop_if_needed(self) -> None:
         given, self._power = self._power, None
@@ -322,7 +322,7 @@ class HttpCharger:
 
 
 def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> int | str:
-    """The maker's number for its state; a word that stands for none is left as it is."""
+    """The maker's number for its state, or its word if `state_words` does not list it."""
     code = json_fields.needed(answer, field)
     if words and isinstance(code, str):
         word = json_fields.clean(code, WORD_MAX)
@@ -362,7 +362,7 @@ def _number(answer: Mapping[str, Any], number: Number | None) -> float | None:
 
 
 def _in_range(answer: Mapping[str, Any], place: InRange | None) -> bool | None:
-    """Null is not in range."""
+    """Null means not in range."""
     return None if place is None else json_fields.flag(answer, place)
 
 

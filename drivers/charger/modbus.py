@@ -1,7 +1,7 @@
 """Xnergy's receiver (`xnergy.py`) on Modbus: its input registers and coils.
 
-Unit 16 and 9600 baud are the maker's. Of input registers 0 to 100 at most 50 were ever asked for at
-once by the maker's own driver.
+The maker's defaults are unit id 16 and 9600 baud. The maker's own driver reads at most 50 of the input
+registers 0 to 100 in one request.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -31,40 +31,40 @@ PLACES: Final[Mapping[str, str]] = {
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One receiver.
 
-    `unit`: its Modbus unit; the maker's is 16.
+    `unit`: its Modbus unit id; the maker's default is 16.
     """
 
     unit: Unit
 
 
 def points(settings: Settings) -> dict[str, Point]:
-    """Where each of its numbers is."""
+    """Name -> its register or coil."""
     return {name: at(settings.unit, place) for name, place in PLACES.items()}
 
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """What no other device may use: its coils."""
+    """(place, path) of its coils, which no other device may use."""
     for name in (xnergy.ENABLE, xnergy.CHECK_RANGE):
         yield str(points(settings)[name]), ("unit",)
 
 
 def describe(settings: Settings, bus_settings: modbus.Settings) -> list[tuple[str, str]]:
-    """What `check` prints in place of a wiring table: (what, meaning)."""
+    """Rows that `check` prints instead of a wiring table: (what, meaning)."""
     return xnergy.rows(settings, {name: str(point) for name, point in points(settings).items()})
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
-    """What is legal but worth a look: (path, text)."""
+    """Valid settings that deserve a second look: (path, text)."""
     return xnergy.warnings(settings, "bus")
 
 
 def create(name: str, settings: Settings, bus: modbus.ModbusBus) -> xnergy.Receiver:
-    """The receiver on its bus; nothing is sent before the first reading."""
+    """The receiver's driver on its bus; it sends nothing before the first reading."""
     return xnergy.Receiver(settings, Registers(settings, bus))
 
 
 class Registers:
-    """`xnergy.Wire` by the registers and coils of one unit."""
+    """`xnergy.Wire` on the registers and coils of one unit."""
 
     def __init__(self, settings: Settings, bus: modbus.ModbusBus) -> None:
         self._points = points(settings)
@@ -73,17 +73,17 @@ class Registers:
         self.now = bus.now
 
     def alive(self) -> bool:
-        """A unit says nothing of itself: whether it answers is seen by reading."""
+        """Always False: Modbus has no heartbeat, so only a read shows whether the unit answers."""
         return False
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
-        """As few questions as will do."""
+        """Read these words, in as few requests as possible. Raises HalError."""
         wanted = {name: self._points[name] for name in names}
         image = self._bus.cells(wanted.values())
         return {name: image[point] for name, point in wanted.items()}
 
     def write(self, name: str, value: int, safe: bool = False) -> None:
-        """Echoed, or it raises."""
+        """Write, and compare the unit's echo. Raises HalError."""
         self._bus.write(self._points[name], value, safe)
 
 

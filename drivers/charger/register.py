@@ -1,7 +1,7 @@
-"""A charging station of any make on Modbus registers, by a map of where it has what.
+"""A charging station of any make on Modbus registers, described by a register map.
 
-Power is a level: it is written while the station shows another. Nothing is written when the daemon
-starts: a charge under way is not ours to end before it has been read.
+Power is a level: the driver writes it while the station shows a different one. It writes nothing when
+the daemon starts, so that a restart does not end a charge.
 """
 
 from collections.abc import Iterator, Mapping
@@ -26,9 +26,9 @@ POWER: Final = "power"
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One station.
 
-    `unit`: its Modbus unit.
-    `profile`: a file of drivers/profiles/ that has the map.
-    `map`: the map, written here.
+    `unit`: its Modbus unit id.
+    `profile`: the name of a file in drivers/profiles/ that holds the map.
+    `map`: the map, written here instead of a profile.
     """
 
     unit: Unit
@@ -36,11 +36,11 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     map: ChargerMap | None = None
 
     def can_stop(self) -> bool:
-        """Only where the map says how."""
+        """Can the driver switch the power off? Only if the map has `power`."""
         return charger_map(self).power is not None
 
     def problems(self) -> Problems:
-        """What the fields cannot say one by one."""
+        """Problems that involve more than one field."""
         yield from super().problems()
         before = list(profile_problems(PROFILE, self.profile, self.map))
         yield from before
@@ -54,24 +54,24 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def charger_map(settings: Settings) -> ChargerMap:
-    """The map, from wherever it is."""
+    """The map: the one in the YAML, or the profile's."""
     found: ChargerMap = settings.map or PROFILE.load(settings.profile or "")
     return found
 
 
 def cells(settings: Settings) -> dict[str, list[Point]]:
-    """The registers or bit of each value."""
+    """Value -> its registers, or its coil or discrete input."""
     found: Mapping[str, Number] = charger_map(settings).values
     return {name: [at(settings.unit, p) for p in n.places()] for name, n in found.items()}
 
 
 def orders(settings: Settings) -> dict[str, Point]:
-    """Where each order is written."""
+    """Order -> the place that it is written to."""
     return {n: at(settings.unit, text) for n, text in charger_map(settings).orders().items()}
 
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """What no other device may use: what is written; nothing while that is not right."""
+    """(place, path) of each place that is written; nothing while the map has problems."""
     if any(profile_problems(PROFILE, settings.profile, settings.map)):
         return
     for name, text in charger_map(settings).orders().items():
@@ -81,7 +81,7 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
-    """For `check`: where each value is, what is written, and what it means."""
+    """Rows for `check`: each value's place, what is written, and what the numbers mean."""
     found = charger_map(settings)
     for name, points in cells(settings).items():
         number = found.values[name]
@@ -100,7 +100,7 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
 
 
 def warnings(settings: Settings) -> Problems:
-    """What is legal but worth a look: (path, text)."""
+    """Valid settings that deserve a second look: (path, text)."""
     if settings.profile and PROFILE.untried(settings.profile):
         text = f"nobody has tried the profile {settings.profile} on hardware"
         yield ("profile",), f"{text}: watch the first charge"
@@ -114,12 +114,12 @@ def warnings(settings: Settings) -> Problems:
 
 
 def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterCharger":
-    """The station on its bus; nothing is sent before the first reading."""
+    """The station's driver on its bus; it sends nothing before the first reading."""
     return RegisterCharger(settings, bus)
 
 
 class RegisterCharger:
-    """`drivers.Driver` of one station. `power` as it shows it is None while that is not known."""
+    """`drivers.Driver` for one station. `_power`: the level that it has; None while unknown."""
 
     def __init__(self, settings: Settings, bus: ModbusBus) -> None:
         self._settings = settings
@@ -133,10 +133,10 @@ class RegisterCharger:
         self._checked = 0
 
     def open(self) -> None:
-        """Nothing is claimed and nothing sent."""
+        """Do nothing: a restart must not end a charge."""
 
     def read(self) -> ChargerSample:
-        """The station now. Raises DriverError."""
+        """Read and decode the station's values. Raises DriverError."""
         power, self._power = self._power, None
         command = self._map.power
         shown = [self._orders[POWER]] if command and command.read_back else []
@@ -151,7 +151,7 @@ class RegisterCharger:
         return decode(self._map, values)
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Bring the station to this level: off first. What is no level is written once for a rise."""
+        """Set the power, off first. A clear or range check is written once when its count changes."""
         if outputs.power is False:
             self._switch(on=False)
         if outputs.clear_errors != self._cleared:
@@ -164,7 +164,7 @@ class RegisterCharger:
             self._switch(on=True)
 
     def make_safe(self) -> None:
-        """No power, and read back where it can be; or left alone, as the YAML says."""
+        """Switch the power off and read it back where possible; with `on_death: keep` do nothing."""
         if self._settings.on_death == "stop":
             self._switch(on=False, anyway=True)
             command = self._map.power
@@ -174,13 +174,13 @@ class RegisterCharger:
                     raise DriverError(f"{point} is not off after {command.off} was written")
 
     def close(self) -> None:
-        """Off, if it was ever driven and may be on; and let go."""
+        """Do what `make_safe` does, if the power was ever written and may be on. Does not raise."""
         if self._touched and self._power is not False:
             self._bus.insist()
             try:
                 self.make_safe()
             except DriverError:
-                return  # it was tried; make_safe has said so before
+                return  # close does not raise, and the earlier make_safe has reported the failure
 
     def _switch(self, on: bool, anyway: bool = False) -> None:
         command = self._map.power
@@ -197,7 +197,7 @@ class RegisterCharger:
 
 
 def decode(found: ChargerMap, values: Mapping[str, float]) -> ChargerSample:
-    """What these values say of the station. Never raises."""
+    """Decode the station's values. Never raises."""
     code = int(values["state"]) if found.codes else None
     said = judged(found, values.__getitem__, code)
     receiver, in_range = values.get("receiver"), values.get("in_range")

@@ -1,4 +1,4 @@
-"""Where a charger on registers has what, and what its numbers mean: a YAML's or profile's map."""
+"""The register map of a charger, from a YAML or a profile: places and what the numbers mean."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Final, Literal
@@ -16,18 +16,18 @@ Problems = Iterator[tuple[tuple[str, ...], str]]
 Bit = Annotated[int, msgspec.Meta(ge=0, le=31)]
 MEASURED: Final = ("volts", "amps", "battery_percent", "time_to_full_s")
 KNOWN: Final = ("state", "receiver", "in_range", *MEASURED)
-"""The values that have a use by their name."""
+"""The values whose names have a meaning of their own."""
 
 
 class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One value of the station.
 
     `at`: `input register N`, `holding register N`, `discrete input N` or `coil N`.
-    `words`: in how many registers it is: 2 for 32 bits.
-    `low_first`: of two, the register with the low word is the first.
-    `signed`: it may be negative (two's complement).
-    `bit`: only this bit of it; 0 is the least.
-    `scale`: what one of the maker's units is in ours (0.1 for tenths of an ampere).
+    `words`: how many registers it takes: 2 for 32 bits.
+    `low_first`: the first of the two registers holds the low word.
+    `signed`: it is signed (two's complement).
+    `bit`: only this bit of it; 0 is the least significant.
+    `scale`: the factor from the maker's unit to ours (0.1 for tenths of an ampere).
     """
 
     at: Place
@@ -38,7 +38,7 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     scale: float = 1.0
 
     def problems(self) -> Problems:
-        """A place that is none, or what it cannot be."""
+        """An invalid place; options that do not fit its table or width."""
         if reason := misplaced(self.at, tuple(TABLES)):
             yield ("at",), reason
             return
@@ -54,13 +54,13 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("low_first",), "is for two registers: words: 2"
 
     def places(self) -> list[str]:
-        """Its registers, the one with the high word first."""
+        """Its registers, the high word's first."""
         table, address = place(self.at)
         found = [f"{table} {address + n}" for n in range(self.words)]
         return found[::-1] if self.low_first else found
 
     def value(self, words: list[int]) -> float:
-        """What these words mean, in the order of `places`."""
+        """The value of these words, which have the order of `places`."""
         raw, bits = 0, 16 * self.words
         for word in words:
             raw = raw << 16 | word
@@ -71,19 +71,19 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         return raw if self.scale == 1.0 else round(raw * self.scale, 6)
 
     def encoded(self, value: float) -> list[int]:
-        """The words that mean this value, for who answers."""
+        """The words that hold this value, for a fake station."""
         raw = int(value) << self.bit if self.bit is not None else round(value / self.scale)
         raw &= (1 << 16 * self.words) - 1
         return [raw >> 16 * n & 0xFFFF for n in reversed(range(self.words))]
 
 
 class Power(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the station is told whether it may charge.
+    """The command that lets the station charge.
 
     `at`: `coil N` or `holding register N`.
-    `on`: the value with which it may charge.
-    `off`: the value with which it must not.
-    `read_back`: false where it can only be written; then it is written in every scan.
+    `on`: the value that lets it charge.
+    `off`: the value that does not.
+    `read_back`: false where the command can only be written; then it is written in every scan.
     """
 
     at: Place
@@ -92,7 +92,7 @@ class Power(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     read_back: bool = True
 
     def problems(self) -> Problems:
-        """A place that cannot be written; values that it cannot take."""
+        """A place that cannot be written; values that it cannot hold."""
         if reason := misplaced(self.at, WRITABLE):
             yield ("at",), reason
         elif misplaced(self.at, ("coil",)) is None and max(self.on, self.off) > 1:
@@ -102,10 +102,10 @@ class Power(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is written once.
+    """A command that is written once.
 
     `at`: `coil N` or `holding register N`.
-    `write`: the value.
+    `write`: the value that is written.
     """
 
     at: Place
@@ -118,17 +118,19 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where a station has what. Addresses begin at 0.
+    """A station's register map. Addresses begin at 0.
 
-    `values`: name -> where it is. `state` is what `codes` speaks of; `volts`, `amps`,
-    `battery_percent`, `time_to_full_s` are shown; `receiver` is whose receiver it sees, 0 nobody's;
-    `in_range` is not 0 while a robot stands where it can be charged; rules and errors take any name.
+    `values`: name -> its place. `state` is the number that `codes` lists; `volts`, `amps`,
+    `battery_percent` and `time_to_full_s` are shown; `receiver` is the id of the receiver that it sees,
+    0 for none; `in_range` is not 0 while a robot stands where it can be charged. Rules and errors may
+    use any name.
     `codes`: what the numbers of `state` mean; not needed with `rules`.
-    `rules`: the state by other values, before `codes`; their places are names of `values`.
-    `errors`: what is an error whatever the state says; its places are names of `values`.
-    `power`: how it is told whether it may charge; without it the station is only observed.
-    `clear_error`: what clears its error.
-    `range_check`: what has it look where the robot stands, where it does not by itself.
+    `rules`: derive the state from other values; tried before `codes`. Their places are names of
+    `values`.
+    `errors`: values that mean an error, whatever the state is. Their places are names of `values`.
+    `power`: the command that lets it charge; without it the station is only observed.
+    `clear_error`: the command that clears its error.
+    `range_check`: the command that makes it check where the robot stands, if it does not by itself.
     """
 
     values: Annotated[dict[Name, Number], msgspec.Meta(min_length=1)]
@@ -140,7 +142,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     range_check: Order | None = None
 
     def problems(self) -> Problems:
-        """Names that are no value's; a state that nothing says."""
+        """Names that are not in `values`; a map without a state."""
         yield from by_rules.problems(self.rules, self.codes is not None)
         if self.codes and "state" not in self.values:
             yield ("values",), "needs 'state', of which codes speaks"
@@ -153,7 +155,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
             yield ("range_check",), "needs the value in_range: where is its result?"
 
     def orders(self) -> Mapping[str, str]:
-        """Each place that is written, by what it does."""
+        """Command -> its place, for each command that is given."""
         names = ("power", "clear_error", "range_check")
         return {name: part.at for name in names if (part := getattr(self, name)) is not None}
 

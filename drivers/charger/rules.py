@@ -1,7 +1,7 @@
-"""A charger's state by rules, and its errors by numbers and bits: on HTTP, Modbus and CAN alike.
+"""Rules for a charger's state, and its errors as numbers and bits: for HTTP, Modbus and CAN.
 
-Where a value is, the protocol spells: a field of an answer, a place of a unit, a signal of a frame.
-Rules come before `codes`: the first one whose tests all hold says what the station does.
+A place is where a value is: a field of an HTTP answer, a name in a register map's `values`, a signal of
+a CAN frame. Rules are tried before `codes`: the first rule whose tests all hold gives the state.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -17,10 +17,10 @@ from drivers.json_fields import Value, same
 
 Problems = Iterator[tuple[tuple[str, ...], str]]
 Read = Callable[[str], object]
-"""What stands at a place; raises DriverError where nothing does."""
+"""Returns the value at a place; raises DriverError if there is none."""
 Meaning = tuple[Activity, FaultSide]
 Found = list[tuple[FaultSide, str]]
-"""What is wrong: whose fault, and its text."""
+"""Errors: the side of each, and its text."""
 
 MEANINGS: Final[Mapping[str, Meaning]] = {
     **{str(a): (a, "") for a in Activity if a is not Activity.UNKNOWN},
@@ -32,11 +32,11 @@ Bit = Annotated[int, msgspec.Meta(ge=0, le=31)]
 
 
 class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What a value must be; all that is given must hold.
+    """A test of one value; every condition that is given must hold.
 
-    `one_of`: it is one of these.
-    `above`: it is greater than this.
-    `below`: it is less than this.
+    `one_of`: the value is one of these.
+    `above`: the value is greater than this.
+    `below`: the value is less than this.
     """
 
     one_of: list[Value] = []
@@ -44,14 +44,14 @@ class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     below: float | None = None
 
     def problems(self) -> Problems:
-        """A test of nothing, or one that nothing passes."""
+        """A test without a condition, or one that no value passes."""
         if not self.one_of and self.above is None and self.below is None:
             yield (), "tests nothing: give one_of, above or below"
         if self.above is not None and self.below is not None and self.above >= self.below:
             yield ("below",), "must be greater than above"
 
     def holds(self, value: object) -> bool:
-        """Is the value so? True and false count as 1 and 0 where limits are given."""
+        """Does the value pass? For `above` and `below`, true and false count as 1 and 0."""
         if self.one_of and not any(same(value, given) for given in self.one_of):
             return False
         if self.above is None and self.below is None:
@@ -62,7 +62,7 @@ class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         return over and (self.below is None or value < self.below)
 
     def text(self) -> str:
-        """For `check`."""
+        """The text or rows that `check` prints."""
         parts = [f"one of {', '.join(map(str, self.one_of))}"] if self.one_of else []
         parts += [f"above {self.above:g}"] if self.above is not None else []
         parts += [f"below {self.below:g}"] if self.below is not None else []
@@ -70,11 +70,11 @@ class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One way of seeing what the station does.
+    """One rule for the station's state.
 
-    `means`: what it does then, as the lists of `codes` are called.
-    `when`: place -> what stands there; without it the rule always holds.
-    `text`: for an error, what is wrong.
+    `means`: the state, by the name of a list of `codes`.
+    `when`: place -> the test of its value; without it the rule always holds.
+    `text`: the error's text, if `means` is an error.
     """
 
     means: str
@@ -82,7 +82,7 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     text: Name | None = None
 
     def problems(self) -> Problems:
-        """A meaning that there is not; a text that nobody reads."""
+        """An unknown meaning; a text for a state that is not an error."""
         if self.means not in MEANINGS:
             yield ("means",), f"is '{self.means}': one of {', '.join(MEANINGS)} is wanted"
         elif self.text and MEANINGS[self.means][0] is not Activity.ERROR:
@@ -90,12 +90,12 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An error as a number: a code, or a word of bits. One that is not listed is shown as it is.
+    """An error as one number. An unlisted number is shown as it is.
 
-    `at`: where it is.
-    `well`: the numbers that are no error.
-    `station`: number -> text, faults of the station.
-    `robot`: number -> text, faults of the robot, its receiver and where it stands.
+    `at`: its place.
+    `well`: the numbers that mean no error.
+    `station`: number -> text, for faults of the station.
+    `robot`: number -> text, for faults of the robot, its receiver and its position.
     """
 
     at: Name
@@ -104,14 +104,14 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     robot: dict[int, Name] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Problems:
-        """A number that means two things."""
+        """A number with two meanings."""
         for number in self.station.keys() & self.robot.keys():
             yield ("robot", str(number)), f"{number} is a fault of the station already"
         for number in {*self.station, *self.robot}.intersection(self.well):
             yield ("well",), f"{number} is an error as well"
 
     def errors(self, value: object) -> Found:
-        """The one error that it is."""
+        """The error that this number means; none for a number of `well`."""
         if not isinstance(value, int | float) or value in self.well:
             return [] if isinstance(value, int | float) else [("", f"error {value}")]
         sides: tuple[tuple[FaultSide, Mapping[int, str]], ...] = (
@@ -123,12 +123,12 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Errors as bits of one number: a flag byte or word. One that is not listed is shown by its number.
+    """Errors as bits of one number: a flag byte or word. An unlisted bit is shown by its number.
 
-    `at`: where it is.
-    `ignore`: bits that are no error.
-    `station`: bit (0 is the least) -> text, faults of the station.
-    `robot`: bit -> text, faults of the robot, its receiver and where it stands.
+    `at`: its place.
+    `ignore`: bits that mean no error.
+    `station`: bit (0 is the least significant) -> text, for faults of the station.
+    `robot`: bit -> text, for faults of the robot, its receiver and its position.
     """
 
     at: Name
@@ -137,7 +137,7 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     robot: dict[Bit, Name] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Problems:
-        """A bit that means two things."""
+        """A bit with two meanings."""
         for bit in self.station.keys() & self.robot.keys():
             yield ("robot", str(bit)), f"bit {bit} is a fault of the station already"
 
@@ -153,12 +153,12 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is wrong with the station or with the robot on it, whatever the state says.
+    """Errors of the station or of the robot on it, whatever the state is.
 
-    `station`: place -> text: what is not 0 while the station has that fault.
-    `robot`: likewise, faults of the robot, its receiver and where it stands.
-    `codes`: errors that are one number with texts.
-    `bits`: errors that are the bits of a flag byte or word.
+    `station`: place -> text; a value other than 0 means that the station has this fault.
+    `robot`: the same for faults of the robot, its receiver and its position.
+    `codes`: errors as one number each.
+    `bits`: errors as the bits of a flag byte or word.
     """
 
     station: dict[Name, Name] = msgspec.field(default_factory=dict)
@@ -167,7 +167,7 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     bits: list[ErrorBits] = []
 
     def found(self, read: Read) -> Found:
-        """All that is wrong now; what reads None is not known, and no error."""
+        """All errors now, the station's first; a value of None is unknown and means no error."""
         sides: tuple[tuple[FaultSide, Mapping[str, str]], ...] = (
             ("station", self.station),
             ("robot", self.robot),
@@ -182,7 +182,7 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         return sorted([*flags, *numbers], key=lambda error: order.index(error[0]))
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """Each place that is read, and where the YAML says so below this."""
+        """(path below this section, place) of each value that is read."""
         for side in ("station", "robot"):
             for at in getattr(self, side):
                 yield (side, at), at
@@ -192,14 +192,14 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 def places(rules: list[Rule]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Each place that rules look at, and where the YAML says so below them."""
+    """(path below the rules, place) of each value that they test."""
     for n, rule in enumerate(rules):
         for at in rule.when:
             yield (str(n), "when", at), at
 
 
 def judge(rules: list[Rule], read: Read) -> Rule | None:
-    """The first rule that holds."""
+    """The first rule that holds, or None."""
     return next((r for r in rules if all(t.holds(read(at)) for at, t in r.when.items())), None)
 
 
@@ -223,9 +223,9 @@ class Judged:
 
 
 def judged(station: "Station", read: Read, code: int | str | None) -> Judged:
-    """What rules, codes and errors say together; `code`: the maker's state, where there are codes.
+    """The state from rules, codes and errors. `code`: the maker's state, if there are codes.
 
-    An error is an error whatever the state says. Raises DriverError.
+    An entry of `errors` makes it an error, whatever the state is. Raises DriverError.
     """
     rule = judge(station.rules, read)
     if rule is not None:
@@ -244,7 +244,7 @@ def judged(station: "Station", read: Read, code: int | str | None) -> Judged:
 
 
 class Station(Protocol):
-    """What a station's settings, or its map, say of its state."""
+    """The part of a station's settings, or of its map, that defines its state."""
 
     @property
     def codes(self) -> Codes | None:
@@ -252,15 +252,15 @@ class Station(Protocol):
 
     @property
     def rules(self) -> list[Rule]:
-        """What comes before them."""
+        """The rules, which are tried before the codes."""
 
     @property
     def errors(self) -> Errors:
-        """What is wrong, whatever the state."""
+        """The values that mean an error, whatever the state is."""
 
 
 def rows(rules: list[Rule], errors: Errors) -> Iterator[tuple[str, str]]:
-    """For `check`."""
+    """The rows that `check` prints."""
     for n, rule in enumerate(rules):
         tests = (f"{at} {test.text()}" for at, test in rule.when.items())
         text = f": {rule.text}" if rule.text else ""
@@ -275,7 +275,7 @@ def rows(rules: list[Rule], errors: Errors) -> Iterator[tuple[str, str]]:
 
 
 def problems(rules: list[Rule], has_codes: bool) -> Problems:
-    """Rules that are never asked; a station whose state nothing says. Paths are below the station."""
+    """Rules that are never reached; a station without a state. Paths are below the station."""
     if not rules and not has_codes:
         yield ("codes",), "needs codes (what the maker's state numbers mean), or rules"
     for n, rule in enumerate(rules[:-1]):
@@ -288,5 +288,5 @@ def problems(rules: list[Rule], has_codes: bool) -> Problems:
 
 
 def said(found: Found) -> str:
-    """The texts of all that is wrong."""
+    """The texts of all errors, in one line."""
     return "; ".join(text for _, text in found)

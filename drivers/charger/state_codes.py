@@ -1,6 +1,6 @@
-"""What a maker's states of a charger mean: a table that the YAML must give, total by its last rule.
+"""What a maker's state numbers of a charger mean: a table in the YAML that covers every number.
 
-A number that stands in no list is an error, with its number; none is passed on as RMF's.
+An unlisted number is an error and is shown. A maker's number is never passed on as an RMF state.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -17,7 +17,7 @@ ROBOT_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "robot")
 
 
 class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the maker's state numbers mean. A number in no list is an error, with its number.
+    """What the maker's state numbers mean. An unlisted number is an error and is shown.
 
     `idle`: nothing is on the pad, and a robot may come.
     `charging`: current flows.
@@ -39,7 +39,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     robot_error: list[Code] = []
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """States that stand twice."""
+        """States that are listed twice."""
         seen: dict[int, str] = {}
         for name in self.__struct_fields__:
             for n, code in enumerate(getattr(self, name)):
@@ -48,7 +48,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
                 seen[code] = name
 
     def meanings(self) -> dict[int | str, tuple[Activity, FaultSide]]:
-        """By the maker's state: what the station does, and whose fault an error is."""
+        """The maker's state -> (activity, the side of an error)."""
         made: dict[int | str, tuple[Activity, FaultSide]] = {
             code: (activity, "") for activity, codes in self.lists().items() for code in codes
         }
@@ -68,7 +68,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         }
 
     def rows(self) -> list[tuple[str, str]]:
-        """For `check`."""
+        """The text or rows that `check` prints."""
         rows = [
             (f"state {meaning}", ", ".join(map(str, codes)) or "no code")
             for meaning, codes in self.lists().items()

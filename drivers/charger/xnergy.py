@@ -1,15 +1,15 @@
-"""Xnergy's receiver (RCU): what its numbers mean and how it is driven, whatever wire it is on.
+"""Xnergy's receiver (RCU): what its numbers mean and how it is driven, on any bus.
 
-Where its numbers are is in `canopen.py` and `modbus.py`. No place for clearing an error is published:
-an error ends by itself, or with the receiver's power.
+`canopen.py` and `modbus.py` know the addresses of its numbers. The maker publishes no address for
+clearing an error: an error ends by itself, or when the receiver's power is cycled.
 
 Facts: the maker's published ROS driver (`xnergy-charger-rcu`): state codes, error bits, addresses,
-scales, and the range check before a start. Not tried on the hardware. That driver decodes the high
-error word only when it is zero, never compares an SDO reply with its question, and shows an RCU that
-does not answer as state 250, which the RCU itself never sends.
+scales, and the range check before a start. Not tried on the hardware. Faults of the maker's driver are
+not copied: it decodes the high error word only when it is zero, never compares an SDO reply with its
+request, and shows an RCU that does not answer as state 250, which the RCU itself never sends.
 
-Errors have a side: what the transmitter (TPU, on the wall) reports, or lies on the pad, is the
-station's; everything else is the robot's, its receiver and where it stands.
+Each error has a side. Errors of the transmitter (TPU, on the wall) and objects on the pad are the
+station's; all others are the robot's: its receiver and its position.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,10 +22,10 @@ from drivers import DriverError
 
 ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
 IN_ERROR: Final = ("latched_low", "latched_high")
-"""What a scan reads, and in an error also the maker's shadow error, which stays after it has gone."""
+"""ALWAYS is read in every scan; IN_ERROR also in an error: the error as the receiver latched it."""
 ENABLE: Final = "enable"
 CHECK_RANGE: Final = "check_range"
-"""What is written: 1 or 0, and 1."""
+"""The two that are written: ENABLE with 1 or 0, CHECK_RANGE with 1."""
 
 Words = Mapping[str, int]
 """Raw unsigned words by the names of ALWAYS and IN_ERROR."""
@@ -56,7 +56,7 @@ CODES: Final[Mapping[int, tuple[Activity, str]]] = {
     250: (Activity.ERROR, "not connected"),
     255: (Activity.ERROR, "debug: error"),
 }
-"""What is published; every other code is UNKNOWN (`activity`)."""
+"""The published state codes; `activity` maps every other code to UNKNOWN."""
 
 ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
     0x0000_0001: ("robot", "the receiver's flash memory is not set"),
@@ -75,19 +75,19 @@ ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
     0x0002_0000: ("station", "foreign object on the pad"),
     0x0010_0000: ("robot", "a temperature sensor of the receiver has failed"),
 }
-"""The error as one number of 32 bits, its high word above its low word."""
+"""The bits of the 32-bit error number, whose upper half is the high word."""
 
 IN_RANGE: Final = 1
-"""The result of a range check that is a yes. Others: 0 under way, 2 out of range, 240 failed."""
+"""The range check's result for a robot in range. Others: 0 under way, 2 out of range, 240 failed."""
 
 
 def activity(code: int) -> Activity:
-    """What a state code means: total, an unpublished one is UNKNOWN."""
+    """What a state code means; UNKNOWN for an unpublished one."""
     return CODES.get(code, (Activity.UNKNOWN, ""))[0]
 
 
 def sample(words: Words, settled: bool = True) -> ChargerSample:
-    """One reading. `words` has at least state, error_low and error_high; never raises.
+    """Decode one reading; never raises. `words` has at least state, error_low and error_high.
 
     An error is one whatever the state says.
     `settled`: the range check's result is that of the last check (`settled` below).
@@ -110,7 +110,7 @@ def sample(words: Words, settled: bool = True) -> ChargerSample:
 def errors(number: int) -> list[tuple[FaultSide, str]]:
     """Side and text of each bit that is set: the station's first, the robot's last.
 
-    An unpublished bit is nobody's.
+    An unpublished bit has no side.
     """
     found = [
         ERROR_BITS.get(1 << bit, ("", f"unknown error bit {bit}"))
@@ -121,7 +121,7 @@ def errors(number: int) -> list[tuple[FaultSide, str]]:
 
 
 def error_number(words: Words) -> int:
-    """The error now; in an error state that shows none now, the one that is latched."""
+    """The current error; in an error state without a current error, the latched one."""
     now = words["error_high"] << 16 | words["error_low"]
     if now or activity(words["state"]) is not Activity.ERROR:
         return now
@@ -129,7 +129,7 @@ def error_number(words: Words) -> int:
 
 
 def _text(words: Words, found: list[tuple[FaultSide, str]]) -> str:
-    """The first error's side says it all for its own; another side's has its name before it."""
+    """The errors' texts; one whose side differs from the first error's has its side before it."""
     if found:
         main = found[0][0]
         return "; ".join(
@@ -148,15 +148,15 @@ def _units(word: int | None) -> float | None:
 # ---- starting and stopping
 
 RANGE_SETTLE_S: Final = 1.0
-"""A check's result is believed so long after it was asked for: till then the one before is there."""
+"""How long after a range check its result is valid (s); until then the previous result is read."""
 
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What the receiver was told last. `enabled`: None while that is not known.
+    """What was last written to the receiver. `enabled`: the last ENABLE; None while unknown.
 
-    `range_checks`: how many were asked for; `asked_at`: when the last was (monotonic s), inf while one
-    has yet to be.
+    `range_checks`: how many checks were requested; `asked_at`: when the last one was (monotonic s), inf
+    while one waits to be sent.
     """
 
     enabled: bool | None = None
@@ -166,22 +166,22 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Orders:
-    """What to write in this scan: `enable` (None: nothing), and whether to ask for a range check."""
+    """What to write in this scan: `enable` (None: nothing), and whether to start a range check."""
 
     enable: bool | None = None
     check_range: bool = False
 
 
 def settled(told: Told, now: float) -> bool:
-    """Is the range check's result that of the last check?"""
+    """Does the range result belong to the last range check?"""
     return now - told.asked_at >= RANGE_SETTLE_S
 
 
 def steer(told: Told, outputs: ChargerOutputs, code: int, now: float) -> tuple[Told, Orders]:
-    """What to write now that the state is `code`, and what the receiver has been told after that.
+    """What to write in state `code`, and the record of it once it is written.
 
-    A start and a range check are written in state idle only, each once; a stop once, and again while
-    the receiver still charges. `power` None writes neither start nor stop.
+    A start and a range check are written only in state idle, each once. A stop is written once, and
+    again while the receiver still charges. `power` None writes neither start nor stop.
     """
     ask = outputs.range_checks != told.range_checks
     if ask and code == IDLE:
@@ -206,26 +206,26 @@ def _charges(code: int) -> bool:
 
 
 class Wire(Protocol):
-    """Where the receiver's numbers are."""
+    """Access to the receiver's numbers on one type of bus."""
 
     def alive(self) -> bool:
-        """Raises DriverError where it does not live; True when it has started anew meanwhile."""
+        """True if the receiver has restarted since the last call. Raises DriverError if it is gone."""
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
         """The words of these names, read now. Raises DriverError."""
 
     def write(self, name: str, value: int, safe: bool = False) -> None:
-        """ENABLE or CHECK_RANGE. `safe`: it takes power away. Raises DriverError."""
+        """Write ENABLE or CHECK_RANGE. `safe`: it switches the power off. Raises DriverError."""
 
     def insist(self) -> None:
-        """Try at once what comes next."""
+        """Send the next request at once, without waiting for the backoff."""
 
     def now(self) -> float:
         """Monotonic seconds."""
 
 
 class Receiver:
-    """`drivers.Driver` of one receiver."""
+    """`drivers.Driver` for one receiver."""
 
     def __init__(self, settings: ChargerSettings, wire: Wire) -> None:
         self._settings = settings
@@ -235,10 +235,10 @@ class Receiver:
         self._touched = False
 
     def open(self) -> None:
-        """Nothing is claimed and nothing sent: a charge under way is not ours to stop."""
+        """Do nothing: a restart must not end a charge."""
 
     def read(self) -> ChargerSample:
-        """The receiver now. Raises DriverError."""
+        """Read and decode the receiver's numbers. Raises DriverError."""
         if self._wire.alive():
             self._told = replace(self._told, enabled=None)
         words = self._wire.read(ALWAYS)
@@ -248,7 +248,7 @@ class Receiver:
         return sample(words, settled(self._told, self._wire.now()))
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Start, stop or check the range, where that is due. Raises DriverError."""
+        """Start, stop or check the range, if it is due (`steer`). Raises DriverError."""
         told, orders = steer(self._told, outputs, self._code, self._wire.now())
         if orders.enable is not None:
             self._enable(orders.enable)
@@ -258,18 +258,18 @@ class Receiver:
         self._told = told
 
     def make_safe(self) -> None:
-        """What the settings say of the daemon's end: stopped, and acknowledged, or left alone."""
+        """Stop the receiver and have it acknowledged; with `on_death: keep` do nothing."""
         if self._settings.on_death == "stop":
             self._enable(False)
 
     def close(self) -> None:
-        """Stopped, if it may be on and may not stay so; and let go."""
+        """Do what `make_safe` does, if the receiver was ever driven and may be on. Does not raise."""
         if self._touched and self._told.enabled is not False:
             self._wire.insist()
             try:
                 self.make_safe()
             except DriverError:
-                return  # it was tried; make_safe has said so before
+                return  # close does not raise, and the earlier make_safe has reported the failure
 
     def _enable(self, on: bool) -> None:
         self._touched = True
@@ -279,7 +279,7 @@ class Receiver:
 
 
 def rows(settings: ChargerSettings, where: Mapping[str, str]) -> list[tuple[str, str]]:
-    """For `check`: (what, meaning), by where each name is."""
+    """Rows for `check`: (what, meaning). `where`: name -> its address as text."""
     return [
         *((name, f"read {where[name]}") for name in ALWAYS),
         *((name, f"the same in an error: {where[name]}") for name in IN_ERROR),
@@ -300,7 +300,7 @@ def _state_rows() -> Iterator[tuple[str, str]]:
 
 
 def warnings(settings: ChargerSettings, wire: str) -> Iterator[tuple[tuple[str, ...], str]]:
-    """What is legal but worth a look: (path, text). `wire`: what the plug is of."""
+    """Valid settings that deserve a second look: (path, text). `wire`: the plug to pull in the test."""
     text = (
         "the maker's published numbers are not tried on hardware: watch the first charge, and pull"
     )

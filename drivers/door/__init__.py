@@ -1,1 +1,1 @@
-"""Drivers for doors: a file for each way of reaching one."""
+"""Drivers for doors: one file for each way of connecting a door."""

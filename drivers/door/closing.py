@@ -1,4 +1,4 @@
-"""What `check` says of closing, whatever a door is reached by."""
+"""The row on closing that `check` prints for every door driver."""
 
 from typing import Final
 
@@ -6,4 +6,4 @@ CLOSING: Final = (
     "closing",
     "nothing is driven: a released door stays open unless its operator closes it by itself",
 )
-"""A row for `check`."""
+"""A row for `check`: (what, meaning)."""

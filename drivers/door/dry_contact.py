@@ -1,11 +1,11 @@
-"""A door operator on contacts: a relay that holds it open, and the limit contacts that see it.
+"""A door operator on dry contacts: a relay holds it open, limit contacts show where it is.
 
-The contacts stand on the GPIO header, or at a Modbus I/O module (coils and discrete inputs). Which
-level means what, and what a cut wire reads as, is `drivers/hal/points.py`; the rules are the core's.
+The contacts are on the GPIO header or on a Modbus I/O module (coils and discrete inputs).
+`drivers/hal/points.py` maps levels to signals and knows how a cut wire reads; the door core decides.
 
-Where the operator is triggered by pulses and the module can time one (`flash`), each pulse is asked of
-the module once. A repeat would prolong it, so one whose reply was lost is not sent again: the next
-pulse is the next try. The module ends the pulse; we switch off when the hold ends before.
+An operator may be triggered by pulses that the Modbus module times (`flash`). The driver requests each
+pulse once, because a repeat would prolong it. If the reply is lost, the next pulse is the next try. The
+module ends the pulse; if the hold ends earlier, the driver switches the relay off.
 """
 
 from collections.abc import Iterator, Mapping
@@ -28,15 +28,15 @@ CUT_MUST_READ: Final = {
     "obstruction": (True, "somebody in the doorway is not seen"),
     "fire": (True, "a fire alarm reads clear"),
 }
-"""What a cut wire has to read as, and what it would mean if it did not."""
+"""Signal -> (the level that a cut wire must read as, what goes wrong if it does not)."""
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The contacts that are read; a limit may be missing with `feedback: estimated`.
+    """The contacts that are read. With `feedback: estimated` a limit contact may be missing.
 
-    `opened`: the limit contact at the open end: asserted is fully open.
-    `closed`: the limit contact at the closed end.
-    `obstruction`: somebody is in the doorway: after CLOSE, the hold is kept until they are not.
+    `opened`: the limit contact at the open end, asserted while the door is fully open.
+    `closed`: the limit contact at the closed end, asserted while the door is closed.
+    `obstruction`: somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear.
     `fire`: the fire alarm; `on_fire` says what it does.
     """
 
@@ -49,15 +49,15 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class Hold(Output, frozen=True, forbid_unknown_fields=True):
     """The relay that holds the door open.
 
-    `flash`: where a Modbus module takes a pulse that it times itself, in tenths of a second: `unit 1
-    coil 0x200` for the first relay of a Waveshare Modbus RTU Relay; each `pulse` is asked for there.
+    `flash`: the place of a Modbus module where each `pulse` is requested and timed by the module, in
+    tenths of a second: `unit 1 coil 0x200` for the first relay of a Waveshare Modbus RTU Relay.
     """
 
     flash: Point | None = None
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What we ask of the operator. There is no relay that closes.
+    """The commands to the operator. No relay closes the door.
 
     `hold_open`: holds the door open while it is on.
     """
@@ -76,7 +76,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     outputs: Outputs
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """What the fields cannot say one by one."""
+        """Problems that involve more than one field."""
         yield from super().problems()
         yield from self._feedback_problems()
         if self.inputs.fire and self.on_fire is None:
@@ -133,7 +133,7 @@ def wires(settings: Settings) -> list[Wire]:
 
 
 def debounce(settings: Settings) -> Mapping[str, float]:
-    """Seconds for which each input must last, by signal."""
+    """The debounce time of each input (s), by signal."""
     return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
 
 
@@ -149,7 +149,7 @@ def tables(settings: Settings) -> Iterator[Table]:
 
 
 def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
-    """What is legal, but should be read before the door is put into service: (path, text)."""
+    """Valid settings to review before the door goes into service: (path, text)."""
     for wire in wires(settings):
         if wire.signal == "closed" and wire.broken_reads() is not False:
             yield (
@@ -164,14 +164,14 @@ def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
 
 
 def create(name: str, settings: Settings, bus: PointsBus) -> "DryContactDoor":
-    """The door on its bus; nothing is touched before `open`."""
+    """The door's driver on its bus; it touches nothing before `open`."""
     return DryContactDoor(
         Points(wires(settings), bus), flashes=settings.outputs.hold_open.flash is not None
     )
 
 
 class DryContactDoor:
-    """`drivers.Driver` of one door. `flashes`: the module times the pulses of its hold."""
+    """`drivers.Driver` for one door. `flashes`: the module times the pulses of the hold."""
 
     def __init__(self, points: Points, flashes: bool = False) -> None:
         self._points = points
@@ -179,7 +179,7 @@ class DryContactDoor:
         self._asked = False
 
     def open(self) -> None:
-        """Claim the relay, off, and the contacts."""
+        """Claim the relay, switched off, and the contacts."""
         self._points.open()
 
     def read(self) -> DoorSample:
@@ -188,7 +188,7 @@ class DryContactDoor:
         return DoorSample(read("opened"), read("closed"), read("obstruction"), read("fire"))
 
     def write(self, outputs: DoorOutputs) -> None:
-        """The hold relay to this; a pulse that the module times is asked for once."""
+        """Set the hold relay; a pulse that the module times is requested once."""
         asked, self._asked = self._asked, outputs.hold_open
         if not self._flashes or not (outputs.hold_open or outputs.between_pulses):
             self._points.write({"hold_open": outputs.hold_open})
@@ -196,12 +196,12 @@ class DryContactDoor:
             self._points.flash("hold_open")
 
     def make_safe(self) -> None:
-        """The hold relay off, and seen to be off."""
+        """Switch the hold relay off and verify it."""
         self._asked = False
         self._points.make_safe()
 
     def close(self) -> None:
-        """The relay off, and let go."""
+        """Switch the relay off and release the lines."""
         self._points.close()
 
 

@@ -1,8 +1,8 @@
-"""A door behind a controller that answers HTTP with JSON: a relay with inputs (Shelly and the like).
+"""A door behind a controller that speaks HTTP and JSON: a relay with inputs (Shelly and the like).
 
-The answer to `state_path` has the contacts; `hold` and `release` switch the relay. Nothing but the
-relay's own timer releases the door when the network is gone, so `hold` sets that timer
-(`switches_off_after_s`) and is sent in every scan while the door is held.
+The answer to `state_path` holds the contacts; `hold` and `release` switch the relay. If the network
+fails, only the relay's own timer can release the door. So `hold` sets that timer
+(`switches_off_after_s`), and the driver sends `hold` in every scan while the door is held.
 """
 
 from collections.abc import Iterator, Mapping
@@ -26,11 +26,11 @@ Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the answer has what; a limit may be missing with `feedback: estimated`.
+    """The fields of the answer. With `feedback: estimated` a limit may be missing.
 
     `opened`: the door is fully open.
     `closed`: the door is closed.
-    `obstruction`: somebody is in the doorway: after CLOSE, the hold is kept until they are not.
+    `obstruction`: somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear.
     `fire`: the fire alarm; `on_fire` says what it does.
     """
 
@@ -43,13 +43,13 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A door and its controller. The paths follow the bus's `api_base`.
 
-    `state_path`: where GET answers the inputs.
-    `inputs`: where that answer has what.
+    `state_path`: the path that GET reads the inputs from.
+    `inputs`: the fields of that answer.
     `hold`: switches on the relay that holds the door open.
     `release`: switches it off, so that the door closes by its own rules.
-    `held`: where the answer says that the relay is on; without it nothing proves that it is off.
-    `switches_off_after_s`: the relay's own timer, as `hold` sets it (`…&toggle_after=10`): without
-    a new `hold` it is off after that time.
+    `held`: the field that says that the relay is on; without it nothing proves that it is off.
+    `switches_off_after_s`: the relay's own timer, as `hold` sets it (`…&toggle_after=10`): it switches
+    the relay off this long after the last `hold`.
     """
 
     state_path: http.Path
@@ -60,12 +60,12 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     switches_off_after_s: Timeout | None = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """The relay's timer."""
+        """The relay's timer (s) and its path in the YAML; None where it has none."""
         path = ("switches_off_after_s",)
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
     def problems(self) -> Problems:
-        """What the fields cannot say one by one."""
+        """Problems that involve more than one field."""
         yield from super().problems()
         missing = [
             signal for signal in ("opened", "closed") if getattr(self.inputs, signal) is None
@@ -93,7 +93,7 @@ def _unsafe(settings: Settings) -> Iterator[Unsafe]:
 
 
 def describe(settings: Settings, bus: http.Settings) -> Iterator[tuple[str, str]]:
-    """For `check`: what is read and what is sent."""
+    """Rows for `check`: what is read and what is sent."""
     api = http.base(bus.api_base)
     yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
     for signal in settings.inputs.__struct_fields__:
@@ -114,7 +114,7 @@ def _renewed(settings: Settings, bus: http.Settings) -> str:
 
 
 def warnings(settings: Settings) -> Problems:
-    """What is legal, but should be read before the door is put into service: (path, text)."""
+    """Valid settings to review before the door goes into service: (path, text)."""
     if settings.switches_off_after_s is not None:
         text = (
             "pull the network plug while the door is held, and see that it is released in this time"
@@ -129,12 +129,12 @@ def warnings(settings: Settings) -> Problems:
 
 
 def create(name: str, settings: Settings, bus: InsistentCalls) -> "HttpDoor":
-    """The door on its bus; nothing is sent before `open`."""
+    """The door's driver on its bus; it sends nothing before `open`."""
     return HttpDoor(settings, bus)
 
 
 class HttpDoor:
-    """`drivers.Driver` of one door. What was told is None while it is not known to be so."""
+    """`drivers.Driver` for one door. `_told`: the relay's last commanded state; None when unknown."""
 
     def __init__(self, settings: Settings, bus: InsistentCalls) -> None:
         self._settings = settings
@@ -145,10 +145,9 @@ class HttpDoor:
         self._touched = False
 
     def open(self) -> None:
-        """See that the controller answers, and release the door; once only.
+        """Check that the controller answers; the first time, release the door.
 
-        Opened again after a failure it only reads: a door that is held must not drop because one
-        answer was lost.
+        After a failure it only reads: a held door must not be released because one answer was lost.
         """
         held = self._held(self._bus.get_json(self._settings.state_path))
         if not self._claimed and held is not False:
@@ -164,25 +163,25 @@ class HttpDoor:
         return sample
 
     def write(self, outputs: DoorOutputs) -> None:
-        """Hold the door, or release it; a hold is renewed."""
+        """Hold the door or release it; where the relay has a timer, a hold is sent in every scan."""
         if outputs.hold_open != self._told or (outputs.hold_open and self._renews):
             self._send(outputs.hold_open)
 
     def make_safe(self) -> None:
-        """Released, and seen to be where that can be read."""
+        """Release the door, and verify it where the relay's state can be read."""
         self._send(on=False)
         if self._settings.held and self._held(self._bus.get_json(self._settings.state_path)):
             raise DriverError("the relay is still on after it was switched off")
 
     def close(self) -> None:
-        """Released, if it was ever driven."""
+        """Release the door if it was ever driven. Does not raise."""
         if not self._touched:
             return
         self._bus.insist()
         try:
             self._send(on=False)
         except DriverError:
-            return  # nobody is left to tell, and the relay's timer is behind it
+            return  # the daemon is ending; the relay's timer switches it off
 
     def _send(self, on: bool) -> None:
         self._told, self._touched = None, True
@@ -195,7 +194,7 @@ class HttpDoor:
 
 
 def decode(settings: Settings, answer: Mapping[str, Any]) -> DoorSample:
-    """What the answer says. Raises DriverError, with the field that has no meaning."""
+    """Decode the answer. Raises DriverError that names the field it cannot decode."""
 
     def said(place: Flag | None) -> bool | None:
         return None if place is None else json_fields.flag(answer, place)

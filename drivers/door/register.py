@@ -1,8 +1,8 @@
 """A door operator that is read and commanded through Modbus registers.
 
-Its status is one number; the map says which numbers are open, closed, moving or a fault, and one that
-is not listed is a fault too: then nobody knows where the door is. A position, where there is one, must
-agree with the status. The command holds the door open or releases it: nothing drives it shut.
+Its status is one number. The map lists the numbers for open, closed, moving and faults; an unlisted
+number is a fault too, because it does not say where the door is. A position, where there is one, must
+agree with the status. The command holds the door open or releases it; nothing drives it shut.
 """
 
 from collections.abc import Iterator, Mapping
@@ -24,14 +24,14 @@ BITS: Final = 16
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door and where its operator is.
+    """A door and its operator's registers.
 
-    `unit`: the operator's Modbus unit.
-    `profile`: a file of drivers/profiles/ that has the map.
-    `map`: the map, written here.
-    `changes`: the parts of the profile's map that are otherwise at this door.
-    `base_address`: added to every address of the map, for a gateway that has several operators in one
-    unit.
+    `unit`: the operator's Modbus unit id.
+    `profile`: the name of a file in drivers/profiles/ that holds the map.
+    `map`: the register map, written here instead of a profile.
+    `changes`: the parts of the profile's map that differ at this door.
+    `base_address`: added to every address of the map, for a gateway with several operators behind one
+    unit id.
     """
 
     unit: Unit
@@ -41,7 +41,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     base_address: Word = 0
 
     def problems(self) -> Problems:
-        """What the fields cannot say one by one."""
+        """Problems that involve more than one field."""
         yield from super().problems()
         before = list(profile_problems(PROFILE, self.profile, self.map))
         yield from before
@@ -61,13 +61,13 @@ PROFILE: Final = Profile("door_register", "map", DoorMap)
 
 
 def door_map(settings: Settings) -> DoorMap:
-    """The map, from wherever it is."""
+    """The map: the one in the YAML, or the profile's."""
     found: DoorMap = settings.map or PROFILE.load(settings.profile or "")
     return found.changed(settings.changes)
 
 
 def points(settings: Settings) -> dict[str, Point]:
-    """Where each part of the map is at this operator; `command` among them."""
+    """The register or coil of each part of the map at this operator, `command` included."""
     return {
         part: at(settings.unit, text, settings.base_address)
         for part, text in door_map(settings).places().items()
@@ -75,7 +75,7 @@ def points(settings: Settings) -> dict[str, Point]:
 
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """What no other device may use, and where the YAML says so; nothing while that is not right."""
+    """(place, path) of the command, for this device alone; nothing while the map has problems."""
     if any(profile_problems(PROFILE, settings.profile, settings.map)):
         return
     place_of_command = door_map(settings).command.at
@@ -86,7 +86,7 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
-    """For `check`: each part of the map, where it is, and what its numbers mean."""
+    """Rows for `check`: each part of the map, its place, and what its numbers mean."""
     found = door_map(settings)
     meanings = {
         "status": _status_text(found.status),
@@ -105,7 +105,7 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
 
 
 def warnings(settings: Settings) -> Problems:
-    """What is legal, but should be read before the door is put into service: (path, text)."""
+    """Valid settings to review before the door goes into service: (path, text)."""
     if settings.profile and PROFILE.untried(settings.profile):
         text = f"nobody has tried the profile {settings.profile} on hardware: watch the door move"
         yield ("profile",), text
@@ -123,7 +123,7 @@ def _command_in(settings: Settings) -> tuple[str, ...]:
 
 
 def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterDoor":
-    """The door on its bus; nothing is sent before `open`."""
+    """The door's driver on its bus; it sends nothing before `open`."""
     found = points(settings)
     command, outputs = door_map(settings).command, {"command": found.pop("command")}
     safe = {"command": command.release}
@@ -132,14 +132,14 @@ def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterDoor":
 
 
 class RegisterDoor:
-    """`drivers.Driver` of one door."""
+    """`drivers.Driver` for one door."""
 
     def __init__(self, found: DoorMap, lines: Lines) -> None:
         self._map = found
         self._lines = lines
 
     def open(self) -> None:
-        """See that the operator answers, and let go of the door."""
+        """Check that the operator answers; the first time, release the door."""
         self._lines.claim()
 
     def read(self) -> DoorSample:
@@ -153,16 +153,16 @@ class RegisterDoor:
         self._lines.bring({"command": value})
 
     def make_safe(self) -> None:
-        """Released, and read back where it can be."""
+        """Release the door, and read the command back where possible."""
         self._lines.make_safe()
 
     def close(self) -> None:
-        """Released, and let go."""
+        """Release the door if it was ever driven. Does not raise."""
         self._lines.close()
 
 
 def decode(found: DoorMap, words: Mapping[str, int]) -> DoorSample:
-    """What these numbers, by part of the map, say of the door. Never raises."""
+    """Decode the register values, given by part of the map. Never raises."""
     lost = _lost(found, words)
     status = words["status"]
     return DoorSample(
@@ -175,7 +175,7 @@ def decode(found: DoorMap, words: Mapping[str, int]) -> DoorSample:
 
 
 def _lost(found: DoorMap, words: Mapping[str, int]) -> str:
-    """Why these numbers do not say where the door is; "" when they do."""
+    """Why these numbers do not tell where the door is; "" when they do."""
     value, status = words["status"], found.status
     if value in status.faults:
         return f"status {value}: {status.faults[value]}"
@@ -208,7 +208,7 @@ def _address(text: str) -> int:
     try:
         return place(text)[1]
     except ValueError:
-        return 0  # reported where the place is spelled
+        return 0  # the map reports the misspelt place itself
 
 
 def _status_text(status: Status) -> str:

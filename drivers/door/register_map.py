@@ -1,4 +1,4 @@
-"""Where a door operator on registers has what, and what its numbers mean: a YAML's or profile's map."""
+"""The register map of a door operator, from a YAML or a profile: places and what the numbers mean."""
 
 from collections.abc import Iterator
 from typing import Annotated
@@ -14,12 +14,12 @@ Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the door is, as one number; a number that is not listed is a fault.
+    """Where the door is, as one number; an unlisted number is a fault.
 
     `at`: `input register N` or `holding register N`.
     `open`: the numbers of a fully open door.
     `closed`: the numbers of a closed door.
-    `moving`: the numbers of a door between its limits, and well.
+    `moving`: the numbers of a door that is between its limits and has no fault.
     `faults`: number -> what is wrong.
     """
 
@@ -30,7 +30,7 @@ class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     faults: dict[Word, Name] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Problems:
-        """A place that is no register; a number that means two things."""
+        """A place that is not a register; a number with two meanings."""
         yield from _place_problems(self.at, REGISTERS)
         first: dict[int, str] = {}
         for key in ("open", "closed", "moving", "faults"):
@@ -45,9 +45,9 @@ class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """How far the door is open, from 0 (closed) to 100 (open); any other number is a fault.
 
     `at`: `input register N` or `holding register N`.
-    `unknown`: the number by which the operator says that it does not know; then only the status counts.
-    `open_from`: at less than this the door is not open, whatever the status.
-    `closed_to`: at more than this the door is not closed, whatever the status.
+    `unknown`: the number for an unknown position; then only the status counts.
+    `open_from`: below this the door does not count as open, whatever the status.
+    `closed_to`: above this the door does not count as closed, whatever the status.
     """
 
     at: Place
@@ -56,7 +56,7 @@ class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     closed_to: Percent = 5
 
     def problems(self) -> Problems:
-        """A place that is no register; limits the wrong way round."""
+        """A place that is not a register; limits that overlap; `unknown` within 0 to 100."""
         yield from _place_problems(self.at, REGISTERS)
         if self.unknown is not None and self.unknown <= 100:
             yield ("unknown",), "0 to 100 are positions"
@@ -65,17 +65,17 @@ class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the operator says is wrong with it: shown, and nothing is driven by it.
+    """The faults that the operator reports. They are shown only; no decision depends on them.
 
     `at`: `input register N` or `holding register N`.
-    `bits`: bit (0 is the least) -> what is wrong; a bit that is not listed is shown by its number.
+    `bits`: bit (0: least significant) -> fault; an unlisted bit is shown by its number.
     """
 
     at: Place
     bits: dict[Bit, Name] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Problems:
-        """A place that is no register."""
+        """A place that is not a register."""
         yield from _place_problems(self.at, REGISTERS)
 
 
@@ -83,25 +83,25 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """One bit of a register.
 
     `at`: `input register N` or `holding register N`.
-    `bit`: which; 0 is the least.
+    `bit`: its number; 0 is the least significant.
     """
 
     at: Place
     bit: Bit
 
     def problems(self) -> Problems:
-        """A place that is no register."""
+        """A place that is not a register."""
         yield from _place_problems(self.at, REGISTERS)
 
 
 class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the door is held open. There is no value that drives it shut.
+    """The command that holds the door open. No value drives it shut.
 
     `at`: `coil N` or `holding register N`.
     `hold`: the value that holds it open.
-    `release`: the value that lets it go, so that it closes by its own rules.
-    `read_back`: false where it can only be written; then it is written in every scan, and nothing
-    proves that it was taken.
+    `release`: the value that releases it, so that the operator closes it by its own rules.
+    `read_back`: false where the command can only be written; then it is written in every scan, and
+    nothing proves that the operator took it.
     """
 
     at: Place
@@ -110,7 +110,7 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     read_back: bool = True
 
     def problems(self) -> Problems:
-        """A place that cannot be written; values that it cannot take."""
+        """A place that cannot be written; values that it cannot hold."""
         yield from _place_problems(self.at, WRITABLE)
         if self.hold == self.release:
             yield ("release",), "is the value of hold"
@@ -121,13 +121,13 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Parts of a map that are not as the profile has them; each is written whole.
+    """Parts that replace those of the profile's map; each is given in full.
 
     `status`: where the door is, as one number.
     `position`: how far it is open.
-    `errors`: what the operator says is wrong with it.
-    `obstruction`: somebody is in the doorway: after CLOSE, the hold is kept until they are not.
-    `command`: how the door is held open.
+    `errors`: the faults that it reports.
+    `obstruction`: somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear.
+    `command`: what holds it open.
     """
 
     status: Status | None = None
@@ -138,18 +138,18 @@ class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class DoorMap(Parts, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where an operator has what. Addresses begin at 0."""
+    """An operator's register map. Addresses begin at 0."""
 
     status: Status
     command: Command
 
     def changed(self, parts: Parts | None) -> "DoorMap":
-        """This map with these parts in place of its own."""
+        """This map with `parts` in place of its own."""
         given = {name: getattr(parts, name, None) for name in Parts.__struct_fields__}
         return msgspec.structs.replace(self, **{n: p for n, p in given.items() if p is not None})
 
     def places(self) -> dict[str, str]:
-        """Where each part is that there is."""
+        """Part -> its place, for each part that is given."""
         parts = {name: getattr(self, name) for name in Parts.__struct_fields__}
         return {name: part.at for name, part in parts.items() if part is not None}
 

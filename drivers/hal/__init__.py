@@ -1,9 +1,9 @@
-"""Buses: the only importers of vendor libraries, each lazily and in its own file or folder.
+"""Buses: each in its own file or folder, the only code that imports vendor libraries, and only on use.
 
-It is named after the bus `type:` of the YAML and holds a `BUS`. A Bus belongs to one thread. Every
-failure is a HalError, raised within the bus's I/O timeout; after one, attempts follow with a backoff
-from 0.5 to 30 s during which calls fail at once, so that a dead device costs the others on its bus no
-more than one timeout a period.
+The file or folder is named after the bus `type:` of the YAML and holds a `BUS`. A Bus belongs to one
+thread. Every failure is a HalError, raised within the bus's I/O timeout. After a failure the bus backs
+off for 0.5 to 30 s, during which calls fail at once: so a dead device costs the other devices on its
+bus at most one timeout per backoff.
 """
 
 from collections.abc import Callable, Iterable
@@ -19,7 +19,7 @@ __all__ = ["AnyBus", "Bus", "BusType", "HalError", "Remark", "Where"]
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
 Remark = tuple[tuple[str, ...], str]
-"""What is to be said of a setting: its path below the struct, and the text."""
+"""A remark on a setting: its path below the struct, and the text."""
 
 
 class Where(NamedTuple):
@@ -37,19 +37,19 @@ class Where(NamedTuple):
 class Bus:
     """What every bus has; the rest depends on its type (`points.PointsBus`, HTTP calls…).
 
-    `calls`: how many calls have ended, well or not; systemd's watchdog is fed by it.
+    `calls`: how many calls have ended, with or without success; systemd's watchdog depends on it.
     """
 
     calls = 0
 
     def on_edge(self, wake: Callable[[], None]) -> None:
-        """Call `wake` (from any thread) when an input may have changed; nothing where polled."""
+        """Call `wake` (from any thread) when an input may have changed; a polled bus never calls it."""
 
     def scanned(self) -> None:
-        """A scan has finished: a dead-man, where there is one, drops the outputs when this stops."""
+        """A scan has finished. A dead-man, where there is one, drops the outputs when scans stop."""
 
     def insist(self) -> None:
-        """Try at once what is asked next, whatever the backoff: outputs are about to go off."""
+        """Make the next call at once, without waiting for the backoff: outputs are about to go off."""
 
     def close(self) -> None:
         """Release the bus. Does not raise; may be called twice."""
@@ -57,9 +57,9 @@ class Bus:
 
 @dataclass(frozen=True)
 class BusType(Generic[Settings]):
-    """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, made without its vendor library.
+    """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, which needs no vendor library.
 
-    `settings`: what stands below the bus's name in the YAML, `scan_s` (how often it is read) among it.
+    `settings`: the struct below the bus's name in the YAML, with `scan_s` (how often it is read).
     `open_bus(settings)`: raises HalError.
     `where(settings)`: what it is in the building; None where files never share it.
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
@@ -67,7 +67,7 @@ class BusType(Generic[Settings]):
     cannot leave the daemon's process, as pins cannot.
 
     A bus with points also has
-    `canonical(point)`: one spelling; ValueError says what to write instead;
+    `canonical(point)`: the one spelling of a point; ValueError says what to write instead;
     `describe(point)`: every spelling, for the table that an electrician reads;
     `wire_problems(wire)`: what cannot be right about this wire on this bus;
     `wire_warnings(wire)`: what is legal about it but worth a look;
@@ -88,4 +88,4 @@ class BusType(Generic[Settings]):
 
 
 AnyBus: TypeAlias = BusType[Any]
-"""One that was found by its name."""
+"""A bus type found by its name."""

@@ -1,4 +1,4 @@
-"""How a bus waits after failures: from 0.5 to 30 s, and never longer than it must."""
+"""A bus's backoff after failures: 0.5 to 30 s, doubled each time, ended by the first success."""
 
 import math
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from drivers.hal.points import HalError
 BACKOFF_FIRST_S: Final = 0.5
 BACKOFF_MAX_S: Final = 30.0
 JITTER: Final = 0.2
-"""By how much of itself a pause may be shorter, so that many daemons do not call in step."""
+"""The fraction by which a pause may be shorter, so that many daemons do not call in step."""
 
 
 class Backoff:
@@ -25,7 +25,7 @@ class Backoff:
 
     @property
     def insisting(self) -> bool:
-        """Is the next attempt made whatever the pause?"""
+        """Does the next attempt ignore the pause?"""
         return self._insisted
 
     @property
@@ -39,22 +39,22 @@ class Backoff:
         return self.failing and not self._insisted
 
     def check(self, not_yet: bool = False) -> None:
-        """Raises HalError with the last failure's text while it is not time again, or `not_yet`."""
+        """Raises HalError with the last failure's text during the pause, or if `not_yet`."""
         if self._clock() < self._retry_at or not_yet:
             raise HalError(self._failure)
 
     def failed(self, text: str) -> HalError:
-        """Begin a pause, twice as long as the last."""
+        """Begin a pause, twice as long as the last; returns the HalError to raise."""
         self._failure = text
         self._pause_s = min(max(2 * self._pause_s, BACKOFF_FIRST_S), BACKOFF_MAX_S)
         self._retry_at = self._clock() + self._pause_s * (1 - JITTER * self._jitter())
         return HalError(text)
 
     def mended(self) -> None:
-        """It works: the next pause will be short."""
+        """An attempt succeeded: end the pause, and begin with the shortest one next time."""
         self._pause_s, self._retry_at, self._insisted = 0.0, -math.inf, False
 
     def insist(self) -> None:
-        """Try at once, whatever the pause; only once until it works again."""
+        """End the pause for one attempt; without effect again until an attempt succeeds."""
         if not self._insisted:
             self._insisted, self._retry_at = True, -math.inf

@@ -1,8 +1,8 @@
-"""TCP connections on which a whole HTTP call ends by its deadline, whatever the far side does.
+"""TCP connections on which a whole call ends by its deadline, whatever the far side does.
 
-A timeout of requests' (or of a socket's) is for one wait: a server that sends a byte now and then, in
-its headers or in its body, holds the caller for ever. Here each single wait of a call gets only the
-time that is left of it: the name's lookup, the connection, every send and every receive.
+A timeout of requests or of a socket covers a single wait: a server that sends a byte now and then keeps
+the caller waiting for ever. Here every wait of a call gets only the time that the call has left: the
+name lookup, the connection, each send and each receive.
 """
 
 import ipaddress
@@ -43,7 +43,7 @@ class Deadline:
 
 
 class DeadlineSocket(socket.socket):
-    """A TCP socket whose every wait ends by the deadline of the call that it serves just then."""
+    """A TCP socket whose every wait ends by the deadline of the current call."""
 
     deadline: Deadline
 
@@ -53,15 +53,15 @@ class DeadlineSocket(socket.socket):
         return super().recv_into(*args, **kwargs)
 
     def sendall(self, *args: Any, **kwargs: Any) -> None:
-        """As socket.sendall, whose timeout is already one for all of it."""
+        """As socket.sendall, whose timeout already covers the whole send."""
         self.settimeout(self.deadline.left())
         super().sendall(*args, **kwargs)
 
 
 def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
-    """Sockets of TLS whose every wait ends by the deadline.
+    """A class of TLS sockets whose every wait ends by the deadline.
 
-    Such a socket takes a plain one over and keeps of it only the timeout, so it looks for itself.
+    A TLS socket wraps a plain socket and keeps only its timeout, so it checks the deadline itself.
     """
     import ssl
 
@@ -94,7 +94,7 @@ class Dialler:
         self._last: socket.socket | None = None
 
     def dial(self) -> socket.socket:
-        """A new connection, each address getting a fair part of the time. Raises OSError."""
+        """A new connection; the addresses share the time that is left. Raises OSError."""
         self.dialled += 1
         try:
             self._last = self._first_of(self._addresses())
@@ -134,7 +134,7 @@ class Dialler:
         return sock
 
     def _addresses(self) -> list[Any]:
-        """The host's addresses. getaddrinfo knows no timeout, so a name is looked up in a thread."""
+        """The host's addresses. getaddrinfo has no timeout, so it runs in a thread."""
         if _is_numeric(self._host):
             return socket.getaddrinfo(self._host, self._port, type=socket.SOCK_STREAM)
         if self._lookup is not None and self._lookup.is_alive():

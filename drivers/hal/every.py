@@ -1,4 +1,4 @@
-"""Several things of which each is tried, whatever becomes of the others."""
+"""Several steps that are all tried, even when one fails."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,14 +7,14 @@ from drivers.hal.points import HalError
 
 
 class Every:
-    """`with every.one(): …` for each; then `check`. `failure`: the first."""
+    """`with every.one(): …` around each step, then `check`. `failure`: the first HalError."""
 
     def __init__(self) -> None:
         self.failure: HalError | None = None
 
     @contextmanager
     def one(self) -> Iterator[None]:
-        """One of them, whose HalError waits."""
+        """One step; its HalError is kept for `check`."""
         try:
             yield
         except HalError as error:

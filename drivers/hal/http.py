@@ -47,7 +47,7 @@ Header = Annotated[
     ),
 ]
 Timeout = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
-"""A call that takes longer would be taken for a hang (`WatchdogSec=10` of the unit)."""
+"""At most 5 s: a longer call would look like a hang to systemd (`WatchdogSec=10` of the unit)."""
 
 _HINTS = {
     3: "redirects are not followed: put the final address in api_base",
@@ -67,12 +67,12 @@ class Settings(
     """A controller's HTTP API.
 
     `api_base`: host, port and path that every path begins with (`192.168.1.60:8080/api`).
-    `timeout_s`: for a whole call, from the lookup of the name to the last byte.
+    `timeout_s`: for a whole call, from the name lookup to the last byte.
     `scan_s`: how often the controller is read.
     `token_file`: a file that holds a bearer token or API key, readable by the daemon alone.
     `token_header`: the header that takes it (`X-API-Key`); `Authorization: Bearer …` when absent.
-    `ca_file`: with https, a PEM file with who has signed the controller's certificate, or with that
-    certificate itself; the public authorities when absent.
+    `ca_file`: with https, a PEM file with the certificate of the controller or of its authority; the
+    public authorities when absent.
     """
 
     api_base: Name
@@ -83,7 +83,7 @@ class Settings(
     ca_file: AbsolutePath | None = None
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """What cannot be right about the address, or has no effect."""
+        """An invalid address; settings that have no effect."""
         try:
             tls = base(self.api_base).scheme == "https"
         except ValueError as error:
@@ -96,7 +96,7 @@ class Settings(
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
-    """What is legal but worth a look: (path, text)."""
+    """Valid settings that deserve a second look: (path, text)."""
     if settings.token_file and base(settings.api_base).scheme == "http":
         text = (
             "the token goes over the network unencrypted: write https://… where the controller has"
@@ -111,14 +111,14 @@ def where(settings: Settings) -> Where:
 
 
 def open_bus(settings: Settings) -> "HttpBus":
-    """The way to this controller; nothing is sent yet."""
+    """The bus for this controller; it sends nothing yet."""
     return HttpBus(settings)
 
 
 class HttpBus(Bus):
-    """Calls to one controller. Every failure is a HalError that says what to look at.
+    """Calls to one controller. Every failure is a HalError that says what to check.
 
-    `clock` and `resolve` are a test's in place of the real ones.
+    Tests replace `clock` and `resolve`.
     """
 
     def __init__(
@@ -144,8 +144,8 @@ class HttpBus(Bus):
     ) -> None:
         """A command, with `body` (JSON) if any; any 2xx is success.
 
-        Sent at most once, also when the answer is lost. `safe`: it takes power away, and waits for no
-        pause that a reading has begun.
+        Sent at most once, even when the answer is lost. `safe`: it switches an output off, so it does
+        not wait for the backoff of a failed reading.
         """
         url = self._base.url(path)
         with self._attempt(self._safe_backoff if safe else self._backoff):
@@ -155,7 +155,7 @@ class HttpBus(Bus):
         """A polled bus has no edges."""
 
     def insist(self) -> None:
-        """Try at once what is asked next, whatever the backoff."""
+        """Make the next call at once, without waiting for the backoff."""
         self._backoff.insist()
         self._safe_backoff.insist()
 
@@ -164,7 +164,7 @@ class HttpBus(Bus):
 
     @contextmanager
     def _attempt(self, backoff: Backoff) -> Iterator[None]:
-        """After a failure, calls fail at once, with the same text, until it is time again."""
+        """One attempt. During the backoff after a failure it fails at once, with the same text."""
         backoff.check()
         self._dialler.deadline.start(self._settings.timeout_s)
         try:
@@ -181,7 +181,7 @@ class HttpBus(Bus):
     def _call(
         self, method: str, url: str, sent: str | None = None, reads: bool = False
     ) -> tuple[str, bytes]:
-        """Content type and body of a good answer; what answers a command is not looked at."""
+        """Content type and body of a good answer; a command's answer body is not read."""
         import requests
 
         self._dialler.failure = None
@@ -238,10 +238,10 @@ class HttpBus(Bus):
 
 
 def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
-    """requests' way to the wire, on the dialler's connections.
+    """requests' HTTP adapter, on the dialler's connections.
 
-    Without a Session: it would read the whole body of a redirect that it is told not to follow, keep
-    cookies, and look at the environment for proxies and passwords.
+    There is no Session, because it reads the whole body of a redirect that it must not follow, keeps
+    cookies, and takes proxies and passwords from the environment.
     """
     from requests.adapters import HTTPAdapter
     from urllib3 import HTTPConnectionPool, HTTPSConnectionPool
@@ -256,7 +256,7 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
         """Without TLS."""
 
     class TlsConnection(Dialled, HTTPSConnection):
-        """With it."""
+        """With TLS."""
 
     class Pool(HTTPConnectionPool):
         ConnectionCls = Connection
@@ -267,14 +267,16 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     adapter = HTTPAdapter(pool_connections=1, pool_maxsize=1, max_retries=0)
     adapter.poolmanager.pool_classes_by_scheme = {"http": Pool, "https": TlsPool}
     if scheme == "https":
-        context = create_urllib3_context()  # it trusts nobody yet: `verify` of a call adds whom
+        context = (
+            create_urllib3_context()
+        )  # trusts no authority yet: each call's `verify` adds them
         context.sslsocket_class = tls_socket(dialler.deadline)
         adapter.poolmanager.connection_pool_kw["ssl_context"] = context
     return adapter
 
 
 def _tls_failure(error: BaseException | None, ca_file: str | None) -> str:
-    """Why there is no trusted connection; "" where that is not the reason."""
+    """Why TLS failed; "" if TLS is not the reason."""
     import ssl
 
     if ca_file and not os.path.isfile(ca_file):
@@ -292,7 +294,7 @@ def _check_status(url: str, reads: bool, status: int) -> None:
 
 
 def _capped(raw: Any) -> bytes:
-    """A body to its end, or one byte more than is allowed. A body cut short shows in the last read."""
+    """The whole body, or one byte more than is allowed. Reading on to its end detects a cut body."""
     body = b""
     while len(body) <= BODY_MAX and (
         more := raw.read(BODY_MAX + 1 - len(body), decode_content=False)
@@ -302,7 +304,7 @@ def _capped(raw: Any) -> bytes:
 
 
 def _cause(error: BaseException) -> str:
-    """The first failure below all that requests and urllib3 have wrapped around it."""
+    """The root cause below the exceptions that requests and urllib3 wrap around it."""
     while (below := error.__cause__ or error.__context__) is not None:
         error = below
     return shown(str(error) or type(error).__name__)

@@ -1,4 +1,4 @@
-"""An answer's body as the one JSON object that it must be."""
+"""Decoding an answer's body, which must be one JSON object."""
 
 import json
 from typing import Any
@@ -12,7 +12,7 @@ def shown(text: str) -> str:
 
 
 def json_object(url: str, content_type: str, body: bytes) -> dict[str, Any]:
-    """The one JSON object that an answer is. Raises HalError."""
+    """The answer's JSON object. Raises HalError if it is anything else."""
     sort = content_type.partition(";")[0].strip().lower()
     if sort != "application/json" and not sort.endswith("+json"):
         what = shown(sort) or "no content type"

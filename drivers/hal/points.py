@@ -1,8 +1,8 @@
-"""Points: the named contacts of a device, on whichever bus carries them.
+"""Points: the named contacts of a device, on any bus that has contacts.
 
-A driver speaks of signals being asserted or not (`fire_alarm`, `call_L1`); this file knows their
-addresses and polarity; the bus (`drivers/hal/`) knows levels only. GPIO pins and the coils and
-discrete inputs of a Modbus I/O module are the same thing here.
+A driver works with signals that are asserted or not (`fire_alarm`, `call_L1`). This file knows their
+addresses and polarity; the bus (`drivers/hal/`) knows only levels. GPIO pins and the coils and discrete
+inputs of a Modbus I/O module are treated alike.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ from drivers import DriverError
 Active = Literal["high", "low"]
 Pull = Literal["up", "down", "none"]
 Point = Annotated[str, msgspec.Meta(extra={"check": "point"})]
-"""Where a contact is. The bus's `canonical` judges it while the file is read, as it is written."""
+"""A contact's address. While the YAML is read, the bus's `canonical` checks it."""
 DebounceSeconds = Annotated[float, msgspec.Meta(ge=0, le=10, extra={"unit": "s"})]
 
 
@@ -25,7 +25,7 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     `point`: its address: `BCM4` or `J8:7` on GPIO, `unit 1 discrete input 0` on Modbus.
     `active`: the level at which the signal is asserted (on Modbus `high` is 1).
-    `pull`: the resistor on a GPIO input; needed there, and not meant elsewhere.
+    `pull`: the resistor on a GPIO input; required there, and not allowed on other buses.
     `debounce_s`: how long a change must last; the kind's default when absent.
     """
 
@@ -36,7 +36,7 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One relay or line that is driven. Not asserted is its safe level, always.
+    """One relay or line that is driven. Its safe level is always not asserted.
 
     `point`: its address: `BCM18` or `J8:12` on GPIO, `unit 1 coil 0` on Modbus.
     `active`: the level at which it is asserted.
@@ -48,7 +48,7 @@ class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Flash:
-    """A pulse that the module times by itself: where it is asked for, and how long it lasts."""
+    """A pulse that the module times: the point where it is requested, and how long it lasts (s)."""
 
     point: str
     on_s: float
@@ -77,9 +77,9 @@ class Wire:
         return level == (self.active == "high")
 
     def broken_reads(self) -> bool | None:
-        """What a cut wire would read as: asserted, not asserted, or None when it floats.
+        """What a cut wire reads as: asserted, not asserted, or None when it floats.
 
-        A GPIO input falls to its pull; an open contact at a Modbus module reads 0.
+        A GPIO input goes to the level of its pull; an open contact at a Modbus module reads 0.
         """
         if self.direction == "out":
             return False
@@ -100,14 +100,14 @@ class Lines(Protocol):
     def write(self, levels: Mapping[str, bool]) -> None:
         """Drive these outputs. Raises HalError; then the levels written are unknown.
 
-        One that goes to its safe level is tried, whatever becomes of the others.
+        Every output that goes to its safe level is tried, even when others fail.
         """
 
     def outputs(self) -> Mapping[str, int] | None:
-        """The outputs' levels as the bus itself says, for read-back; None where it cannot say."""
+        """The outputs' levels as read back from the bus; None where they cannot be read."""
 
     def close(self) -> None:
-        """Outputs to their safe level, and let go. Does not raise."""
+        """Set the outputs to their safe level and release every line. Does not raise."""
 
 
 @runtime_checkable
@@ -115,7 +115,7 @@ class FlashLines(Protocol):
     """Lines of a bus whose modules can time a pulse."""
 
     def flash(self, point: str, flash: Flash) -> None:
-        """Have the module switch this output on, and off again by itself; asked once.
+        """Have the module switch this output on, and off again by itself; requested once.
 
         Raises HalError; then it may be on.
         """
@@ -148,7 +148,7 @@ class Points:
         self._written: dict[str, bool] | None = None
 
     def open(self) -> None:
-        """Claim all; outputs not asserted."""
+        """Claim every line, outputs not asserted."""
         self._written = None
         self._lines.claim()
 
@@ -160,7 +160,7 @@ class Points:
         return {signal: w.asserted(levels[point]) for signal, (w, point) in self._in.items()}
 
     def write(self, asserted: Mapping[str, bool]) -> None:
-        """Bring every output to this. Off goes first, so that exclusive outputs never overlap."""
+        """Set every output, off first, so that exclusive outputs never overlap."""
         wanted = {signal: asserted.get(signal, False) for signal in self._out}
         known = self._written or {}
         changed = [s for s in wanted if known.get(s) != wanted[s]]
@@ -178,7 +178,7 @@ class Points:
     def flash(self, signal: str) -> None:
         """Have the module time a pulse of this output; its level is unknown from now on.
 
-        Raises HalError; then there may be a pulse: to ask again would prolong it.
+        Raises HalError; then there may be a pulse, which a second request would prolong.
         """
         wire, point = self._out[signal]
         assert wire.flash  # or the driver would not ask
@@ -187,7 +187,7 @@ class Points:
         self._lines.flash(point, wire.flash)
 
     def make_safe(self) -> None:
-        """Every output off, written whatever was known, and read back where the bus can say."""
+        """Write every output off, even one believed off, and read it back where the bus can."""
         self._written = None
         self.write({})
         levels = self._lines.outputs()
@@ -200,5 +200,5 @@ class Points:
             raise DriverError(f"still on after being switched off: {', '.join(stuck)}")
 
     def close(self) -> None:
-        """Outputs off and let go."""
+        """Switch every output off and release the lines."""
         self._lines.close()

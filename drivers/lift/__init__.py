@@ -1,1 +1,1 @@
-"""Drivers for lifts: a file for each way of wiring one."""
+"""Drivers for lifts: one file for each way of connecting a lift."""

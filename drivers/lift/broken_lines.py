@@ -1,8 +1,8 @@
 """What a lift's codes read as when one of their lines is cut or shorted.
 
-A cut line reads as its wire does when it breaks; a shorted one, or one whose contact is stuck, as the
-opposite. A service or motion code that then reads less safe than the truth is unsafe; of a floor code
-that reads as another floor it is warned.
+A cut line reads as its wiring makes it read (`Wire.broken_reads`); a shorted line, or one with a stuck
+contact, reads the opposite. A service or motion code that then reads safer than the lift really is, is
+unsafe. A floor code that then reads as another floor gives a warning.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,7 +13,7 @@ from drivers.lift.wiring import FloorCode, LiftWiring, MotionCode, ServiceCode
 from drivers.unsafe import Unsafe
 
 SERVES = {"agv_mode": 0, "normal": 1, "overload": 1}
-"""How far a state is from having the lift taken away from RMF; every other state takes it away."""
+"""How much a state restricts RMF; every state that is not listed takes the lift away from RMF."""
 TAKEN_AWAY = 2
 
 Lines = Mapping[str, bool]
@@ -21,7 +21,7 @@ Lines = Mapping[str, bool]
 
 
 class Misread(NamedTuple):
-    """With `how` this line is broken, what is in truth `shown` reads as `reads`."""
+    """With `line` broken (`how`: cut or shorted), the code for `shown` reads as `reads`."""
 
     line: str
     how: str
@@ -34,7 +34,7 @@ def misread(
     read: Callable[[Lines], str | None],
     table: Mapping[str, Wire],
 ) -> Iterator[Misread]:
-    """What one broken line makes of a code. `shown`: the lines of each meaning; `read`: its reader."""
+    """Each misreading by one broken line. `shown`: meaning -> its codes; `read` decodes a code."""
     for meaning, codes in shown.items():
         for lines in codes:
             for line, asserted in lines.items():
@@ -46,7 +46,7 @@ def misread(
 
 
 def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
-    """The lines of the service and motion codes that must be accepted by name."""
+    """The lines of the service and motion codes that `accept_unsafe` must name."""
     for name, code in (("service", wiring.inputs.service), ("motion", wiring.inputs.motion)):
         if code is None or any(number >> len(code.bits) for number in code.codes):
             continue
@@ -59,14 +59,14 @@ def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsa
 
 
 def floor_warnings(code: FloorCode, table: Mapping[str, Wire]) -> str:
-    """Which floors one broken line makes another floor of; "" for none."""
+    """The floors that read as another floor when one line is broken, as a text; "" for none."""
     levels = dict.fromkeys((*code.codes.values(), *code.lines))
     shown = {level: [code.show(level)] for level in levels}
     return told(misread(shown, lambda lines: code.read(lines)[0], table))
 
 
 def told(found: Iterator[Misread]) -> str:
-    """As one sentence, each line's break once."""
+    """The misreadings as one sentence, grouped by broken line."""
     broken: dict[str, list[str]] = {}
     for line, how, shown, reads in sorted(found):
         broken.setdefault(f"with {line} {how}", []).append(f"{shown} reads as {reads}")
@@ -74,12 +74,12 @@ def told(found: Iterator[Misread]) -> str:
 
 
 def _danger(state: str) -> int:
-    """The greater, the more it keeps us from driving; a moving car counts as taken away."""
+    """How strictly a state keeps robots away (greater is stricter); a moving car is the strictest."""
     return 0 if state == "stopped" else SERVES.get(state, TAKEN_AWAY)
 
 
 def _shown(name: str, code: ServiceCode | MotionCode) -> dict[str, list[Lines]]:
-    """Each state's codes as lines; what the controller never shows has none."""
+    """Each state's codes as lines, without the codes that the controller never shows."""
     shown: dict[str, list[Lines]] = {}
     for number, state in code.codes.items():
         if state != "fault":

@@ -1,4 +1,4 @@
-"""What cannot be right about a lift's wiring, what is unsafe, and what deserves a second look."""
+"""Checks of a lift's wiring: problems, unsafe choices, warnings and notes."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
@@ -12,13 +12,13 @@ from drivers.lift.wiring import FloorCode, LiftWiring
 from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, slow_alarms, unaccepted
 
 Problem = tuple[tuple[str, ...], str]
-"""Where (path below the device), and what is wrong with the fix."""
+"""Where it is (path below the device), and what is wrong and how to fix it."""
 
 ALARMS = (Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY)
 
 
 def problems(wiring: LiftWiring) -> Iterator[Problem]:
-    """What keeps the daemon from starting."""
+    """The problems that keep the daemon from starting, unaccepted unsafe choices included."""
     yield from floors(wiring)
     yield from _floor_code(wiring.floor_code, wiring.levels())
     yield from _calls(wiring)
@@ -30,7 +30,7 @@ def problems(wiring: LiftWiring) -> Iterator[Problem]:
 
 
 def warnings(wiring: LiftWiring) -> Iterator[Problem]:
-    """What works and deserves a second look."""
+    """Valid wiring that deserves a second look."""
     table = {w.signal: w for w in wires(wiring)}
     told = wiring.inputs.agv_mode is not None or _in_service(wiring, "agv_mode")
     fire = sees_fire(wiring)
@@ -55,9 +55,10 @@ def warnings(wiring: LiftWiring) -> Iterator[Problem]:
 def missing(
     settings: LiftSettings, path: tuple[str, ...], told: bool, asks: bool, fire: bool, holds: bool
 ) -> Iterator[Problem]:
-    """What a lift can do without, and hardly should.
+    """Optional signals whose absence deserves a warning.
 
-    `told`: its AGV mode is. `asks`: for AGV mode. `fire`: is told. `holds`: its door open.
+    `told`: the lift reports AGV mode. `asks`: an output requests AGV mode. `fire`: the lift reports a
+    fire. `holds`: an output holds the door open. `path`: the section that lacks them.
     """
     by_call = settings.agv_mode == "by_call"
     if not told:
@@ -75,7 +76,7 @@ def missing(
 
 
 def notes(settings: LiftSettings, fire: bool) -> Iterator[Problem]:
-    """What the site decides. `fire`: a fire is told by the lift."""
+    """Choices that the site makes and should know of. `fire`: the lift reports a fire."""
     if fire and settings.alarm == "none":
         text = (
             "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)"
@@ -86,7 +87,7 @@ def notes(settings: LiftSettings, fire: bool) -> Iterator[Problem]:
 def by_call(
     settings: LiftSettings, told: bool, asks: bool, request: tuple[str, ...]
 ) -> Iterator[Problem]:
-    """AGV mode that comes by a call: it must be told, and is not asked for. `request`: where it is."""
+    """`by_call`: the lift must report AGV mode, and no output may request it. `request`: its path."""
     if settings.agv_mode == "by_call" and not told:
         text = "by_call needs an agv_mode input: nothing else tells that a call was taken"
         yield ("agv_mode",), text
@@ -95,7 +96,7 @@ def by_call(
 
 
 def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
-    """What must be accepted by name, because a cut wire or a power-on could hurt."""
+    """What `accept_unsafe` must name, because a cut wire or a power-on could cause harm."""
     table = {w.signal: w for w in wires(wiring)}
     yield from _cut(table, Hazard.FIRE, True, "a fire alarm reads clear")
     yield from _cut(table, "agv_mode", False, "AGV mode reads on")
@@ -116,7 +117,7 @@ def _cut(table: Mapping[str, Wire], signal: str, asserted: bool, meaning: str) -
 
 
 def floors(wiring: LiftSettings) -> Iterator[Problem]:
-    """A lift without floors; a floor or a door of a landing that is named twice."""
+    """A lift without floors; a floor, or one door of a landing, that is named twice."""
     stops = wiring.stops()
     if not stops:
         yield ("floors",), "no floors: name those of RMF's map that this lift serves"
@@ -135,7 +136,7 @@ def floors(wiring: LiftSettings) -> Iterator[Problem]:
 def named(
     what: str, section: tuple[str, ...], given: Collection[str], levels: Collection[str]
 ) -> Iterator[Problem]:
-    """Every landing has one, and nothing else has."""
+    """Every landing must be in `given`, and nothing else. `what`: the missing entry, for the text."""
     for level in given:
         if level not in levels:
             yield section, f"{level!r} is no landing of this lift, which has {', '.join(levels)}"
@@ -252,7 +253,7 @@ def _service(wiring: LiftWiring) -> Iterator[Problem]:
 
 
 def sees_fire(wiring: LiftWiring) -> bool:
-    """Is a fire told, by a line or by the service code?"""
+    """Does the lift report a fire, by a line or by its service code?"""
     return wiring.inputs.fire_alarm is not None or _in_service(wiring, Hazard.FIRE)
 
 
@@ -262,7 +263,7 @@ def _in_service(wiring: LiftWiring, state: str) -> bool:
 
 
 def _dead_code(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
-    """All lines cut at once (a cable, a supply) must not be a floor."""
+    """With all lines cut at once (the cable, the supply) the code must not read as a floor."""
     lines = [signal for signal, _, _ in code.inputs()]
     level, _ = code.read({signal: bool(table[signal].broken_reads()) for signal in lines})
     if level is not None:

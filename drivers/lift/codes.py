@@ -1,4 +1,4 @@
-"""Numbers on several lines, least significant first, as lifts show floors: binary, gray, BCD."""
+"""Numbers on several lines, least significant first, as lifts show floors: binary, Gray, BCD."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -15,7 +15,7 @@ def decode(encoding: Encoding, lines: Sequence[bool]) -> int | None:
 
 
 def encode(encoding: Encoding, number: int, width: int) -> tuple[bool, ...]:
-    """The lines that show a number. ValueError when there are too few of them."""
+    """The lines that show a number. Raises ValueError when it needs more lines than `width`."""
     pattern = number
     if encoding == "gray":
         pattern = number ^ (number >> 1)

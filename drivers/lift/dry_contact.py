@@ -1,6 +1,6 @@
-"""A lift on dry contacts: one line per meaning, or numbers on several lines, as the YAML says.
+"""A lift on dry contacts: one line for each signal, or numbers on several lines, as the YAML says.
 
-The points may be GPIO pins, or coils and discrete inputs of a Modbus I/O module.
+The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 """
 
 from collections.abc import Iterable, Mapping
@@ -35,7 +35,7 @@ class Settings(LiftWiring, frozen=True, kw_only=True, forbid_unknown_fields=True
     """A lift on dry contacts."""
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """What cannot be right, and what is unsafe and not accepted."""
+        """Wiring that cannot work, and unsafe choices that `accept_unsafe` does not name."""
         return lift_checks.problems(self)
 
 
@@ -45,12 +45,12 @@ def wires(settings: Settings) -> list[Wire]:
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
-    """What works and deserves a second look: (path below the device, text)."""
+    """Valid settings that deserve a second look: (path below the device, text)."""
     return lift_checks.warnings(settings)
 
 
 def notes(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
-    """What the site decides: (path below the device, text)."""
+    """Choices that the site makes and should know of: (path below the device, text)."""
     return lift_checks.notes(settings, lift_checks.sees_fire(settings))
 
 
@@ -60,12 +60,12 @@ def debounce(settings: Settings) -> Mapping[str, float]:
 
 
 def create(name: str, settings: Settings, bus: object) -> "LiftDryContact":
-    """The driver of one lift. `bus` has points (GPIO or Modbus)."""
+    """The lift's driver on its GPIO or Modbus bus; it touches nothing before `open`."""
     return LiftDryContact(settings, cast(PointsBus, bus))
 
 
 class LiftDryContact:
-    """One lift (`drivers.Driver[LiftSample, LiftOutputs]`)."""
+    """`drivers.Driver[LiftSample, LiftOutputs]` for one lift."""
 
     def __init__(self, settings: Settings, bus: PointsBus) -> None:
         self._settings = settings
@@ -73,7 +73,7 @@ class LiftDryContact:
         self._points = Points(wires(settings), bus)
 
     def open(self) -> None:
-        """Claim every output, off, and every input."""
+        """Claim every output, switched off, and every input."""
         self._points.open()
 
     def read(self) -> LiftSample:
@@ -81,20 +81,20 @@ class LiftDryContact:
         return decode(self._settings, self._points.read(), self._conditional)
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Bring every output to this level; what goes off goes first."""
+        """Set every output to this level, those that go off first."""
         self._points.write(encode(self._settings, outputs))
 
     def make_safe(self) -> None:
-        """Every output off."""
+        """Switch every output off and verify it where possible."""
         self._points.make_safe()
 
     def close(self) -> None:
-        """Outputs off and let go."""
+        """Switch every output off and release the lines."""
         self._points.close()
 
 
 def encode(settings: Settings, outputs: LiftOutputs) -> dict[str, bool]:
-    """Signal -> asserted. Signals that are not wired are left out by the points layer."""
+    """Signal -> asserted, also for signals without a wire, which `Points` leaves out."""
     calls = {f"call_{level}": level == outputs.call for level in settings.calls}
     if settings.call_code:
         calls = settings.call_code.lines(outputs.call)
@@ -109,7 +109,7 @@ def encode(settings: Settings, outputs: LiftOutputs) -> dict[str, bool]:
 def decode(
     settings: Settings, shown: Mapping[str, bool], conditional: frozenset[str]
 ) -> LiftSample:
-    """What the lines say (signal -> asserted). `conditional`: what counts only in AGV mode."""
+    """Decode the lines (signal -> asserted). `conditional`: the groups that count only in AGV mode."""
     inputs = settings.inputs
     service = _service(inputs, shown)
     agv = _agv(inputs, shown, service)

@@ -1,7 +1,7 @@
-"""A lift behind a gateway's Modbus registers: floor, door, motion and service state as numbers, hazards
-as bits, commands as registers or coils.
+"""A lift behind the Modbus registers of a gateway.
 
-A number that its map does not list is a fault, and never a floor, an open door or a standing car.
+Floor, door, motion and service state are numbers, hazards are bits, commands are registers or coils. A
+number that the map does not list is a fault; it never means a floor, an open door or a standing car.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,17 +22,17 @@ HOLD: Final = {Side.FRONT: "door_open", Side.REAR: "rear_door_open"}
 
 
 class Settings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A lift and where its gateway is.
+    """A lift and its gateway's registers.
 
-    `unit`: the gateway's Modbus unit.
-    `map`: where it has what.
+    `unit`: the gateway's Modbus unit id.
+    `map`: the gateway's register map.
     """
 
     unit: Unit
     map: LiftMap
 
     def problems(self) -> Problems:
-        """What the fields cannot say one by one."""
+        """Problems that involve more than one field."""
         levels, commands = self.levels(), self.map.commands
         yield from checks.floors(self)
         landings = set(self.map.floor.codes.values())
@@ -66,7 +66,7 @@ def _rear_door(settings: Settings) -> Problems:
 
 
 def warnings(settings: Settings) -> Problems:
-    """What works and deserves a second look: (path below the device, text)."""
+    """Valid settings that deserve a second look: (path below the device, text)."""
     found, commands = settings.map, settings.map.commands
     fire, told = found.shows(Hazard.FIRE), found.shows("agv_mode")
     asks, holds = bool(commands.agv_mode_request), bool(commands.door_open)
@@ -77,17 +77,17 @@ def warnings(settings: Settings) -> Problems:
 
 
 def notes(settings: Settings) -> Problems:
-    """What the site decides: (path below the device, text)."""
+    """Choices that the site makes and should know of: (path below the device, text)."""
     return checks.notes(settings, settings.map.shows(Hazard.FIRE))
 
 
 def debounce(settings: Settings) -> Mapping[str, float]:
-    """How long a change must last (s), as for contacts: a gateway may show a number half changed."""
+    """How long a change must last (s), as for contacts: a gateway may show a half-changed number."""
     return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
 
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """The places of commands, which nobody else may write."""
+    """(place, path) of each command; no other device may write there."""
     seen: set[str] = set()
     for path, where, _ in settings.map.commands.places():
         if where not in seen and misplaced(where, WRITABLE) is None:
@@ -96,7 +96,7 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
-    """For `check`: each part of the map, where it is, and what its numbers mean."""
+    """Rows for `check`: each part of the map, its place, and what its numbers mean."""
     for name, part in settings.map.parts().items():
         yield name, f"{at(settings.unit, part.at)}{_meaning(part)}"
     commands = settings.map.commands
@@ -123,7 +123,7 @@ def _meaning(part: Number | Flag) -> str:
 
 
 def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterLift":
-    """The lift on its bus; nothing is sent before `open`."""
+    """The lift's driver on its bus; it sends nothing before `open`."""
     inputs = {part: at(settings.unit, p.at) for part, p in settings.map.parts().items()}
     safe = encode(settings.map, LiftOutputs())
     outputs = {where: at(settings.unit, where) for where in safe}
@@ -132,14 +132,14 @@ def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterLift":
 
 
 class RegisterLift:
-    """One lift (`drivers.Driver[LiftSample, LiftOutputs]`)."""
+    """`drivers.Driver[LiftSample, LiftOutputs]` for one lift."""
 
     def __init__(self, found: LiftMap, lines: Lines) -> None:
         self._map = found
         self._lines = lines
 
     def open(self) -> None:
-        """See that the gateway answers, and ask for nothing."""
+        """Check that the gateway answers; the first time, switch every command off."""
         self._lines.claim()
 
     def read(self) -> LiftSample:
@@ -147,20 +147,20 @@ class RegisterLift:
         return decode(self._map, self._lines.read())
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Bring every command to this level; what goes off goes first."""
+        """Set every command to this level, those that go off first."""
         self._lines.bring(encode(self._map, outputs))
 
     def make_safe(self) -> None:
-        """Every command off, and read back where it can be."""
+        """Switch every command off, and read it back where possible."""
         self._lines.make_safe()
 
     def close(self) -> None:
-        """Commands off and let go."""
+        """Switch every command off, if any was ever written. Does not raise."""
         self._lines.close()
 
 
 def encode(found: LiftMap, outputs: LiftOutputs) -> dict[str, int]:
-    """Place -> value. Commands that share a register are joined in it."""
+    """Place -> value. The values of commands that share a register are combined with OR."""
     asserted = {"agv_mode_request"} if outputs.agv_request else set()
     if outputs.hold_door:
         asserted.add(HOLD[outputs.hold_door])
@@ -170,7 +170,7 @@ def encode(found: LiftMap, outputs: LiftOutputs) -> dict[str, int]:
 
 
 def decode(found: LiftMap, words: Mapping[str, int]) -> LiftSample:
-    """What these registers, by part of the map, say. Never raises."""
+    """Decode the registers, given by part of the map. Never raises."""
     flags = {n: p.asserted(words[n]) for n, p in found.parts().items() if isinstance(p, Flag)}
     service = _service(found, words)
     agv = _agv(found, flags, service)

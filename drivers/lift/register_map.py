@@ -1,4 +1,4 @@
-"""Where a lift's gateway has what in its registers, and what its numbers mean: a YAML's map."""
+"""The register map of a lift's gateway, as the YAML gives it: places and what the numbers mean."""
 
 import functools
 import operator
@@ -21,8 +21,8 @@ class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """A number in a register.
 
     `at`: `input register N` or `holding register N`.
-    `bits`: the bits that it consists of, least significant first; the whole register when absent.
-    `valid_when`: with `agv_mode` it means something only while AGV mode is on.
+    `bits`: the bits that form the number, least significant first; the whole register when absent.
+    `valid_when`: `agv_mode` if it is valid only while AGV mode is on.
     """
 
     at: Place
@@ -30,19 +30,19 @@ class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     valid_when: Literal["agv_mode"] | None = None
 
     def number(self, word: int) -> int:
-        """The number, from the register."""
+        """The number in a register's value."""
         if not self.bits:
             return word
         return sum((word >> bit & 1) << i for i, bit in enumerate(self.bits))
 
     def word(self, number: int) -> int:
-        """The register's bits that show a number."""
+        """The register's value that shows a number."""
         if not self.bits:
             return number
         return sum((number >> i & 1) << bit for i, bit in enumerate(self.bits))
 
     def fits(self, numbers: Collection[int], key: str) -> Problems:
-        """A place that is no register, bits that stand here twice, numbers that do not fit."""
+        """A place that is not a register, a bit that is listed twice, numbers that do not fit."""
         yield from _misplaced(self.at, REGISTERS)
         if len(set(self.bits)) < len(self.bits):
             yield ("bits",), "a bit stands here twice"
@@ -54,15 +54,15 @@ class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 class FloorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Where the car is.
 
-    `codes`: number -> landing; a number that is not listed is a fault.
-    `between_floors`: the numbers that mean no landing.
+    `codes`: number -> landing; an unlisted number is a fault.
+    `between_floors`: the numbers for a car between floors.
     """
 
     codes: dict[Word, Name]
     between_floors: list[Word] = msgspec.field(default_factory=list)
 
     def problems(self) -> Problems:
-        """What cannot be; a number that means two things."""
+        """What `fits` finds; a number with two meanings."""
         yield from self.fits([*self.codes, *self.between_floors], "codes")
         for number in self.codes:
             if number in self.between_floors:
@@ -72,13 +72,13 @@ class FloorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class DoorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A door.
 
-    `codes`: number -> state; a number that is not listed is a fault.
+    `codes`: number -> state; an unlisted number is a fault.
     """
 
     codes: dict[Word, Literal["open", "closed", "moving"]]
 
     def problems(self) -> Problems:
-        """What cannot be; a door that is never open."""
+        """What `fits` finds; a door without a code for open or for closed."""
         yield from self.fits(self.codes, "codes")
         if not {"open", "closed"} <= set(self.codes.values()):
             yield ("codes",), "needs a code for open and one for closed"
@@ -87,13 +87,13 @@ class DoorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class MotionField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The car's motion.
 
-    `codes`: number -> motion; a number that is not listed is a fault.
+    `codes`: number -> motion; an unlisted number is a fault.
     """
 
     codes: dict[Word, Literal["stopped", "up", "down", "moving"]]
 
     def problems(self) -> Problems:
-        """What cannot be; a car that never stands, or never moves."""
+        """What `fits` finds; a car that never stands, or never moves."""
         yield from self.fits(self.codes, "codes")
         shown = set(self.codes.values())
         if "stopped" not in shown or not ("moving" in shown or {"up", "down"} <= shown):
@@ -103,13 +103,13 @@ class MotionField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class ServiceField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The lift's service state.
 
-    `codes`: number -> state; with a number that is not listed the lift is out of service.
+    `codes`: number -> state; at an unlisted number the lift is out of service.
     """
 
     codes: dict[Word, ServiceState]
 
     def problems(self) -> Problems:
-        """What cannot be."""
+        """What `fits` finds."""
         yield from self.fits(self.codes, "codes")
 
     def means(self, number: int) -> str:
@@ -125,9 +125,9 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """One bit.
 
     `at`: `input register N`, `holding register N`, `coil N` or `discrete input N`.
-    `bit`: which of a register's; 0 is the least.
+    `bit`: its number in a register; 0 is the least significant.
     `active`: the level at which it is asserted; `high` is 1.
-    `valid_when`: with `agv_mode` it means something only while AGV mode is on.
+    `valid_when`: `agv_mode` if it is valid only while AGV mode is on.
     """
 
     at: Place
@@ -136,15 +136,15 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     valid_when: Literal["agv_mode"] | None = None
 
     def asserted(self, word: int) -> bool:
-        """What the register or bit says."""
+        """Is the flag asserted, by the value of its register or bit?"""
         return bool(word >> (self.bit or 0) & 1) == (self.active == "high")
 
     def word(self, asserted: bool) -> int:
-        """The register's bits that say so."""
+        """The value of its register or bit that shows this."""
         return (asserted == (self.active == "high")) << (self.bit or 0)
 
     def problems(self) -> Problems:
-        """A place that there is not; a register without its bit."""
+        """An invalid place; a register without its bit, or a coil with one."""
         yield from _misplaced(self.at, tuple(TABLES))
         register = misplaced(self.at, REGISTERS) is None
         if register and self.bit is None:
@@ -167,7 +167,7 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     release: Word = 0
 
     def problems(self) -> Problems:
-        """A place that cannot be written; values that it cannot take."""
+        """A place that cannot be written; values that it cannot hold."""
         yield from _misplaced(self.at, WRITABLE)
         if self.ask == self.release:
             yield ("release",), "is the value of ask"
@@ -181,7 +181,7 @@ class CallCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     `at`: `holding register N`.
     `codes`: number -> landing.
-    `none`: the value that calls nowhere.
+    `none`: the value for no call.
     """
 
     at: Place
@@ -189,21 +189,21 @@ class CallCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     none: Word = 0
 
     def problems(self) -> Problems:
-        """A place that cannot be written; a call that is none."""
+        """A place that cannot be written; a landing whose number means no call."""
         yield from _misplaced(self.at, ("holding register",))
         if self.none in self.codes:
             yield ("codes", str(self.none)), f"{self.none} is no call, as none says"
 
 
 class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is asked of the lift.
+    """The commands to the lift.
 
-    `agv_mode_request`: asks for AGV mode for as long as a robot holds the lift.
-    `door_open`, `rear_door_open`: holds that door open where the car stands.
-    `calls`: landing -> its command; or `call`.
+    `agv_mode_request`: requests AGV mode while a robot holds the lift.
+    `door_open`, `rear_door_open`: holds that door open at the landing where the car stands.
+    `calls`: landing -> its command. Give either `calls` or `call`.
     `call`: calls as numbers in one register.
     `read_back`: false where commands can only be written; then they are written in every scan, and
-    nothing proves that they were taken.
+    nothing proves that the gateway took them.
     """
 
     agv_mode_request: Command | None = None
@@ -214,7 +214,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     read_back: bool = True
 
     def singles(self) -> Iterator[tuple[str, tuple[str, ...], Command]]:
-        """Each command but `call`: its signal, its path below this section, and itself."""
+        """Each command except `call`: its signal, its path below this section, and the command."""
         for name in ("agv_mode_request", "door_open", "rear_door_open"):
             command: Command | None = getattr(self, name)
             if command:
@@ -223,7 +223,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield f"call_{level}", ("calls", level), command
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str, int]]:
-        """Each command's path below this section, its place, and the bits that it sets there."""
+        """Each command's path below this section, its place, and the bits that it uses there."""
         for _, path, command in self.singles():
             yield path, command.at, command.ask | command.release
         if self.call:
@@ -231,7 +231,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield ("call",), self.call.at, bits
 
     def words(self, asserted: Collection[str], call: str | None) -> dict[str, int]:
-        """Place -> value, for these commands and a call to this landing."""
+        """Place -> value, with these signals asserted and a call to this landing (None: no call)."""
         found: dict[str, int] = {}
         for signal, _, command in self.singles():
             value = command.ask if signal in asserted else command.release
@@ -243,7 +243,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return found
 
     def problems(self) -> Problems:
-        """Two ways of calling; commands that share a bit of a register."""
+        """Both `calls` and `call`; commands that use the same bit of a register."""
         if self.calls and self.call:
             yield ("calls",), "calls and call are two ways of calling: keep one"
         taken: dict[str, int] = {}
@@ -259,18 +259,18 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the gateway has what. Addresses begin at 0.
+    """The gateway's register map. Addresses begin at 0.
 
     `floor`: where the car is.
     `door`, `rear_door`: the car's doors.
     `motion`: the car's motion.
-    `service`: the lift's service state; it may show hazards and AGV mode.
-    `agv_mode`: AGV mode is on; or one state of `service`.
+    `service`: the lift's service state; it may include hazards and AGV mode.
+    `agv_mode`: AGV mode is on. It may be a state of `service` instead.
     `fire_alarm`: fire, shown as MODE_FIRE; latched with `fire_reset: manual`.
     `code_blue`, `earthquake`, `emergency`: shown as MODE_EMERGENCY.
-    `out_of_service`, `manual_mode`: shown as MODE_OFFLINE; the second is the key switch.
-    `overload`: delays the ride, and nothing else.
-    `commands`: what is asked of the lift.
+    `out_of_service`, `manual_mode`: shown as MODE_OFFLINE; `manual_mode` is the key switch.
+    `overload`: only delays the ride.
+    `commands`: the commands to the lift.
     """
 
     floor: FloorField
@@ -289,13 +289,13 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     commands: Commands
 
     def parts(self) -> dict[str, Number | Flag]:
-        """Everything that is read and is there."""
+        """Name -> part, for each part that is read and given."""
         read = [name for name in self.__struct_fields__ if name != "commands"]
         found = {name: getattr(self, name) for name in read}
         return {name: part for name, part in found.items() if part is not None}
 
     def shows(self, state: str) -> bool:
-        """Is this state read, as a flag or as one of the service states?"""
+        """Does the map have this state, as a flag or as a state of `service`?"""
         in_service = self.service is not None and state in self.service.codes.values()
         return in_service or getattr(self, state) is not None
 

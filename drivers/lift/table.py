@@ -1,4 +1,4 @@
-"""A lift's wiring as a table: a row for each line, with its signal, place and debounce."""
+"""A lift's wiring as a table: one row for each line, with its signal, point and debounce."""
 
 from collections.abc import Iterator
 
@@ -7,10 +7,10 @@ from drivers.hal.points import Output, Wire
 from drivers.lift.wiring import LiftInput, LiftWiring
 
 DEBOUNCE_S = {"floor": 0.08, "door": 0.1, "rear_door": 0.1, "motion": 0.05, "agv_mode": 0.05}
-"""What each group of signals must last by default; hazards and service codes HAZARD_DEBOUNCE_S.
+"""Each group's default debounce (s); HAZARD_DEBOUNCE_S is that of hazards and service codes.
 
-A door that seems open for 50 ms while the car passes a floor is a glitch, and where no motion line is
-wired nothing else would tell.
+A door that reads open for 50 ms while the car passes a floor is a glitch. Without a motion line only
+the debounce filters it out.
 """
 
 HAZARD_DEBOUNCE_S = 0.05
@@ -20,7 +20,7 @@ Row = tuple[str, tuple[str, ...], LiftInput]
 
 
 def input_rows(wiring: LiftWiring) -> Iterator[Row]:
-    """Each input line: its signal, its path below the device, and itself."""
+    """Each input line: its signal, its path below the device, and the line."""
     for name in wiring.inputs.__struct_fields__:
         found = getattr(wiring.inputs, name)
         if isinstance(found, LiftInput):
@@ -33,7 +33,7 @@ def input_rows(wiring: LiftWiring) -> Iterator[Row]:
 
 
 def output_rows(wiring: LiftWiring) -> Iterator[tuple[str, tuple[str, ...], Output]]:
-    """Each output line: its signal, its path below the device, and itself."""
+    """Each output line: its signal, its path below the device, and the line."""
     for name in wiring.outputs.__struct_fields__:
         output = getattr(wiring.outputs, name)
         if output is not None:
@@ -45,7 +45,7 @@ def output_rows(wiring: LiftWiring) -> Iterator[tuple[str, tuple[str, ...], Outp
 
 
 def wires(wiring: LiftWiring) -> list[Wire]:
-    """The table, inputs first, with every debounce filled in."""
+    """The wiring table, inputs first, with default debounces filled in."""
     return [
         *(
             Wire(signal, "in", line.point, line.active, line.pull, _debounce_s(signal, line), path)
@@ -59,7 +59,7 @@ def wires(wiring: LiftWiring) -> list[Wire]:
 
 
 def group(signal: str) -> str:
-    """What a line is a part of: `floor`, `door`, `rear_door`, `motion`, `service`, or itself."""
+    """A signal's group: `floor`, `door`, `rear_door`, `motion`, `service`, or the signal itself."""
     for name in ("floor", "door", "rear_door", "motion", "service"):
         if signal == name or signal.startswith(f"{name}_"):
             return name
@@ -69,7 +69,7 @@ def group(signal: str) -> str:
 def debounce(wiring: LiftWiring) -> dict[str, float]:
     """How long a change of each group must last (s): the longest of its lines.
 
-    A state of the service code is debounced as its lines are.
+    A state of the service code has the debounce of the code's lines.
     """
     longest: dict[str, float] = {}
     for signal, _, line in input_rows(wiring):
@@ -84,7 +84,7 @@ def debounce(wiring: LiftWiring) -> dict[str, float]:
 
 
 def conditional(wiring: LiftWiring) -> frozenset[str]:
-    """The groups that mean something only in AGV mode."""
+    """The groups that are valid only in AGV mode."""
     return frozenset(group(s) for s, _, line in input_rows(wiring) if line.valid_when)
 
 

@@ -1,4 +1,4 @@
-"""A lift's wiring as the YAML has it. Sites differ in every signal, so all of it is configuration."""
+"""A lift's wiring in the YAML. Sites differ in every signal, so all of it is configuration."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
@@ -18,8 +18,8 @@ Number = Annotated[int, msgspec.Meta(ge=0, le=65535)]
 class LiftInput(Input, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One line from the lift.
 
-    `valid_when`: with `agv_mode` the line means something only while AGV mode is on. Outside it a
-    floor or motion is not known, a door is neither open nor closed, and a hazard is not there.
+    `valid_when`: `agv_mode` if the line is valid only while AGV mode is on. Outside AGV mode its floor
+    or motion is unknown, its door is neither open nor closed, and its hazard is clear.
     """
 
     valid_when: Literal["agv_mode"] | None = None
@@ -28,16 +28,16 @@ class LiftInput(Input, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class DoorInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The only contact of a door.
 
-    `proves`: what is sure when it is asserted; the other end is estimated by `door_travel_s`.
+    `proves`: what the asserted contact proves; the other end is estimated by `door_travel_s`.
     """
 
     proves: Literal["open", "closed"]
 
 
 class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A line that makes a broken line of the code show.
+    """A parity line, which reveals a broken line of the code.
 
-    `total`: whether the asserted lines of the code, this one included, are even or odd in number.
+    `total`: whether the number of asserted lines of the code, this one included, is even or odd.
     """
 
     total: Literal["even", "odd"]
@@ -47,7 +47,7 @@ class MotionCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """Motion as a number on several lines.
 
     `bits`: least significant first.
-    `codes`: number -> motion; a number not listed is a fault.
+    `codes`: number -> motion; an unlisted number is a fault.
     """
 
     bits: list[LiftInput]
@@ -72,8 +72,8 @@ class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """The lift's service state as a number on several lines.
 
     `bits`: least significant first.
-    `codes`: number -> state; every number must be listed, and `fault` is for one that the controller
-    never shows: a line is broken, and the lift is out of service.
+    `codes`: number -> state; every number must be listed. Write `fault` for a number that the
+    controller never shows: then a line is broken, and the lift is out of service.
     """
 
     bits: list[LiftInput]
@@ -86,23 +86,23 @@ class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the lift tells us.
+    """The lines from the lift.
 
-    A hazard takes the lift away from RMF at once. A door has one contact or two. Motion is one of:
-    `moving`, `stopped`, `up` with `down`, or a code.
+    A hazard takes the lift away from RMF at once. A door has one contact or two. Give motion in one
+    way: `moving`, `stopped`, `up` with `down`, or a code.
 
     `fire_alarm`: fire, shown as MODE_FIRE; latched with `fire_reset: manual`.
     `code_blue`, `earthquake`, `emergency`: shown as MODE_EMERGENCY.
-    `out_of_service`, `manual_mode`: shown as MODE_OFFLINE; the second is the key switch.
-    `overload`: delays the ride, and nothing else.
-    `agv_mode`: AGV mode is on; or one state of `service`.
+    `out_of_service`, `manual_mode`: shown as MODE_OFFLINE; `manual_mode` is the key switch.
+    `overload`: only delays the ride.
+    `agv_mode`: AGV mode is on. It may be a state of `service` instead.
     `service`: the lift's service state as a code.
     `door`, `rear_door`: the door's only contact.
     `door_opened`, `rear_door_opened`: the contact at the open end, with one at the closed end.
     `door_closed`, `rear_door_closed`: the contact at the closed end, with one at the open end.
-    `moving`: the car moves, whichever way.
+    `moving`: the car moves, up or down.
     `stopped`: the car stands.
-    `up`, `down`: the car moves that way; neither is standing still.
+    `up`, `down`: the car moves that way; with neither asserted it stands.
     `motion`: motion as a code.
     """
 
@@ -131,12 +131,12 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Where the car is.
 
-    `encoding`: how the lines say it; `one_hot` is one line for each landing.
+    `encoding`: how the lines show the landing; `one_hot` is one line for each.
     `bits`: the lines that show a number, least significant first.
     `codes`: number -> landing.
-    `parity`: a line that makes a broken one show.
-    `lines`: with `one_hot`, landing -> its line; none on is between floors.
-    `between_floors`: the numbers that mean no landing. One that is neither this nor a landing's is a
+    `parity`: a parity line, which reveals a broken line.
+    `lines`: with `one_hot`, landing -> its line; with no line asserted the car is between floors.
+    `between_floors`: the numbers for a car between floors. A number neither here nor in `codes` is a
     fault.
     """
 
@@ -148,7 +148,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     between_floors: list[Number] = msgspec.field(default_factory=lambda: [0])
 
     def inputs(self) -> Iterator[tuple[str, tuple[str, ...], LiftInput]]:
-        """Each line: its signal, its path below this section, and itself."""
+        """Each line: its signal, its path below this section, and the line."""
         for i, bit in enumerate(self.bits):
             yield f"floor_bit{i}", ("bits", str(i)), bit
         for level, line in self.lines.items():
@@ -157,7 +157,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             yield "floor_parity", ("parity",), self.parity
 
     def read(self, shown: Mapping[str, bool]) -> tuple[str | None, str]:
-        """The landing (None between floors), and "" or why the code cannot be."""
+        """The landing (None between floors), and "" or why the code is a fault."""
         if self.encoding == "one_hot":
             on = [level for level in self.lines if shown[f"floor_{level}"]]
             if len(on) > 1:
@@ -174,7 +174,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return None, "" if number in self.between_floors else f"code {number} is no floor's"
 
     def show(self, level: str | None) -> dict[str, bool]:
-        """The lines that a controller asserts at a landing. ValueError where there is no code."""
+        """Signal -> asserted at a landing (None: between floors). ValueError if it has no code."""
         if self.encoding == "one_hot":
             return {f"floor_{name}": name == level for name in self.lines}
         numbers = [n for n, name in self.codes.items() if name == level]
@@ -200,16 +200,16 @@ class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     codes: dict[Number, Name]
 
     def lines(self, level: str | None) -> dict[str, bool]:
-        """The lines to assert for a call to this landing."""
+        """Signal -> asserted, for a call to this landing (None: no call)."""
         number = next((n for n, name in self.codes.items() if name == level), 0)
         return {f"call_bit{i}": bool(number >> i & 1) for i in range(len(self.bits))}
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What we ask of the lift, besides calls. Each is a level, and off is its safe state.
+    """The lines to the lift, except calls. Each is a level, and off is its safe state.
 
-    `agv_mode_request`: asks for AGV mode for as long as a robot holds the lift.
-    `door_open`, `rear_door_open`: holds that door open where the car stands.
+    `agv_mode_request`: requests AGV mode while a robot holds the lift.
+    `door_open`, `rear_door_open`: holds that door open at the landing where the car stands.
     """
 
     agv_mode_request: Output | None = None
@@ -218,12 +218,12 @@ class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class LiftWiring(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A lift on dry contacts, behind GPIO pins or a Modbus I/O module.
+    """A lift on dry contacts, on GPIO pins or a Modbus I/O module.
 
     `inputs`: the lines from the lift.
     `floor_code`: where the car is.
-    `outputs`: the lines to the lift, but for calls.
-    `calls`: landing -> its line; or `call_code`.
+    `outputs`: the lines to the lift, except calls.
+    `calls`: landing -> its line. Give either `calls` or `call_code`.
     `call_code`: calls as a number on several lines.
     """
 

@@ -1,11 +1,11 @@
-"""Profiles: a make's registers and habits as a file, drivers/profiles/NAME.yaml, for `profile: NAME`.
+"""Profiles: a make's register or frame map as drivers/profiles/NAME.yaml, for `profile: NAME`.
 
-    for: door_register       what reads it
-    hardware: untried        has somebody `tried` it on the hardware? `none`: an example of no make
-    source: "..."            where its numbers are from
-    map: {...}               what it says, under the key that would hold it in a device YAML
+    for: door_register       the driver that reads it
+    hardware: untried        `tried` on the hardware, `untried`, or `none`: an example of no make
+    source: "..."            where its numbers come from
+    map: {...}               the content, under the key that holds it in a device YAML
 
-It is read like a device YAML, and a problem has its file, line and column.
+It is parsed like a device YAML, so each problem has its file, line and column.
 """
 
 import functools
@@ -24,7 +24,7 @@ from drivers.profiles.texts import FOLDER
 
 
 class Profile:
-    """One sort of profile. `reader`: its `for:`; `key`: where its content is; `content`: a struct."""
+    """One type of profile. `reader`: its `for:`; `key`: where its content is; `content`: its struct."""
 
     def __init__(self, reader: str, key: str, content: type[msgspec.Struct]) -> None:
         self.reader = reader
@@ -32,17 +32,17 @@ class Profile:
         self._content = content
 
     def names(self, folder: Path = FOLDER) -> list[str]:
-        """The profiles of this sort that there are."""
+        """The names of the profiles of this type."""
         first = f"for: {self.reader}"
         files = sorted({*folder.glob("*.yaml"), *texts.known_in(folder)})
         return [f.stem for f in files if f.suffix == ".yaml" and first in _lines(f)]
 
     def load(self, name: str, folder: Path = FOLDER) -> Any:
-        """What a profile says. Raises SettingsError with every problem of the file."""
+        """A profile's content, as its struct. Raises SettingsError with every problem of the file."""
         return self._read(folder / f"{name}.yaml")[self.key]
 
     def untried(self, name: str) -> bool:
-        """Is it of a make, and nobody has tried it?"""
+        """Is it for a real make, and not yet tried on its hardware?"""
         return bool(self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried")
 
     def _read(self, file: Path) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def _understood(
 def profile_problems(
     sort: Profile, name: str | None, inline: object
 ) -> Iterator[tuple[tuple[str, ...], str]]:
-    """What is wrong about `profile:` and the key that stands in its place."""
+    """Problems of `profile:` and of the key that may replace it (`map`)."""
     if name is None and inline is None:
         text = f"needs '{sort.key}', or a profile: {either(sort.names())}"
         yield ("profile",), text

@@ -1,9 +1,9 @@
-"""The texts of profiles and DBC files, as this process has read them or was given them.
+"""The texts of profiles and DBC files: those that this process has read, or was given.
 
-A daemon writes down what it claims together with these texts. `outputs-off`, much later and perhaps
-after an upgrade, is given them, and so finds what the dead daemon meant, whatever now has the name.
+A daemon records these texts together with its claims. `outputs-off` may run much later, even after an
+upgrade that changed the files; it gets the recorded texts and so reads the maps as the daemon did.
 
-A file of drivers/profiles/ goes by its name, any other by its path.
+A file of drivers/profiles/ is stored under its name, any other under its path.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,29 +15,29 @@ _texts: dict[str, bytes] = {}
 
 
 def text(file: Path, read: Callable[[], bytes]) -> bytes:
-    """A file's text: as it is known, else as `read` finds it, and from then on known."""
+    """A file's text: the stored one, or what `read` returns, which is then stored."""
     if _name(file) not in _texts:
         _texts[_name(file)] = read()
     return _texts[_name(file)]
 
 
 def known(file: Path) -> bytes | None:
-    """A file's text, if it is known."""
+    """A file's stored text, or None."""
     return _texts.get(_name(file))
 
 
 def known_in(folder: Path) -> list[Path]:
-    """The files of a folder whose texts are known."""
+    """The files of a folder whose texts are stored."""
     return [file for name in _texts if (file := FOLDER / name).parent == folder]
 
 
 def all_known() -> dict[str, bytes]:
-    """Name -> text of every one that was read or given."""
+    """Name -> text of every stored file."""
     return dict(_texts)
 
 
 def give(texts: Mapping[str, bytes]) -> None:
-    """Know these and no others; the disk is not looked at for them."""
+    """Replace the stored texts by these; they are not read from disk again."""
     _texts.clear()
     _texts.update(texts)
 

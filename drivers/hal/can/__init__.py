@@ -4,7 +4,7 @@
     frames.py      frames, their ids and their names
     bus.py         takes and gives out frames, pauses, and knows the bus's troubles
     link.py        python-can: opens, reads, sends
-    broadcasts.py  one device that says its frames again and again, and is fed with ours
+    broadcasts.py  one device that broadcasts its frames and needs periodic frames from us
     canopen.py     one CANopen node; sdo.py: the canopen library
 
 Only link.py and sdo.py import a library, and they are imported when a bus or a node is made.

@@ -1,7 +1,7 @@
-"""One device that says its frames again and again, and lives on frames that it is fed.
+"""One device that broadcasts its frames, and works only while it receives periodic frames.
 
-What it said last counts while it is fresh. It is fed from the scan, each frame at its pace and never by
-a cyclic sender: a daemon that hangs stops feeding.
+A broadcast is valid while it is fresh. The periodic frames are sent from the scan, never by a cyclic
+sender: when the daemon hangs, they cease.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -80,7 +80,7 @@ class Broadcasts:
         return True
 
     def feed_at_once(self) -> None:
-        """Every frame is due: it says something else from now on."""
+        """Make every frame due at once, because its content changes."""
         self._sent_at.clear()
 
     def _hearer(self, name: str, length: int) -> Callable[[Frame, float], None]:

@@ -1,13 +1,13 @@
 """CAN: one bus, on an interface of the kernel (SocketCAN) or an slcan adapter, through python-can.
 
-Everything happens in the thread of the loop. A reading takes whatever has come since the last one and
-gives each frame to the devices that want it; the rest is remembered by its id for a while, to say what
-is heard where a device is not. Nothing is sent but from a scan: no frame is ever handed to the kernel's
-or the library's cyclic sender, so that a daemon that hangs falls silent.
+Everything runs in the loop's thread. A reading takes all frames that have come since the last one and
+gives each to the devices that want it. Ids that no device wants are kept for a while, so that an error
+can name what is heard instead. Frames are sent only from a scan, never by a cyclic sender of the kernel
+or the library, so that the daemon falls silent when it hangs.
 
-An interface that is down, gone or bus-off is closed and opened anew after a pause of 0.5 to 30 s, in
-which calls fail at once. A bus-off is over when a frame is heard again, or the controller says so;
-`restart-ms` of `ip link` makes the controller try.
+An interface that is down, gone or bus-off is closed, and opened again after a backoff of 0.5 to 30 s,
+during which calls fail at once. A bus-off ends with the next frame, or when the controller reports it;
+`restart-ms` of `ip link` makes the controller restart.
 """
 
 import random
@@ -128,12 +128,12 @@ class CanBus(Bus):
         return sorted(found for found, at in self._others.items() if now - at < RECENT_S)
 
     def insist(self) -> None:
-        """Try at once what is asked next, whatever the pauses: to switch off before the end."""
+        """Make the next call at once, without waiting for the backoff, to switch off before the end."""
         for backoff in self._backoffs:
             backoff.insist()
 
     def close(self) -> None:
-        """Let go of the interface."""
+        """Close the interface."""
         self._link.close()
 
     def _open(self) -> None:

@@ -1,16 +1,16 @@
 """One CANopen node: its heartbeat, and its objects by SDO (CiA 301), through the `canopen` library.
 
-The library knows the protocol; asking, waiting and pausing is done here, in the loop's thread. It would
-take whatever comes on the reply's id for the answer, within its time limit or not. Here
+The library encodes and decodes; this file sends, waits and backs off, in the loop's thread. The library
+alone would accept any frame with the reply's id, even a late one. Here
 
-- a reply counts when it has eight bytes and names the object that was asked for; any other is dropped,
-  and named when the answer does not come;
-- after a question that stays without an answer the node is left alone until its answer cannot come any
-  more, LATE times the time that it had: a late reply is never the answer to the next question;
-- no question is sent twice;
-- what takes power away is asked at once, whatever reading has failed before.
+- a reply counts only if it has eight bytes and names the requested object; others are dropped, and
+  named in the error if no reply comes;
+- after a request without a reply the node gets no request for LATE times the timeout, so that a late
+  reply is never taken for the reply to the next request;
+- no request is sent twice;
+- a write that switches power off is sent at once, even after a failed reading.
 
-A node that has gone pauses as every device does; its heartbeat or its start ends the pause.
+A lost node has a backoff as every device has; its heartbeat or its restart ends it.
 """
 
 import struct

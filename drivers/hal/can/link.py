@@ -135,7 +135,7 @@ class Link:
             raise LinkDown(self._explained(error)) from error
 
     def close(self) -> None:
-        """Let go, whatever state it is in. May be called twice."""
+        """Close the interface, in any state. May be called twice."""
         bus, self._bus = self._bus, None
         if bus is None:
             return

@@ -66,7 +66,7 @@ class Settings(
     scan_s: Period = 0.2
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """What the fields cannot say one by one."""
+        """Problems that involve more than one field."""
         if self.socketcan is None and self.slcan is None:
             yield (), "needs an interface: write socketcan: can0, or slcan: {port: …, bitrate: …}"
         elif self.socketcan and self.slcan:
@@ -80,7 +80,7 @@ class Settings(
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
-    """What is legal but worth a look: (path, text)."""
+    """Valid settings that deserve a second look: (path, text)."""
     if settings.slcan and not settings.slcan.port.startswith("/dev/serial/by-"):
         port = settings.slcan.port
         text = f"{port} may be another adapter after a reboot: use a path of /dev/serial/by-id"

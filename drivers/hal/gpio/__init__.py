@@ -4,7 +4,7 @@ Outputs are claimed at their safe level in one call and are left at it (`drivers
 Inputs are sampled: an edge only calls `wake`, because lgpio loses edges.
 
     header.py     how pins are spelled
-    bus.py        claims, samples, drives and lets go of them
+    bus.py        claims, samples, drives and releases pins
     pins.py       gpiozero's pins on lgpio; imported when the header is opened
     dead_man.py   drops the outputs when scans stop
 """
@@ -67,7 +67,7 @@ def where(settings: Settings) -> Where:
 def open_bus(
     settings: Settings, factory: Any = None, clock: Callable[[], float] = time.monotonic
 ) -> "GpioBus":
-    """The header's pins. Raises HalError with what to look at.
+    """The header's pins. Raises HalError that says what to check.
 
     `factory`: a gpiozero pin factory whose pins claim as those of `pins.py` do.
     """

@@ -1,4 +1,4 @@
-"""The pins of one header: claimed, sampled, driven and let go, through gpiozero's pins."""
+"""The pins of one header: claimed, sampled, driven and released, through gpiozero's pins."""
 
 import logging
 import sys
@@ -47,7 +47,7 @@ class GpioBus(Bus):
             self._wake()
 
     def scanned(self) -> None:
-        """Feed the dead-man."""
+        """Tell the dead-man that a scan has finished."""
         self._dead_man.fed()
 
     def _drop(self) -> None:
@@ -56,7 +56,7 @@ class GpioBus(Bus):
         log.critical(pairs("dead_man", reason=DROPPED))
 
     def close(self) -> None:
-        """Every output to its safe level, and let go of the chip."""
+        """Set every output to its safe level and close the chip."""
         self._wake = None
         self._dead_man.close()
         for device in self._devices:
@@ -80,7 +80,7 @@ class GpioLines:
         self._dropped = False
 
     def claim(self) -> None:
-        """Outputs at their safe level first, each in one call; then inputs. All, or none."""
+        """Claim the outputs at their safe level, each in one call, then the inputs: all, or none."""
         self._release()
         self._dropped = False
         try:
@@ -100,7 +100,7 @@ class GpioLines:
         return self._levels(self._pulls)
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Drive these outputs; off is tried for each, whatever becomes of others. Raises HalError."""
+        """Drive these outputs; each that goes off is tried, even when others fail. Raises HalError."""
         every = Every()
         for point, level in levels.items():
             if level != self._safe[point]:
@@ -110,11 +110,11 @@ class GpioLines:
                 self._of(point).state = level
         every.check()
         if self._dropped and levels.items() - self._safe.items():
-            self.drop()  # it happened meanwhile: what was just driven is dropped too
+            self.drop()  # the dead-man dropped during this write: drop these outputs too
             self._check()
 
     def drop(self) -> None:
-        """Every output to its safe level until the next claim, from any thread. Does not raise."""
+        """Hold every output at its safe level until the next claim. For any thread; does not raise."""
         self._dropped = True
         for point, level in self._safe.items():
             if point in self._claimed:
@@ -124,11 +124,11 @@ class GpioLines:
                     continue  # the others must still drop
 
     def outputs(self) -> dict[str, bool]:
-        """The outputs' levels as the chip says. Raises HalError."""
+        """The outputs' levels, read from the chip. Raises HalError."""
         return self._levels(self._safe)
 
     def close(self) -> None:
-        """Outputs to their safe level, and let go."""
+        """Set the outputs to their safe level and release every line."""
         self._release()
 
     def _check(self) -> None:
@@ -148,7 +148,7 @@ class GpioLines:
         return self._claimed[point]
 
     def _pin(self, point: str) -> Any:
-        """Reserved before it is touched: gpiozero refuses a pin that another device holds."""
+        """Reserve a pin before using it: gpiozero refuses one that another device holds."""
         self._bus.factory.reserve_pins(self, point)
         self._claimed[point] = self._bus.factory.pin(point)
         return self._claimed[point]
@@ -168,7 +168,7 @@ class GpioLines:
             try:
                 pin.close()
             except _failures():
-                continue  # the others must still be let go
+                continue  # the others must still be released
             finally:
                 self._bus.factory.release_pins(self, point)
         self._claimed.clear()

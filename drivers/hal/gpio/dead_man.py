@@ -1,8 +1,8 @@
-"""The dead-man beside a loop: outputs drop when its scans stop, and stay dropped.
+"""The dead-man beside a loop: when its scans stop, the outputs drop and stay dropped.
 
-It works where an output can be written from another thread: on GPIO. (A Modbus client cannot be
-pre-empted; its module has a watchdog of its own. A thread that holds Python's lock stops this one
-too; systemd's watchdog is behind it.)
+It needs outputs that another thread can write, so it is for GPIO. (A Modbus client cannot be
+pre-empted; Modbus modules have their own watchdog.) A thread that keeps Python's global lock stops the
+dead-man too; then systemd's watchdog acts.
 """
 
 import threading
@@ -32,7 +32,7 @@ class DeadMan:
             self._thread.start()
 
     def check(self) -> bool:
-        """Drop if it is time to; True when it was."""
+        """Drop the outputs if the last scan is too old; True if so."""
         overdue = self._fed_at is not None and self._clock() - self._fed_at > AFTER_S
         if overdue:
             self._fed_at = None
@@ -40,7 +40,7 @@ class DeadMan:
         return overdue
 
     def close(self) -> None:
-        """Watch no more."""
+        """Stop watching."""
         self._ended.set()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join()

@@ -1,6 +1,7 @@
-"""The 40-pin header: how its pins are spelled, and what cannot be right about a wire on one.
+"""The 40-pin header: how its pins are spelled, and checks of the wires on them.
 
-Points are `BCM17` or `J8:11`; a bare number is refused, as it is the commonest wiring mistake.
+Points are `BCM17` or `J8:11`. A bare number is refused: mixing up position and BCM number is the most
+common wiring mistake.
 """
 
 import re
@@ -29,7 +30,7 @@ SHARED = {
     "BCM14": "the serial console, which sends and switches it at boot (enable_uart=1)",
     "BCM15": "the serial console (enable_uart=1)",
 }
-"""Pins that the firmware or the kernel may use, as a Raspberry Pi is often set up."""
+"""Pins that the firmware or the kernel uses in common setups of a Raspberry Pi."""
 
 
 def canonical(point: str) -> str:
@@ -72,11 +73,11 @@ def boot_level(point: str) -> bool:
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:
-    """What cannot be right about this wire on a header pin."""
+    """What is wrong with this wire on a header pin."""
     try:
         name = canonical(wire.point)
     except ValueError:
-        return  # reported where points are spelled
+        return  # the check of the point's spelling reports it
     if wire.direction == "in":
         if wire.pull is None:
             yield "pull is missing: say up, down, or none where an external resistor is fitted"
@@ -95,7 +96,7 @@ def wire_warnings(wire: Wire) -> Iterable[str]:
     try:
         name = canonical(wire.point)
     except ValueError:
-        return  # reported where points are spelled
+        return  # the check of the point's spelling reports it
     if name in SHARED:
         free = "; see that it is switched off in config.txt, or use another pin"
         yield f"{name} is for {SHARED[name]}{free}"

@@ -1,4 +1,4 @@
-"""Who has a GPIO chip open, by name: the kernel says of a line only its library's label ('lg')."""
+"""Which processes have a GPIO chip open: of a line's holder the kernel knows only a label ('lg')."""
 
 import os
 from collections.abc import Iterator
@@ -6,8 +6,9 @@ from pathlib import Path
 
 
 def holders(chip: Path, proc: Path = Path("/proc")) -> list[str]:
-    """The other processes that have this device open, as far as this user may see: a service by its
-    unit's name, else the command with its process id.
+    """The other processes that have this device open, as far as this user may see them.
+
+    A service has the name of its systemd unit, any other its process id and command.
     """
     found = (_name(p) for p in _processes(proc) if p.name != str(os.getpid()) and _has(p, chip))
     return sorted(set(found))

@@ -1,11 +1,11 @@
 """gpiozero's pins on lgpio, with outputs that never glitch. Imported only where there is lgpio.
 
 The stock `LGPIOPin` claims an output as an input, then as an output at low, and only then writes
-its level: an active-low relay clicks at each start. It ends by claiming a floating input. These
-pins claim once, at the safe level, and are left at it: the kernel of Raspberry Pi OS keeps the
-level of a line that nobody holds.
+its level: an active-low relay clicks at each start. On close it claims a floating input. These pins
+claim once, at the safe level, and stay at it after close: the kernel of Raspberry Pi OS keeps the level
+of a line that no process holds.
 
-lgpio makes a FIFO in the working directory when it is imported: be in the runtime directory.
+lgpio creates a FIFO in the working directory on import, so import it in the runtime directory.
 """
 
 import os
@@ -29,7 +29,7 @@ PULLS = {"up": lgpio.SET_PULL_UP, "down": lgpio.SET_PULL_DOWN, "floating": lgpio
 
 
 class HeldPin(LGPIOPin):  # type: ignore[misc]
-    """One line: claimed in one call, left at its safe level."""
+    """One line, claimed in one call and left at its safe level."""
 
     def __init__(self, factory: Any, info: Any) -> None:
         LocalPiPin.__init__(self, factory, info)  # LGPIOPin's own claims an input
@@ -41,7 +41,7 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
         self._safe: int | None = None
 
     def output_with_state(self, state: bool) -> None:
-        """Claim as an output at this level, which is the one to leave it at."""
+        """Claim as an output at this level, which is its safe level and restored on close."""
         self._claim(lgpio.gpio_claim_output, int(state))
         self._safe = int(state)
 
@@ -53,7 +53,7 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
         self._safe = None
 
     def close(self) -> None:
-        """An output to its safe level; then let go of the line. May be called twice."""
+        """Set an output to its safe level, then release the line. May be called twice."""
         if not self._held or self.factory._handle is None:
             return
         self._held = False
@@ -73,7 +73,7 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
         self._held = True
 
     def _holder(self) -> str:
-        """Who has the line: who has the chip open, else the label that the kernel has."""
+        """Who holds the line: the processes with the chip open, else the kernel's label."""
         *_, label = lgpio.gpio_get_line_info(self.factory._handle, self._number)
         if not label:
             return ""

@@ -1,15 +1,15 @@
 """Modbus: the coils, discrete inputs and registers of units, over TCP or on a serial line (RTU).
 
-    settings.py   what a YAML says: places.py (where), watchdog.py (the modules' own dead-man)
-    points.py     contacts and relays by their spelling; registers.py: places of a map
+    settings.py   settings of the YAML; places.py: address or line; watchdog.py: the modules' watchdogs
+    points.py     spelling of contacts and relays; registers.py: spelling of a map's places
     bus.py        the units of one connection or line: retries, pauses
     lines.py      one device's coils and registers: claim, read, write, read back, let go
     rivals.py     two masters on one output: a fault by that name, and no relay that chatters
     dead_man.py   keeps the modules' watchdogs from tripping
     wire.py       a question and its answer; tcp.py and rtu.py carry them, frames.py spells them
 
-Only frames.py (pymodbus) and rtu.py (pyserial) import a library, and they are imported when a bus is
-made that needs them.
+Only frames.py (pymodbus) and rtu.py (pyserial) import a library. They are imported when a bus needs
+them.
 """
 
 from drivers.hal import BusType
@@ -33,7 +33,7 @@ __all__ = [
 
 
 def open_bus(settings: Settings) -> ModbusBus:
-    """The way to these units; nothing is sent yet."""
+    """The bus for these units; it sends nothing yet."""
     return ModbusBus(settings)
 
 

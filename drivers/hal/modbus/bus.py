@@ -1,16 +1,16 @@
-"""The units of one TCP connection or serial line: asked one by one, with retries and pauses.
+"""The units of one TCP connection or serial line: one request at a time, with retries and backoff.
 
-- A request has `timeout_s` from the lookup of the name to the last byte of the reply, and is tried
-  `retries` times more. That a late reply or half a frame is never taken for the answer to another
-  question is the work of `tcp.py` (new connections) and `rtu.py` (silence). Only what may be repeated
-  is: a repeat of a read or a write changes nothing, of a pulse it does.
-- A connection or port that cannot be opened pauses the bus, a unit that fails pauses that unit, from
-  0.5 to 30 s; meanwhile calls fail at once with the same text. After a pause there is one try until the
-  unit answers again: a dead unit costs the others one `timeout_s` a pause, and no more.
-- What switches off has pauses of its own at each unit, so that no reading that fails keeps it waiting.
+- A request has `timeout_s` from the name lookup to the last byte of the reply, and up to `retries` more
+  tries. Reads and writes may be repeated; a pulse is not, because a repeat would prolong it. `tcp.py`
+  (new connections) and `rtu.py` (silence) see that a late reply or half a frame is never taken for
+  the reply to another request.
+- If the connection or port cannot be opened, the whole bus backs off; if a unit fails, only that unit
+  does: for 0.5 to 30 s, while calls fail at once with the same text. After that a request gets
+  one try until the unit answers again: a dead unit costs the others one `timeout_s` per backoff.
+- Writes that switch off have their own backoff at each unit: a failed reading never delays them.
 
-A gateway that waits for its serial units longer than `timeout_s` makes the others wait too: set its
-own timeout below ours.
+If a gateway waits for its serial units longer than `timeout_s`, the other units wait too: set the
+gateway's timeout below `timeout_s`.
 """
 
 import functools
@@ -42,7 +42,7 @@ from drivers.hal.points import Pull
 class ModbusBus(Bus):
     """One TCP connection or serial line, and the units there (also a `drivers.hal.points.PointsBus`).
 
-    `clock` and `jitter` are a test's in place of the real ones; `now` is that clock.
+    Tests replace `clock` and `jitter`; `now` is the clock.
     """
 
     canonical = staticmethod(canonical)
@@ -74,7 +74,7 @@ class ModbusBus(Bus):
         return dict(zip(asked.points(), found.values, strict=True))
 
     def cells(self, points: Iterable[Point]) -> dict[Point, int]:
-        """These bits and registers, by as few requests as will do. Raises HalError."""
+        """These bits and registers, in as few requests as possible. Raises HalError."""
         return Image(self, points).read()
 
     def write(self, point: Point, value: int, safe: bool = False) -> None:
@@ -89,8 +89,8 @@ class ModbusBus(Bus):
 
         Function 5 at an address of its own for each relay (0x0200 and the relay's number, from 0), with
         tenths of a second in place of a coil's two values; the reply is its echo. The maker's manual,
-        protocol V2: `01 05 02 00 00 07 8D B0` has relay 0 of unit 1 on for 0.7 s. Asked again, the time
-        begins again: so it is sent once. Raises HalError; then it may pulse.
+        protocol V2: `01 05 02 00 00 07 8D B0` switches relay 0 of unit 1 on for 0.7 s. A repeat would
+        restart the time, so it is sent once. Raises HalError; then there may be a pulse.
         """
         question = Question(place.unit, WRITES["coil"], place.address, round(on_s * 10))
         self._ask(f"flash at coil {place.address:#x}", question, once=True)
@@ -104,12 +104,12 @@ class ModbusBus(Bus):
         self._watchdogs.scanned()
 
     def insist(self) -> None:
-        """Try at once what is asked next, whatever the pauses: to switch off before the end."""
+        """Make the next call at once, without waiting for the backoff, to switch off before the end."""
         for backoff in (self._link, *self._units.values()):
             backoff.insist()
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection or port."""
         self._wire.close()
 
     def _ask(self, what: str, question: Question, safe: bool = False, once: bool = False) -> Answer:
@@ -149,7 +149,7 @@ class ModbusBus(Bus):
         return None, reason
 
     def _refused(self, backoff: Backoff, unit: int, text: str, code: int) -> HalError:
-        """An exception. One about the question itself shows that the unit lives: no pause."""
+        """The error for an exception reply. Exceptions 1 to 3 show that the unit works: no backoff."""
         self._watchdogs.refused(unit, code)
         text += f"exception {code}, {EXCEPTIONS.get(code, EXCEPTIONS[9])}"
         if code not in (1, 2, 3):
@@ -158,7 +158,7 @@ class ModbusBus(Bus):
 
 
 def _way(settings: Settings) -> tuple[Wire, str]:
-    """How to reach the units, and where that is, for texts. Only here the libraries are imported."""
+    """The wire to the units, and its name for texts. Only this function imports the libraries."""
     if settings.serial:
         from drivers.hal.modbus.rtu import Line
 

@@ -1,12 +1,12 @@
-"""The modules' own watchdogs, kept from tripping (`watchdog.py` says how a make's is used).
+"""Arms and refreshes the modules' own watchdogs (`watchdog.py` describes a make's).
 
-- Armed before the first output is driven, and believed only when read back.
-- Refreshed when the loop has finished a scan, and by nothing else: a daemon that hangs loses its
-  outputs. The loop's whole round, failing units included, has to fit into the module's time.
-- A trip (read back, or exception 4) makes every output unknown: it is armed again, each device on the
-  unit fails one reading, and its outputs are written anew.
+- A watchdog is armed before the first output is driven, and counts as armed only when read back.
+- Only a finished scan refreshes it: when the daemon hangs, the module drops its outputs. So one round
+  of the loop, failing units included, must be shorter than the module's time.
+- After a trip (read back, or exception 4) every output is unknown: the watchdog is armed again, each
+  device on the unit fails one reading, and its outputs are written anew.
 
-On stopping it is left armed: the outputs were switched off before, and stay so.
+When the daemon stops, the watchdog stays armed: the outputs are off by then, and stay off.
 """
 
 import itertools

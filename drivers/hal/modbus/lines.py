@@ -1,4 +1,4 @@
-"""One device's coils and registers: claimed, read, written, read back and let go in one way.
+"""One device's coils and registers: the same claim, read, write, read-back and close for each driver.
 
 Nothing is written before a first good reading of what is written. What is written is read back, and
 looked at again in each reading: a module that restarts with its outputs off, or whose watchdog has
@@ -108,9 +108,9 @@ class Lines:
     def claim(self) -> None:
         """Read each output and bring it to its safe value; once only.
 
-        Inputs are asked only where outputs cannot be, to see that the unit answers. Claimed again after
-        a failure it only reads: the outputs are as they were, or as the next write says. A door that is
-        held must not drop because one reply was lost.
+        Where outputs cannot be read, inputs are read to check that the unit answers. A claim after a
+        failure only reads, and the outputs stay as they were: a held door must not be released because
+        one reply was lost.
         """
         self._set.clear()
         every = Every()
@@ -168,11 +168,11 @@ class Lines:
         self.write(self._safe)
 
     def close(self) -> None:
-        """The same, one try for each unit whatever the pauses; not if nothing was ever driven."""
+        """Try once to make every output safe, if any was ever written. Does not raise."""
         if not self._touched:
             return
         self._units.insist()
-        unheard = Every()  # nobody is left to tell
+        unheard = Every()  # failures are dropped: the daemon is ending
         for name, point in self._outputs.items():
             with unheard.one():
                 self._units.write(point, self._safe[name], safe=True)

@@ -22,8 +22,8 @@ GAP_MAX: Final[dict[Table, int]] = {
     "holding register": 0,
     "input register": 0,
 }
-"""Addresses between two points that are rather read along than asked for in two requests. Not so
-between registers: a controller may lack what lies there, or take a reading for an acknowledgement.
+"""The widest gap between two points that are still read in one request. Registers are never read across
+a gap: a controller may lack those addresses, or take a reading for an acknowledgement.
 """
 COUNT_MAX: Final[dict[Table, int]] = {
     "coil": 2000,
@@ -128,11 +128,11 @@ def describe(point: str) -> str:
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:
-    """What cannot be right about this wire at a Modbus module."""
+    """What is wrong with this wire on a Modbus module."""
     try:
         point = parse(wire.point)
     except ValueError:
-        return  # reported where points are spelled
+        return  # the check of the point's spelling reports it
     if wire.pull is not None:
         yield "pull is for GPIO pins; the module has its own: leave it out"
     if wire.direction == "in":

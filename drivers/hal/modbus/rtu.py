@@ -3,16 +3,16 @@
 pyserial opens and configures the port; frames are made and read by pymodbus (`frames.py`). The waiting
 is ours. Imported with the first bus that needs it.
 
-RTU has no transaction number, so that a late reply looks like a prompt one. Hence:
+RTU has no transaction number, so a late reply looks like a prompt one. Hence:
 
-- Before each request the line has been silent for 3.5 characters; what came before is thrown away.
-- Other units' frames are no answer. They are dropped, and the wait for ours goes on. What is no frame
-  at all may have been ours, in a collision with a late one: the try ends when the line is silent.
-- A unit that has not answered in time is believed to answer late until LATE x `timeout_s` after it was
-  asked. Meanwhile it is only asked the same again, within the same call, and nothing else: whichever of
-  its replies comes first, it was sampled after the call began, and the other is thrown away.
+- A request is sent only after 3.5 characters of silence; bytes that came before are dropped.
+- Frames of other units are dropped, and the wait goes on. Bytes that are not a frame may be the reply
+  in a collision with a late one: the try ends when the line is silent.
+- A unit that misses its timeout may answer late, until LATE x `timeout_s` after its request. Until then
+  it gets only repeats of the same request, within the same call. Whichever reply comes first, it was
+  sampled after the call began; the other one is dropped.
 
-A unit that is later than that still needs a longer `timeout_s`.
+A unit that answers even later needs a longer `timeout_s`.
 """
 
 import errno

@@ -28,7 +28,7 @@ class Settings(
     `timeout_s`: for one try of one request.
     `retries`: how many more tries a request gets.
     `scan_s`: how often every input is read.
-    `module_watchdog`: the modules' own dead-man switch for their outputs.
+    `module_watchdog`: the modules' own watchdog for their outputs.
     """
 
     tcp: Tcp | None = None
@@ -39,7 +39,7 @@ class Settings(
     module_watchdog: Watchdog | None = None
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """What the fields cannot say one by one."""
+        """Problems that involve more than one field."""
         if self.tcp is None and self.serial is None:
             yield (), "says not where the units are: write tcp: {host: …} or serial: {port: …}"
         elif self.tcp and self.serial:
@@ -47,7 +47,7 @@ class Settings(
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
-    """What is legal but worth a look: (path, text)."""
+    """Valid settings that deserve a second look: (path, text)."""
     for path, text in settings.serial.warnings() if settings.serial else ():
         yield ("serial", *path), text
     for path, text in settings.module_watchdog.warnings() if settings.module_watchdog else ():

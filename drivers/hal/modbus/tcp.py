@@ -48,7 +48,7 @@ class Connection:
             raise NoReply(self._reason(error)) from error
 
     def close(self) -> None:
-        """Hang up. May be called twice."""
+        """Close the connection. May be called twice."""
         connection, self._socket = self._socket, None
         if connection is not None:
             connection.close()

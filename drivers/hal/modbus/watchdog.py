@@ -1,8 +1,7 @@
-"""`module_watchdog:` of a Modbus bus: the module's own dead-man switch for its outputs.
+"""`module_watchdog:` of a Modbus bus: the module's own watchdog for its outputs.
 
-A module that is not written to in time drops its outputs by itself. Which registers arm, refresh and
-show that is the module's habit, so it is data: in the YAML, or a profile. What is done with it is in
-`dead_man.py`.
+A module that is not written to in time drops its outputs by itself. Each make has its own registers for
+arming, refreshing and showing this, so they are in the YAML or a profile. `dead_man.py` uses them.
 """
 
 from collections.abc import Collection, Iterator
@@ -67,10 +66,10 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     `time_s`: the time that `arm` gives the module.
     `arm`: the writes that start it, in order.
-    `armed`: reads like this while it is armed: all of them.
+    `armed`: places that all read like this while it is armed.
     `refresh`: what keeps it from tripping.
     `refresh_s`: how often; at most half of `time_s`.
-    `tripped`: reads like this after a trip: any of them.
+    `tripped`: places of which any reads like this after a trip.
     `rearm`: the writes that end a trip, before `arm`.
     """
 
@@ -104,13 +103,13 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     habits: Habits | None = None
 
     def problems(self) -> Problems:
-        """Neither or both of profile and habits; a profile that is not right."""
+        """Neither or both of profile and habits; a profile with problems."""
         if len(set(self.units)) < len(self.units):
             yield ("units",), "a unit stands here twice"
         yield from profile_problems(PROFILE, self.profile, self.habits)
 
     def chosen(self) -> Habits:
-        """The habits, from wherever they are."""
+        """The habits: those in the YAML, or the profile's."""
         found: Habits = self.habits or PROFILE.load(self.profile or "")
         return found
 

@@ -89,4 +89,4 @@ class Wire(Protocol):
         """What answers this question. Raises NoReply."""
 
     def close(self) -> None:
-        """Hang up. May be called twice."""
+        """Close the connection. May be called twice."""
