@@ -55,7 +55,8 @@ def example(struct: type, field: mi.Field) -> str:
         (_shown()[c, field.name] for c in struct.__mro__ if (c, field.name) in _shown()), ""
     )
     if not shown:
-        shown = flow(WRITTEN[field.name] if field.name in WRITTEN else _by_type(field))
+        written = field.name in WRITTEN and not _is_numbered(field.type)
+        shown = flow(WRITTEN[field.name] if written else _by_type(field))
     return f"{field.encode_name}: {shown}"
 
 
@@ -128,6 +129,12 @@ def _is_section(info: mi.Type) -> bool:
     if isinstance(info, mi.DictType):
         return _is_section(info.value_type)
     return isinstance(info, mi.StructType)
+
+
+def _is_numbered(info: mi.Type) -> bool:
+    """A mapping whose keys are numbers."""
+    key = info.key_type if isinstance(info, mi.DictType) else None
+    return isinstance(key.type if isinstance(key, mi.Metadata) else key, mi.IntType)
 
 
 def _by_type(field: mi.Field) -> Any:

@@ -90,7 +90,10 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
         yield name, f"{' and '.join(map(str, points))}{bit}{scaled}"
     written = orders(settings)
     if found.power:
-        yield POWER, f"{written[POWER]}: {found.power.on} may charge, {found.power.off} must not"
+        yield (
+            POWER,
+            f"{written[POWER]}: {found.power.start} may charge, {found.power.stop} must not",
+        )
         yield "end of the daemon", "off is written" if settings.on_death == "stop" else "nothing"
     for name, order in (("clear_error", found.clear_error), ("range_check", found.range_check)):
         if order:
@@ -147,7 +150,7 @@ class RegisterCharger:
         }
         self._power = power
         if command and shown:
-            self._power = {command.on: True, command.off: False}.get(image[shown[0]])
+            self._power = {command.start: True, command.stop: False}.get(image[shown[0]])
         return decode(self._map, values)
 
     def write(self, outputs: ChargerOutputs) -> None:
@@ -170,8 +173,8 @@ class RegisterCharger:
             command = self._map.power
             if command and command.read_back:
                 point = self._orders[POWER]
-                if self._bus.cells([point])[point] != command.off:
-                    raise DriverError(f"{point} is not off after {command.off} was written")
+                if self._bus.cells([point])[point] != command.stop:
+                    raise DriverError(f"{point} is not off after {command.stop} was written")
 
     def close(self) -> None:
         """Do what `make_safe` does, if the power was ever written and may be on. Does not raise."""
@@ -187,7 +190,7 @@ class RegisterCharger:
         if command is None or (self._power is on and command.read_back and not anyway):
             return
         self._power, self._touched = None, True
-        self._bus.write(self._orders[POWER], command.on if on else command.off, safe=not on)
+        self._bus.write(self._orders[POWER], command.start if on else command.stop, safe=not on)
         self._power = on
 
     def _order(self, name: str) -> None:

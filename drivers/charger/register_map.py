@@ -81,24 +81,24 @@ class Power(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """The command that lets the station charge.
 
     `at`: `coil N` or `holding register N`.
-    `on`: the value that lets it charge.
-    `off`: the value that does not.
+    `start`: the value that lets it charge.
+    `stop`: the value that does not.
     `read_back`: false where the command can only be written; then it is written in every scan.
     """
 
     at: Place
-    on: Word
-    off: Word
+    start: Word
+    stop: Word
     read_back: bool = True
 
     def problems(self) -> Problems:
         """A place that cannot be written; values that it cannot hold."""
         if reason := misplaced(self.at, WRITABLE):
             yield ("at",), reason
-        elif misplaced(self.at, ("coil",)) is None and max(self.on, self.off) > 1:
-            yield ("on",), "a coil is 0 or 1"
-        if self.on == self.off:
-            yield ("off",), "is the value of on"
+        elif misplaced(self.at, ("coil",)) is None and max(self.start, self.stop) > 1:
+            yield ("start",), "a coil is 0 or 1"
+        if self.start == self.stop:
+            yield ("stop",), "is the value of start"
 
 
 class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

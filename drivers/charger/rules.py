@@ -84,7 +84,7 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     def problems(self) -> Problems:
         """An unknown meaning; a text for a state that is not an error."""
         if self.means not in MEANINGS:
-            yield ("means",), f"is '{self.means}': one of {', '.join(MEANINGS)} is wanted"
+            yield ("means",), f"is '{self.means}': write one of {', '.join(MEANINGS)}"
         elif self.text and MEANINGS[self.means][0] is not Activity.ERROR:
             yield ("text",), "is for an error"
 

@@ -27,7 +27,7 @@ class RegisterCharger:
         self._orders = {point: name for name, point in orders(settings).items()}
         self._written = dict.fromkeys(self._orders, 0)
         if self._map.power:
-            self._written[orders(settings)[POWER]] = self._map.power.off
+            self._written[orders(settings)[POWER]] = self._map.power.stop
         self.points = frozenset((*self._orders, *(p for c in self._cells.values() for p in c)))
         self.outputs = frozenset(self._orders)
 
@@ -49,7 +49,7 @@ class RegisterCharger:
             return False
         self._written[point] = value
         name, power = self._orders[point], self._map.power
-        on = power is not None and value == power.on if name == POWER else True
+        on = power is not None and value == power.start if name == POWER else True
         self.plant.drive(name, on, now)
         return True
 

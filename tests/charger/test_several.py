@@ -37,7 +37,7 @@ def daemon(file: Path, **stations: Conversation) -> Iterator[list[ChargerState]]
         for name, talk in stations.items():
             far = open_.enter_context(FarEnd(talk))
             base = f"127.0.0.1:{far.port}"
-            timing = {"timeout_s": TIMEOUT_S if name == "b" else 10.0, "scan_s": 0.05}
+            timing = {"timeout_s": TIMEOUT_S if name == "b" else 5.0, "scan_s": 0.05}
             buses[name] = {"type": "http", "api_base": base, **timing}
             chargers[name] = {"bus": name, "codes": {"idle": [0], "charging": [5], "error": [8]}}
         whole = {"kind": "charger", "driver": "http", "buses": buses, "chargers": chargers}

@@ -120,6 +120,8 @@ CHECKED = {
         "ward_door opened unit 1 discrete input 0 (10001) in high - 0.05 s - not asserted",
         "ward_door closed unit 1 discrete input 1 (10002) in high - 0.05 s - not asserted",
         "ward_door hold_open unit 1 coil 0 (00001) out high - - low not asserted",
+        "ward_door closing nothing is driven: a released door stays open unless its operator closes it"
+        " by itself",
     ],
     "a bus type too": ["ward_door asks left wing at 192.0.2.1:4000"],
 }

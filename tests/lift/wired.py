@@ -112,6 +112,7 @@ class _Registers:
 
     def __init__(self, building: GatewayBuilding) -> None:
         self._building = building
+        self.now = lambda: building.now
         self._watchdogs = Watchdogs(cast(ModbusBus, self), None, lambda: building.now)
 
     def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:

@@ -86,6 +86,7 @@ class RegisterFar:
     def __init__(self, timeline: Timeline, door: RegisterDoor) -> None:
         self.down = False
         self._timeline = timeline
+        self.now = lambda: timeline.now
         self._door = door
         self._first = {p: door.get(p, 0.0) for p in door.outputs}
 

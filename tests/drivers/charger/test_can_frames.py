@@ -470,6 +470,6 @@ def test_a_map_without_a_receiver_verifies_nobody() -> None:
     "text", ["", "hello", 'VERSION ""\nBO_ 1 A: 8 X\n SG_ B : 0|99@1+ (1,0) [0|1] "" X\n']
 )
 def test_a_file_that_is_not_a_dbc_file_is_a_value_error_on_one_line(text: str) -> None:
-    with pytest.raises(ValueError, match="is no DBC file") as caught:
+    with pytest.raises(ValueError, match="is not a DBC file") as caught:
         dbc.Dbc(text)
     assert "\n" not in str(caught.value)

@@ -182,14 +182,15 @@ def test_letting_go_of_what_does_not_answer_is_no_error(receiver: Receiver) -> N
 
 
 def test_the_example_is_right_and_says_what_is_untried() -> None:
-    [warning] = load(EXAMPLE).warnings
-    assert "not tried on hardware" in str(warning)
+    [no_station, untried] = load(EXAMPLE).warnings
+    assert "is no station" in str(no_station)
+    assert "not tried on hardware" in str(untried)
 
 
 def test_facts_that_the_yaml_cannot_supply_are_warned_of() -> None:
     made = Settings(node=10, heartbeat="none", receivers={"7": "tiny/r1"})
     paths = [path for path, _ in warnings(made)]
-    assert paths == [(), ("heartbeat",), ("receivers",)]
+    assert paths == [(), (), ("heartbeat",), ("receivers",)]
 
 
 def test_check_prints_objects_and_meanings() -> None:

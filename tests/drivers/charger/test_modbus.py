@@ -42,8 +42,8 @@ def test_no_other_device_may_use_its_coils() -> None:
 
 def test_check_warns_that_it_is_untried_and_that_it_tells_no_receiver() -> None:
     known = msgspec.structs.replace(SETTINGS, receivers={"1": "tiny/AMR01"})
-    assert [path for path, _ in warnings(known)] == [(), ("receivers",)]
-    assert [path for path, _ in warnings(SETTINGS)] == [()]
+    assert [path for path, _ in warnings(known)] == [(), (), ("receivers",)]
+    assert [path for path, _ in warnings(SETTINGS)] == [(), ()]
 
 
 def test_a_receiver_that_is_lost_while_it_is_enabled_is_let_go_without_a_word() -> None:

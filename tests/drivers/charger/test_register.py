@@ -74,17 +74,20 @@ def test_what_it_measures_is_told() -> None:
 WRONG: dict[str, tuple[str, str]] = {
     "state: {at: input register 0}": (
         "stat: {at: input register 0}",
-        "needs 'state', of which codes speaks",
+        "'values' needs 'state', of which codes speaks",
     ),
     "{at: flags, ignore": ("{at: flagz, ignore", "'flagz' is no value of this map"),
-    "{at: coil 0, on: 1, off: 0}": ("{at: coil 0, on: 1, off: 1}", "is the value of on"),
+    "{at: coil 0, start: 1, stop: 0}": (
+        "{at: coil 0, start: 1, stop: 1}",
+        "'stop' is the value of start",
+    ),
     "{at: input register 4, scale: 0.01, signed: true}": (
         "{at: input register 4, bit: 16}",
         "1 registers have bits 0 to 15",
     ),
     "in_range: {at: discrete input 0}": (
         "in_range: {at: discrete input 0, words: 2}",
-        "is one bit: leave words, signed and bit out",
+        "'at' is one bit: leave words, signed and bit out",
     ),
     "    unit: 3\n": (
         "    unit: 3\n    receivers: {a: fleet/robot}\n",

@@ -128,18 +128,19 @@ WRONG = {
     ),
     "switches_off_after_s: 30 ": (
         "switches_off_after_s: 2 ",
-        "switches_off_after_s is 2, and it is renewed every 1 s (scan_s): at least 4 s, so that one"
-        " lost answer does not drop it",
+        "switches_off_after_s is 2, but it is renewed every 1 s (scan_s): write at least 4, so that one"
+        " lost reply does not drop the output",
     ),
     "{means: idle}": (
         "{means: idel}",
-        "is 'idel': one of idle, handshake, charging, stopping, released, error, robot_error is wanted",
+        "'means' is 'idel': write one of idle, handshake, charging, stopping, released, error,"
+        " station_error, robot_error",
     ),
     "temperature.tC: {above": (
         "tempe rature: {above",
         "'tempe rature' is no field: write names with dots between them (status.code)",
     ),
-    "{above: 20}": ("{above: 20, below: 20}", "must be greater than above"),
+    "{above: 20}": ("{above: 20, below: 20}", "'below' must be greater than above"),
     "{means: charging, when: {apower: {above: 20}}} ": (
         "{means: idle} ",
         "always holds: the rules below it are never asked",

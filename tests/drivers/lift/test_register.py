@@ -110,7 +110,7 @@ MODEL = "looks like a number of the data model, which begins at 1"
         (
             "0: closed, 1: moving, 2: open",
             "0: moving, 1: moving, 2: open",
-            "37:9: needs a code for open and one for closed",
+            "37:9: 'codes' needs a code for open and one for closed",
         ),
         ("bit: 0, active", "active", "41:7: a flag is one bit of a register: say which"),
         (

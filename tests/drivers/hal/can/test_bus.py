@@ -299,7 +299,7 @@ def test_a_bus_is_one_of_the_two_sorts() -> None:
     [(nowhere, what)] = problems(Settings())
     assert (nowhere, what[:18]) == ((), "needs an interface")
     [(path, text)] = problems(Settings(socketcan="can0", slcan=place))
-    assert (path, text[:30]) == (("slcan",), "a bus has socketcan or slcan: ")
+    assert (path, text[:37]) == (("slcan",), "a bus has either socketcan or slcan: ")
 
 
 def test_a_bitrate_that_no_adapter_knows_is_a_problem() -> None:
