@@ -157,7 +157,7 @@ def _timer_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]
             "when the network dies nothing switches the power off: have start set the relay's own"
             " timer, and write that as switches_off_after_s"
         )
-        yield from unaccepted([(POWER, ("start",), text)], settings.accept_unsafe)
+        yield from unaccepted([(POWER, ("switches_off_after_s",), text)], settings.accept_unsafe)
 
 
 def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
