@@ -154,7 +154,10 @@ def test_a_reader_that_fails_joins_anew_and_hears_again(
         whole()
 
     monkeypatch.setattr(node, "_read_once", fails)
-    publisher.publish(d.LiftState(lift_name="wakes it"))
+    wakes = d.LiftState(lift_name="wakes it")
+    wait_until(
+        lambda: any(r.exc_info for r in caplog.records) or peer.sent(publisher, wakes), "it fails"
+    )
     received.clear()
     after = d.LiftState(lift_name="after")
     wait_until(
