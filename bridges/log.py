@@ -1,5 +1,6 @@
 """Logs: one line `event key=value …` for each event, with journald's priority."""
 
+import codecs
 import dataclasses
 import logging
 import os
@@ -9,6 +10,10 @@ from enum import Enum
 
 import msgspec
 
+ESCAPED = "unicode_escape"
+codecs.lookup(
+    ESCAPED
+)  # loaded now: without a free descriptor it could not be, and would end the daemon
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
@@ -56,7 +61,7 @@ def _set(record: object) -> Iterator[tuple[str, object]]:
 def _quoted(text: str) -> str:
     if text and text.isprintable() and not any(c in text for c in ' "='):
         return text
-    return '"' + text.encode("unicode_escape").decode("ascii").replace('"', "'") + '"'
+    return '"' + text.encode(ESCAPED).decode("ascii").replace('"', "'") + '"'
 
 
 class _Formatter(logging.Formatter):

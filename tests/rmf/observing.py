@@ -13,13 +13,12 @@ SUBSCRIPTION = builtin.BuiltinTopicDcpsSubscription
 
 def seen(observer: Any, kind: Any, topic: Topic[Any]) -> Any:
     """The one end of a topic that is announced."""
-    reader = builtin.BuiltinDataReader(observer, kind)
     found: list[Any] = []
 
     def look() -> bool:
-        found.extend(end for end in reader.take(100) if end.topic_name == f"rt/{topic.name}")
-        return bool(found)
+        reader = builtin.BuiltinDataReader(observer, kind)  # a new one sees who is there now
+        found[:] = [end for end in reader.take(100) if end.topic_name == f"rt/{topic.name}"]
+        return len(found) == 1
 
-    wait_until(look, f"{topic.name} is announced")
-    assert len(found) == 1
+    wait_until(look, f"{topic.name} is announced, once")
     return found[0]
