@@ -11,9 +11,7 @@ from enum import Enum
 import msgspec
 
 ESCAPED = "unicode_escape"
-codecs.lookup(
-    ESCAPED
-)  # loaded now: without a free descriptor it could not be, and would end the daemon
+codecs.lookup(ESCAPED)  # at once: without a free descriptor it could not be loaded
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
