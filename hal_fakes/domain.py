@@ -39,11 +39,12 @@ def _claimed() -> tuple[int, socket.socket]:
     """A free domain and the claim on it, which lasts until it is closed.
 
     Raises OSError when there is none. Of a domain d the ports are 7400 + 250 d: multicast discovery
-    there, the first participant's unicast ports 10 and 11 above it (DDSI-RTPS 2.5, 9.6.2.3).
+    there, participant i's unicast ports 10 + 2 i and 11 + 2 i above it (DDSI-RTPS 2.5, 9.6.2.3). The
+    first one may have left while others are still there.
     """
     for domain in random.sample(DOMAINS, len(DOMAINS)):
         base = 7400 + 250 * domain
-        dds = all(_is_free(base + offset) for offset in (0, 10, 11))
+        dds = all(_is_free(base + offset) for offset in (0, *range(10, 72)))
         zenoh = _is_free(LOOPBACK_PORT + domain, socket.SOCK_STREAM)
         if dds and zenoh and (claim := _claim(domain)):
             return domain, claim
