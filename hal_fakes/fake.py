@@ -25,12 +25,12 @@ class Fake(Generic[Settings]):
     """One sort of controller.
 
     `plant(name, settings, wires)`: its physics; `wires` is the driver's table.
-    `station(plant, settings, settings of the bus)`: what the bus's fake puts on the bus, with that
-    plant behind it. None: the plant's contacts stand there, as a `Wiring`.
+    `station(plant, settings)`: what the bus's fake puts on the bus, with that plant behind it. None:
+    the plant's contacts stand there, as a `Wiring`.
     """
 
     plant: Callable[[str, Settings, Sequence[Wire]], Plant]
-    station: Callable[[Plant, Settings, Any], object] | None = None
+    station: Callable[[Plant, Settings], object] | None = None
 
 
 class Server(Protocol):
@@ -40,7 +40,7 @@ class Server(Protocol):
     (`{"tcp": {"host": "127.0.0.1", "port": 41234}}`).
     """
 
-    replace: dict[str, Any]
+    replace: dict[str, object]
 
     def close(self) -> None:
         """Stop serving. Does not raise."""
@@ -88,7 +88,7 @@ def _station(config: Config, bus: str, name: str, plant: Plant) -> object:
     station = _fake(config, name).station
     if station is None:
         return Wiring(plant, config.wires(name), config.bus_type(bus).canonical)
-    return station(plant, config.devices[name], config.buses[bus])
+    return station(plant, config.devices[name])
 
 
 def far_side(config: Config, bus: str) -> FarSide:

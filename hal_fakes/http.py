@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from select import select
 from types import MappingProxyType
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 from drivers.hal import http
 from hal_fakes.fake import Outside
@@ -66,7 +66,7 @@ class HttpServer:
     def __init__(self, stations: Sequence[Station], path: str, timeout_s: float) -> None:
         self._server = _Listener(stations, path, timeout_s)
         host, port = self._server.server_address[:2]
-        self.replace = {"api_base": f"{host!s}:{port}{path}", "token_file": None}
+        self.replace: dict[str, object] = {"api_base": f"{host!s}:{port}{path}", "token_file": None}
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(LOOK_S,), name="http", daemon=True
         )
@@ -101,13 +101,14 @@ class _Listener(ThreadingHTTPServer):
         for station in self._stations:
             station.tick()
 
-    def get_request(self) -> tuple[socket.socket, Any]:
+    def get_request(self) -> tuple[socket.socket, object]:
         caller, address = super().get_request()
         with self._lock:
             self._callers.add(caller)
         return caller, address
 
-    def shutdown_request(self, request: Any) -> None:
+    def shutdown_request(self, request: socket.socket | tuple[bytes, socket.socket]) -> None:
+        assert isinstance(request, socket.socket)  # a datagram's would be a pair
         with self._lock:
             self._callers.discard(request)
         super().shutdown_request(request)
@@ -120,7 +121,9 @@ class _Listener(ThreadingHTTPServer):
             with contextlib.suppress(OSError):
                 caller.shutdown(socket.SHUT_RDWR)
 
-    def handle_error(self, request: Any, client_address: Any) -> None:
+    def handle_error(
+        self, request: socket.socket | tuple[bytes, socket.socket], client_address: object
+    ) -> None:
         """Ignore a caller that has hung up; anything else is a defect of this file."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
@@ -205,7 +208,7 @@ class _Call(BaseHTTPRequestHandler):
             if select([self.connection], [], [], min(left_s, LOOK_S))[0]:
                 raise ConnectionAbortedError("the caller has hung up")
 
-    def log_message(self, format: str, *args: Any) -> None:
+    def log_message(self, format: str, *args: object) -> None:
         """Log nothing: the daemon's log shows its requests."""
 
 

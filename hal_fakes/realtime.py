@@ -112,6 +112,10 @@ class _Serialised:
         with self._world.lock:
             return self._plant.sense(signal)
 
+    def reading(self) -> object:
+        with self._world.lock:
+            return self._plant.reading()
+
     def next_at(self) -> float:
         with self._world.lock:
             return self._plant.next_at()

@@ -10,7 +10,7 @@ list.
 
 import time
 from collections.abc import Mapping
-from typing import Final, cast
+from typing import Final
 
 import can
 
@@ -95,7 +95,8 @@ class FrameCharger:
 
     def _message(self, frame: str, wrong: bool) -> can.Message:
         self.plant.advance(time.monotonic())
-        reading = cast(PadReading, self.plant.sense("reading"))
+        reading = self.plant.reading()
+        assert isinstance(reading, PadReading)
         values = dict.fromkeys(self._dbc.signals(frame), 0.0) | {
             signal.split(".")[1]: value
             for signal, value in self._values(reading, wrong).items()
@@ -155,5 +156,5 @@ def _short(message: can.Message) -> can.Message:
 
 FAKE = Fake[Settings](
     plant=lambda name, settings, wires: PadPlant(name),
-    station=lambda plant, settings, bus: FrameCharger(plant, settings),
+    station=lambda plant, settings: FrameCharger(plant, settings),
 )

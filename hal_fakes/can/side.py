@@ -15,8 +15,8 @@ import itertools
 import random
 import threading
 import time
-from collections.abc import Callable, Sequence
-from typing import Any, Final, Protocol
+from collections.abc import Sequence
+from typing import Final, Protocol
 
 import can
 
@@ -38,7 +38,7 @@ def slow_s(settings: Settings) -> float:
 class Medium(Protocol):
     """How frames come and go. `replace`: what must stand in the bus's settings instead."""
 
-    replace: dict[str, Any]
+    replace: dict[str, object]
 
     def receive(self, wait_s: float) -> can.Message | None:
         """The next frame from the daemon, if one comes in time."""
@@ -53,7 +53,11 @@ class Medium(Protocol):
         """End. May be called twice."""
 
 
-Send = Callable[[can.Message], None]
+class Send(Protocol):
+    """How a station sends."""
+
+    def __call__(self, message: can.Message, late: bool = False) -> None:
+        """Send now; `late`: after the daemon has stopped waiting for it."""
 
 
 class Station(Protocol):
@@ -62,7 +66,7 @@ class Station(Protocol):
     plant: Plant
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """A frame from the daemon. What is sent goes out at its `timestamp` (monotonic s), if later."""
+        """A frame from the daemon."""
 
     def tick(self, now: float, send: Send) -> None:
         """Send what is due; called often."""
@@ -72,7 +76,7 @@ class VirtualBus:
     """python-can's `virtual` bus: `channel` names it for whoever opens it as well."""
 
     def __init__(self, channel: str) -> None:
-        self.replace: dict[str, Any] = {}
+        self.replace: dict[str, object] = {}
         self._bus: can.BusABC | None = can.Bus(channel, interface="virtual")
         self._noise = random.Random("can")
         self._off_told = False
@@ -115,7 +119,7 @@ def any_frame(noise: random.Random) -> can.Message:
 class CanSide:
     """The running far side. `replace`: what must stand in the bus's settings instead.
 
-    `slow_s`: how late a slow bus's frames come.
+    `slow_s`: how late a frame comes that is sent late, or on a slow bus.
     """
 
     def __init__(self, medium: Medium, stations: Sequence[Station], slow_s: float) -> None:
@@ -158,12 +162,11 @@ class CanSide:
         return min(LOOK_S, max(0.0, next_at - time.monotonic()))
 
     def _post(self, mode: FailureMode | None, now: float) -> Send:
-        at = now + (self._slow_s if mode == "slow" else 0.0)
-        return lambda message: self.put(message, max(at, message.timestamp))
+        def post(message: can.Message, late: bool = False) -> None:
+            at = now + (self._slow_s if late or mode == "slow" else 0.0)
+            heapq.heappush(self._due, (at, next(self._order), message))
 
-    def put(self, message: can.Message, at: float) -> None:
-        """Have it sent at this time (monotonic s)."""
-        heapq.heappush(self._due, (at, next(self._order), message))
+        return post
 
     def _say(self, passes: bool) -> None:
         while self._due and self._due[0][0] <= time.monotonic():

@@ -10,13 +10,14 @@ import os
 import random
 import select
 import tempfile
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import can
+import msgspec
 
+from drivers.hal.can import Slcan
 from hal_fakes.can.side import any_frame
 from hal_fakes.modbus.rtu import Adapter
 from hal_fakes.plants.plant import FailureMode
@@ -27,12 +28,13 @@ DIGITS: Final = {"t": 3, "T": 8}
 class SlcanPort:
     """A medium (`hal_fakes.can.side.Medium`). `settings`: the bus's own `slcan`, if it has one."""
 
-    def __init__(self, settings: Mapping[str, Any]) -> None:
+    def __init__(self, settings: Slcan | None = None) -> None:
         self._directory = tempfile.TemporaryDirectory(prefix="rmf-slcan-")
         self.adapter = Adapter(Path(self._directory.name) / "adapter")
         self.adapter.plug()
-        place = {"bitrate": 250_000, **settings, "port": str(self.adapter.path)}
-        self.replace = {"socketcan": None, "slcan": place}
+        found = settings or Slcan(port="", bitrate=250_000)
+        place = msgspec.structs.replace(found, port=str(self.adapter.path))
+        self.replace = {"socketcan": None, "slcan": msgspec.to_builtins(place)}
         self._noise = random.Random("slcan")
         self._others = False
         self._heard = b""

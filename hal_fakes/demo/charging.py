@@ -8,7 +8,7 @@ request, two robots too many, a robot at the wrong charger, and a charger that o
 from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from bridges.charger_coordinator.settings import Settings
 from bridges.rmf import definitions as d
@@ -50,7 +50,7 @@ class Yard:
 
     # ---- a party on RMF's side
 
-    def hear(self, message: Any, now: float) -> list[Said]:
+    def hear(self, message: d.Message, now: float) -> list[Said]:
         """Charging assignments."""
         return self.fleet.hear(message, now)
 

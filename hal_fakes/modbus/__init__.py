@@ -59,14 +59,14 @@ class ModbusServer:
         self._noise = random.Random("modbus")
         self._kinds = itertools.cycle((0, 1))
         self._port = 0
-        self._server: Any = None
+        self._server: Any = None  # pymodbus types neither its sockets nor a context of ours
         self._closed = False
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="modbus", daemon=True)
         self._thread.start()
         self._run(self._listen())
         self._watch = asyncio.run_coroutine_threadsafe(self._look(), self._loop)
-        self.replace = {"tcp": {"host": "127.0.0.1", "port": self._port}}
+        self.replace: dict[str, object] = {"tcp": {"host": "127.0.0.1", "port": self._port}}
 
     def close(self) -> None:
         """Hang up on everybody. May be called twice."""
@@ -79,7 +79,7 @@ class ModbusServer:
         self._thread.join()
         self._loop.close()
 
-    def _run(self, work: Coroutine[Any, Any, None]) -> None:
+    def _run(self, work: Coroutine[object, None, None]) -> None:
         asyncio.run_coroutine_threadsafe(work, self._loop).result(READY_S)
 
     async def _listen(self) -> None:

@@ -29,6 +29,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+import msgspec
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
 from pymodbus.framer import FramerRTU
@@ -90,7 +91,9 @@ class RtuLine:
         self._directory = tempfile.TemporaryDirectory(prefix="rmf-rs485-", dir=directory)
         self.adapter = Adapter(Path(self._directory.name) / "adapter")
         self.adapter.plug()
-        self.replace = {"serial": {**_plain(settings), "port": str(self.adapter.path)}}
+        self.replace: dict[str, object] = {
+            "serial": {**_plain(settings), "port": str(self.adapter.path)}
+        }
         self.requests: list[bytes] = []
         self._order = itertools.count()
         self._due: list[tuple[float, int, bytes]] = []
@@ -216,7 +219,3 @@ class RtuLine:
             return self.requests[-1] + reply
         body = bodies[kind % len(bodies)]
         return body + FramerRTU.compute_CRC(body).to_bytes(2, "big")
-
-
-def _plain(settings: Serial) -> dict[str, object]:
-    return {name: getattr(settings, name) for name in settings.__struct_fields__}

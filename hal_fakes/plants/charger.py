@@ -18,7 +18,7 @@ takes ten times as long for it, `wrong` fails it, `garbage` loses contact while 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 from bridges.charger.signals import CURRENT_FLOWS, Activity
 from drivers.hal.points import Wire
@@ -97,10 +97,12 @@ class ChargerPlant(Machine):
         self._since = 0.0
         self._until = NEVER
 
-    def sense(self, signal: str) -> Any:
-        """`reading`: everything at once, as a Reading; else whether `robot` or a cause is there."""
-        if signal != "reading":
-            return self.contact(signal)
+    def sense(self, signal: str) -> bool:
+        """Is `robot` or a cause there?"""
+        return self.contact(signal)
+
+    def reading(self) -> Reading:
+        """Everything at once."""
         lasts = self._until - self._since
         progress = 0.0 if lasts == NEVER else (self.now - self._since) / lasts
         flows = self.activity in CURRENT_FLOWS

@@ -83,6 +83,10 @@ class Machine(ABC):
         """Is this contact asserted, as the wire shows it?"""
         return self._sensors[signal].shows
 
+    def reading(self) -> object:
+        """None: it is read by its contacts alone."""
+        return None
+
     def next_at(self) -> float:
         """When something will change if nothing is driven: s, or inf."""
         contacts = (*self._sensors.values(), *self._relays.values())

@@ -21,7 +21,7 @@ A failing `fan` lets the coil heat up, and a failing `thermometer` is an error, 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from bridges.charger.signals import CURRENT_FLOWS, Activity
 from hal_fakes.plants.machine import Machine
@@ -110,10 +110,12 @@ class PadPlant(Machine):
 
     # ---- what a controller sees and does
 
-    def sense(self, signal: str) -> Any:
-        """`reading`: everything at once, as a PadReading; else whether what can be pressed is."""
-        if signal != "reading":
-            return self.contact(signal)
+    def sense(self, signal: str) -> bool:
+        """Is what can be pressed there?"""
+        return self.contact(signal)
+
+    def reading(self) -> PadReading:
+        """Everything at once."""
         lasts = self._until - self._since
         progress = 0.0 if lasts in (0.0, NEVER) else (self.now - self._since) / lasts
         flows = self.activity in CURRENT_FLOWS

@@ -1,7 +1,6 @@
 """What every plant is: physics driven by commands and time, that records each edge and can fail.
 
-`machine.py` has all of it but the physics. A kind's plants are in `<kind>.py`, which
-holds `build(name, settings) -> Plant`.
+`machine.py` has all of it but the physics. A kind's plants are in `<kind>.py`.
 """
 
 from collections.abc import Callable, Mapping
@@ -45,6 +44,9 @@ class Plant(Protocol):
 
     def sense(self, signal: str) -> bool:
         """Is this contact asserted, as the wire shows it (failures included)?"""
+
+    def reading(self) -> object:
+        """What a controller that is not read by its contacts knows of it; None where none is."""
 
     def next_at(self) -> float:
         """When something will change if nothing is driven: monotonic seconds, or inf."""

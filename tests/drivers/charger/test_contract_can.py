@@ -86,7 +86,7 @@ def on_a_bus(driver: Any, plain: dict[str, Any], medium: Medium, bus: CanBus) ->
     world = RealTime({"a": PadPlant("a", PACE)})
     fake: Fake[Any] = import_module(driver.DRIVER.fake).FAKE
     assert fake.station
-    station: Any = fake.station(world.plants["a"], settings, Settings(timeout_s=TIMEOUT_S))
+    station: Any = fake.station(world.plants["a"], settings)
     side = CanSide(medium, [station], slow_s=2 * TIMEOUT_S)
 
     def new(on_death: OnDeath) -> ChargerDriver:
@@ -211,7 +211,7 @@ class OnAnAdapter(CanContract):
 
     @contextmanager
     def pads(self) -> Iterator[PadBench]:
-        port = SlcanPort({})
+        port = SlcanPort()
         place = msgspec.convert(port.replace["slcan"], Slcan)
         settings = Settings(slcan=place, timeout_s=TIMEOUT_S, scan_s=0.1)
         bus = CanBus(settings, Clock(), lambda: 0.0)
