@@ -91,9 +91,8 @@ class RtuLine:
         self._directory = tempfile.TemporaryDirectory(prefix="rmf-rs485-", dir=directory)
         self.adapter = Adapter(Path(self._directory.name) / "adapter")
         self.adapter.plug()
-        self.replace: dict[str, object] = {
-            "serial": {**_plain(settings), "port": str(self.adapter.path)}
-        }
+        place = msgspec.structs.replace(settings, port=str(self.adapter.path))
+        self.replace: dict[str, object] = {"serial": msgspec.to_builtins(place)}
         self.requests: list[bytes] = []
         self._order = itertools.count()
         self._due: list[tuple[float, int, bytes]] = []
