@@ -106,10 +106,8 @@ class HttpCharger:
         said = self._settings
         robots = reading.error_text in ROBOTS_FAULTS
         wanted = ROBOT_ERROR if robots else (reading.activity, "")
-        looked_at = (at for _, at in places(said.rules))
-        natural = {
-            at: found(answer, at) for at in looked_at if isinstance(found(answer, at), Value)
-        }
+        shown = {at: found(answer, at) for _, at in places(said.rules)}
+        natural = {at: value for at, value in shown.items() if isinstance(value, Value)}
         return values(said.rules, said.errors, wanted, natural) or {}
 
     def _code(self, reading: Reading) -> int:

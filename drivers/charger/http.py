@@ -11,7 +11,7 @@ states mean; an unlisted state is an error. A maker's state is never passed on a
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 
@@ -321,7 +321,7 @@ class HttpCharger:
             send(self._bus, self._settings.start)
 
 
-def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> int | str:
+def _code(answer: Mapping[str, object], field: str, words: Mapping[str, int]) -> int | str:
     """The maker's number for its state, or its word if `state_words` does not list it."""
     code = json_fields.needed(answer, field)
     if words and isinstance(code, str):
@@ -334,7 +334,7 @@ def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> in
     return code
 
 
-def _error(answer: Mapping[str, Any], fields: Fields) -> tuple[str, FaultSide]:
+def _error(answer: Mapping[str, object], fields: Fields) -> tuple[str, FaultSide]:
     """The station's words for its error, and whose they say that it is."""
     said = json_fields.text(answer, fields.error_text)
     means = fields.error_texts.get(said)
@@ -343,7 +343,7 @@ def _error(answer: Mapping[str, Any], fields: Fields) -> tuple[str, FaultSide]:
     return said, means or ""
 
 
-def _measured(answer: Mapping[str, Any], fields: Fields) -> Measured:
+def _measured(answer: Mapping[str, object], fields: Fields) -> Measured:
     numbers = ("volts", "amps", "battery_percent", "time_to_full_s")
     found = {name: _number(answer, getattr(fields, name)) for name in numbers}
     percent, left_s = found["battery_percent"], found["time_to_full_s"]
@@ -357,11 +357,11 @@ def _measured(answer: Mapping[str, Any], fields: Fields) -> Measured:
     return Measured(receiver_id=receiver, in_range=_in_range(answer, fields.in_range), **found)
 
 
-def _number(answer: Mapping[str, Any], number: Number | None) -> float | None:
+def _number(answer: Mapping[str, object], number: Number | None) -> float | None:
     return json_fields.number(answer, number.field, number.scale) if number else None
 
 
-def _in_range(answer: Mapping[str, Any], place: InRange | None) -> bool | None:
+def _in_range(answer: Mapping[str, object], place: InRange | None) -> bool | None:
     """Null means not in range."""
     return None if place is None else json_fields.flag(answer, place)
 

@@ -6,7 +6,7 @@ fails, only the relay's own timer can release the door. So `hold` sets that time
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 
@@ -188,12 +188,12 @@ class HttpDoor:
         send(self._bus, self._settings.hold if on else self._settings.release, safe=not on)
         self._told = on
 
-    def _held(self, answer: Mapping[str, Any]) -> bool | None:
+    def _held(self, answer: Mapping[str, object]) -> bool | None:
         place = self._settings.held
         return None if place is None else json_fields.flag(answer, place)
 
 
-def decode(settings: Settings, answer: Mapping[str, Any]) -> DoorSample:
+def decode(settings: Settings, answer: Mapping[str, object]) -> DoorSample:
     """Decode the answer. Raises DriverError that names the field it cannot decode."""
 
     def said(place: Flag | None) -> bool | None:

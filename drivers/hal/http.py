@@ -11,7 +11,7 @@ import socket
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
@@ -27,6 +27,7 @@ __all__ = ["Base", "HttpBus", "Method", "Path", "Settings", "base"]
 
 if TYPE_CHECKING:
     from requests.adapters import HTTPAdapter
+    from urllib3 import BaseHTTPResponse
 
 BODY_MAX = 64 * 1024
 HEADERS = {
@@ -133,7 +134,7 @@ class HttpBus(Bus):
         self._adapter = _adapter(self._dialler, self._base.scheme)
         self._backoff, self._safe_backoff = (Backoff(clock, lambda: 0.0) for _ in range(2))
 
-    def get_json(self, path: str) -> dict[str, Any]:
+    def get_json(self, path: str) -> dict[str, object]:
         """GET `api_base` + `path`, which must answer 200 with one JSON object."""
         url = self._base.url(path)
         with self._attempt(self._backoff):
@@ -293,7 +294,7 @@ def _check_status(url: str, reads: bool, status: int) -> None:
     raise HalError(f"{url} answered status {status}: {hint}")
 
 
-def _capped(raw: Any) -> bytes:
+def _capped(raw: "BaseHTTPResponse") -> bytes:
     """The whole body, or one byte more than is allowed. Reading on to its end detects a cut body."""
     body = b""
     while len(body) <= BODY_MAX and (

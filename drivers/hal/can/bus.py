@@ -13,7 +13,7 @@ during which calls fail at once. A bus-off ends with the next frame, or when the
 import random
 import time
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from drivers.hal import Bus, HalError
 from drivers.hal.backoff import Backoff
@@ -21,7 +21,7 @@ from drivers.hal.can.frames import Frame, Hear, LinkDown, Trouble, Wanted, named
 from drivers.hal.can.settings import Settings
 
 if TYPE_CHECKING:
-    from drivers.hal.can.link import Link
+    from drivers.hal.can.link import Link, Vendor
 
 FRAMES_AT_ONCE: Final = 20_000
 """A reading takes no more: a bus at 1 Mbit/s has 8,000 a second."""
@@ -32,9 +32,6 @@ RECENT_S: Final = 5.0
 OTHERS_MAX: Final = 64
 OTHERS_SHOWN: Final = 5
 
-Vendor = Callable[[], Any]
-"""Opens python-can's bus."""
-
 
 class CanBus(Bus):
     """One bus and the devices on it. `clock`, `jitter` and `vendor` are a test's."""
@@ -44,7 +41,7 @@ class CanBus(Bus):
         settings: Settings,
         clock: Callable[[], float] = time.monotonic,
         jitter: Callable[[], float] = random.random,
-        vendor: Vendor | None = None,
+        vendor: "Vendor | None" = None,
     ) -> None:
         self.settings = settings
         self.now = clock
@@ -197,7 +194,7 @@ class CanBus(Bus):
         return self._backoffs[0].failed(text)
 
 
-def _link(settings: Settings, where: str, vendor: Vendor | None) -> "Link":
+def _link(settings: Settings, where: str, vendor: "Vendor | None") -> "Link":
     """The way onto the bus. Only here python-can is imported."""
     from drivers.hal.can.link import Link, slcan, socketcan
 

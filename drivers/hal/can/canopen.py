@@ -14,7 +14,8 @@ A lost node has a backoff as every device has; its heartbeat or its restart ends
 """
 
 import struct
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from drivers.hal import HalError
 from drivers.hal.backoff import Backoff
@@ -24,6 +25,7 @@ from drivers.hal.can.frames import Frame, Wanted
 if TYPE_CHECKING:
     from drivers.hal.can.sdo import Client
 
+Reply = TypeVar("Reply")
 LATE: Final = 3.0
 SDO_TO_NODE: Final = 0x600
 SDO_FROM_NODE: Final = 0x580
@@ -78,7 +80,7 @@ class CanOpenNode:
     def read(self, index: int, subindex: int, octets: int) -> int:
         """An unsigned number of so many octets. Raises HalError."""
         what = f"read 0x{index:04X}:{subindex:02X}"
-        found = self._exchanged(what, self._sdo_pause, "upload", index, subindex)
+        found = self._exchanged(what, self._sdo_pause, lambda: self._client.upload(index, subindex))
         number = bytes(found)[:octets]
         if len(number) < octets or any(found[octets:]):
             size = f"{len(found)} bytes ({found.hex(' ')})"
@@ -97,15 +99,15 @@ class CanOpenNode:
         what = f"write 0x{index:04X}:{subindex:02X}"
         payload = number.to_bytes(octets, "little")
         pause = self._safe_pause if safe else self._sdo_pause
-        self._exchanged(what, pause, "download", index, subindex, payload)
+        self._exchanged(what, pause, lambda: self._client.download(index, subindex, payload))
 
-    def _exchanged(self, what: str, pause: Backoff, call: str, *arguments: Any) -> Any:
+    def _exchanged(self, what: str, pause: Backoff, transfer: Callable[[], Reply]) -> Reply:
         """One SDO transfer by the library. Raises HalError."""
         waits = pause is self._sdo_pause and not pause.insisting
         pause.check(not_yet=waits and self._bus.now() < self._late_until)
         text = f"{self._name()}, {what}: "
         try:
-            found = getattr(self._client, call)(*arguments)
+            found = transfer()
         except TimeoutError:
             raise pause.failed(text + self._no_reply()) from None
         except self._client.ABORTED as error:

@@ -17,7 +17,7 @@ import os
 import select
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, Final
+from typing import Final
 
 import can
 import serial
@@ -49,7 +49,7 @@ TROUBLES: Final = {
 """Bits of an error frame's id (linux/can/error.h), the most telling first."""
 
 
-Vendor = Callable[[], Any]
+Vendor = Callable[[], BusABC]
 """Opens python-can's bus."""
 
 

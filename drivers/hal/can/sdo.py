@@ -3,7 +3,7 @@
 import logging
 import struct
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 from canopen import ObjectDictionary, SdoAbortedError, SdoCommunicationError
 from canopen.sdo.client import SdoClient
@@ -27,13 +27,13 @@ class Client(SdoClient):
         self._exchange = exchange
         self._post = post
 
-    def request_response(self, sdo_request: Any) -> bytes:
+    def request_response(self, sdo_request: bytes) -> bytes:
         """One question. Raises ABORTED, and what `exchange` raises."""
         reply = self._exchange(bytes(sdo_request))
         if reply[0] == ABORT:
             raise SdoAbortedError(int.from_bytes(reply[4:8], "little"))
         return reply
 
-    def send_request(self, request: Any) -> None:
+    def send_request(self, request: bytes) -> None:
         """Without an answer."""
         self._post(bytes(request))

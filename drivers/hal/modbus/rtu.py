@@ -21,7 +21,7 @@ import select
 import termios
 import time
 from contextlib import suppress
-from typing import Any, Final
+from typing import Final
 
 import serial
 
@@ -52,7 +52,7 @@ class Line:
         self._settings = settings
         self._timeout_s = timeout_s
         self._deadline = Deadline()
-        self._port: Any = None
+        self._port: serial.Serial | None = None
         self._busy_until = 0.0
         self._sent_at = 0.0
         self._late: dict[int, float] = {}
@@ -113,7 +113,7 @@ class Line:
             with suppress(OSError, termios.error):
                 port.close()
 
-    def _opened(self) -> Any:
+    def _opened(self) -> serial.Serial:
         port = serial.Serial(
             self._settings.port,
             self._settings.baudrate,
@@ -137,12 +137,14 @@ class Line:
         self._busy_until = self._sent_at + len(request) * self._settings.character_s
         if request[0] in self._late:  # asked again: this may be what is answered late
             self._late[request[0]] = self._sent_at + LATE * self._timeout_s
+        assert self._port  # `connect` has opened it
         if os.write(self._port.fileno(), request) != len(request):
             raise OSError(errno.EIO, "it does not take what is sent")
 
     def _heard(self, within_s: float) -> bytes:
         """What comes next; nothing when nothing does within this. Raises TimeoutError, OSError."""
         left_s = min(max(0.0, within_s), self._deadline.left())
+        assert self._port
         descriptor = self._port.fileno()
         if not select.select([descriptor], [], [], left_s)[0]:
             return b""
