@@ -62,9 +62,7 @@ class Dbc:
             found = self._messages[frame].decode(payload, decode_choices=False)
         except (Error, ValueError, KeyError) as error:
             raise DriverError(f"{frame} {payload.hex(' ')} cannot be decoded: {error}") from None
-        assert isinstance(
-            found, dict
-        )  # a list is of a frame that contains frames, which DBC has not
+        assert isinstance(found, dict)  # a list is for frames within frames, which DBC has not
         return {
             name: value
             for name, value in found.items()

@@ -12,10 +12,11 @@ from bridges.charger.settings import robot
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings.load import SettingsError, load
 from drivers import DriverError, json_fields
-from drivers.charger.http import InRange, Settings, create, describe, warnings
+from drivers.charger.http import Settings, create, describe, warnings
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
 from drivers.http_call import Call
+from drivers.json_fields import Flag
 from tests.depth import examples
 from tests.drivers.charger.test_http import Station
 
@@ -69,9 +70,7 @@ def test_a_robots_error_is_told_from_the_stations_and_an_unknown_word_is_unknown
 
 
 def test_a_range_may_be_a_number() -> None:
-    fields = msgspec.structs.replace(
-        FULL.fields, in_range=InRange(field="pad.aligned", when=[1, 3])
-    )
+    fields = msgspec.structs.replace(FULL.fields, in_range=Flag(field="pad.aligned", when=[1, 3]))
     made = msgspec.structs.replace(FULL, fields=fields)
     seen = [read(answer(aligned=value), made).measured.in_range for value in (1, 3, 0, True, "1")]
     assert seen == [True, True, False, False, False]
@@ -324,9 +323,7 @@ def test_a_whole_profile_has_no_warning_and_each_gap_has_its_own() -> None:
 
 
 def test_check_prints_every_place_word_and_receiver() -> None:
-    fields = msgspec.structs.replace(
-        FULL.fields, in_range=InRange(field="pad.aligned", when=[1, 3])
-    )
+    fields = msgspec.structs.replace(FULL.fields, in_range=Flag(field="pad.aligned", when=[1, 3]))
     made = msgspec.structs.replace(FULL, fields=fields)
     assert describe(made, load(EXAMPLE).buses["tpu"])[:14] == [
         ("state", "GET http://192.168.1.61:8080/api/v2/status every 0.5 s"),
