@@ -19,7 +19,7 @@ from drivers.driver_type import DriverType
 from drivers.hal import http
 from drivers.http_call import Call, InsistentCalls, send, told
 from drivers.json_fields import Flag
-from drivers.unsafe import Unsafe, unaccepted
+from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted
 
 HOLD: Final = "hold_open"
 Problems = Iterator[tuple[tuple[str, ...], str]]
@@ -120,8 +120,7 @@ def warnings(settings: Settings) -> Problems:
             "pull the network plug while the door is held, and see that it is released in this time"
         )
         yield ("switches_off_after_s",), text
-        if HOLD in settings.accept_unsafe:
-            yield ("accept_unsafe", HOLD), f"nothing is unsafe about {HOLD}: delete this"
+    yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if settings.held is None:
         yield (), "held is not read: that the door was released is not verified"
     if settings.feedback == "estimated":

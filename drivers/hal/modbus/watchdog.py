@@ -110,8 +110,7 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def chosen(self) -> Habits:
         """The habits: those in the YAML, or the profile's."""
-        found: Habits = self.habits or PROFILE.load(self.profile or "")
-        return found
+        return self.habits or PROFILE.load(self.profile or "")
 
     def warnings(self) -> Problems:
         """A profile that nobody has tried."""
