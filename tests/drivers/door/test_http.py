@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from bridges.door.signals import DoorOutputs, DoorSample
-from bridges.settings.load import SettingsError, load
+from bridges.settings.load import load
 from drivers import DriverError
 from drivers.door import http as door_http
 from drivers.door.http import Settings, create
@@ -20,6 +20,7 @@ from hal_fakes.plants.plant import FailureMode
 from hal_fakes.realtime import RealTime
 from tests.drivers.benches import on_http
 from tests.drivers.door.contract import CLOSED, HOLD, OPEN, QUICK, RELEASE, Bench, WiredDoorContract
+from tests.settings.reading import changed, texts_of
 from tests.waiting import wait_until
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "door_http.yaml"
@@ -172,13 +173,8 @@ WRONG = {
 @pytest.mark.parametrize("old", WRONG)
 def test_what_would_leave_a_door_held_or_unseen_is_refused(tmp_path: Path, old: str) -> None:
     new, wanted = WRONG[old]
-    text = EXAMPLE.read_text()
-    assert text.count(old) == 1
-    file = tmp_path / "door.yaml"
-    file.write_text(text.replace(old, new))
-    with pytest.raises(SettingsError) as caught:
-        load(file)
-    assert [problem.text for problem in caught.value.problems] == [wanted]
+    found = texts_of(tmp_path / "door.yaml", changed(old, new, EXAMPLE.read_text()))
+    assert found == [wanted]
 
 
 def test_a_relay_without_a_timer_is_taken_with_a_reason(tmp_path: Path) -> None:
