@@ -60,7 +60,7 @@ class BusType(Generic[Settings]):
     """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, which needs no vendor library.
 
     `settings`: the struct below the bus's name in the YAML, with `scan_s` (how often it is read).
-    `open_bus(settings)`: raises HalError.
+    `open_bus(settings)`: makes the bus, which sends nothing yet. Raises HalError.
     `where(settings)`: what it is in the building; None where files never share it.
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
     far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it

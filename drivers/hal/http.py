@@ -111,11 +111,6 @@ def where(settings: Settings) -> Where:
     return Where(base(settings.api_base).url(""), local=False)
 
 
-def open_bus(settings: Settings) -> "HttpBus":
-    """The bus for this controller; it sends nothing yet."""
-    return HttpBus(settings)
-
-
 class HttpBus(Bus):
     """Calls to one controller. Every failure is a HalError that says what to check.
 
@@ -313,7 +308,7 @@ def _cause(error: BaseException) -> str:
 
 BUS = BusType(
     settings=Settings,
-    open_bus=open_bus,
+    open_bus=HttpBus,
     fake="hal_fakes.http",
     where=where,
     warnings=warnings,

@@ -18,7 +18,7 @@ from bridges.settings.load import load
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.stage import Demo
 from hal_fakes.demo.world import World
-from hal_fakes.rmf import Said
+from hal_fakes.rmf import Party, Said
 from hal_fakes.rmf.fleet import Fleet, FleetRobot
 
 FLEET: Final = "tiny"
@@ -31,7 +31,7 @@ HERE = Path(__file__).parent
 COORDINATOR = HERE.parents[1] / "config" / "charger_coordinator.yaml"
 
 
-class Yard:
+class Yard(Party):
     """The fleet and the pads. A robot that arrives at a charger's waypoint stands on that charger's
     pad, and its battery fills while the charger says that it charges."""
 

@@ -12,7 +12,7 @@ from typing import Final
 
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import CHARGING_ASSIGNMENTS, FLEET_STATES, AnyTopic
-from hal_fakes.rmf import Said
+from hal_fakes.rmf import Party, Said
 
 EVERY_S: Final = 1.0
 Graph = Mapping[str, tuple[str, float, float]]
@@ -39,7 +39,7 @@ class FleetRobot:
     mode: d.RobotModeValue = d.RobotModeValue.MODE_IDLE
 
 
-class Fleet:
+class Fleet(Party):
     """Publishes FleetState at 1 Hz and hears ChargingAssignments."""
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS,)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
-from hal_fakes.rmf import NEVER, Said, door_request, has_session
+from hal_fakes.rmf import NEVER, Party, Said, door_request, has_session
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Phase(ABC):
         return []
 
 
-class Robot:
+class Robot(Party):
     """A fleet adapter's RobotContext (`requester_id` is fleet/robot) and its one running phase.
 
     `on_task`: it has a task. `in_car`: its position is inside the lift. Both belong to the story.

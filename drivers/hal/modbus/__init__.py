@@ -26,20 +26,14 @@ __all__ = [
     "Tcp",
     "canonical",
     "describe",
-    "open_bus",
     "warnings",
     "wire_problems",
 ]
 
 
-def open_bus(settings: Settings) -> ModbusBus:
-    """The bus for these units; it sends nothing yet."""
-    return ModbusBus(settings)
-
-
 BUS = BusType(
     settings=Settings,
-    open_bus=open_bus,
+    open_bus=ModbusBus,
     fake="hal_fakes.modbus",
     where=where,
     warnings=warnings,
