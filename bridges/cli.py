@@ -18,6 +18,10 @@ COMMANDS = {
     ),
     "schema": ("print the JSON Schema of a device YAML", "schema > rmf-bridge.json"),
     "watch": ("show lifts, doors and chargers live, as RMF sees them", "watch --localhost"),
+    "status": (
+        "show every daemon on this machine: state, faults and what to do",
+        "status --json",
+    ),
     "send": (
         "send a request as RMF does, and wait for its effect",
         "send lift Lift1 L3 --session me --direct --localhost",
