@@ -1,5 +1,4 @@
-"""What stands in for the hardware in `rmf-bridge run FILE --simulate`: for each bus of the file, a
-plant for each of its devices and the far side of the bus in front of them.
+"""The hardware of `rmf-bridge run FILE --simulate`: a plant for each device behind its bus.
 
 Where it can, a far side stands in a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real
 bus is pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's.

@@ -2,8 +2,8 @@
 
 Every call has one deadline from the lookup of the name to the last byte of the body
 (`drivers/hal/deadline.py`). The body is capped; proxies, redirects and compression are off. Each call
-has a connection of its own: replies have no numbers in HTTP/1.1, so on a kept one a second reply to the
-last request, or a late one, would be taken for the next one's. A call is sent once, whatever happens.
+has a connection of its own, because replies in HTTP/1.1 have no numbers: on a kept connection a late or
+second reply would be taken for the reply to the next request. A call is sent only once.
 """
 
 import os
@@ -39,7 +39,7 @@ HEADERS = {
 JSON = {"Content-Type": "application/json"}
 
 Method = Literal["POST", "PUT", "GET"]
-"""How a command is sent. Some makes take them as a GET, with a query."""
+"""How a command is sent. Some makes take commands as a GET with a query."""
 Header = Annotated[
     str,
     msgspec.Meta(

@@ -1,7 +1,7 @@
-"""A charger that speaks frames of its maker's, by the same map as the driver's, with a plant behind.
+"""A charger with its maker's own CAN frames, by the driver's map, with a plant behind it.
 
-It charges while it is fed: while every frame that its map wants comes, at the pace of the map, and says
-what `on` means. It stops when one says what `off` means, and when one stays away for three periods.
+It charges while every frame of its map comes on time with the values of `on`. It stops when a frame has
+the values of `off`, or when one stays away for three periods.
 
 Failing part `node`, beside those of the plant and the bus: `off` is silent, `stuck` says what it said
 before, `slow` says it every two seconds, `garbage` sends frames of six bytes, `wrong` a state of no

@@ -24,10 +24,10 @@ from drivers.hal.can import Settings
 from hal_fakes.plants.plant import FailureMode, Plant
 
 LOOK_S: Final = 0.02
-"""The longest delay of an ordered failure, of heartbeats and of status frames."""
+"""How late an ordered failure, a heartbeat or a status frame may be (s)."""
 BUS_OFF: Final = 0x40
 SLOWNESS: Final = 1.5
-"""How many of the client's time limits a slow answer takes."""
+"""How many of the client's timeouts a slow answer takes."""
 
 
 def slow_s(settings: Settings) -> float:
@@ -36,18 +36,18 @@ def slow_s(settings: Settings) -> float:
 
 
 class Medium(Protocol):
-    """How frames come and go. `replace`: what must stand in the bus's settings instead."""
+    """The wire. `replace`: what to write into the bus's settings instead."""
 
     replace: dict[str, object]
 
     def receive(self, wait_s: float) -> can.Message | None:
-        """The next frame from the daemon, if one comes in time."""
+        """The next frame from the daemon; None if none comes within `wait_s`."""
 
     def send(self, message: can.Message) -> None:
-        """To the daemon; lost when nobody has it open."""
+        """Send to the daemon. The frame is lost if no program has the bus open."""
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Work (None), or be `off`, `garbage` or `wrong`, from now on. Called often."""
+        """From now on work (None) or fail in this way. Called often."""
 
     def close(self) -> None:
         """End. May be called twice."""
@@ -117,7 +117,7 @@ def any_frame(noise: random.Random) -> can.Message:
 
 
 class CanSide:
-    """The running far side. `replace`: what must stand in the bus's settings instead.
+    """A running far side. `replace`: what to write into the bus's settings instead.
 
     `slow_s`: how late a frame comes that is sent late, or on a slow bus.
     """

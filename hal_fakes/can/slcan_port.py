@@ -3,7 +3,7 @@
     t123 2 0102 CR     frame 0x123 with two bytes; T and eight digits: with 29 bits
     Sn CR, O CR, C CR  bitrate, open, close
 
-It answers a frame that it takes with `z` or `Z`, and passes frames only while it is open.
+It acknowledges a frame with `z` or `Z`, and passes frames only while it is open.
 """
 
 import os
@@ -60,7 +60,7 @@ class SlcanPort:
             self._write(encoded(message))
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Pulled out, noisy, or among strangers."""
+        """`off` pulls the adapter out, `garbage` sends noise, `wrong` passes only others' frames."""
         if (mode == "off") != (self.adapter.wire is None):
             self._heard, self._open = b"", False
             (self.adapter.pull if mode == "off" else self.adapter.plug)()
@@ -95,14 +95,14 @@ class SlcanPort:
 
 
 def encoded(message: can.Message) -> bytes:
-    """A frame as an adapter says it."""
+    """The line for a frame."""
     letter = "T" if message.is_extended_id else "t"
     digits = f"{message.arbitration_id:0{DIGITS[letter]}X}"
     return f"{letter}{digits}{message.dlc}{bytes(message.data).hex().upper()}\r".encode()
 
 
 def decoded(line: str) -> can.Message:
-    """A line as a frame. Raises ValueError, IndexError."""
+    """The frame in a line. Raises ValueError, IndexError."""
     size = DIGITS[line[0]]
     count = int(line[1 + size])
     data = bytes.fromhex(line[2 + size : 2 + size + 2 * count])

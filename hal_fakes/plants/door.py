@@ -4,7 +4,7 @@ Contacts: `opened` and `closed` at its limits, `obstruction` (light curtain), `f
 Relay: `hold_open`. To press: `push` (a person's button or hand), `obstruction`, `fire`.
 Failing part `operator`: `off` and `stuck` stand still, `slow` takes five times as long, `wrong` turns
 each command round, `garbage` stops half-way. At a Modbus module `unit` and `server` fail as well
-(`hal_fakes/modbus.py`).
+(`hal_fakes/modbus/`).
 """
 
 from collections.abc import Iterable

@@ -21,7 +21,7 @@ class Machine(ABC):
     `wires`: the driver's wiring table of this device; empty where the controller has no contacts.
     `parts`: what can fail besides wires (`car`, `door_operator`); the plant looks at `failures`.
     `buttons`: what can be pressed; `pressed` has each, and whether it is now.
-    Wires to an I/O module bring its parts along, `unit` and `server`: `hal_fakes/modbus.py` has those.
+    Wires to an I/O module add its parts `unit` and `server` (`hal_fakes/modbus/`).
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class Machine(ABC):
         return self._sensors[signal].shows
 
     def reading(self) -> object:
-        """None: it is read by its contacts alone."""
+        """None: it has contacts alone."""
         return None
 
     def next_at(self) -> float:

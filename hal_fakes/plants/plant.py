@@ -1,4 +1,4 @@
-"""What every plant is: physics driven by commands and time, that records each edge and can fail.
+"""What every plant is: physics driven by commands and time. It records each edge and can fail.
 
 `machine.py` has all of it but the physics. A kind's plants are in `<kind>.py`.
 """
@@ -34,7 +34,7 @@ class Plant(Protocol):
 
     @property
     def failures(self) -> Mapping[str, FailureMode]:
-        """What has been told to fail, and how; the far side of a bus looks for its own parts here."""
+        """Part -> how it fails. The far side of a bus looks for its own parts here."""
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
         """A relay of ours changes."""
@@ -46,7 +46,7 @@ class Plant(Protocol):
         """Is this contact asserted, as the wire shows it (failures included)?"""
 
     def reading(self) -> object:
-        """What a controller that is not read by its contacts knows of it; None where none is."""
+        """What a controller without contacts knows at this instant; None if it has contacts alone."""
 
     def next_at(self) -> float:
         """When something will change if nothing is driven: monotonic seconds, or inf."""
