@@ -78,7 +78,7 @@ class Connection:
     def _unreachable(self, error: OSError) -> str:
         text = f"no Modbus TCP connection to {self._where}: "
         if isinstance(error, ConnectionRefusedError):
-            return text + "it is refused; is this the module, and does it take another connection?"
+            return text + "it is refused; is this the module, and does it take more connections?"
         if isinstance(error, socket.gaierror):
             return text + "its name is not known; write its address"
         if isinstance(error, TimeoutError):

@@ -225,7 +225,7 @@ from bridges.settings.load import load
 from drivers.door import dry_contact
 from drivers.hal import modbus
 config = load(sys.argv[1])
-bus = modbus.open_bus(config.buses["module"])
+bus = modbus.ModbusBus(config.buses["module"])
 door = dry_contact.create("ward_door", config.devices["ward_door"], bus)
 door.open()
 pause = threading.Event()

@@ -170,9 +170,9 @@ def test_loading_the_vendors_library_costs_the_first_request_none_of_its_time(
 def test_the_vendors_libraries_are_loaded_with_the_first_bus_and_their_server_never() -> None:
     before = "import drivers.hal.modbus as m, drivers.door.dry_contact, drivers.door.register"
     assert loaded(before) == set()
-    tcp = loaded(f"{before}; m.open_bus(m.Settings(tcp=m.Tcp(host='a')))")
+    tcp = loaded(f"{before}; m.ModbusBus(m.Settings(tcp=m.Tcp(host='a')))")
     line = "m.Serial(port='/dev/a', baudrate=9600, parity='none', stopbits=1)"
-    rtu = loaded(f"{before}; m.open_bus(m.Settings(serial={line}))")
+    rtu = loaded(f"{before}; m.ModbusBus(m.Settings(serial={line}))")
     assert "pymodbus.framer.socket" in tcp
     assert {m for m in tcp if m.startswith(("pymodbus.server", "aiohttp", "serial"))} == set()
     assert {m for m in rtu if m.startswith(("pymodbus.server", "aiohttp"))} == set()
