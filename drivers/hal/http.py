@@ -147,9 +147,6 @@ class HttpBus(Bus):
         with self._attempt(self._safe_backoff if safe else self._backoff):
             self._call(method, url, body)
 
-    def on_edge(self, wake: Callable[[], None]) -> None:
-        """A polled bus has no edges."""
-
     def insist(self) -> None:
         """Make the next call at once, without waiting for the backoff."""
         self._backoff.insist()

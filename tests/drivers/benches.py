@@ -108,16 +108,19 @@ class Contract(ABC, Generic[B]):
 
 @contextmanager
 def on_modbus(
-    world: RealTime, far_sides: Sequence[FarSide], serial: modbus.Serial | None = None
+    world: RealTime,
+    far_sides: Sequence[FarSide],
+    serial: modbus.Serial | None = None,
+    timeout_s: float = TIMEOUT_S,
 ) -> Iterator[tuple[modbus.ModbusBus, Time]]:
     """A bus to a simulated gateway, or line, on which these are."""
     clock = Time()
     server = (
-        RtuLine(far_sides, serial, slow_s=2.2 * TIMEOUT_S)
+        RtuLine(far_sides, serial, slow_s=2.2 * timeout_s)
         if serial
-        else ModbusServer(far_sides, slow_s=1.5 * TIMEOUT_S)
+        else ModbusServer(far_sides, slow_s=1.5 * timeout_s)
     )
-    plain = {"type": "modbus", "timeout_s": TIMEOUT_S, **server.replace}
+    plain = {"type": "modbus", "timeout_s": timeout_s, **server.replace}
     bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
     try:
         yield bus, clock
