@@ -6,7 +6,16 @@ import pytest
 
 from drivers.hal.modbus.tcp import Connection
 from drivers.hal.points import HalError
-from tests.drivers.hal.modbus.module import Module, Time, bits_reply, bus_to, door, fails, frame, proven
+from tests.drivers.hal.modbus.module import (
+    Module,
+    Time,
+    bits_reply,
+    bus_to,
+    door,
+    fails,
+    frame,
+    proven,
+)
 
 IN0 = "unit 1 discrete input 0"
 
