@@ -120,7 +120,7 @@ class Loop:
         self.inbox.wake()
 
     def _take_edge(self) -> None:
-        """After an edge every device is due. One that comes meanwhile counts now or wakes the next round."""
+        """After an edge every device is due. One that comes meanwhile wakes the next round."""
         if self._edge:
             self._edge = False
             self._due = dict.fromkeys(self._due, AGES_AGO)

@@ -157,7 +157,7 @@ def serial(port: str, ignore_echo: bool = False) -> Serial:
 def proven(
     module: Module, clock: Time | None = None, *, timeout_s: float = 2.0, retries: int = 1
 ) -> ModbusBus:
-    """A bus whose unit 1 has answered once, so that it gets its retries; what was asked is forgotten."""
+    """A bus whose unit 1 has answered once, so that it gets its retries. `asked` begins anew."""
     door(module)
     bus = bus_to(module.port, clock, timeout_s=timeout_s, retries=retries)
     read = bus.lines({"unit 1 discrete input 0": None}, {}).read
