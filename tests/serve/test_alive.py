@@ -1,5 +1,6 @@
 """A daemon that is suspended, deaf or hung: what RMF is shown, and what systemd hears."""
 
+import argparse
 import os
 import signal
 import socket
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from bridges.commands import reset
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.loop import SUSPENDED_S
 from tests.serve.site import Graph, Module, command, daemon, environment, hold_open
@@ -168,3 +170,25 @@ def _inode(run: Path) -> int | None:
         return (run / "status.json").stat().st_ino
     except FileNotFoundError:
         return None
+
+
+def test_a_reset_during_the_start_does_no_harm(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    """`rmf-bridge reset` again and again, from before the process begins until it is in service."""
+    run = tmp_path / "run"
+    asked = argparse.Namespace(file=module.file, runtime_dir=str(run))
+    codes: list[tuple[bool, int]] = []
+    with daemon(module.file, run, **SERVICE) as running:
+
+        def ready() -> bool:
+            serving = "serving " in running.log.read_text()
+            codes.append((serving, reset.run(asked)))
+            return "ready " in running.log.read_text()
+
+        wait_until(ready, "the daemon is in service")
+        assert (False, 0) in codes, "one reached it before it served"
+        assert {code for _, code in codes} <= {0, 1}
+        hold_open(module, graph, running)
+        assert running.end(signal.SIGTERM) == 0
+    assert module.relay() == [True, False]
