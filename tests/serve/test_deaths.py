@@ -405,6 +405,28 @@ def test_a_user_without_permission_is_told_what_to_do_and_switches_nothing(
             assert module.relay() == [True]
 
 
+@pytest.mark.skipif(
+    os.geteuid() == 0 and not _runs_for_others(), reason="no other user can run this Python"
+)
+@pytest.mark.parametrize("name", ["door_rs485.yaml", "charger_wiferion.yaml"])
+def test_a_user_who_may_not_open_the_adapter_is_told_what_to_do(name: str) -> None:
+    with tempfile.TemporaryDirectory(dir="/tmp") as base:
+        os.chmod(base, 0o755)
+        adapter, file = Path(base) / "adapter", Path(base) / name
+        adapter.touch(mode=0o000)
+        text = (Path(__file__).parents[2] / "config" / name).read_text()
+        file.write_text(re.sub(r"/dev/serial/by-id/[^ ,}\n]*", str(adapter), text))
+        done = subprocess.run(
+            command("outputs-off", file, "--runtime-dir", Path(base) / "none"),
+            env=environment(),
+            capture_output=True,
+            text=True,
+            user=65534 if os.geteuid() == 0 else None,
+        )
+    assert (done.returncode, "Traceback" in done.stderr) == (1, False), done.stderr
+    assert "add the daemon's user to the group dialout" in done.stderr
+
+
 def test_missing_lgpio_or_permission_is_told_in_one_line(tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
     done = _told("outputs-off", file, "--runtime-dir", tmp_path / "run")
