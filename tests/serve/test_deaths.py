@@ -371,6 +371,23 @@ def test_no_descriptor_left_ends_no_daemon(module: Module, graph: Graph, tmp_pat
     assert module.relay() == [True, False]
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root has others' directories to be careful of")
+def test_by_hand_nothing_is_switched_where_it_cannot_be_known_who_lives_and_as_execstoppost_it_is(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    with daemon(module.file, tmp_path / "run", **SERVICE) as running:
+        hold_open(module, graph, running)
+        running.end(signal.SIGKILL)
+    (tmp_path / "run").chmod(0o777)
+    off = ("outputs-off", module.file, "--runtime-dir", tmp_path / "run")
+    by_hand = _told(*off)
+    assert (by_hand.returncode, "can be written by others" in by_hand.stderr) == (69, True)
+    assert module.relay() == [True]
+    stopped = _told(*off, SERVICE_RESULT="signal")
+    assert (stopped.returncode, "Traceback" in stopped.stderr) == (0, False), stopped.stderr
+    _off(module)
+
+
 def _runs_for_others() -> bool:
     """Whether another user may run the Python that runs these tests (not below root's home)."""
     try:
