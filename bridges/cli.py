@@ -21,6 +21,11 @@ COMMANDS = {
         "validate device YAMLs and print their wiring as a table",
         "check my_lift.yaml --building-map hospital.building.yaml",
     ),
+    "enable": (
+        "make a service of a device YAML, or renew it after a change",
+        "enable my_lift.yaml --dry-run",
+    ),
+    "disable": ("end a service, outputs off; its YAML stays", "disable my_lift"),
     "schema": ("print the JSON Schema of a device YAML", "schema > rmf-bridge.json"),
     "watch": ("show lifts, doors and chargers live, as RMF sees them", "watch --localhost"),
     "status": (

@@ -12,7 +12,7 @@ from bridges.commands.graph import TRANSPORTS, overridden
 from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
-from bridges.serve import guard, places, signals
+from bridges.serve import drop_in, guard, places, signals
 from bridges.serve.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
@@ -63,8 +63,8 @@ def run(args: argparse.Namespace) -> int:
         for problem in error.problems:
             logging.error(str(problem))
         return EX_CONFIG
-    if slow := too_slow(config, watchdog_s()):
-        logging.error(slow)
+    if wrong := drop_in.misfit(config, os.environ) or too_slow(config, watchdog_s()):
+        logging.error(wrong)
         return EX_CONFIG
     end = signals.End()  # before the lock names our pid, which others then signal
     signals.ignore_reset()

@@ -98,8 +98,8 @@ class Daemon:
 
     def _watch(self) -> None:
         """Tell systemd that we are ready, and each time that every loop has finished scans."""
-        period_s = min(STATUS_EVERY_S, (watchdog_s() or 10.0) / 3)
-        told_ready = False
+        period_s = min(STATUS_EVERY_S, (watchdog_s() or 10.0) / 6)
+        told_ready, tell_at = False, 0.0
         fed = [-1] * len(self._loops)
         while not self._end.wait(0.02 if not told_ready else period_s):
             self._require_life()
@@ -113,7 +113,8 @@ class Daemon:
                 fed = finished
             if self._predecessor is not None:
                 self._predecessor.tick(time.monotonic())
-            if told_ready:
+            if told_ready and time.monotonic() >= tell_at:
+                tell_at = time.monotonic() + STATUS_EVERY_S - period_s / 2
                 self._convenience("status", self._tell)
 
     def _require_life(self) -> None:

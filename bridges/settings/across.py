@@ -42,20 +42,20 @@ class Claim:
 
 def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
     """What is wrong or worth a look about these files together."""
-    lines = [claim for config in configs for claim in _lines(config, one_machine)]
     claims = [claim for config in configs for claim in _claims(config, one_machine)]
-    busy = {claim.what for claim, _ in _twice(lines)}
-    errors = [
-        *_domains(configs),
-        *map(_taken, _twice(lines)),
-        *map(
-            _taken, _twice(c for c in claims if not any(c.what.endswith(f" of {b}") for b in busy))
-        ),
-        *_nowhere(configs),
-    ]
+    errors = [*_domains(configs), *taken(configs, one_machine), *_nowhere(configs)]
     gateways = [claim for config in configs for claim in _gateways(config)]
     warnings = [_shared(pair, claims) for pair in _twice(gateways)]
     return Found(errors, [*warnings, *_unspoken(configs)])
+
+
+def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Problem]:
+    """What a file uses that an earlier one has for itself: ports, pins, units' points, RMF's names."""
+    lines = list(_twice(c for config in configs for c in _lines(config, one_machine)))
+    busy = {claim.what for claim, _ in lines}
+    claims = (c for config in configs for c in _claims(config, one_machine))
+    rest = (c for c in claims if not any(c.what.endswith(f" of {b}") for b in busy))
+    yield from map(_taken, (*lines, *_twice(rest)))
 
 
 def _twice(claims: Iterable[Claim]) -> Iterator[tuple[Claim, Claim]]:

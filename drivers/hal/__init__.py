@@ -14,7 +14,7 @@ import msgspec
 
 from drivers.hal.points import HalError, Wire
 
-__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Remark", "Where"]
+__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Needs", "Remark", "Where"]
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
@@ -32,6 +32,21 @@ class Where(NamedTuple):
     text: str
     local: bool
     clients: Literal["one", "many"] | None = "many"
+
+
+class Needs(NamedTuple):
+    """What systemd must permit a daemon for a bus (`bridges/serve/drop_in.py`).
+
+    `devices`: as its DeviceAllow has them: a path, or a class whose devices may come and go
+    (`char-ttyUSB`). `modules`: the kernel modules that bring those classes. `group`: who may open
+    them. `family`: an address family beside those of IP. `host`: the one that it reaches over IP.
+    """
+
+    devices: tuple[str, ...] = ()
+    modules: tuple[str, ...] = ()
+    group: str = ""
+    family: str = ""
+    host: str = ""
 
 
 class Bus:
@@ -62,6 +77,7 @@ class BusType(Generic[Settings]):
     `settings`: the struct below the bus's name in the YAML, with `scan_s` (how often it is read).
     `open_bus(settings)`: makes the bus, which sends nothing yet. Raises HalError.
     `where(settings)`: what it is in the building; None where files never share it.
+    `needs(settings)`: what it needs of the machine, beside IP.
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
     far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it
     cannot leave the daemon's process, as pins cannot.
@@ -77,6 +93,7 @@ class BusType(Generic[Settings]):
     settings: type[Settings]
     open_bus: Callable[[Settings], Bus]
     where: Callable[[Settings], Where | None] = lambda settings: None
+    needs: Callable[[Settings], Needs] = lambda settings: Needs()
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
     fake: str = ""
     fake_inside: bool = False

@@ -17,7 +17,7 @@ import msgspec
 
 from bridges import secret_file
 from bridges.core.fields import AbsolutePath, Name, Period
-from drivers.hal import Bus, BusType, HalError, Where
+from drivers.hal import Bus, BusType, HalError, Needs, Where
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
@@ -104,6 +104,11 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
             " it, or keep such controllers on a network of their own"
         )
         yield ("token_file",), text
+
+
+def needs(settings: Settings) -> Needs:
+    """The controller's address."""
+    return Needs(host=base(settings.api_base).host)
 
 
 def where(settings: Settings) -> Where:
@@ -308,5 +313,6 @@ BUS = BusType(
     open_bus=HttpBus,
     fake="hal_fakes.http",
     where=where,
+    needs=needs,
     warnings=warnings,
 )

@@ -13,7 +13,7 @@ Only link.py and sdo.py import a library, and they are imported when a bus or a 
 from drivers.hal import BusType
 from drivers.hal.can.bus import CanBus
 from drivers.hal.can.frames import EXTENDED, Frame, Wanted, named
-from drivers.hal.can.settings import Settings, Slcan, describe, warnings, where
+from drivers.hal.can.settings import Settings, Slcan, describe, needs, warnings, where
 
 __all__ = [
     "BUS",
@@ -34,5 +34,6 @@ BUS = BusType(
     open_bus=CanBus,
     fake="hal_fakes.can",
     where=where,
+    needs=needs,
     warnings=warnings,
 )

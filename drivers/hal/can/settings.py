@@ -6,7 +6,7 @@ from typing import Annotated, Final
 import msgspec
 
 from bridges.core.fields import Name, Period
-from drivers.hal import Where
+from drivers.hal import Needs, Where, serial_port
 
 BITRATES: Final = (
     10_000,
@@ -92,6 +92,11 @@ def where(settings: Settings) -> Where:
     if settings.slcan:
         return Where(settings.slcan.port, local=True, clients="one")
     return Where(str(settings.socketcan), local=True)
+
+
+def needs(settings: Settings) -> Needs:
+    """CAN's own sockets, or an adapter's port."""
+    return serial_port.needs(settings.slcan.port) if settings.slcan else Needs(family="AF_CAN")
 
 
 def describe(settings: Settings) -> str:

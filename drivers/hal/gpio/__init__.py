@@ -16,7 +16,7 @@ from typing import Annotated
 import msgspec
 
 from bridges.core.fields import Period
-from drivers.hal import BusType, HalError, Where
+from drivers.hal import BusType, HalError, Needs, Where
 from drivers.hal.gpio.bus import Factory, GpioBus
 from drivers.hal.gpio.header import (
     J8,
@@ -64,6 +64,12 @@ def where(settings: Settings) -> Where:
     return Where("the header" if settings.chip is None else f"gpiochip{settings.chip}", local=True)
 
 
+def needs(settings: Settings) -> Needs:
+    """That chip; all of them where the header's is found by its label, which means to open each."""
+    chip = "char-gpiochip" if settings.chip is None else f"/dev/gpiochip{settings.chip}"
+    return Needs((chip,), group="gpio")
+
+
 def open_bus(
     settings: Settings, factory: Factory | None = None, clock: Callable[[], float] = time.monotonic
 ) -> "GpioBus":
@@ -93,6 +99,7 @@ BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
     where=where,
+    needs=needs,
     fake="hal_fakes.gpio",
     fake_inside=True,
     canonical=canonical,

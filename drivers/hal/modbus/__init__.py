@@ -15,7 +15,7 @@ from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.points import canonical, describe, wire_problems
-from drivers.hal.modbus.settings import Settings, unreachable, warnings, where
+from drivers.hal.modbus.settings import Settings, needs, unreachable, warnings, where
 
 __all__ = [
     "BUS",
@@ -35,6 +35,7 @@ BUS = BusType(
     open_bus=ModbusBus,
     fake="hal_fakes.modbus",
     where=where,
+    needs=needs,
     warnings=warnings,
     canonical=canonical,
     describe=describe,

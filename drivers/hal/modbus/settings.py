@@ -6,7 +6,7 @@ from typing import Annotated
 import msgspec
 
 from bridges.core.fields import Period
-from drivers.hal import Where
+from drivers.hal import Needs, Where, serial_port
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.watchdog import Watchdog
 
@@ -69,3 +69,11 @@ def where(settings: Settings) -> Where:
         return Where(settings.serial.port, local=True, clients="one")
     assert settings.tcp  # or `problems` has said so
     return Where(f"{settings.tcp.host}:{settings.tcp.port}", local=False, clients=None)
+
+
+def needs(settings: Settings) -> Needs:
+    """The line's port, or the module's address."""
+    if settings.serial:
+        return serial_port.needs(settings.serial.port)
+    assert settings.tcp  # or `problems` has said so
+    return Needs(host=settings.tcp.host)

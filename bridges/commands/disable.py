@@ -1,0 +1,44 @@
+"""`rmf-bridge disable NAME`: a service stops, outputs off, and starts no more. Its YAML stays."""
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from bridges.commands.services import (
+    INSTANCE,
+    NO_INSTANCE,
+    Remove,
+    Run,
+    Step,
+    add_root,
+    carry_out,
+    drop_in_file,
+    switch_off,
+    unit,
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `disable`."""
+    parser.add_argument("name", metavar="NAME", help="the service: a device YAML, or its name")
+    add_root(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 when it has stopped, outputs off; 77 for others than root."""
+    name = Path(args.name).name.removesuffix(".yaml")
+    if not INSTANCE.fullmatch(name):
+        print(NO_INSTANCE.format(name), file=sys.stderr)
+        return os.EX_USAGE
+    return carry_out(steps(name, args.root), args)
+
+
+def steps(name: str, root: Path) -> Iterator[Step]:
+    """All that is to be done, in turn."""
+    yield Run(("systemctl", "stop", unit(name)), running_only=True)
+    yield Run(("systemctl", "disable", unit(name)))
+    yield switch_off(name)
+    yield Remove(root / drop_in_file(name))
+    yield Run(("systemctl", "daemon-reload"), running_only=True)

@@ -1,0 +1,94 @@
+"""`rmf-bridge enable FILE`: from a YAML to a running service.
+
+It validates the file, beside the files of this machine's other services; stops an instance that runs,
+so that its outputs are switched off while it may still reach the old relay; copies the file to
+/etc/rmf-bridges; writes the instance's drop-in (`bridges/serve/drop_in.py`); and starts it.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from bridges.commands.services import (
+    CONFIG,
+    INSTANCE,
+    NO_INSTANCE,
+    Run,
+    Step,
+    Write,
+    add_root,
+    carry_out,
+    drop_in_file,
+    switch_off,
+    unit,
+)
+from bridges.serve import drop_in
+from bridges.settings.across import taken
+from bridges.settings.load import Config, Problem, SettingsError, load
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `enable`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
+    add_root(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 when the service runs; 78 for a file that cannot be right; 77 for others than root."""
+    if not INSTANCE.fullmatch(args.file.stem):
+        print(NO_INSTANCE.format(args.file.stem), file=sys.stderr)
+        return os.EX_CONFIG
+    try:
+        config = load(args.file)
+    except SettingsError as error:
+        return _wrong(error.problems)
+    if problems := list(_taken(config, args.root)):
+        return _wrong(problems)
+    for problem in config.warnings:
+        print(problem, file=sys.stderr)
+    return carry_out(steps(config, args.root, groups(args.root)), args)
+
+
+def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step]:
+    """All that is to be done for a service of this file, in turn. `present`: groups."""
+    name = config.path.stem
+    target = root / CONFIG / f"{name}.yaml"
+    yield Run(("systemctl", "stop", unit(name)), running_only=True)
+    yield switch_off(name)
+    if not target.exists() or not target.samefile(config.path):
+        yield Write(target, config.text, config.path)
+    yield Write(root / drop_in_file(name), drop_in.text(config, present).encode())
+    yield Run(("systemctl", "daemon-reload"), running_only=True)
+    yield Run(("systemctl", "enable", "rmf-bridges.target", unit(name)))
+    yield Run(("systemctl", "start", unit(name)), running_only=True)
+
+
+def groups(root: Path) -> set[str]:
+    """The groups of this system that a service may be given."""
+    with suppress(OSError):
+        lines = (root / "etc/group").read_text("utf-8", "replace").splitlines()
+        return {line.partition(":")[0] for line in lines} & set(drop_in.GROUPS)
+    return set()
+
+
+def _taken(config: Config, root: Path) -> Iterator[Problem]:
+    """What this file uses that another service's has for itself."""
+    others = list(_neighbours(root, config.path.stem))
+    return (p for p in taken([*others, config]) if p.file == str(config.path))
+
+
+def _neighbours(root: Path, name: str) -> Iterator[Config]:
+    """The files of the other services, as far as they are right."""
+    for file in sorted((root / CONFIG).glob("*.yaml")):
+        if file.stem != name:
+            with suppress(SettingsError):
+                yield load(file)
+
+
+def _wrong(problems: Iterable[Problem]) -> int:
+    for problem in problems:
+        print(problem, file=sys.stderr)
+    return os.EX_CONFIG

@@ -1,0 +1,118 @@
+"""The drop-in of a service: what this YAML needs of systemd, beside the unit for all of them.
+
+`rmf-bridge enable` writes it. The unit alone permits no device, and `run` refuses a drop-in that was
+written for other needs: a daemon that may not open its relay would only say so each second.
+"""
+
+import hashlib
+import ipaddress
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Final
+
+from bridges.core.fields import Rmf, Zenoh
+from bridges.rmf.zenoh_config import mode
+from bridges.settings.config import Config
+from drivers.hal import Needs
+
+FITS: Final = "RMF_BRIDGE_FITS"
+"""The environment variable that says which needs the unit meets; `nothing` in the unit alone."""
+GROUPS: Final = ("gpio", "dialout")
+"""The groups that a drop-in may give."""
+ROUND_S: Final = 1.25
+LEAST_S: Final = 3.0
+WITHOUT_OUTPUTS_S: Final = 10.0
+LOCAL: Final = ("localhost", "multicast")
+
+
+def text(config: Config, groups: Collection[str]) -> str:
+    """The drop-in's text. `groups`: those of the machine; systemd starts no unit with another one."""
+    head = (
+        f"# Written by `rmf-bridge enable` for {config.path.name}. After a change enable it again."
+    )
+    service = [f"Environment={FITS}={fits(config)}", *_service(config, groups)]
+    return "\n".join([head, *_unit(config), "[Service]", *service, ""])
+
+
+def fits(config: Config) -> str:
+    """A word for what this file needs; files with equal needs have the same."""
+    needs = "\n".join([*_unit(config), *_service(config, GROUPS)])
+    return hashlib.sha256(needs.encode()).hexdigest()[:16]
+
+
+def misfit(config: Config, environ: Mapping[str, str]) -> str:
+    """What is wrong if the unit that started us was written for other needs; "" if nothing is."""
+    met = environ.get(FITS, "")
+    if met in ("", fits(config)):  # none: no unit of ours
+        return ""
+    why = "has no drop-in" if met == "nothing" else "has a drop-in for other buses or durations"
+    return f"{config.path}: the unit {why}: run `sudo rmf-bridge enable {config.path}`"
+
+
+def watchdog_s(config: Config) -> float:
+    """How long a hung daemon keeps its relays (s).
+
+    A loop finishes something each second, when its states are due, or one call of its bus later.
+    A call may take half of this at most. Without outputs nothing hurries, and disks may be slow.
+    """
+    slowest = max((getattr(bus, "timeout_s", 0.0) for bus in config.buses.values()), default=0.0)
+    return max(LEAST_S, 1.75 * slowest + ROUND_S) if config.buses else WITHOUT_OUTPUTS_S
+
+
+def _unit(config: Config) -> list[str]:
+    """Classes of devices must be known to the kernel when the unit starts."""
+    units = " ".join(
+        f"modprobe@{name}.service" for name in _each(n.modules for n in _needs(config))
+    )
+    return ["[Unit]", f"Wants={units}", f"After={units}"] if units else []
+
+
+def _service(config: Config, groups: Collection[str]) -> Iterator[str]:
+    needs = _needs(config)
+    yield f"WatchdogSec={watchdog_s(config):g}"
+    devices = _each(n.devices for n in needs)
+    yield from (f"DeviceAllow={device} rw" for device in devices)
+    if not devices:
+        yield "PrivateDevices=yes"
+    yield from (f"SupplementaryGroups={n}" for n in _each([n.group] for n in needs) if n in groups)
+    yield from (f"RestrictAddressFamilies={name}" for name in _each([n.family] for n in needs))
+    hosts = _hosts(config.rmf, needs)
+    if hosts is not None:
+        yield "IPAddressDeny=any"
+        yield f"IPAddressAllow={' '.join(hosts)}"
+
+
+def _needs(config: Config) -> list[Needs]:
+    return [config.bus_type(name).needs(bus) for name, bus in config.buses.items()]
+
+
+def _each(found: Iterable[Iterable[str]]) -> list[str]:
+    """Every word once, without empty ones."""
+    return list(dict.fromkeys(word for words in found for word in words if word))
+
+
+def _hosts(rmf: Rmf, needs: Iterable[Needs]) -> list[str] | None:
+    """The addresses that it talks to; None if they cannot be known before it runs.
+
+    Unknown are the nodes of a DDS site, the peers of a zenoh peer, and whatever a name stands for.
+    """
+    hosts = [*_graph_hosts(rmf), *_each([n.host] for n in needs)]
+    return None if not all(map(_is_address, hosts)) else _each([LOCAL, hosts])
+
+
+def _graph_hosts(rmf: Rmf) -> list[str]:
+    """Where the other nodes are, by address; a name among them stands for any address."""
+    if rmf.network == "localhost":
+        return []
+    zenoh = rmf.zenoh or Zenoh()
+    if rmf.transport != "zenoh" or mode(zenoh) == "peer":
+        return ["*"]
+    ends = (end.partition("/")[2].rpartition(":")[0] for end in zenoh.connect)
+    return [end.strip("[]") for end in ends if end != "localhost"]
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True
