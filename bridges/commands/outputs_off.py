@@ -1,28 +1,15 @@
 """`rmf-bridge outputs-off FILE`: every output off, from a new process, after any death of the daemon.
 
-systemd runs it as ExecStopPost; so does the guard of a daemon started by hand. The record that the dead
-daemon wrote before it claimed anything takes precedence over the YAML, which may have been edited
-since. A directory that is full, missing or read-only does not delay switching off.
+systemd runs it as ExecStopPost; so does the guard of a daemon started by hand. After a clean stop of a
+service, whose last mark says that all is off, it ends before it has loaded what it takes to switch.
 """
 
 import argparse
-import logging
 import os
-from collections.abc import Mapping
+import sys
 from pathlib import Path
 
-from bridges import log
-from bridges.log import pairs
-from bridges.serve import directory as runtime
-from bridges.serve import signals
-from bridges.serve.last_shown import ages
-from bridges.serve.places import Places, act_as_owner, by_hand, work_somewhere
-from bridges.serve.record import Record, Records
-from bridges.serve.switch_off import outputs_off
-from bridges.settings.load import Config, SettingsError, load
-
-TIMEOUT_S = 5.0
-EX_UNAVAILABLE, EX_CONFIG = 69, 78
+from bridges.serve import last_mark
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,104 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """0 when every output is verified off, 1 when not, 69 while the daemon lives or may live."""
-    log.start()
-    signals.ignore()
-    file = args.file.absolute()
-    try:
-        places = _places(file, args.runtime_dir)
-    except (runtime.Unknown, PermissionError) as error:
-        logging.error(str(error))
-        return EX_UNAVAILABLE
-    work_somewhere(places or by_hand(file))
-    if places is None:
-        return _off_by_yaml(file, {})
-    answered = ages(places)
-    if args.record and _asked_by_our_daemon(places):
-        return _off_by_records(Records(places, file), answered, args.record)
-    try:
-        held = runtime.RuntimeDirectory(places, file, serves=False)
-    except runtime.AlreadyRunning as error:
-        logging.error("%s: stop it instead, it switches its outputs off", error)
-        return EX_UNAVAILABLE
-    try:
-        if held.records.unreleased():
-            return _off_by_records(held.records, answered)
-        return _off_by_yaml(file, answered)
-    finally:
-        held.close()
-
-
-def _places(file: Path, given: str | None) -> Places | None:
-    """The daemon's directories. None if they cannot be trusted and systemd says that it is dead.
-
-    Raises Unknown or PermissionError if it cannot be known whether a daemon runs there.
-    """
-    try:
-        places = runtime.find(file, given)
-        act_as_owner(places)
-        runtime.holder(places)
-    except (runtime.Unknown, PermissionError) as error:
-        if "SERVICE_RESULT" not in os.environ:  # set for ExecStopPost: systemd.exec(5)
-            raise
-        logging.error("%s; switching off what %s names", error, file)
-        return None
-    return places
-
-
-def _asked_by_our_daemon(places: Places) -> bool:
-    """Whether our parent holds the lock (`serve/predecessor.py`), or its pid is not readable."""
-    found = runtime.holder(places)
-    return found is None or found.pid in (0, os.getppid())
-
-
-def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
-    try:
-        config = load(file)
-    except SettingsError as error:
-        _say(error)
-        return EX_CONFIG
-    if not config.buses:
-        logging.info(pairs("nothing_to_switch_off", file=file, kind=config.kind))
+    if last_mark.says_off(os.environ):
+        print('nothing_to_switch_off reason="the daemon verified it"', file=sys.stderr)
         return 0
-    return _told(_unsafe(config, (), answered) == set())
+    from bridges.commands.dead import switch_off
 
-
-def _off_by_records(
-    records: Records, answered: Mapping[str, float], names: list[str] | None = None
-) -> int:
-    """Switch off what these records name; all records by default."""
-    found = [r for r in records.unreleased() if names is None or r.name in names]
-    return _told(not [r for r in found if not _off_by_record(records, r, answered)])
-
-
-def _off_by_record(records: Records, record: Record, answered: Mapping[str, float]) -> bool:
-    try:
-        config = record.config()
-    except SettingsError as error:
-        _say(error)
-        return False
-    unsafe = _unsafe(config, record.safe, answered)
-    try:
-        if unsafe:
-            records.still_unsafe(record, unsafe, config)
-        else:
-            records.release(record)
-    except OSError as error:
-        logging.warning(pairs("not_written", what="record", reason=error))
-    return not unsafe
-
-
-def _unsafe(config: Config, safe: tuple[str, ...], answered: Mapping[str, float]) -> set[str]:
-    return set(config.devices) - set(safe) - outputs_off(config, TIMEOUT_S, safe, answered)
-
-
-def _told(all_off: bool) -> int:
-    if all_off:
-        return 0
-    logging.error("outputs not verified off: cut the relays' supply before working on the device")
-    return 1
-
-
-def _say(error: SettingsError) -> None:
-    for problem in error.problems:
-        logging.error(str(problem))
+    return switch_off(args)

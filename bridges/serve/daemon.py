@@ -19,7 +19,7 @@ from bridges.rmf.definitions import DiagnosticArray
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import DIAGNOSTICS
 from bridges.rmf.transport import Publisher, TransportError
-from bridges.serve import guard, record, signals
+from bridges.serve import guard, last_mark, record, signals
 from bridges.serve.diagnostics import diagnosis
 from bridges.serve.directory import KEPT, KeptFile, Once, RuntimeDirectory, state_file
 from bridges.serve.guard import Guard
@@ -134,10 +134,16 @@ class Daemon:
             self._predecessor.close()
         if all(safe):
             self._runtime.released()
+            if not self._left():
+                self._convenience("mark", last_mark.leave)
             if self._guard is not None:
                 self._guard.dismiss()
         log.info(pairs("stopped", outputs_off=all(safe)))
         return all(safe)
+
+    def _left(self) -> list[str]:
+        """Records of dead daemons whose outputs are not verified off."""
+        return self._predecessor.left() if self._predecessor else []
 
     def _convenience(self, what: str, do: Callable[[], None]) -> None:
         """A failure is logged once and tried again; the daemon runs on."""
@@ -162,7 +168,7 @@ class Daemon:
             "transport": self._transport.speaks,
             "domain_id": self._domain_id,
             "samples_dropped": dict(self._transport.dropped),
-            "predecessor_not_off": self._predecessor.left() if self._predecessor else [],
+            "predecessor_not_off": self._left(),
             **self._service.status(),
         }
         devices = self._service.devices()

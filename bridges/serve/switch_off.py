@@ -60,7 +60,7 @@ def _bus_off(
     if not devices:
         return
     try:
-        bus = config.open_bus(bus_name)
+        bus = config.open_to_switch_off(bus_name)
     except HalError as error:
         log.error(pairs("outputs_not_off", bus=bus_name, reason=error))
         results.update(dict.fromkeys(devices, False))

@@ -61,3 +61,8 @@ class Config:
     def open_bus(self, name: str) -> Bus:
         """The real bus of this name. Raises HalError."""
         return self.bus_type(name).open_bus(self.buses[name])
+
+    def open_to_switch_off(self, name: str) -> Bus:
+        """The same for a process that only switches off. Raises HalError."""
+        hal = self.bus_type(name)
+        return (hal.open_to_switch_off or hal.open_bus)(self.buses[name])

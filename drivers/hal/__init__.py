@@ -76,6 +76,8 @@ class BusType(Generic[Settings]):
 
     `settings`: the struct below the bus's name in the YAML, with `scan_s` (how often it is read).
     `open_bus(settings)`: makes the bus, which sends nothing yet. Raises HalError.
+    `open_to_switch_off(settings)`: the same for a process that only switches off, where that is
+    quicker to load; else None.
     `where(settings)`: what it is in the building; None where files never share it.
     `needs(settings)`: what it needs of the machine, beside IP.
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
@@ -92,6 +94,7 @@ class BusType(Generic[Settings]):
 
     settings: type[Settings]
     open_bus: Callable[[Settings], Bus]
+    open_to_switch_off: Callable[[Settings], Bus] | None = None
     where: Callable[[Settings], Where | None] = lambda settings: None
     needs: Callable[[Settings], Needs] = lambda settings: Needs()
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()

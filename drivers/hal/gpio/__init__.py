@@ -6,11 +6,14 @@ Inputs are sampled: an edge only calls `wake`, because lgpio loses edges.
     header.py     how pins are spelled
     bus.py        claims, samples, drives and releases pins
     pins.py       gpiozero's pins on lgpio; imported when the header is opened
+    bare.py       the same claims without gpiozero, to switch off from a new process
+    chip.py       which chip it is, and who holds a line
     dead_man.py   drops the outputs when scans stop
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Annotated
 
 import msgspec
@@ -78,13 +81,24 @@ def open_bus(
     `factory`: a gpiozero pin factory whose pins claim as those of `pins.py` do.
     """
     if factory is None:
-        factory = _lgpio_factory(settings.chip)
+        with _with_lgpio():
+            from drivers.hal.gpio.pins import open_factory
+        factory = open_factory(settings.chip)
     return GpioBus(factory, clock)
 
 
-def _lgpio_factory(chip: int | None) -> Factory:
+def open_to_switch_off(settings: Settings) -> "GpioBus":
+    """The same pins without gpiozero. Raises HalError."""
+    with _with_lgpio():
+        from drivers.hal.gpio.bare import BareFactory
+    return GpioBus(BareFactory(settings.chip), time.monotonic)
+
+
+@contextmanager
+def _with_lgpio() -> Iterator[None]:
+    """Around its import."""
     try:
-        from drivers.hal.gpio import pins
+        yield
     except ImportError as error:
         raise HalError(
             f"GPIO needs lgpio ({error}): apt install python3-lgpio, or pip install"
@@ -92,12 +106,12 @@ def _lgpio_factory(chip: int | None) -> Factory:
         ) from error
     except OSError as error:  # lgpio makes a FIFO in the working directory when it is imported
         raise HalError(f"lgpio cannot write in the working directory: {error}") from error
-    return pins.open_factory(chip)
 
 
 BUS = BusType(
     settings=Settings,
     open_bus=open_bus,
+    open_to_switch_off=open_to_switch_off,
     where=where,
     needs=needs,
     fake="hal_fakes.gpio",

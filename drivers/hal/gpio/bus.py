@@ -211,11 +211,10 @@ class GpioLines:
 
 
 def _failures() -> tuple[type[Exception], ...]:
-    """What gpiozero and lgpio raise; lgpio only where it is loaded."""
-    from gpiozero import GPIOZeroError
-
-    lgpio = sys.modules.get("lgpio")
-    return (GPIOZeroError, OSError, *((lgpio.error,) if lgpio else ()))
+    """What gpiozero and lgpio raise, where they are loaded."""
+    gpiozero, lgpio = sys.modules.get("gpiozero"), sys.modules.get("lgpio")
+    vendors = ((gpiozero, "GPIOZeroError"), (lgpio, "error"))
+    return (OSError, *(getattr(vendor, name) for vendor, name in vendors if vendor))
 
 
 @contextmanager

@@ -21,6 +21,7 @@ def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
 
 def forget() -> None:
     """Nobody has imported lgpio."""
-    for module in ("gpiozero.pins.lgpio", "drivers.hal.gpio.pins"):
-        sys.modules.pop(module, None)
-    vars(drivers.hal.gpio).pop("pins", None)
+    sys.modules.pop("gpiozero.pins.lgpio", None)
+    for name in ("pins", "bare", "chip"):
+        sys.modules.pop(f"drivers.hal.gpio.{name}", None)
+        vars(drivers.hal.gpio).pop(name, None)

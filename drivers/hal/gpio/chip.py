@@ -1,0 +1,81 @@
+"""The header's chip and claims of its lines, through lgpio alone. Imported only where there is lgpio.
+
+lgpio creates a FIFO in the working directory on import, so import it in the runtime directory.
+"""
+
+import os
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import lgpio
+
+from drivers.hal import HalError
+from drivers.hal.gpio.holders import holders
+
+HEADER_LABEL = "pinctrl-"
+PULLS = {"up": lgpio.SET_PULL_UP, "down": lgpio.SET_PULL_DOWN, "floating": lgpio.SET_PULL_NONE}
+DEV = Path("/dev")
+
+
+def open_chip(chip: int | None, dev: Path = DEV) -> tuple[int, int]:
+    """This chip, or the header's, found by its label: (handle, number). Raises HalError."""
+    if chip is not None:
+        return _open(chip, dev), chip
+    numbers = sorted(int(p.name[8:]) for p in dev.glob("gpiochip*") if p.name[8:].isdecimal())
+    refused = []
+    for number in numbers:
+        try:
+            handle = _open(number, dev)
+        except HalError as error:
+            refused.append(str(error))
+            continue
+        if _label(handle).startswith(HEADER_LABEL):
+            return handle, number
+        lgpio.gpiochip_close(handle)
+    raise HalError(_not_found(numbers, refused))
+
+
+def claim(
+    call: Callable[[int, int, int], object], handle: int, chip: int, line: int, value: int
+) -> None:
+    """Claim a line by this call of lgpio's. Raises HalError that names who holds it."""
+    try:
+        call(handle, line, value)
+    except lgpio.error as error:
+        raise HalError(f"BCM{line}: {error.value}{_holder(handle, chip, line)}") from error
+
+
+def _holder(handle: int, chip: int, line: int) -> str:
+    """Who holds the line: the processes with the chip open, else the kernel's label."""
+    *_, label = lgpio.gpio_get_line_info(handle, line)
+    if not label:
+        return ""
+    names = " or ".join(holders(Path(f"/dev/gpiochip{chip}"))) or repr(label)
+    return f"; it is held by {names}: stop that, or take another pin"
+
+
+def _open(chip: int, dev: Path) -> int:
+    path = dev / f"gpiochip{chip}"
+    try:
+        handle: int = lgpio.gpiochip_open(chip)
+    except lgpio.error as error:
+        if not path.exists():
+            why = "there is no such chip"
+        elif not os.access(path, os.R_OK | os.W_OK):
+            why = "no permission: the daemon's user must be in the group gpio"
+        else:
+            why = str(error.value)
+        raise HalError(f"{path}: {why}") from error
+    return handle
+
+
+def _label(handle: int) -> str:
+    *_, label = lgpio.gpio_get_chip_info(handle)
+    return str(label)
+
+
+def _not_found(numbers: Iterable[int], refused: list[str]) -> str:
+    if refused:
+        return "; ".join(refused)
+    seen = ", ".join(f"gpiochip{n}" for n in numbers) or "no GPIO chip at all"
+    return f"no chip of a Raspberry Pi's header (label {HEADER_LABEL}…) among: {seen}"

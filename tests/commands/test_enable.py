@@ -1,0 +1,174 @@
+"""`enable` and `disable`: what they do, in which order, and what they refuse."""
+
+import argparse
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bridges.cli import main
+from bridges.commands import disable, enable, services
+from bridges.commands.services import Remove, Run, Write, carry_out, switch_off
+from bridges.serve import drop_in
+from bridges.settings.load import load
+
+CONFIG = Path(__file__).parents[2] / "config"
+LIFT = CONFIG / "lift_dry_contact.yaml"
+UNIT = "rmf-bridge@lift_dry_contact.service"
+DROP_IN = f"etc/systemd/system/{UNIT}.d/10-enable.conf"
+TARGET = "etc/rmf-bridges/lift_dry_contact.yaml"
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """The commands that were run; each succeeds."""
+    found: list[list[str]] = []
+
+    class Done:
+        returncode = 0
+
+    def run(words: list[str]) -> Done:
+        found.append(list(words))
+        return Done()
+
+    monkeypatch.setattr(subprocess, "run", run)
+    return found
+
+
+def test_an_instance_is_stopped_and_off_before_its_file_and_drop_in_change(tmp_path: Path) -> None:
+    config = load(LIFT)
+    assert list(enable.steps(config, tmp_path, ["gpio"])) == [
+        Run(("systemctl", "stop", UNIT), running_only=True),
+        switch_off("lift_dry_contact"),
+        Write(tmp_path / TARGET, LIFT.read_bytes(), LIFT),
+        Write(tmp_path / DROP_IN, drop_in.text(config, ["gpio"]).encode()),
+        Run(("systemctl", "daemon-reload"), running_only=True),
+        Run(("systemctl", "enable", "rmf-bridges.target", UNIT)),
+        Run(("systemctl", "start", UNIT), running_only=True),
+    ]
+    assert list(disable.steps("lift_dry_contact", tmp_path)) == [
+        Run(("systemctl", "stop", UNIT), running_only=True),
+        Run(("systemctl", "disable", UNIT)),
+        switch_off("lift_dry_contact"),
+        Remove(tmp_path / DROP_IN),
+        Run(("systemctl", "daemon-reload"), running_only=True),
+    ]
+
+
+def test_what_was_left_on_is_switched_off_by_the_installed_files_record() -> None:
+    assert switch_off("a").words[1:] == (
+        "-m",
+        "bridges.cli",
+        "outputs-off",
+        "/etc/rmf-bridges/a.yaml",
+    )
+    assert switch_off("a").state == Path("/var/lib/rmf-bridge/a")
+
+
+def test_a_system_that_is_not_running_gets_file_drop_in_and_links(
+    tmp_path: Path, calls: list[list[str]]
+) -> None:
+    (tmp_path / "etc").mkdir()
+    (tmp_path / "etc/group").write_text("gpio:x:99:\nwheel:x:1:\n")
+    assert main(["enable", str(LIFT), "--root", str(tmp_path)]) == 0
+    written = (tmp_path / DROP_IN).read_text()
+    assert written == drop_in.text(load(LIFT), ["gpio"])
+    assert (tmp_path / TARGET).read_bytes() == LIFT.read_bytes()
+    assert (tmp_path / TARGET).stat().st_mode & 0o777 == 0o644
+    assert main(["disable", "lift_dry_contact", "--root", str(tmp_path)]) == 0
+    assert not (tmp_path / DROP_IN).parent.exists()
+    assert (tmp_path / TARGET).exists()
+    root = f"--root={tmp_path}"
+    assert calls == [
+        ["systemctl", root, "enable", "rmf-bridges.target", UNIT],
+        ["systemctl", root, "disable", UNIT],
+    ]
+
+
+def test_the_installed_file_itself_is_enabled_again_without_a_copy(
+    tmp_path: Path, calls: list[list[str]]
+) -> None:
+    main(["enable", str(LIFT), "--root", str(tmp_path)])
+    installed = tmp_path / TARGET
+    assert not [
+        s for s in enable.steps(load(installed), tmp_path, []) if s == Write(installed, b"")
+    ]
+    assert [type(s).__name__ for s in enable.steps(load(installed), tmp_path, [])].count(
+        "Write"
+    ) == 1
+
+
+def test_a_dry_run_prints_every_step_and_takes_none(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["disable", str(LIFT), "--dry-run"]) == 0
+    assert main(["enable", str(LIFT), "--root", str(tmp_path), "--dry-run"]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    off = f"{sys.executable} -m bridges.cli outputs-off /{TARGET}"
+    assert printed[:7] == [
+        f"systemctl stop {UNIT}",
+        f"systemctl disable {UNIT}",
+        f"{off}   # if a record is left in /var/lib/rmf-bridge/lift_dry_contact",
+        f"rm /{DROP_IN}",
+        "systemctl daemon-reload",
+        f"install -m 644 {LIFT} {tmp_path / TARGET}",
+        f"write {tmp_path / DROP_IN}:",
+    ]
+    assert (calls, list(tmp_path.iterdir())) == ([], [])
+
+
+def test_pins_that_another_service_has_are_refused_by_place(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["enable", str(LIFT), "--root", str(tmp_path)])
+    other = CONFIG / "lift_relay_board.yaml"
+    assert main(["enable", str(other), "--root", str(tmp_path)]) == 78
+    told = capsys.readouterr().err
+    assert f"BCM16 of the header is used in {tmp_path / TARGET} too, on line" in told
+    assert [path.name for path in (tmp_path / "etc/rmf-bridges").iterdir()] == [LIFT.name]
+
+
+@pytest.mark.parametrize("name", ["my lift.yaml", "-x.yaml", "a@b.yaml", "%i.yaml"])
+def test_a_file_that_cannot_name_a_service_is_refused(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / name
+    file.write_bytes(LIFT.read_bytes())
+    assert enable.run(_told(file, tmp_path)) == 78
+    assert "is no name of a service" in capsys.readouterr().err
+
+
+def _told(file: Path, root: Path) -> argparse.Namespace:
+    return argparse.Namespace(file=file, root=root, dry_run=True)
+
+
+def test_only_root_changes_a_running_system(
+    monkeypatch: pytest.MonkeyPatch, calls: list[list[str]]
+) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    assert main(["enable", str(LIFT)]) == 77
+    assert main(["disable", "lift_dry_contact"]) == 77
+    assert calls == []
+
+
+def test_a_relay_that_is_not_verified_off_keeps_its_drop_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    left = tmp_path / "ward" / "claimed-1.json"
+    left.parent.mkdir()
+    kept = tmp_path / "drop_in"
+    kept.touch()
+    words = (sys.executable, "-c", "raise SystemExit(1)")
+    off = services.SwitchOff(words, left.parent)
+    live = _told(LIFT, Path("/"))
+    live.dry_run = False
+    assert carry_out([off], live) == 0  # no record: nothing to switch off
+    left.touch()
+    assert carry_out([off, Remove(kept)], live) == 69
+    told = capsys.readouterr().err
+    assert "what ward had claimed is not verified off" in told
+    assert f"rm {left}" in told
+    assert kept.exists()

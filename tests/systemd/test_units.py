@@ -1,0 +1,89 @@
+"""The unit with the drop-in of each shipped file, as systemd itself judges it."""
+
+import configparser
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from bridges.serve.drop_in import GROUPS, text
+from bridges.settings.load import load
+
+ROOT = Path(__file__).parents[2]
+FILES = ROOT / "systemd"
+UNIT = FILES / "rmf-bridge@.service"
+CONFIG = sorted((ROOT / "config").glob("*.yaml"))
+MOST = 2.0
+"""On systemd 252 a file on the network has 1.5, one with GPIO or a serial port 1.7, one with CAN's own
+sockets 1.7: AF_CAN counts as an exotic family, 0.2.
+"""
+
+needs_systemd = pytest.mark.skipif(
+    shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed"
+)
+
+
+def system(folder: Path, file: Path) -> str:
+    """A root directory with the service of this file; returns its name."""
+    units = folder / "etc/systemd/system"
+    name = f"rmf-bridge@{file.stem}.service"
+    (units / f"{name}.d").mkdir(parents=True)
+    for each in (UNIT, FILES / "rmf-bridges.target"):
+        shutil.copy(each, units)
+    (units / f"{name}.d/10-enable.conf").write_text(text(load(file), GROUPS))
+    return name
+
+
+def exposure(folder: Path, name: str) -> float:
+    """The score of `systemd-analyze security`: 0 exposes nothing, 10 everything."""
+    done = subprocess.run(
+        ["systemd-analyze", "security", "--offline=true", f"--root={folder}", name],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = re.search(r"Overall exposure level for .*: ([0-9.]+) ", done.stdout)
+    assert found, done.stdout
+    assert not done.stderr  # "Unknown key name", say
+    return float(found[1])
+
+
+@needs_systemd
+@pytest.mark.parametrize("file", CONFIG, ids=lambda file: file.stem)
+def test_no_shipped_file_needs_a_service_that_is_more_exposed_than_this(
+    file: Path, tmp_path: Path
+) -> None:
+    score = exposure(tmp_path, system(tmp_path, file))
+    assert score <= MOST
+
+
+@needs_systemd
+def test_systemd_finds_nothing_wrong_with_the_units(tmp_path: Path) -> None:
+    name = system(tmp_path, ROOT / "config/door_rs485.yaml")
+    units = tmp_path / "etc/systemd/system"
+    program = "/opt/rmf-bridges/.venv/bin/rmf-bridge"
+    for unit in (units / "rmf-bridge@.service", units / "rmf-bridges.target"):
+        unit.write_text(unit.read_text().replace(program, "/bin/true").replace("man:", "file:/"))
+    (units / "rmf-bridge@.service").rename(units / name)
+    done = subprocess.run(
+        ["systemd-analyze", "verify", "--man=no", units / name, units / "rmf-bridges.target"],
+        capture_output=True,
+        text=True,
+    )
+    ours = [line for line in done.stderr.splitlines() if "rmf" in line]
+    assert (done.returncode, ours) == (0, [])
+
+
+def test_the_unit_permits_no_device_and_says_that_it_fits_nothing() -> None:
+    lines = UNIT.read_text().splitlines()
+    assert "DevicePolicy=closed" in lines
+    assert not [line for line in lines if line.startswith(("DeviceAllow", "SupplementaryGroups"))]
+    assert "Environment=RMF_BRIDGE_SERVICE=1 RMF_BRIDGE_FITS=nothing PYTHONUNBUFFERED=1" in lines
+
+
+def test_can_is_back_by_itself_after_a_bus_off() -> None:
+    network = configparser.ConfigParser()
+    network.read(FILES / "80-rmf-can0.network")
+    assert dict(network["CAN"]) == {"bitrate": "250K", "restartsec": "100ms"}
