@@ -6,7 +6,7 @@ BIN := .venv/bin
 # compiles every file again.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo demo-charging test deep test-ros lint man format bench flood soak torture mutate clean
+.PHONY: help demo demo-charging test deep test-ros lint man deb format bench flood soak torture mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
@@ -20,6 +20,8 @@ help:
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make man     the manual page, build/rmf-bridge.1"
+	@echo "make deb     Debian packages in dist/, for Debian 12 and 13 and Ubuntu 24.04, amd64 and arm64"
+	@echo "             (one of them: make deb ARCHS=arm64 PYTHONS=3.11)"
 	@echo "make format  rewrite the sources as the linter wants them"
 	@echo "make clean   remove the virtual environment and everything generated"
 
@@ -68,6 +70,13 @@ man: .venv/ready
 	$(BIN)/argparse-manpage --module bridges.cli --function whole_parser --prog rmf-bridge \
 	  --project-name rmf-bridges --description "connect Open-RMF to lifts, doors and chargers" \
 	  --manual-section 1 --output build/rmf-bridge.1
+
+# Built here for every machine; nothing of it runs here.
+ARCHS ?= amd64 arm64
+PYTHONS ?= 3.11 3.12 3.13
+deb: man
+	@for arch in $(ARCHS); do for python in $(PYTHONS); do \
+	  deb/build.sh $$arch $$python || exit 1; done; done
 
 format: .venv/ready
 	$(BIN)/ruff check --fix .

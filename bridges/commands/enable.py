@@ -33,6 +33,9 @@ from bridges.settings.load import Config, Problem, SettingsError, load
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `enable`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
+    parser.add_argument(
+        "--no-start", action="store_true", help="write and enable it, and start nothing now"
+    )
     add_root(parser)
 
 
@@ -49,7 +52,9 @@ def run(args: argparse.Namespace) -> int:
         return _wrong(problems)
     for problem in config.warnings:
         print(problem, file=sys.stderr)
-    return carry_out(steps(config, args.root, groups(args.root)), args)
+    planned = steps(config, args.root, groups(args.root))
+    last = "start" if args.no_start else None
+    return carry_out((s for s in planned if not (isinstance(s, Run) and s.words[1] == last)), args)
 
 
 def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step]:

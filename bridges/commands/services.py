@@ -82,7 +82,7 @@ Step = Run | SwitchOff | Write | Remove
 
 def switch_off(name: str) -> SwitchOff:
     """Switch off what a service has left on."""
-    words = ("-m", "bridges.cli", "outputs-off", f"/{CONFIG}/{name}.yaml")
+    words = ("-P", "-m", "bridges.cli", "outputs-off", f"/{CONFIG}/{name}.yaml")
     return SwitchOff((sys.executable, *words), SERVICE_STATE / name)
 
 

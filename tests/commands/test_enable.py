@@ -59,6 +59,7 @@ def test_an_instance_is_stopped_and_off_before_its_file_and_drop_in_change(tmp_p
 
 def test_what_was_left_on_is_switched_off_by_the_installed_files_record() -> None:
     assert switch_off("a").words[1:] == (
+        "-P",
         "-m",
         "bridges.cli",
         "outputs-off",
@@ -106,7 +107,7 @@ def test_a_dry_run_prints_every_step_and_takes_none(
     assert main(["disable", str(LIFT), "--dry-run"]) == 0
     assert main(["enable", str(LIFT), "--root", str(tmp_path), "--dry-run"]) == 0
     printed = capsys.readouterr().out.splitlines()
-    off = f"{sys.executable} -m bridges.cli outputs-off /{TARGET}"
+    off = f"{sys.executable} -P -m bridges.cli outputs-off /{TARGET}"
     assert printed[:7] == [
         f"systemctl stop {UNIT}",
         f"systemctl disable {UNIT}",
@@ -117,6 +118,14 @@ def test_a_dry_run_prints_every_step_and_takes_none(
         f"write {tmp_path / DROP_IN}:",
     ]
     assert (calls, list(tmp_path.iterdir())) == ([], [])
+
+
+def test_without_a_start_everything_else_is_done(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["enable", str(LIFT), "--dry-run"]) == 0
+    whole = capsys.readouterr().out.splitlines()
+    assert main(["enable", str(LIFT), "--dry-run", "--no-start"]) == 0
+    assert capsys.readouterr().out.splitlines() == whole[:-1]
+    assert whole[-1] == f"systemctl start {UNIT}"
 
 
 def test_pins_that_another_service_has_are_refused_by_place(
@@ -141,7 +150,7 @@ def test_a_file_that_cannot_name_a_service_is_refused(
 
 
 def _told(file: Path, root: Path) -> argparse.Namespace:
-    return argparse.Namespace(file=file, root=root, dry_run=True)
+    return argparse.Namespace(file=file, root=root, dry_run=True, no_start=False)
 
 
 def test_only_root_changes_a_running_system(

@@ -1,0 +1,110 @@
+"""Installs a wheel and all that it needs for another machine: python deb/wheels.py --help.
+
+pip can fetch wheels of another platform, but judges conditions (`; platform_machine == ...`) by the
+machine that it runs on. So each round here asks what is still missing on the machine that is meant, and
+has pip fetch just that.
+"""
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from importlib.metadata import Distribution, distributions
+from pathlib import Path
+
+from packaging.markers import default_environment
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
+GLIBC = (34, 31, 28, 27, 24, 17)
+"""Of the manylinux tags: Debian 12 has 2.36. A tag means that version or a newer one."""
+
+
+def main() -> int:
+    """Fetch until nothing is missing. Returns 1 for a requirement that the result does not meet."""
+    args = _arguments()
+    machine = {
+        **default_environment(),
+        "python_version": args.python,
+        "python_full_version": f"{args.python}.0",
+        "platform_machine": MACHINES[args.arch],
+    }
+    _fetch([str(args.wheel)], args)
+    extras = {canonicalize_name(args.wheel.name.split("-")[0]): tuple(args.extra)}
+    while missing := sorted(set(_missing(args.target, machine, extras))):
+        _fetch(missing, args)
+    wrong = sorted(set(_wrong(args.target, machine, extras)))
+    print(*wrong, sep="\n", file=sys.stderr)
+    return 1 if wrong else 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("wheel", type=Path, help="the wheel to begin with")
+    parser.add_argument("--target", type=Path, required=True, help="the site-packages to fill")
+    parser.add_argument("--arch", choices=MACHINES, required=True)
+    parser.add_argument("--python", required=True, help="such as 3.11")
+    parser.add_argument("--extra", action="append", default=[], help="an extra of the wheel")
+    return parser.parse_args()
+
+
+def _fetch(what: list[str], args: argparse.Namespace) -> None:
+    """Install these, and nothing that they need."""
+    machine = MACHINES[args.arch]
+    platforms = [f"manylinux_2_{minor}_{machine}" for minor in GLIBC] + [f"manylinux2014_{machine}"]
+    options = [word for platform in platforms for word in ("--platform", platform)]
+    options += ["--python-version", args.python, "--implementation", "cp", "--abi"]
+    options += [f"cp{args.python.replace('.', '')}", "--abi", "abi3", "--abi", "none"]
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    with tempfile.TemporaryDirectory() as fresh:  # pip leaves out what is there in part
+        place = ["--no-deps", "--no-compile", "--only-binary", ":all:", "--target", fresh]
+        subprocess.run([*pip, *place, *options, *what], check=True)
+        shutil.copytree(fresh, args.target, dirs_exist_ok=True)
+
+
+def _needed(
+    target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]]
+) -> Iterator[Requirement]:
+    """What the distributions there need on that machine."""
+    for found in distributions(path=[str(target)]):
+        asked = extras.get(canonicalize_name(found.name), ())
+        for text in found.requires or ():
+            need = Requirement(text)
+            given = [machine | {"extra": extra} for extra in ("", *asked)]
+            if need.marker is None or any(map(need.marker.evaluate, given)):
+                extras[canonicalize_name(need.name)] = (
+                    *extras.get(canonicalize_name(need.name), ()),
+                    *need.extras,
+                )
+                yield need
+
+
+def _there(target: Path) -> dict[str, Distribution]:
+    return {canonicalize_name(found.name): found for found in distributions(path=[str(target)])}
+
+
+def _missing(
+    target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]]
+) -> Iterator[str]:
+    there = _there(target)
+    for need in _needed(target, machine, extras):
+        if canonicalize_name(need.name) not in there:
+            yield f"{need.name}{need.specifier}"
+
+
+def _wrong(
+    target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]]
+) -> Iterator[str]:
+    """Requirements that what is there does not meet: two packages want different versions."""
+    there = _there(target)
+    for need in _needed(target, machine, extras):
+        version = there[canonicalize_name(need.name)].version
+        if not need.specifier.contains(version, prereleases=True):
+            yield f"{need} is not met by {version}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
