@@ -20,10 +20,8 @@ log = logging.getLogger(__name__)
 
 NO_CYCLONEDDS = (
     "transport dds needs the Python package cyclonedds 11.0.1, and {}. On x86-64 `pip install"
-    " cyclonedds==11.0.1` fetches it. For arm64 there is none to fetch: put zenoh-bridge-ros2dds beside"
-    " RMF and write `transport: zenoh` with `keys: ros2dds`, or build the C library Cyclone DDS 11.0.1"
-    " (cmake -DBUILD_IDLC=OFF; make an empty bin/ in its prefix), then `CYCLONEDDS_HOME=<prefix> pip"
-    " install --no-binary cyclonedds cyclonedds==11.0.1`"
+    " cyclonedds==11.0.1` fetches it. For arm64 there is none: put zenoh-bridge-ros2dds beside RMF and"
+    " write `transport: zenoh` with `keys: ros2dds`, or install ROS 2 and write `transport: ros2`"
 )
 NO_ROS = (
     "transport ros2 needs ROS 2 with RMF's messages, and {}. On Ubuntu 24.04 `sudo apt install"
