@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 
 from bridges.core.decision import RequestRefused
+from bridges.core.freshness import in_ns
 from bridges.core.names import check_length
 from bridges.lift.report import LiftReport
 from bridges.lift.settings import LiftSettings
-from bridges.lift.signals import Ended, Requested
+from bridges.lift.signals import Ended, FromAdapter, Requested
 from bridges.rmf.definitions import (
     LiftMode,
     LiftRequest,
@@ -43,6 +44,11 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
             "floor not served", f"{request.destination_floor!r} is none of {', '.join(floors)}"
         )
     return Requested(request.session_id, agv, request.destination_floor)
+
+
+def accept_adapters(request: LiftRequest, settings: LiftSettings) -> FromAdapter:
+    """A fleet adapter's request, before RMF's supervisor has decided on it. Raises RequestRefused."""
+    return FromAdapter(accept(request, settings), in_ns(request.request_time))
 
 
 def alarm_topics(settings: LiftSettings) -> tuple[Topic[Message], ...]:
