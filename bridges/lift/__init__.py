@@ -6,7 +6,7 @@ from bridges.lift.memory import LiftLimits, Memory
 from bridges.lift.report import LiftReport
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Asked, LiftOutputs, LiftSample
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, OWN_LIFT_REQUESTS
+from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 
 KIND: Kind[
     LiftSettings,
@@ -20,7 +20,7 @@ KIND: Kind[
     name="lift",
     devices_key="lifts",
     states=LIFT_STATES,
-    requests={LIFT_REQUESTS: messages.accept, OWN_LIFT_REQUESTS: messages.accept_adapters},
+    requests={LIFT_REQUESTS: messages.accept, messages.OWN_REQUESTS: messages.accept_adapters},
     device_name=messages.device_name,
     sender=lambda request: str(request.session_id),
     limits=LiftLimits.of,

@@ -17,8 +17,10 @@ from bridges.rmf.definitions import (
     Message,
     Time,
 )
-from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
+from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
 
+OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
+"""What fleet adapters send to RMF's supervisor, heard for the robot that has the lift."""
 AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
 
 
@@ -86,5 +88,6 @@ def summary(report: LiftReport) -> Mapping[str, str]:
         "door": f"{door} (estimated)" if report.estimated else door,
         "motion": report.motion.name.removeprefix("MOTION_").lower(),
         "session": report.session or "-",
+        "boarded": "yes" if report.boarded else "no",
         "destination": report.destination or "-",
     }

@@ -20,7 +20,7 @@ class LiftReport(msgspec.Struct, frozen=True):
     """LiftState without its name, floors and stamp, and what only the status file shows.
 
     `floor`: RMF's name, "" when unknown. `read_at`: monotonic seconds, None before the first reading.
-    `estimated`: no contact proves what `door` shows.
+    `estimated`: no contact proves what `door` shows. `boarded`: a robot may be inside.
     """
 
     read_at: float | None
@@ -32,6 +32,7 @@ class LiftReport(msgspec.Struct, frozen=True):
     session: str
     faults: tuple[Fault, ...] = ()
     estimated: bool = False
+    boarded: bool = False
 
     @property
     def open_at(self) -> str:
@@ -69,6 +70,7 @@ def report(
         session=session.id if session else "",
         faults=faults,
         estimated=estimated,
+        boarded=bool(session and session.boarded),
     )
 
 

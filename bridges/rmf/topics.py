@@ -38,6 +38,10 @@ class Topic(Generic[M_co]):
         """The same topic under the name that a site has given it."""
         return replace(self, name=name)
 
+    def live(self) -> "Topic[M_co]":
+        """The same topic for who wants nothing that was retained."""
+        return replace(self, subscribe=VOLATILE)
+
 
 AnyTopic = Topic[d.Message]
 """A topic of whichever type."""
@@ -49,9 +53,6 @@ LIFT_REQUESTS = Topic("lift_requests", d.LiftRequest, publish=RETAINED, subscrib
 ADAPTER_LIFT_REQUESTS = Topic(
     "adapter_lift_requests", d.LiftRequest, publish=RETAINED, subscribe=RETAINED
 )
-# A lift's node hears it too, for the robot that has the lift (bridges/lift/forgotten.py): only what is
-# said now, so VOLATILE.
-OWN_LIFT_REQUESTS = replace(ADAPTER_LIFT_REQUESTS, subscribe=VOLATILE)
 DOOR_STATES = Topic("door_states", d.DoorState)
 DOOR_REQUESTS = Topic("door_requests", d.DoorRequest)
 ADAPTER_DOOR_REQUESTS = Topic("adapter_door_requests", d.DoorRequest)

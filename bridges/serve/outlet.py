@@ -23,8 +23,10 @@ class Outlet:
         self._ends: dict[str, Publisher[Message]] = {}
 
     def open(self, topics: Iterable[Topic[Message]]) -> None:
-        """Declare them. Raises TransportError."""
+        """Declare those that are not declared yet. Raises TransportError."""
         for topic in topics:
+            if topic.name in self._ends:
+                continue
             self._ends[topic.name] = self._transport.publisher(self._named(topic))
 
     def publish(self, topic: Topic[Message], message: Message) -> None:

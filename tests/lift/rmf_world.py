@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Sequence
 
+from bridges.lift.messages import OWN_REQUESTS
 from bridges.rmf.definitions import LiftRequest, LiftState, Message
 from bridges.rmf.topics import (
     ADAPTER_LIFT_REQUESTS,
     LIFT_REQUESTS,
     LIFT_STATES,
-    OWN_LIFT_REQUESTS,
     AnyTopic,
 )
 from hal_fakes.rmf import Party, Said
@@ -132,7 +132,7 @@ class World:
             return
         if topic == ADAPTER_LIFT_REQUESTS:
             self._history.setdefault(message.session_id, []).append(message)
-            self.story.incoming.append((OWN_LIFT_REQUESTS, message))
+            self.story.incoming.append((OWN_REQUESTS, message))
         elif topic == LIFT_REQUESTS:
             self.requested.append(message)
             for delay_s in self.fate(message):

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 import pytest
 
+from bridges.lift.messages import OWN_REQUESTS
 from bridges.lift.signals import LiftOutputs
 from bridges.rmf.definitions import LiftRequest
 from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import OWN_LIFT_REQUESTS
 from hal_fakes.rmf.robot import Robot
 from tests.lift.rmf_world import World
 from tests.lift.story import AGV, END, WALL, Controller, Story
@@ -94,7 +94,7 @@ class Overheard:
         now = WALL + self.story.now + self.sent * 1e-3
         self.sent += 1
         request = LiftRequest("Lift1", stamp(now if at is None else at), who, int(kind), floor, 2)
-        self.story.receive((OWN_LIFT_REQUESTS, request))
+        self.story.receive((OWN_REQUESTS, request))
         self.story.run(self.story.now + 0.2)
 
 

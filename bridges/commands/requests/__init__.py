@@ -21,7 +21,8 @@ class Seen:
 
     `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
     request, in order. `names`: every device of the kind that was heard. `heartbeat`: the latest of the
-    door supervisor.
+    door supervisor. `boarded`: what the lift's diagnostics say of a robot inside, "yes" or "no"; "" if
+    they were not heard.
     """
 
     began_at: float
@@ -32,6 +33,7 @@ class Seen:
     states: tuple[Heard, ...] = ()
     names: frozenset[str] = frozenset()
     heartbeat: Heard | None = None
+    boarded: str = ""
 
     def latest(self) -> Any:
         """The last state heard, None before the first."""
@@ -109,6 +111,15 @@ class Request:
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """Why there is no effect, judged by the last state; the first `present` one counts."""
         raise NotImplementedError
+
+    @property
+    def supervisor(self) -> AnyTopic | None:
+        """The topic on which the supervisor speaks, if others hear adapters as it does."""
+        return None
+
+    def goes_direct(self, seen: Seen, now: float) -> bool:
+        """Whether it is time to ask the device's own daemon, which the supervisor has not done."""
+        return False
 
     def about(self, state: words.Stated) -> bool:
         """Whether the state is of this device."""
