@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from bridges.core.fields import Rmf
 from bridges.log import pairs
 from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.releases import RELEASES, Release
 from bridges.rmf.transport import Transport, TransportError
 
 log = logging.getLogger(__name__)
@@ -45,6 +46,7 @@ def open_transport(
     loopback = localhost or stays_on_loopback(rmf, os.environ)
     network = "localhost" if loopback else "subnet"
     speaks, reason = _choice(rmf)
+    release = RELEASES.get(rmf.release)
     log.info(pairs("transport", speaks=speaks, domain_id=domain, network=network, reason=reason))
     node_name = re.sub(r"\W", "_", node_name, flags=re.ASCII)  # ROS knows no other characters
     if speaks == "ros2":
@@ -55,10 +57,10 @@ def open_transport(
             " names by `topics:` in the YAML"
         )
     if speaks == "dds":
-        return _open_dds(node_name, domain, loopback=loopback)
+        return _open_dds(node_name, domain, loopback=loopback, release=release)
     from bridges.rmf.zenoh import ZenohTransport
 
-    return ZenohTransport(node_name, domain, loopback=loopback, settings=rmf.zenoh)
+    return ZenohTransport(node_name, domain, loopback=loopback, settings=rmf.zenoh, release=release)
 
 
 def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
@@ -139,9 +141,9 @@ def _open_ros2(
     return Ros2Transport(node_name, domain, loopback=loopback, ros_args=ros_args)
 
 
-def _open_dds(node_name: str, domain: int, *, loopback: bool) -> Transport:
+def _open_dds(node_name: str, domain: int, *, loopback: bool, release: Release | None) -> Transport:
     if missing := missing_of_dds():
         raise TransportError(NO_CYCLONEDDS.format(missing))
     from bridges.rmf.dds import DdsTransport
 
-    return DdsTransport(node_name, domain, loopback=loopback)
+    return DdsTransport(node_name, domain, loopback=loopback, release=release)

@@ -32,10 +32,13 @@ from cyclonedds.topic import Topic as DdsTopic
 from bridges.log import pairs
 from bridges.rmf import network, notices
 from bridges.rmf.dds_ends import AnyPublisher, AnySubscription, DdsPublisher, DdsSubscription
+from bridges.rmf.dds_peers import DdsPeers
 from bridges.rmf.definitions import Message
 from bridges.rmf.graph import NodeOnGraph
 from bridges.rmf.idl import sample_type
 from bridges.rmf.loopback import LOOPBACK
+from bridges.rmf.peers import Peers
+from bridges.rmf.releases import Release
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
 
@@ -65,10 +68,15 @@ class DdsTransport:
 
     `loopback`: stay on this machine whatever CYCLONEDDS_URI says. Otherwise, when the machine's
     addresses have changed, it leaves the graph and joins anew, with the same ends; what a publisher
-    retains goes out again. Raises TransportError when the domain cannot be joined.
+    retains goes out again. `release`: None to follow RMF's. Raises TransportError when the domain
+    cannot be joined.
     """
 
-    def __init__(self, node_name: str, domain_id: int, *, loopback: bool) -> None:
+    speaks = "dds"
+
+    def __init__(
+        self, node_name: str, domain_id: int, *, loopback: bool, release: Release | None = None
+    ) -> None:
         self.name = node_name
         self.dropped: dict[str, int] = {}
         self._lock = threading.Lock()
@@ -84,6 +92,8 @@ class DdsTransport:
         self._joined = False
         self._look_at = -math.inf
         self._addresses: network.Addresses = frozenset()
+        self._peers = Peers(release)
+        self._dds_peers = DdsPeers(self._peers)
         try:
             with self._reporting(f"{CANNOT_JOIN} {domain_id}"):
                 self._join()
@@ -113,6 +123,15 @@ class DdsTransport:
             self._ends += (subscription,)
             self._subscriptions += (subscription,)
         return subscription
+
+    @property
+    def release(self) -> Release:
+        """Whose message definitions it speaks now."""
+        return self._peers.release
+
+    def faults(self) -> list[tuple[str, str]]:
+        """What keeps it apart from others; from any thread."""
+        return self._peers.faults()
 
     @property
     def lives(self) -> bool:
@@ -145,6 +164,8 @@ class DdsTransport:
         self._waitset = self._keep(core.WaitSet(self._participant))
         self._leaving = self._keep(core.GuardCondition(self._participant))
         self._waitset.attach(self._leaving)
+        for reader in self._dds_peers.join(self._participant):
+            self._waitset.attach(self._keep(core.ReadCondition(self._keep(reader), ANY_SAMPLE)))
         self._node = NodeOnGraph(self._participant, self.name)
         self._entities += [self._node.topic, self._node.writer]
         self._joined = True
@@ -182,13 +203,17 @@ class DdsTransport:
     def _topic(self, topic: Topic[M]) -> DdsTopic:
         name = f"rt/{topic.name}"
         if name not in self._topics:
-            kind = sample_type(topic.type)
+            kind = sample_type(topic.type, self.release)
             self._topics[name] = self._keep(DdsTopic(self._participant, name, kind))
         return self._topics[name]
 
     def _attach(self, end: AnyPublisher | AnySubscription) -> None:
-        """Give an end its place in DDS."""
-        entity = self._keep(end.create(self._participant, self._topic(end.topic)))
+        """Give an end its place in DDS, if the release has its message."""
+        self._peers.ours(end.topic, publishes=isinstance(end, DdsPublisher))
+        if not self.release.has(end.topic.type):
+            end.drop()
+            return
+        entity = self._keep(end.create(self._participant, self._topic(end.topic), self.release))
         entity.set_status_mask(end.watched)
         self._waitset.attach(entity)
         if isinstance(end, DdsPublisher):
@@ -214,10 +239,20 @@ class DdsTransport:
             self._stop.wait(LOOK_EVERY_S)
             return
         self._waitset.wait(dds_infinity if self._loopback else LOOK_EVERY_NS)
+        if self._dds_peers.look():
+            self._follow_release()
         taken = [subscription.take() for subscription in self._subscriptions]
         if not any(taken):
             for end in self._ends:
                 end.log_misfits()
+
+    def _follow_release(self) -> None:
+        """Join again if RMF is of another release in which a message of ours differs."""
+        before = self.release
+        if self._peers.settle() and any(self._peers.differs(e.topic, before) for e in self._ends):
+            self._join_anew()
+        else:
+            self._peers.name_misfits()
 
     def _recover(self, error: Exception) -> None:
         """Reading failed unexpectedly: log it once, and join again after a while."""

@@ -13,6 +13,7 @@ from typing import Any, Generic, TypeVar
 
 from bridges.rmf import cdr, notices
 from bridges.rmf.definitions import Message
+from bridges.rmf.releases import NEWEST, Release
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
 
@@ -30,9 +31,12 @@ class MemoryNetwork:
 class MemoryTransport:
     """One node on a MemoryNetwork. Callbacks run on the thread that publishes."""
 
-    def __init__(self, network: MemoryNetwork, node_name: str) -> None:
+    speaks = "memory"
+
+    def __init__(self, network: MemoryNetwork, node_name: str, release: Release = NEWEST) -> None:
         self.name = node_name
         self.dropped: dict[str, int] = {}
+        self.release = release
         self._network = network
         self._closed = False
 
@@ -57,6 +61,10 @@ class MemoryTransport:
     def lives(self) -> bool:
         """Until it is closed."""
         return not self._closed
+
+    def faults(self) -> list[tuple[str, str]]:
+        """None: all nodes are of one process and one release."""
+        return []
 
     def wall(self) -> float:
         """The wall clock (s since the epoch)."""

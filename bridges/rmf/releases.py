@@ -10,7 +10,6 @@ Two nodes of different releases do not hear each other where a message differs. 
 hash of every end, so the hashes on a graph tell which release RMF has there.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -58,25 +57,9 @@ KILTED: Final = Release("kilted")
 RELEASES: Final = {release.name: release for release in (JAZZY, KILTED)}
 DEFAULT: Final = JAZZY
 """What is spoken where nobody tells: the release that most sites have."""
+DIFFERING: Final = frozenset[type]().union(
+    *(release.lacks | {message for message, _ in release.without} for release in RELEASES.values())
+)
+"""The messages that tell one release from another."""
 NEWEST: Final = KILTED
 """What holds every message and field."""
-
-
-def same(message_type: type, releases: Iterable[Release]) -> bool:
-    """Do all of these have this message, with the same fields all through?"""
-    return len({_shape(message_type, release) for release in releases}) == 1
-
-
-def _shape(message_type: type, release: Release) -> object:
-    """The message with what it is made of; equal in two releases whose nodes hear each other."""
-    if not release.has(message_type):
-        return None
-    return tuple(
-        (name, kind, tuple(_shape(part, release) for part in sorted(parts(kind), key=repr)))
-        for name, kind in release.fields(message_type).items()
-    )
-
-
-def parts(kind: type) -> set[type]:
-    """The messages that a field's type is made of: itself, or its elements."""
-    return {kind, *getattr(kind, "__args__", ())} & PACKAGES.keys()

@@ -8,6 +8,7 @@ Source: rclpy 7.1 (ROS 2 Jazzy); its public API, with RCLError and InvalidHandle
 rclpy is imported here alone, the message packages in ros_types.py, and both only by choose.py.
 """
 
+import atexit
 import logging
 import os
 import threading
@@ -31,10 +32,12 @@ from rclpy.qos import (
 )
 
 from bridges.log import pairs
-from bridges.rmf import cdr, notices, topics
+from bridges.rmf import cdr, notices, ros_peers, topics
 from bridges.rmf.definitions import Message
 from bridges.rmf.loopback import LOOPBACK
-from bridges.rmf.ros_types import ros_type
+from bridges.rmf.peers import Peers
+from bridges.rmf.releases import Release
+from bridges.rmf.ros_types import installed, ros_type
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
 
@@ -68,6 +71,8 @@ class Ros2Transport:
     Raises TransportError when the graph cannot be joined.
     """
 
+    speaks = "ros2"
+
     def __init__(
         self,
         node_name: str,
@@ -83,6 +88,8 @@ class Ros2Transport:
         self._pause = threading.Event()
         self._publishers: list[_Publisher[Any]] = []
         self._deaf: list[_Subscription[Any]] = []
+        self._subscribed: list[Topic[Any]] = []
+        self._peers = Peers(installed())
         self._context = Context()
         try:
             with _environment(ON_LOOPBACK if loopback else {}):
@@ -92,6 +99,8 @@ class Ros2Transport:
             raise TransportError(f"cannot join ROS domain {domain_id}: {error}") from error
         self._thread = threading.Thread(target=self._spin, name=f"{self.name}-ros2", daemon=True)
         self._thread.start()
+        # An executor's thread that outlives the interpreter aborts it, as where a start is refused.
+        atexit.register(self.close)
 
     def publisher(self, topic: Topic[M]) -> "_Publisher[M]":
         """Declare a publisher with `topic.publish` QoS. Raises TransportError, as for a ROS package
@@ -107,9 +116,24 @@ class Ros2Transport:
         """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
         with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
             subscription = _Subscription(self, topic, received, others_only=others_only)
+            self._subscribed.append(topic)
             if others_only:
                 self._deaf.append(subscription)
         return subscription
+
+    @property
+    def release(self) -> Release:
+        """That of the installed message packages."""
+        return self._peers.release
+
+    def faults(self) -> list[tuple[str, str]]:
+        """What keeps it apart from others; from any thread."""
+        if not self.lives:
+            return []
+        published = [(end.topic, True) for end in list(self._publishers)]
+        subscribed = [(topic, False) for topic in list(self._subscribed)]
+        ros_peers.look(self.node, self._peers, [*published, *subscribed])
+        return self._peers.faults()
 
     def wall(self) -> float:
         """ROS's time (s since the epoch): the wall clock, or `/clock` where use_sim_time is set."""
@@ -121,6 +145,7 @@ class Ros2Transport:
             if self._closed:
                 return
             self._closed = True
+        atexit.unregister(self.close)
         self._pause.set()
         self._leaving.trigger()
         if threading.current_thread() is not self._thread:
@@ -192,7 +217,7 @@ class _Publisher(Generic[M]):
         self.topic = topic
         self._transport = transport
         self.end = transport.node.create_publisher(
-            ros_type(topic.type),
+            ros_type(topic.type, transport.release),
             topic.name,
             _profile(topic.publish),
             event_callbacks=PublisherEventCallbacks(
@@ -204,9 +229,10 @@ class _Publisher(Generic[M]):
         """Send. Raises TransportError when it was not sent, CdrError for what no sample can hold."""
         if not self._transport.lives:
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        sample = cdr.encode(self.topic.type, message)
+        release = self._transport.release
+        sample = cdr.encode(self.topic.type, message, release)
         for subscription in self._transport.heard_back(self.topic):
-            subscription.said.append(cdr.decode(self.topic.type, sample))
+            subscription.said.append(cdr.decode(self.topic.type, sample, release))
         try:
             self.end.publish(sample)
         except RuntimeError as error:
@@ -245,7 +271,7 @@ class _Subscription(Generic[M]):
         self._received = received
         self._others_only = others_only
         self._end = transport.node.create_subscription(
-            ros_type(topic.type),
+            ros_type(topic.type, transport.release),
             topic.name,
             self._take,
             _profile(topic.subscribe),
@@ -273,7 +299,7 @@ class _Subscription(Generic[M]):
 
     def _take(self, sample: bytes) -> None:
         try:
-            message = cdr.decode(self.topic.type, sample)
+            message = cdr.decode(self.topic.type, sample, self._transport.release)
         except cdr.CdrError as error:
             notices.drop(self._transport.dropped, self.topic, error)
             return

@@ -8,14 +8,34 @@ import importlib
 import typing
 from typing import Any
 
-from bridges.rmf.definitions import PACKAGES, field_types
+from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.releases import DEFAULT, DIFFERING, NEWEST, RELEASES, Release
 from bridges.rmf.transport import TransportError
 
 NAMES = {str: "string", bool: "boolean", "byte": "octet", "float32": "float", "float64": "double"}
 """Where Python's message classes speak IDL and not ROS."""
 
 
-def ros_type(message_type: type) -> Any:
+def installed() -> Release:
+    """The release of RMF's message packages that are installed; the default if they are of none."""
+    fitting = (one for one in RELEASES.values() if all(_fits(kind, one) for kind in DIFFERING))
+    return next(fitting, DEFAULT)
+
+
+def _fits(message_type: type, release: Release) -> bool:
+    """Is it installed as this release has it, or not at all if the release lacks it?"""
+    try:
+        module = importlib.import_module(f"{PACKAGES[message_type]}.msg")
+    except ImportError:
+        return True  # told when it is wanted
+    found = getattr(module, message_type.__name__, None)
+    if found is None or not release.has(message_type):
+        return found is None and not release.has(message_type)
+    theirs = found.get_fields_and_field_types()
+    return list(theirs.items()) == list(fields_of(message_type, release).items())
+
+
+def ros_type(message_type: type, release: Release = NEWEST) -> Any:
     """The ROS class of a message type. Raises TransportError where it is missing or another."""
     package, name = PACKAGES[message_type], message_type.__name__
     try:
@@ -29,8 +49,8 @@ def ros_type(message_type: type) -> Any:
             f"the installed {package} has no {name}: a newer one is needed, or `transport: dds`"
         )
     for nested in sorted(_nested_in(message_type), key=lambda kind: kind.__name__):
-        ros_type(nested)
-    theirs, ours = found.get_fields_and_field_types(), fields_of(message_type)
+        ros_type(nested, release)
+    theirs, ours = found.get_fields_and_field_types(), fields_of(message_type, release)
     if list(theirs.items()) != list(ours.items()):
         raise TransportError(
             f"the installed {package}/{name} has the fields {theirs}, this version knows {ours}:"
@@ -47,9 +67,9 @@ def how_to_install(package: str) -> str:
     )
 
 
-def fields_of(message_type: type) -> dict[str, str]:
+def fields_of(message_type: type, release: Release = NEWEST) -> dict[str, str]:
     """Field -> type, in the words of `get_fields_and_field_types()`."""
-    return {name: _name(kind) for name, kind in field_types(message_type).items()}
+    return {name: _name(kind) for name, kind in release.fields(message_type).items()}
 
 
 def _name(kind: type) -> str:
@@ -62,6 +82,6 @@ def _name(kind: type) -> str:
 
 
 def _nested_in(message_type: type) -> set[type]:
-    kinds = field_types(message_type).values()
+    kinds = NEWEST.fields(message_type).values()
     sequences = {typing.get_args(kind)[0] for kind in kinds if typing.get_origin(kind) is tuple}
     return PACKAGES.keys() & {*kinds, *sequences}

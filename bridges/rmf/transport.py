@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Protocol, TypeVar
 
 from bridges.rmf.definitions import Message
+from bridges.rmf.releases import Release
 from bridges.rmf.topics import Topic
 
 M = TypeVar("M", bound=Message)
@@ -38,14 +39,23 @@ class Subscription(Protocol):
 
 
 class Transport(Protocol):
-    """One node on the RMF graph. `received` is called on the transport's own thread.
+    """One node on the RMF graph. `speaks`: the transport's name in a YAML.
 
-    A callback must only append to an inbox and must not raise. Samples that do not decode, or whose
-    callback raises, are dropped, counted in `dropped` by topic name, and logged once for each topic.
+    `received` is called on the transport's own thread. A callback must only append to an inbox and
+    must not raise. Samples that do not decode, or whose callback raises, are dropped, counted in
+    `dropped` by topic name, and logged once for each topic.
     """
 
     name: str
+    speaks: str
     dropped: dict[str, int]
+
+    @property
+    def release(self) -> Release:
+        """The release of RMF's messages that it speaks now."""
+
+    def faults(self) -> list[tuple[str, str]]:
+        """(code, detail) of what keeps this node apart from others now; from any thread."""
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Declare a publisher with `topic.publish` QoS."""

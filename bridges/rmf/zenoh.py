@@ -10,13 +10,11 @@ zenoh is imported here and there alone, and only by choose.py.
 """
 
 import atexit
-import ctypes
-import json
 import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from itertools import count
 from queue import Empty, SimpleQueue
@@ -29,10 +27,14 @@ from bridges.core.fields import Zenoh
 from bridges.log import pairs
 from bridges.rmf import addresses, notices, zenoh_config
 from bridges.rmf.definitions import Message
+from bridges.rmf.peers import Peers
+from bridges.rmf.releases import Release
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
 from bridges.rmf.zenoh_ends import ZenohPublisher, ZenohSubscription
 from bridges.rmf.zenoh_keys import WAYS, Keys
+from bridges.rmf.zenoh_peers import ZenohPeers
+from bridges.rmf.zenoh_session import closed, give_back, opened
 
 M = TypeVar("M", bound=Message)
 log = logging.getLogger(__name__)
@@ -52,8 +54,16 @@ class ZenohTransport:
     when no session can be opened; that nobody answers yet is no error.
     """
 
+    speaks = "zenoh"
+
     def __init__(
-        self, node_name: str, domain_id: int, *, loopback: bool, settings: Zenoh | None = None
+        self,
+        node_name: str,
+        domain_id: int,
+        *,
+        loopback: bool,
+        settings: Zenoh | None = None,
+        release: Release | None = None,
     ) -> None:
         self.name = node_name
         self.dropped: dict[str, int] = {}
@@ -65,6 +75,8 @@ class ZenohTransport:
         self._failed = False
         self._ends: Ends = ()
         self._deaf: set[str] = set()
+        self._peers = Peers(release)
+        self._watcher = ZenohPeers(self._peers, lambda: self._orders.put(self._follow_release))
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._session: zenoh.Session | None = None
         self._linked: bool | None = None
@@ -85,7 +97,12 @@ class ZenohTransport:
     def publisher(self, topic: Topic[M]) -> ZenohPublisher[M]:
         """Declare a publisher with `topic.publish` QoS."""
         publisher = ZenohPublisher(
-            topic, self._orders.put, self._withdraw, lambda: self.lives, self._deaf
+            topic,
+            self._orders.put,
+            self._withdraw,
+            lambda: self.lives,
+            self._deaf,
+            self._watcher.tell,
         )
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             self._attach(publisher)
@@ -103,11 +120,21 @@ class ZenohTransport:
             self.dropped,
             others_only=others_only,
             attached=self._settings.keys == "rmw_zenoh",
+            tell=self._watcher.tell,
         )
         with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
             self._attach(subscription)
             self._ends += (subscription,)
         return subscription
+
+    @property
+    def release(self) -> Release:
+        """Whose message definitions it speaks now."""
+        return self._peers.release
+
+    def faults(self) -> list[tuple[str, str]]:
+        """What keeps it apart from others; from any thread."""
+        return self._peers.faults()
 
     def wall(self) -> float:
         """The wall clock (s since the epoch)."""
@@ -143,12 +170,12 @@ class ZenohTransport:
         else:
             ways = [zenoh_config.on_the_site(self._settings)]
         try:
-            session = _opened(ways)
+            session = opened(ways)
         except zenoh.ZError as error:
             self._trouble = str(error).partition(" at /")[0]  # it names a line of its source
             return
         way, name = WAYS[self._settings.keys], str(session.zid())
-        self._keys: Keys = way(self._domain_id, name, self.name)
+        self._keys: Keys = way(self._domain_id, name, self.name, self.release)
         self._numbers = count(1)
         self._presence = session.liveliness().declare_token(self._keys.presence())
         self._neighbours = {}
@@ -156,11 +183,13 @@ class ZenohTransport:
             Callback(partial(self._neighbour, self._neighbours), indirect=False), history=True
         )
         self._session = session
-        _give_back()
+        self._witnesses = self._watcher.watch(session, self._keys)
+        give_back()
 
     def _attach(self, end: ZenohPublisher[Any] | ZenohSubscription[Any]) -> None:
-        """Give an end its place in the session, when there is one."""
-        if self._session is None:
+        """Give an end its place in the session, when there is one and the release has its message."""
+        self._peers.ours(end.topic, publishes=isinstance(end, ZenohPublisher))
+        if self._session is None or not self.release.has(end.topic.type):
             return
         number = next(self._numbers)
         if isinstance(end, ZenohSubscription) and end.others_only:
@@ -192,8 +221,8 @@ class ZenohTransport:
         self._deaf.clear()
         self._neighbours = {}
         if session:
-            held += [self._presence, self._events]
-            closing = threading.Thread(target=_close, args=(session, held), daemon=True)
+            held += [self._presence, self._events, self._witnesses]
+            closing = threading.Thread(target=closed, args=(session, held), daemon=True)
             closing.start()
             self._closing.append(closing)
 
@@ -210,6 +239,23 @@ class ZenohTransport:
             except (TransportError, zenoh.ZError) as error:  # a secret that has gone, say
                 self._trouble = str(error)
                 self._leave()
+
+    # --- RMF's release -------------------------------------------------------------------------
+
+    def _follow_release(self) -> None:
+        """Give the ends whose message differs in RMF's release a new place."""
+        before = self.release
+        if not self._peers.settle():
+            self._peers.name_misfits()
+            return
+        with self._lock:
+            if self._closed or self._session is None:
+                return
+            self._keys.release = self.release
+            for end in self._ends:
+                if self._peers.differs(end.topic, before):
+                    end.leave()
+                    self._attach(end)
 
     # --- our thread ----------------------------------------------------------------------------
 
@@ -285,32 +331,6 @@ class ZenohTransport:
             yield
         except zenoh.ZError as error:
             raise TransportError(f"{text}: {error}") from error
-
-
-def _opened(ways: list[dict[str, Any]]) -> zenoh.Session:
-    """A session by the first of these configurations that serves. Raises ZError when none does."""
-    wanted, *further = ways
-    config = zenoh.Config()
-    for key, value in wanted.items():
-        config.insert_json5(key, json.dumps(value))
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError:
-        if further:
-            return _opened(further)
-        raise
-
-
-def _close(session: zenoh.Session, held: list[Any]) -> None:
-    with suppress(zenoh.ZError):  # by a dead link nobody hears the farewell
-        session.close()  # type: ignore[no-untyped-call]
-    held.clear()
-
-
-def _give_back() -> None:
-    """Return freed memory to the machine: opening a session leaves 2.5 MB of it in this process."""
-    with suppress(AttributeError):  # a C library other than glibc has no such call
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _nothing() -> None:

@@ -21,11 +21,16 @@ from zenoh.handlers import Callback
 from bridges.rmf import cdr, notices, zenoh_keys
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
+from bridges.rmf.peers import Announced
+from bridges.rmf.releases import NEWEST
+from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import TransportError
 from bridges.rmf.zenoh_keys import Keys, Kind
 
 M = TypeVar("M", bound=Message)
+
+Tell = Callable[[str, Announced | None], None]
 
 HEARTBEAT_S: Final = 0.5
 """As rmw_zenoh: after a retained message, its number is told once more, so that a loss shows."""
@@ -39,7 +44,8 @@ AT_ONCE: Final = 100
 class Place:
     """An end's place in one session: its token, and the tokens of those on the other side.
 
-    `stranger(token, policy)`: called on zenoh's thread for a peer that does not fit.
+    `stranger(token, policy)`: called on zenoh's thread for a peer whose QoS does not fit. `tell(token,
+    end)`: likewise for each that comes, and with None when it goes.
     """
 
     def __init__(
@@ -50,6 +56,7 @@ class Place:
         topic: Topic[Any],
         number: int,
         stranger: Callable[[str, str], None],
+        tell: Tell,
     ) -> None:
         self.key = keys.data(topic)
         self.token = keys.token(kind, topic, number)
@@ -60,6 +67,7 @@ class Place:
         self._kind = kind
         self._topic = topic
         self._stranger = stranger
+        self._tell = tell
         retained = topic.publish if kind == "MP" else topic.subscribe
         self._transient_local = retained.durability == "transient_local"
         self._live = session.liveliness()
@@ -86,17 +94,26 @@ class Place:
         if sample.kind == SampleKind.DELETE:
             self.peers.pop(token, None)
             self.unheard.discard(zenoh_keys.gid(token))
+            self._tell(token, None)
         elif (end := self._keys.end(token)) is None:
             return
-        elif policy := self._misfit(end):
-            self.unheard.add(zenoh_keys.gid(token))
-            self._stranger(token, policy)
         else:
+            self._tell(token, end.announced)
+            self._meet(token, end)
+
+    def _meet(self, token: str, end: zenoh_keys.End) -> None:
+        policy = self._misfit(end)
+        if not policy:
             self.peers[token] = end
+            return
+        self.unheard.add(zenoh_keys.gid(token))
+        if policy != "type":  # which `peers.py` tells, of all ends
+            self._stranger(token, policy)
 
     def _misfit(self, theirs: zenoh_keys.End) -> str:
         """Which policy keeps the two apart, as DDS has it; "" for none."""
-        if theirs.type != self._keys.type(self._topic):
+        hashed = type_hash(self._topic.type, self._keys.release)
+        if theirs.type != self._keys.type(self._topic) or theirs.announced.hash not in ("", hashed):
             return "type"
         wants, keeps = theirs.transient_local, self._transient_local
         if self._kind == "MS":
@@ -105,14 +122,17 @@ class Place:
 
 
 class _End:
-    """What both ends have. `do`: has something done on the transport's thread."""
+    """What both ends have. `do`: has something done on the transport's thread. `tell`: as `Place`."""
 
-    def __init__(self, topic: Topic[Any], text: str, do: Callable[[Callable[[], None]], None]):
+    def __init__(
+        self, topic: Topic[Any], text: str, do: Callable[[Callable[[], None]], None], tell: Tell
+    ) -> None:
         self.place: Place | None = None
         self._end: Any = None
         self._notice = (topic, text)
         self._named: set[str] = set()
         self._do = do
+        self._tell = tell
 
     def leave(self) -> None:
         """Give up the place in a session that goes on."""
@@ -145,19 +165,22 @@ class ZenohPublisher(_End, Generic[M]):
         withdraw: Callable[["ZenohPublisher[Any]"], None],
         lives: Callable[[], bool],
         deaf: set[str],
+        tell: Tell,
     ) -> None:
-        super().__init__(topic, notices.NOT_SERVED, do)
+        super().__init__(topic, notices.NOT_SERVED, do, tell)
         self.topic = topic
         self._withdraw = withdraw
         self._lives = lives
         self._deaf = deaf
         self._sent = 0
+        self._release = NEWEST
         depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
         self._retained: deque[bytes] = deque(maxlen=depth)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
         """Take a place in a session; what was retained goes out again for late joiners."""
-        place = Place(session, keys, "MP", self.topic, number, self.name_stranger)
+        place = Place(session, keys, "MP", self.topic, number, self.name_stranger, self._tell)
+        self._release = keys.release
         self._end = self._declared(session, place.key)
         place.appear()
         self.place, self._sent = place, 0
@@ -168,7 +191,7 @@ class ZenohPublisher(_End, Generic[M]):
         """Send. Raises TransportError when it was not sent, CdrError for what no sample can hold."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        sample = cdr.encode(self.topic.type, message)
+        sample = cdr.encode(self.topic.type, message, self._release)
         self._retained.append(sample)
         place, end = self.place, self._end  # another thread may give them up meanwhile
         if place is None or end is None:
@@ -226,8 +249,9 @@ class ZenohSubscription(_End, Generic[M]):
         *,
         others_only: bool,
         attached: bool,
+        tell: Tell,
     ) -> None:
-        super().__init__(topic, notices.NOT_HEARD, do)
+        super().__init__(topic, notices.NOT_HEARD, do, tell)
         self.topic = topic
         self.others_only = others_only
         self._rung = False
@@ -235,11 +259,13 @@ class ZenohSubscription(_End, Generic[M]):
         self._received = received
         self._dropped = dropped
         self._attached = attached
+        self._release = NEWEST
         self._waiting: deque[Sample | CdrError] = deque(maxlen=topic.subscribe.depth)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
         """Take a place in a session."""
-        place = Place(session, keys, "MS", self.topic, number, self.name_stranger)
+        place = Place(session, keys, "MS", self.topic, number, self.name_stranger, self._tell)
+        self._release = keys.release
         self.place, self._own_session = place, keys.session
         origin = Locality.REMOTE if self.others_only else Locality.ANY
         on_sample = Callback(self._arrived, indirect=False)
@@ -304,4 +330,4 @@ class ZenohSubscription(_End, Generic[M]):
             raise CdrError("without the attachment of a ROS node")
         if sender in place.unheard:
             return None
-        return cdr.decode(self.topic.type, bytes(sample.payload))
+        return cdr.decode(self.topic.type, bytes(sample.payload), self._release)

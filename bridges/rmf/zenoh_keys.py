@@ -8,6 +8,7 @@ attachment_helpers.cpp), and zenoh-bridge-ros2dds's, which routes a DDS domain
 A token is a key that lives as long as its session: by it the others know of a node and its ends.
 """
 
+import re
 import struct
 from dataclasses import dataclass
 from typing import Any, Final, Literal, Protocol
@@ -15,6 +16,8 @@ from typing import Any, Final, Literal, Protocol
 import xxhash
 
 from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.peers import WITNESSES, Announced
+from bridges.rmf.releases import NEWEST, Release
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import Qos, Topic
 
@@ -23,22 +26,25 @@ Kind = Literal["MP", "MS"]
 NODE_ID: Final = 0
 _HEAD: Final = struct.Struct("<qqB")
 GID_LENGTH: Final = 16
+HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """What a token says of a publisher or subscription: its session, its type with the hash, and
-    whether it retains messages or wants what is retained."""
+    """What a token says of a publisher or subscription: its session, its type (as the keys name it),
+    whether it retains messages or wants what is retained, and all that its node announces of it."""
 
     session: str
     type: str
     transient_local: bool
+    announced: Announced
 
 
 class Keys(Protocol):
     """One of the two ways, for one node."""
 
     session: str
+    release: Release
 
     def presence(self) -> str:
         """The token of the node itself."""
@@ -55,6 +61,9 @@ class Keys(Protocol):
     def others(self, kind: Kind, topic: Topic[Any]) -> str:
         """Matches the token of each end of this kind on a topic."""
 
+    def witnesses(self) -> list[str]:
+        """Matches the tokens that tell RMF's release (`peers.py`)."""
+
     def end(self, token: str) -> End | None:
         """The end that a token describes; None for any other token."""
 
@@ -62,8 +71,10 @@ class Keys(Protocol):
 class RmwZenoh:
     """rmw_zenoh's keys for a node in a ROS domain. A slash within a part of a token is `%`."""
 
-    def __init__(self, domain_id: int, session: str, node_name: str) -> None:
-        self.session = session
+    def __init__(
+        self, domain_id: int, session: str, node_name: str, release: Release = NEWEST
+    ) -> None:
+        self.session, self.release = session, release
         self._domain = domain_id
         self._node = f"%/%/{node_name}"  # enclave "/", namespace "/"
 
@@ -75,7 +86,7 @@ class RmwZenoh:
 
     def type(self, topic: Topic[Any]) -> str:
         name = f"{PACKAGES[topic.type]}::msg::dds_::{topic.type.__name__}_"
-        return f"{name}/{type_hash(topic.type)}"
+        return f"{name}/{type_hash(topic.type, self.release)}"
 
     def token(self, kind: Kind, topic: Topic[Any], number: int) -> str:
         qos = _qos(topic, kind)
@@ -91,12 +102,21 @@ class RmwZenoh:
     def others(self, kind: Kind, topic: Topic[Any]) -> str:
         return f"@ros2_lv/{self._domain}/*/*/*/{kind}/*/*/*/{_name(topic, '%')}/**"
 
+    def witnesses(self) -> list[str]:
+        return [
+            f"@ros2_lv/{self._domain}/*/*/*/{_kind(publishes)}/*/*/*/*/{package}::msg::dds_::{name}_/**"
+            for package, name, publishes in _witnesses()
+        ]
+
     def end(self, token: str) -> End | None:
         parts = token.split("/")
         qos = parts[12].split(":") if len(parts) > 12 else []
         if len(qos) < 6:
             return None
-        return End(parts[2], "/".join(parts[10:12]), qos[1] == "1")
+        kind = parts[10].replace("::msg::dds_::", "/msg/").removesuffix("_")
+        topic = parts[9].strip("%").replace("%", "/")
+        announced = Announced(topic, kind, parts[11], parts[5] == "MP")
+        return End(parts[2], "/".join(parts[10:12]), qos[1] == "1", announced)
 
 
 class Ros2Dds:
@@ -105,8 +125,10 @@ class Ros2Dds:
     A key holds neither domain nor type: the bridge stands for one domain, and a token says the type.
     """
 
-    def __init__(self, domain_id: int, session: str, node_name: str) -> None:
-        self.session = session
+    def __init__(
+        self, domain_id: int, session: str, node_name: str, release: Release = NEWEST
+    ) -> None:
+        self.session, self.release = session, release
 
     def presence(self) -> str:
         return f"@/{self.session}/@ros2_lv"
@@ -121,18 +143,27 @@ class Ros2Dds:
         qos = _qos(topic, kind)
         retained = int(qos.durability == "transient_local")
         # No key fields; reliable; durability; keep last; the user data of the DDS end made for us.
-        text = f":1:{retained}:0,{qos.depth}:typehash={type_hash(topic.type)};"
+        text = f":1:{retained}:0,{qos.depth}:typehash={type_hash(topic.type, self.release)};"
         return f"@/{self.session}/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/{self.type(topic)}/{text}"
 
     def others(self, kind: Kind, topic: Topic[Any]) -> str:
         return f"@/*/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/*/*"
+
+    def witnesses(self) -> list[str]:
+        return [
+            f"@/*/@ros2_lv/{_kind(publishes)}/*/{package}§msg§{name}/*"
+            for package, name, publishes in _witnesses()
+        ]
 
     def end(self, token: str) -> End | None:
         parts = token.split("/")
         qos = parts[6].split(":") if len(parts) > 6 else []
         if len(qos) < 4:
             return None
-        return End(parts[1], parts[5], qos[2] == "1")
+        found = HASH.search(parts[6])
+        topic, kind = parts[4].replace("§", "/"), parts[5].replace("§", "/")
+        announced = Announced(topic, kind, found[1] if found else "", parts[3] == "MP")
+        return End(parts[1], parts[5], qos[2] == "1", announced)
 
 
 WAYS: Final[dict[str, type[RmwZenoh] | type[Ros2Dds]]] = {
@@ -156,6 +187,14 @@ def sender(attached: bytes) -> bytes | None:
     if len(attached) != _HEAD.size + GID_LENGTH or attached[_HEAD.size - 1] != GID_LENGTH:
         return None
     return attached[_HEAD.size :]
+
+
+def _kind(publishes: bool) -> Kind:
+    return "MP" if publishes else "MS"
+
+
+def _witnesses() -> list[tuple[str, str, bool]]:
+    return [(*name.split("/msg/"), publishes) for name, publishes in sorted(WITNESSES)]  # type: ignore[misc]
 
 
 def _qos(topic: Topic[Any], kind: Kind) -> Qos:

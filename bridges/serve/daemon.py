@@ -14,7 +14,7 @@ import msgspec
 
 from bridges import __version__
 from bridges.log import pairs
-from bridges.rmf.choose import open_transport
+from bridges.rmf.choose import domain_id, open_transport
 from bridges.rmf.definitions import DiagnosticArray
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import DIAGNOSTICS
@@ -68,6 +68,7 @@ class Daemon:
             self._predecessor = Predecessor(runtime.records, ours, outputs_off)
             unsafe = self._predecessor.make_safe(end.wait)
         node_name = f"rmf_bridge_{config.path.stem}"
+        self._domain_id = domain_id(config.rmf, os.environ)
         self._transport = open_transport(
             config.rmf, node_name, localhost=localhost, ros_args=ros_args
         )
@@ -150,15 +151,24 @@ class Daemon:
         about = {"version": __version__, "node": self._transport.name, "pid": os.getpid()}
         return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
 
+    def _apart(self) -> list[dict[str, str]]:
+        """What keeps this node apart from others."""
+        return [{"code": code, "detail": detail} for code, detail in self._transport.faults()]
+
     def _tell(self) -> None:
         """Write the status file and publish diagnostics."""
+        service = self._service.status()
         daemon = {
             "simulated": self._simulated,
-            "file": str(self._config.path),
+            "file": str(self._config.path.absolute()),
+            "kind": self._config.kind,
             **self._about(),
+            "transport": self._transport.speaks,
+            "domain_id": self._domain_id,
             "samples_dropped": dict(self._transport.dropped),
             "predecessor_not_off": self._predecessor.left() if self._predecessor else [],
-            **self._service.status(),
+            **service,
+            "faults": [*service.get("faults", []), *self._apart()],
         }
         devices = self._service.devices()
         self._runtime.write_status(msgspec.json.encode({**daemon, "devices": devices}))

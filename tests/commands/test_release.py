@@ -29,7 +29,8 @@ def told(
     request: LiftEnd, states: Iterable[d.LiftState], boarded: str, listeners: int = 1
 ) -> tuple[list[tuple[int, str]], list[str], Done | Failed]:
     """Each second a state; when what was sent where, the hints, and the end."""
-    seen, sent, hints = Seen(0.0, 10.0, listeners, boarded=boarded), list[tuple[int, str]](), []
+    seen = Seen(0.0, 10.0, listeners, boarded=boarded)
+    sent, hints = list[tuple[int, str]](), list[str]()
     for now, state in enumerate(states):
         seen = replace(seen, states=(*seen.states, Heard(state, now)))
         todo = step(request, seen, now)

@@ -8,6 +8,7 @@ import pytest
 from bridges.core.fields import Zenoh
 from bridges.rmf.choose import missing_of_dds
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.releases import NEWEST, Release
 from bridges.rmf.transport import Transport
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf.domains import domain_of_this_run
@@ -85,16 +86,18 @@ def observer(join_dds: Join) -> Iterator[Any]:
     gc.collect()
 
 
-def joining(transport: str, domain: int) -> Join:
+def joining(transport: str, domain: int, release: Release | None = NEWEST) -> Join:
     """What opens nodes of this transport in this domain, on loopback."""
 
     def join(name: str) -> Transport:
         if transport.startswith("zenoh"):
-            return ZenohTransport(name, domain, loopback=True, settings=ZENOH[transport])
+            ways = ZENOH[transport]
+            return ZenohTransport(name, domain, loopback=True, settings=ways, release=release)
         # Imported here: there may be no ROS.
         module = importlib.import_module(f"bridges.rmf.{transport}")
         kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
-        node: Transport = getattr(module, kind)(name, domain, loopback=True)
+        wanted = {} if transport == "ros2" else {"release": release}  # that takes what is installed
+        node: Transport = getattr(module, kind)(name, domain, loopback=True, **wanted)
         return node
 
     return join

@@ -65,12 +65,15 @@ class RealTime(Timeline):
 class DdsPlace:
     """One node on DDS, whose messages come at the timeline's own time."""
 
+    speaks = "dds"
+
     def __init__(self, timeline: RealTime, domain: int, name: str) -> None:
         self.name = name
         self.dropped: dict[str, int] = {}
         self._timeline = timeline
         self._closed = False
         self._inner = wire.join(name.replace("/", "_"), domain)
+        self.release = self._inner.release
 
     def publisher(self, topic: Topic[Any]) -> Publisher[Any]:
         return self._inner.publisher(topic)
@@ -86,6 +89,9 @@ class DdsPlace:
     @property
     def lives(self) -> bool:
         return self._inner.lives
+
+    def faults(self) -> list[tuple[str, str]]:
+        return self._inner.faults()
 
     def wall(self) -> float:
         return self._inner.wall()
