@@ -61,6 +61,12 @@ class RivalSeen(msgspec.Struct, frozen=True):
     """Another node publishes states under this device's name."""
 
 
+class Attended(msgspec.Struct, frozen=True):
+    """Whether any node publishes the requests that this device obeys."""
+
+    yes: bool
+
+
 class OperatorReset(msgspec.Struct, frozen=True):
     """`rmf-bridge reset`: latched faults may clear if their cause is gone."""
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, Union
 
 from bridges.core.decision import (
+    Attended,
     Decision,
     IoFailed,
     M,
@@ -29,7 +30,7 @@ L = TypeVar("L")
 E = TypeVar("E")
 """The events that `accept` makes of requests."""
 
-DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: UP007
+DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, Attended, E]  # noqa: UP007
 """Every event that the core of a device takes."""
 
 Place = tuple[tuple[str, ...], str, str]
@@ -53,6 +54,7 @@ class Kind(Generic[S, L, M, X, E, O, R]):
     `alarm_topics(settings)`: what a device publishes beside its states.
     `on_map(settings)`: which of its settings name a place on RMF's map, as (path, what it is, name).
     The device's own name is checked for every kind.
+    `attended_by`: the topic of requests whose publishers the core is told of (`Attended`), if any.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Kind(Generic[S, L, M, X, E, O, R]):
     published: Callable[[M, R], M] = lambda memory, report: memory
     alarm_topics: Callable[[S], tuple[Topic[Message], ...]] = lambda settings: ()
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
+    attended_by: Topic[Message] | None = None
 
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]

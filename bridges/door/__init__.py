@@ -27,5 +27,6 @@ KIND: Kind[
     initial=core.initial,
     decide=core.decide,
     state_message=messages.state_message,
+    attended_by=topics.DOOR_REQUESTS,
     summary=messages.summary,
 )

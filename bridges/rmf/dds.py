@@ -244,7 +244,7 @@ class DdsTransport:
         taken = [subscription.take() for subscription in self._subscriptions]
         if not any(taken):
             for end in self._ends:
-                end.log_misfits()
+                end.log_misfits(self._peers)
 
     def _follow_release(self) -> None:
         """Join again if RMF is of another release in which a message of ours differs."""

@@ -19,9 +19,10 @@ from bridges.rmf import notices, topics
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
 from bridges.rmf.idl import SampleType, sample_type
+from bridges.rmf.peers import Peers
 from bridges.rmf.releases import Release
 from bridges.rmf.rihs01 import type_hash
-from bridges.rmf.topics import Topic
+from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import TransportError
 
 M = TypeVar("M", bound=Message)
@@ -94,13 +95,13 @@ class DdsPublisher(Generic[M]):
         """Take this end off the graph."""
         self._withdraw(self, self._writer)
 
-    def log_misfits(self) -> None:
+    def log_misfits(self, peers: Peers) -> None:
         """Log each new subscription of this topic whose QoS does not match."""
         if self._writer is None:
             return
         status = self._writer.get_offered_incompatible_qos_status()
         if status.total_count_change:
-            _log_misfit(self.topic, notices.NOT_SERVED, status)
+            _log_misfit(self.topic, notices.NOT_SERVED, status, peers)
 
 
 class DdsSubscription(Generic[M]):
@@ -158,22 +159,25 @@ class DdsSubscription(Generic[M]):
                 notices.hand_on(self._dropped, self.topic, self._received, samples[0].message)
         return True
 
-    def log_misfits(self) -> None:
+    def log_misfits(self, peers: Peers) -> None:
         """Log each new publisher of this topic whose QoS does not match."""
         if self._reader is None:
             return
         status = self._reader.get_requested_incompatible_qos_status()
         if status.total_count_change:
-            _log_misfit(self.topic, notices.NOT_HEARD, status)
+            _log_misfit(self.topic, notices.NOT_HEARD, status, peers)
 
 
 AnyPublisher = DdsPublisher[Any]
 AnySubscription = DdsSubscription[Any]
 
 
-def _log_misfit(topic: Topic[M], text: str, status: SampleType) -> None:
+def _log_misfit(topic: AnyTopic, text: str, status: SampleType, peers: Peers) -> None:
     policy = POLICIES.get(status.last_policy_id, f"QoS policy {status.last_policy_id}")
-    notices.misfit(topic, text, policy)
+    if policy == "type":
+        peers.name(topic, published=text == notices.NOT_HEARD)
+    else:
+        notices.misfit(topic, text, policy)
 
 
 def _writer_qos(qos: topics.Qos, hashed: str) -> Qos:

@@ -85,11 +85,15 @@ class Peers:
     def name_misfits(self) -> None:
         """Log each topic on which others have another type, once."""
         for end in list(self._ends.values()):
-            if self._misfits(end) and (end.topic, end.publishes) not in self._named:
-                self._named.add((end.topic, end.publishes))
-                ours = self._ours[end.topic, not end.publishes]
-                text = notices.NOT_HEARD if end.publishes else notices.NOT_SERVED
-                notices.misfit(ours, text, "type")
+            if self._misfits(end):
+                self.name(self._ours[end.topic, not end.publishes], published=end.publishes)
+
+    def name(self, topic: AnyTopic, *, published: bool) -> None:
+        """Log that what others publish on a topic, or hear there, is of another type; once."""
+        key = topic.name.strip("/"), published
+        if key not in self._named:
+            self._named.add(key)
+            notices.misfit(topic, notices.NOT_HEARD if published else notices.NOT_SERVED, "type")
 
     def differs(self, topic: AnyTopic, before: Release) -> bool:
         """Is this topic's message another one in the present release than in that one?"""

@@ -23,7 +23,9 @@ class ZenohPeers:
     def watch(self, session: zenoh.Session, keys: Keys) -> list[object]:
         """Begin anew in this session; what is returned must be kept while it is open."""
         self._peers.clear()
-        on_token = Callback(lambda sample: self._token(sample, keys), indirect=False)
+        on_token: Callback[zenoh.Sample] = Callback(
+            lambda sample: self._token(sample, keys), indirect=False
+        )
         live = session.liveliness()
         return [live.declare_subscriber(key, on_token, history=True) for key in keys.witnesses()]
 

@@ -114,6 +114,7 @@ class Daemon:
             if self._predecessor is not None:
                 self._predecessor.tick(time.monotonic())
             if told_ready:
+                self._convenience("graph", self._service.look)
                 self._convenience("status", self._tell)
 
     def _require_life(self) -> None:
