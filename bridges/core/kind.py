@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, Union
 
 from bridges.core.decision import (
-    Attended,
     Decision,
     IoFailed,
     M,
@@ -30,7 +29,7 @@ L = TypeVar("L")
 E = TypeVar("E")
 """The events that `accept` makes of requests."""
 
-DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, Attended, E]  # noqa: UP007
+DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: UP007
 """Every event that the core of a device takes."""
 
 Place = tuple[tuple[str, ...], str, str]

@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from bridges.core.fields import Rmf
 from bridges.log import pairs
 from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.network import static_peers
 from bridges.rmf.releases import RELEASES, Release
 from bridges.rmf.transport import Transport, TransportError
 
@@ -43,9 +44,10 @@ def open_transport(
     `ros_args`: `--ros-args` and what stood behind it on the command line.
     """
     domain = domain_id(rmf, os.environ)
-    loopback = localhost or stays_on_loopback(rmf, os.environ)
-    network = "localhost" if loopback else "subnet"
     speaks, reason = _choice(rmf)
+    peers = [] if speaks == "zenoh" else static_peers(os.environ)
+    loopback = localhost or stays_on_loopback(rmf, os.environ, peers)
+    network = "localhost" if loopback else "subnet"
     release = RELEASES.get(rmf.release)
     log.info(pairs("transport", speaks=speaks, domain_id=domain, network=network, reason=reason))
     node_name = re.sub(r"\W", "_", node_name, flags=re.ASCII)  # ROS knows no other characters
@@ -73,10 +75,11 @@ def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
     return int(text)
 
 
-def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str]) -> bool:
+def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str] = ()) -> bool:
     """Whether the YAML, ROS_LOCALHOST_ONLY or ROS_AUTOMATIC_DISCOVERY_RANGE asks for it.
 
-    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable.
+    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable, and LOCALHOST
+    reaches static `peers` all the same.
     """
     if rmf.network == "localhost" or environ.get("ROS_LOCALHOST_ONLY") == "1":
         return True
@@ -86,7 +89,7 @@ def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str]) -> bool:
             f"ROS_AUTOMATIC_DISCOVERY_RANGE is {text!r}: with it this node would find nobody, or it"
             " is not known. Use SUBNET or LOCALHOST"
         )
-    return text == "LOCALHOST"
+    return text == "LOCALHOST" and not peers
 
 
 def _choice(rmf: Rmf) -> tuple[str, str]:

@@ -2,7 +2,7 @@
 
 import logging
 import random as the_random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from random import Random
 
@@ -12,7 +12,14 @@ from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.lift import FAILS, LiftPlant
 from tests.site.building import CHARGERS, DOORS, FLOORS, LIFTS, Device, devices
-from tests.site.daemons import RIVAL, DeviceDaemon, GraphDaemon, RmfsSupervisor
+from tests.site.daemons import (
+    RIVAL,
+    DeviceDaemon,
+    GraphDaemon,
+    RmfsSupervisor,
+    rmfs_door_supervisor,
+    rmfs_lift_supervisor,
+)
 from tests.site.growth import Look, look
 from tests.site.laws import BOUND_S, Laws
 from tests.site.network import CLEAR, Air, Place
@@ -23,15 +30,27 @@ from tests.site.trouble import Ill, Ills, Mortal, Trouble, breakable, pressable
 ROBOTS = ("red", "green", "blue", "white", "black")
 WIND_DOWN_S = BOUND_S + 90.0
 """Before the end: nothing goes wrong any more, and every robot ends its tour."""
+SWEEP_S = 45.0
+"""Before the end: by then every robot is at home."""
 LOOK_EVERY_S = 5.0
 HOUR_S = 3600.0
 
 
-class Site:
-    """One seed's day. `run` raises `laws.Broken` when a law is broken."""
+SUPERVISORS = ("ours", "kilted", "jazzy")
+"""Whose supervisors a day has: ours, or RMF's own by the rules of a release."""
 
-    def __init__(self, seed: int) -> None:
+
+class Site:
+    """One seed's day. `run` raises `laws.Broken` when a law is broken.
+
+    `rmf`: one of SUPERVISORS; the seed decides when it is not given. The fleet adapters of a day with
+    ours are of either release.
+    """
+
+    def __init__(self, seed: int, rmf: str | None = None) -> None:
         self.seed = seed
+        self.rmf = rmf or SUPERVISORS[seed % len(SUPERVISORS)]
+        self.jazzy = self.rmf == "jazzy" or (self.rmf == "ours" and seed % 2 == 1)
         self.random = Random(seed)
         self.timeline = timeline = Timeline()
         self.ills = Ills(timeline)
@@ -40,11 +59,7 @@ class Site:
         self.air.watch = self.laws.heard
         self.devices = devices(timeline)
         self.daemons = {n: DeviceDaemon(timeline, self.air, d) for n, d in self.devices.items()}
-        self.supervisors = [
-            GraphDaemon(timeline, self.air, "lift_supervisor", LIFT_SUPERVISOR, wall_skew=1.5),
-            GraphDaemon(timeline, self.air, "lift_standby", LIFT_SUPERVISOR),
-            GraphDaemon(timeline, self.air, "door_supervisor", DOOR_SUPERVISOR),
-        ]
+        self.supervisors = self._rmfs() if self.rmf != "ours" else self._ours()
         self.robots = [self._robot(f"fleet/{name}") for name in ROBOTS]
         self.trouble = Trouble(
             timeline, self.ills, Random(self.random.random()), self._draw, self.laws.note
@@ -53,6 +68,18 @@ class Site:
         self._people = Random(self.random.random())
         self._people_at: dict[str, float] = {}
 
+    def _ours(self) -> list[GraphDaemon | RmfsSupervisor]:
+        timeline, air = self.timeline, self.air
+        return [
+            GraphDaemon(timeline, air, "lift_supervisor", LIFT_SUPERVISOR, wall_skew=1.5),
+            GraphDaemon(timeline, air, "lift_standby", LIFT_SUPERVISOR),
+            GraphDaemon(timeline, air, "door_supervisor", DOOR_SUPERVISOR),
+        ]
+
+    def _rmfs(self) -> list[GraphDaemon | RmfsSupervisor]:
+        lifts = rmfs_lift_supervisor(self.timeline, self.air, jazzy=self.jazzy)
+        return [lifts, rmfs_door_supervisor(self.timeline, self.air)]
+
     def run(self, hours: float, told: Callable[[Look], None] = lambda look: None) -> None:
         """All of it. `told`: each hour's look."""
         end = hours * HOUR_S
@@ -60,6 +87,7 @@ class Site:
         self._open()
         self.trouble.begin(until=end - WIND_DOWN_S)
         self.timeline.at(end - WIND_DOWN_S, self._wind_down)
+        self.timeline.at(end - SWEEP_S, self._sweep)
         with _silent():
             hour = 0
             while (hour := hour + 1) * HOUR_S < end:
@@ -119,6 +147,13 @@ class Site:
         for robot in self.robots:
             robot.homing = True
 
+    def _sweep(self) -> None:
+        """RMF's supervisors still hold what robots held whose adapters died: somebody restarts them."""
+        for supervisor in self.supervisors:
+            if isinstance(supervisor, RmfsSupervisor):
+                supervisor.kill()
+                supervisor.start()
+
     def _close(self) -> None:
         for robot in self.robots:
             self.laws.require(robot.at_rest, f"{robot.name} is not home: {robot.waits_for}")
@@ -132,7 +167,7 @@ class Site:
     def _speakers(self, topic: str) -> int:
         """How many there are, but for what a rival has just made of it."""
         speaking = [end.node.name for end in self.air.memory.publishers if end.topic.name == topic]
-        if RIVAL in speaking:
+        if RIVAL in speaking and self.rmf == "ours":
             return 1
         return len(speaking)
 
@@ -203,7 +238,7 @@ class Site:
         self.air.best_effort.add(name)
         places = Places(FLOORS, [*LIFTS], [*DOORS], [*CHARGERS])
         own = Random(self.random.random())
-        return Resident(self.timeline, self._join, self, name, own, places)
+        return Resident(self.timeline, self._join, self, name, own, places, jazzy=self.jazzy)
 
     def _join(self, name: str) -> Place:
         return Place(self.air, name, lambda: None)
@@ -215,9 +250,9 @@ class Site:
             self._lose_bus,
             self._restart,
             self._cut,
-            self._rival,
+            self._rival if self.rmf == "ours" else self._restart_rmfs,
         )
-        (draw,) = random.choices(sorts, (6, 4, 2, 4, 2, 0.5))
+        (draw,) = random.choices(sorts, (6, 4, 2, 4, 2, 0.5 if self.rmf == "ours" else 4))
         return draw(random)
 
     def _device(self, random: Random) -> Device:
@@ -225,21 +260,43 @@ class Site:
 
     def _rival(self, random: Random) -> Ill:
         """RMF's own lift supervisor is started as well, and stopped again."""
-        rival = RmfsSupervisor(self.timeline, self.air)
+        rival = rmfs_lift_supervisor(self.timeline, self.air, jazzy=self.jazzy)
 
         def begin() -> None:
             rival.start()
-            for name in LIFTS:
-                self.ills.begin(name, "rival")
-            for robot in self.robots:
-                self.laws.abandoned(robot.name)
+            self._distrust(LIFTS, "rival")
 
         def end() -> None:
             rival.kill()
-            for name in LIFTS:
-                self.ills.end(name, "rival")
+            self._trust(LIFTS, "rival")
 
         return Ill("rival", rival.name, "rival", begin, end, most_s=40.0)
+
+    def _restart_rmfs(self, random: Random) -> Ill:
+        """One of RMF's supervisors forgets everything, and may then speak for other robots."""
+        supervisor = random.choice([s for s in self.supervisors if isinstance(s, RmfsSupervisor)])
+        devices = LIFTS if supervisor.name == RIVAL else DOORS
+
+        def begin() -> None:
+            supervisor.kill()
+            self._distrust(devices, "supervisor")
+
+        def end() -> None:
+            supervisor.start()
+            self._trust(devices, "supervisor")
+
+        return Ill("supervisor", supervisor.name, "daemon", begin, end, least_s=0.2, most_s=20.0)
+
+    def _distrust(self, devices: Sequence[str], why: str) -> None:
+        """What is said for a robot now is not its own wish."""
+        for name in devices:
+            self.ills.begin(name, why)
+        for robot in self.robots:
+            self.laws.abandoned(robot.name)
+
+    def _trust(self, devices: Sequence[str], why: str) -> None:
+        for name in devices:
+            self.ills.end(name, why)
 
     def _break(self, random: Random) -> Ill:
         device = self._device(random)
@@ -303,7 +360,9 @@ class Site:
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:
-        sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.supervisors], [*self.robots]]
+        ours = [s for s in self.supervisors if isinstance(s, GraphDaemon)]
+        sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.robots], [*ours]]
+        sorts = [parties for parties in sorts if parties]
         party = random.choice(random.choice(sorts))
         skew_s = random.choice((0.0, 0.0, 0.0, 5.0, -5.0, 3600.0, -3600.0))
 

@@ -99,6 +99,7 @@ class Resident:
         random: Random,
         places: Places,
         pace: float = 1.0,
+        jazzy: bool = False,
     ) -> None:
         self.name = name
         self.floor = random.choice(places.floors)
@@ -119,6 +120,7 @@ class Resident:
         self._random = random
         self._places = places
         self._pace = pace
+        self._jazzy = jazzy
         self._alarm = Alarm(timeline, self._tick)
         self._until = NEVER
         self._awaits: Phase | None = None
@@ -133,7 +135,7 @@ class Resident:
     def start(self) -> None:
         """A new fleet adapter: it knows where its robot is, and nothing else."""
         self.alive = True
-        self.robot = Robot(self.name)
+        self.robot = Robot(self.name, self._jazzy)
         self.robot.in_car = self.in_car is not None
         self._place = self._join(self.name)
         published = (
