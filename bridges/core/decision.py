@@ -103,6 +103,11 @@ class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     publish: tuple[Said, ...] = ()
 
 
+RELEASED_LATELY = "released a moment ago"
+STARTING = "inputs settle after the start"
+EXPECTED = frozenset({RELEASED_LATELY, STARTING})
+"""Kinds of refusal that belong to every handover and every start: they are counted, and no warning."""
+
 LONGEST_DETAIL = 300
 
 

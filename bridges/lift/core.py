@@ -28,6 +28,8 @@ from typing import Any
 from msgspec.structs import replace
 
 from bridges.core.decision import (
+    RELEASED_LATELY,
+    STARTING,
     Decision,
     Fault,
     IoFailed,
@@ -177,11 +179,13 @@ def _ask(memory: Memory, request: Requested, now: float, limits: LiftLimits) -> 
         return replace(memory, session=session), ""
     if grace and now < grace.until:
         if grace.session.id != request.session_id:
-            return memory, f"released a moment ago: by {grace.session.id}"
+            return memory, f"{RELEASED_LATELY}: by {grace.session.id}"
         return replace(memory, session=_grant(request, now, grace.session.boarded), grace=None), ""
-    why_not = obstacles(memory, look(memory.senses, now, limits), now, limits)
+    view = look(memory.senses, now, limits)
+    why_not = obstacles(memory, view, now, limits)
     if why_not:
-        return memory, why_not[0].code
+        starting = view.settling and not memory.io_fault and why_not[0].code == NOT_FRESH
+        return memory, STARTING if starting else why_not[0].code
     return replace(memory, session=_grant(request, now, boarded=False), grace=None), ""
 
 
@@ -212,7 +216,7 @@ def _refresh(session: Session, request: Requested, now: float) -> Session:
 
 def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tuple[Memory, str]:
     held = memory.session
-    if held is None:
+    if held is None or not session_id:
         return memory, ""
     if held.id != session_id:
         session = forgotten.remembered(held, session_id)

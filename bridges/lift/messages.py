@@ -28,13 +28,14 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
     """The request as an event. Raises RequestRefused if it is malformed or asks for the impossible.
 
     An END_SESSION counts whatever its floor and door are: fleet adapters send "" and 0
-    (rmf_fleet_adapter RobotContext.cpp).
+    (rmf_fleet_adapter RobotContext.cpp). Jazzy's supervisor sends one without a session at each state
+    of a lift that nobody has (lift_supervisor/Node.cpp); it ends nothing.
     """
-    if not request.session_id:
-        raise RequestRefused("empty session_id", "a session needs a name")
     check_length(session_id=request.session_id)
     if request.request_type == LiftRequestType.REQUEST_END_SESSION:
         return Ended(request.session_id)
+    if not request.session_id:
+        raise RequestRefused("empty session_id", "a session needs a name")
     agv = request.request_type == LiftRequestType.REQUEST_AGV_MODE
     if not agv and request.request_type != LiftRequestType.REQUEST_HUMAN_MODE:
         raise RequestRefused("unknown request_type", str(request.request_type))

@@ -206,7 +206,7 @@ def rmfs_lift_supervisor(timeline: Timeline, air: Air, *, jazzy: bool = False) -
 
 def rmfs_door_supervisor(timeline: Timeline, air: Air) -> RmfsSupervisor:
     """rmf_door_supervisor."""
-    says = [DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT]
+    says: list[Topic[Any]] = [DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT]
     return RmfsSupervisor(timeline, air, "rmf_door_supervisor", DoorSupervisor, says)
 
 
