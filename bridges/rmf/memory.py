@@ -93,7 +93,7 @@ class _Publisher(Generic[M]):
         """Deliver at once. Raises CdrError for what could not be sent by wire either."""
         if self not in self._network.publishers:
             raise TransportError(f"topic {self.topic.name}: the node has left the graph")
-        cdr.encode(self.topic.type, message)
+        cdr.encode(self.topic.type, message, self.node.release)
         if self.topic.publish.durability == "transient_local":
             self.retained.append(message)
         for subscription in self._network.subscriptions:

@@ -214,10 +214,17 @@ class GraphDaemon:
     """Serves a kind that lives on the graph alone. `wall_skew`: its clock is ahead (s)."""
 
     def __init__(
-        self, timeline: Timeline, air: Air, name: str, kind: AnyGraphKind, wall_skew: float = 0.0
+        self,
+        timeline: Timeline,
+        air: Air,
+        name: str,
+        kind: AnyGraphKind,
+        wall_skew: float = 0.0,
+        settings: Any = None,
     ) -> None:
         self.name = name
         self.kind = kind
+        self._settings = settings or kind.settings()
         self.alive = False
         self._timeline = timeline
         self._air = air
@@ -231,7 +238,7 @@ class GraphDaemon:
         """A new one, which knows what it has kept."""
         self._place = Place(self._air, self.name, self._round)
         kept = self._disk if self.kind.persist else None
-        self.node = GraphNode(self.kind, self.kind.settings(), self._place, self._clock, kept=kept)
+        self.node = GraphNode(self.kind, self._settings, self._place, self._clock, kept=kept)
         self.alive = True
         self.node.subscribe()
         self._round()
@@ -241,6 +248,11 @@ class GraphDaemon:
         self.alive = False
         self._alarm.set(NEVER)
         self._place.close()
+
+    def reset(self) -> None:
+        """`rmf-bridge reset`."""
+        self.node.reset()
+        self._round()
 
     def summary(self) -> Mapping[str, Status]:
         """Each subject's status, as the status file has it."""

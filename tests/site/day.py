@@ -6,11 +6,14 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from random import Random
 
+from bridges.charger_coordinator import KIND as COORDINATOR
 from bridges.door_supervisor import KIND as DOOR_SUPERVISOR
 from bridges.lift_supervisor import KIND as LIFT_SUPERVISOR
+from bridges.rmf.releases import JAZZY, KILTED
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.lift import FAILS, LiftPlant
+from tests.site import charging
 from tests.site.building import CHARGERS, DOORS, FLOORS, LIFTS, Device, devices
 from tests.site.daemons import (
     RIVAL,
@@ -25,7 +28,7 @@ from tests.site.laws import BOUND_S, Laws
 from tests.site.network import CLEAR, Air, Place
 from tests.site.robots import Places, Resident
 from tests.site.timeline import Timeline
-from tests.site.trouble import Ill, Ills, Mortal, Trouble, breakable, pressable
+from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable, pressable
 
 ROBOTS = ("red", "green", "blue", "white", "black")
 WIND_DOWN_S = BOUND_S + 90.0
@@ -60,6 +63,13 @@ class Site:
         self.devices = devices(timeline)
         self.daemons = {n: DeviceDaemon(timeline, self.air, d) for n, d in self.devices.items()}
         self.supervisors = self._rmfs() if self.rmf != "ours" else self._ours()
+        self.air.release = JAZZY if self.jazzy else KILTED
+        self.charging = charging.settings(CHARGERS, ROBOTS)
+        self.coordinator = GraphDaemon(
+            timeline, self.air, "coordinator", COORDINATOR, settings=self.charging
+        )
+        self.coordinated = seed // len(SUPERVISORS) % 2 == 0
+        self.nodes = [*self.supervisors, *([self.coordinator] if self.coordinated else [])]
         self.robots = [self._robot(f"fleet/{name}") for name in ROBOTS]
         self.trouble = Trouble(
             timeline, self.ills, Random(self.random.random()), self._draw, self.laws.note
@@ -114,7 +124,7 @@ class Site:
             self.timeline.after(self.random.uniform(0.0, 2.0), daemon.start)
             assert name == daemon.name
         self.laws.speakers = self._speakers
-        parties: list[Mortal] = [*self.supervisors, *self.robots]
+        parties: list[Mortal] = [*self.nodes, *self.robots]
         for party in parties:
             self.timeline.after(self.random.uniform(2.0, 6.0), party.start)
         self.timeline.after(LOOK_EVERY_S, self._watch)
@@ -129,7 +139,17 @@ class Site:
         for robot in self.robots:
             if robot.alive and robot.waits_for:
                 self.laws.waits(robot.name, robot.waits_for, robot.since)
+        self._mend_queue()
         self.timeline.after(LOOK_EVERY_S, self._watch)
+
+    def _mend_queue(self) -> None:
+        """A technician who has seen to robots and stations that failed tells the coordinator so."""
+        told = (
+            [s["faults"] for s in self.coordinator.summary().values()] if self.coordinated else []
+        )
+        calm = self.ills.calm_since() + BY_RESET_S < self.timeline.now
+        if self.coordinated and self.coordinator.alive and calm and any(told):
+            self.coordinator.reset()
 
     def _live(self) -> None:
         """People use lifts and doors as well; that is no trouble."""
@@ -238,7 +258,10 @@ class Site:
         self.air.best_effort.add(name)
         places = Places(FLOORS, [*LIFTS], [*DOORS], [*CHARGERS])
         own = Random(self.random.random())
-        return Resident(self.timeline, self._join, self, name, own, places, jazzy=self.jazzy)
+        charge = charging.Charge(name.split("/")[1], self.charging) if self.coordinated else None
+        return Resident(
+            self.timeline, self._join, self, name, own, places, jazzy=self.jazzy, charge=charge
+        )
 
     def _join(self, name: str) -> Place:
         return Place(self.air, name, lambda: None)
@@ -252,7 +275,7 @@ class Site:
             self._cut,
             self._rival if self.rmf == "ours" else self._restart_rmfs,
         )
-        (draw,) = random.choices(sorts, (6, 4, 2, 4, 2, 0.5 if self.rmf == "ours" else 4))
+        (draw,) = random.choices(sorts, (6, 4, 2, 4, 2, 0.5 if self.rmf == "ours" else 8))
         return draw(random)
 
     def _device(self, random: Random) -> Device:
@@ -360,7 +383,7 @@ class Site:
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:
-        ours = [s for s in self.supervisors if isinstance(s, GraphDaemon)]
+        ours = [node for node in self.nodes if isinstance(node, GraphDaemon)]
         sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.robots], [*ours]]
         sorts = [parties for parties in sorts if parties]
         party = random.choice(random.choice(sorts))
@@ -381,7 +404,7 @@ class Site:
         return Ill("restart", party.name, "daemon", begin, end, least_s=0.2, most_s=20.0)
 
     def _cut(self, random: Random) -> Ill:
-        parties: list[Mortal] = [*self.daemons.values(), *self.supervisors, *self.robots]
+        parties: list[Mortal] = [*self.daemons.values(), *self.nodes, *self.robots]
         name = random.choice(parties).name
         lasts_s = random.choice((random.uniform(0.5, 9.0), random.uniform(11.0, 60.0)))
 
