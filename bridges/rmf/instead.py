@@ -28,6 +28,14 @@ def converted(message: Message) -> Message | None:
     return None
 
 
-def lacking(topic: AnyTopic) -> list[str]:
-    """The names of the releases without this topic's message."""
-    return [name for name, release in RELEASES.items() if not release.has(topic.type)]
+def told(topic: AnyTopic, wanted: str) -> list[str]:
+    """What a person is told of a topic that is sent on; `wanted`: the YAML's `release`."""
+    names = RELEASES if wanted == "auto" else [wanted]
+    way = (
+        f"goes out on {INSTEAD[topic.name].name}" if topic.name in INSTEAD else "goes into the log"
+    )
+    return [
+        f"RMF's {name} has no {topic.type.__name__}: there what is for {topic.name} {way}"
+        for name in names
+        if not RELEASES[name].has(topic.type)
+    ]

@@ -6,9 +6,10 @@ from typing import Any
 import pytest
 
 from bridges.core.fields import Zenoh
-from bridges.rmf.choose import missing_of_dds
+from bridges.rmf.choose import missing_of_dds, missing_of_ros
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.releases import NEWEST, Release
+from bridges.rmf.ros_types import installed
 from bridges.rmf.transport import Transport
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf.domains import domain_of_this_run
@@ -21,6 +22,9 @@ if missing_of_dds():
         "test_network.py",
         "test_wires.py",
     ]
+
+RELEASE = NEWEST if missing_of_ros() else installed()
+"""What the tests speak: where ROS is installed, its release on every wire."""
 
 Join = Callable[[str], Transport]
 """Open a node of this name on the graph of this test."""
@@ -86,7 +90,7 @@ def observer(join_dds: Join) -> Iterator[Any]:
     gc.collect()
 
 
-def joining(transport: str, domain: int, release: Release | None = NEWEST) -> Join:
+def joining(transport: str, domain: int, release: Release | None = RELEASE) -> Join:
     """What opens nodes of this transport in this domain, on loopback."""
 
     def join(name: str) -> Transport:

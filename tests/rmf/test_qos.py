@@ -8,10 +8,9 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import Topic
-from tests.rmf import peer
 from tests.rmf.golden_qos import GOLDEN, PLAIN, RETAINED, Qos
 
-TOPICS = {topic.name: topic for topic in peer.TOPICS.values()}
+TOPICS = {topic.name: topic for topic in vars(topics).values() if isinstance(topic, Topic)}
 
 
 def typed(qos: topics.Qos) -> Qos:

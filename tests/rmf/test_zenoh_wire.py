@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given
 
 from bridges.rmf import definitions as d
-from bridges.rmf.releases import NEWEST
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf import peer
-from tests.rmf.conftest import ZENOH, joining
+from tests.rmf.conftest import RELEASE, ZENOH, joining
 from tests.rmf.values import repeatable, values
 from tests.waiting import wait_until
 
@@ -24,7 +23,7 @@ class Here:
     def __init__(self, way: str, domain: int) -> None:
         self.way, self.domain = way, domain
         self.node = ZenohTransport(
-            "here", domain, loopback=True, settings=ZENOH[way], release=NEWEST
+            "here", domain, loopback=True, settings=ZENOH[way], release=RELEASE
         )
 
 

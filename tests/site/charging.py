@@ -30,7 +30,7 @@ def waits_at(robot: str) -> str:
 
 
 class Charge:
-    """What a fleet adapter tells of its robot. `place`: the waypoint where it stands, "" on the road."""
+    """What a fleet adapter tells of its robot. `place`: the waypoint where it is, "" on the road."""
 
     def __init__(self, robot: str, known: Settings) -> None:
         self.robot = robot
