@@ -9,6 +9,10 @@ from collections.abc import Container
 from bridges import __version__
 
 COMMANDS = {
+    "init": (
+        "write a first YAML for the device in front of you",
+        "init my_lift.yaml --kind lift --wiring gpio --floors L1,L2,L3 --yes",
+    ),
     "run": (
         "serve a device, from its YAML, until SIGTERM or SIGINT",
         "run my_lift.yaml --simulate",
@@ -29,6 +33,10 @@ COMMANDS = {
     ),
     "release": ("end the session of whoever holds a lift", "release Lift1"),
     "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
+    "walk": (
+        "try every wire of a device with the electrician, and sign what was seen",
+        "walk my_lift.yaml --device Lift1",
+    ),
     "press": (
         "in a simulation: a person or the building acts",
         "press my_lift.yaml fire_alarm on",
