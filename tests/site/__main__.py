@@ -47,7 +47,7 @@ def _failed(site: Site, why: str, options: argparse.Namespace) -> int:
         _print(f"{at:12.3f}  {line}")
     _print(f"wrong now: {', '.join(site.ills.all()) or 'nothing'}")
     _print(f"BROKEN {why}")
-    _print(f"again: make soak SEED={site.seed} HOURS={options.hours:g}")
+    _print(f"again: make soak SEED={site.seed} HOURS={options.hours:g} RMF={site.rmf}")
     return 1
 
 
