@@ -165,6 +165,7 @@ class Daemon:
             "kind": self._config.kind,
             **self._about(),
             "transport": self._transport.speaks,
+            "release": self._transport.release.name,
             "domain_id": self._domain_id,
             "samples_dropped": dict(self._transport.dropped),
             "predecessor_not_off": self._predecessor.left() if self._predecessor else [],
