@@ -33,6 +33,9 @@ from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable
 ROBOTS = ("red", "green", "blue", "white", "black")
 WIND_DOWN_S = BOUND_S + 90.0
 """Before the end: nothing goes wrong any more, and every robot ends its tour."""
+ADOPTS_S = 5.0
+"""After its restart RMF's supervisor ends the session that it is shown, and takes up who asks next. If
+that is not the robot in the car, another is let in beside it, which only RMF can mend."""
 SWEEP_S = 45.0
 """Before the end: by then every robot is at home."""
 LOOK_EVERY_S = 5.0
@@ -300,13 +303,20 @@ class Site:
         supervisor = random.choice([s for s in self.supervisors if isinstance(s, RmfsSupervisor)])
         devices = LIFTS if supervisor.name == RIVAL else DOORS
 
+        why = f"supervisor {random.random()}"  # two restarts may follow one another closely
+
         def begin() -> None:
             supervisor.kill()
-            self._distrust(devices, "supervisor")
+            self._distrust(devices, why)
 
         def end() -> None:
             supervisor.start()
-            self._trust(devices, "supervisor")
+            self._distrust((), "")
+            self.timeline.after(ADOPTS_S, again)
+
+        def again() -> None:
+            self._distrust((), "")
+            self._trust(devices, why)
 
         return Ill("supervisor", supervisor.name, "daemon", begin, end, least_s=0.2, most_s=20.0)
 
