@@ -8,7 +8,7 @@ from tests.site.day import Site
 from tests.site.growth import Look, growth
 from tests.site.laws import Broken
 
-MINUTES = depth(8, 20)
+MINUTES = depth(10, 20)
 
 
 @pytest.mark.long
