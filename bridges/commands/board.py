@@ -4,10 +4,11 @@ RMF's states have no field for faults, queues and simulations. Our daemons publi
 `/diagnostics`.
 """
 
+import json
 import re
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Final
 
 from bridges.commands.graph import SILENT_AFTER_S, Heard
@@ -247,7 +248,14 @@ def change_line(row: Row, wall: float) -> str:
     return "  ".join(parts)
 
 
-def repaint(rows: list[Row], lines_before: int, columns: int, lines: int) -> tuple[str, int]:
+def json_line(row: Row, wall: float) -> str:
+    """A changed row as one line of JSON, with the time of the change (s since the epoch)."""
+    return json.dumps({"at": round(wall, 3), **asdict(row)})
+
+
+def repaint(
+    rows: list[Row], lines_before: int, columns: int, lines: int, *, coloured: bool = True
+) -> tuple[str, int]:
     """The text that redraws a terminal showing `lines_before` lines of the table, and the new number
     of lines. No line wraps and nothing scrolls away.
     """
@@ -258,5 +266,6 @@ def repaint(rows: list[Row], lines_before: int, columns: int, lines: int) -> tup
     text = f"\x1b[{lines_before}A" if lines_before else ""
     for i, line in enumerate(shown):
         line = line[: columns - 1]
-        text += f"\r\x1b[K\x1b[31m{line}\x1b[0m\n" if i in marked else f"\r\x1b[K{line}\n"
+        red = coloured and i in marked
+        text += f"\r\x1b[K\x1b[31m{line}\x1b[0m\n" if red else f"\r\x1b[K{line}\n"
     return text + "\x1b[J", len(shown)
