@@ -92,12 +92,12 @@ class Board:
     """The latest state and diagnosis of each device."""
 
     def __init__(self) -> None:
-        self._latest: dict[tuple[str, str], Heard] = {}
+        self._latest: dict[tuple[str, str], Heard[words.Stated]] = {}
         self._requesters: dict[str, str] = {}
         self._places: dict[str, str] = {}
         self._diagnoses: dict[str, Diagnosis] = {}
 
-    def take(self, heard: Heard) -> None:
+    def take(self, heard: Heard[d.Message]) -> None:
         """Take one message that was heard."""
         match heard.message:
             case d.SupervisorHeartbeat():
@@ -112,9 +112,9 @@ class Board:
             case d.DiagnosticArray():
                 for status in heard.message.status:
                     self._diagnose(status, heard.at)
-            case state:
+            case d.LiftState() | d.DoorState() | d.ChargerState() as state:
                 key = (KINDS[type(state)], words.device(state))
-                self._latest[key] = heard
+                self._latest[key] = Heard(state, heard.at)
 
     def rows(self, now: float, wall: float) -> list[Row]:
         """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
@@ -133,7 +133,9 @@ class Board:
         ):
             self._diagnoses[status.name] = diagnosis
 
-    def _device(self, kind: str, name: str, heard: Heard, now: float, wall: float) -> Row:
+    def _device(
+        self, kind: str, name: str, heard: Heard[words.Stated], now: float, wall: float
+    ) -> Row:
         state = heard.message
         found = [
             one for one in self._current(now) if one.device == (kind, name) and not one.of_daemon
@@ -191,7 +193,7 @@ def _faults(found: Iterable[Diagnosis]) -> str:
     return words.printable("; ".join(dict.fromkeys(texts)))
 
 
-def _order(entry: tuple[tuple[str, str], Heard]) -> tuple[int, str]:
+def _order(entry: tuple[tuple[str, str], Heard[words.Stated]]) -> tuple[int, str]:
     (kind, name), _ = entry
     return list(KINDS.values()).index(kind), name
 
@@ -205,7 +207,7 @@ def _age(stamped_at: float, wall: float) -> str:
     return f"{age / 60:.0f} min" if age < 7200 else f"{age / 3600:.0f} h"
 
 
-def _mark(heard: Heard, now: float, wall: float) -> str:
+def _mark(heard: Heard[words.Stated], now: float, wall: float) -> str:
     silent_s = now - heard.at
     age = wall - words.stamped_at(heard.message)
     if silent_s > SILENT_AFTER_S:

@@ -1,6 +1,6 @@
 """When `send` sends, when it ends, and what it says when the request has no effect.
 
-Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as RMF does.
+Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as in RMF.
 Only a state heard after the first request counts: an earlier one may show the same for another
 reason. What each request asks for, and what fulfils it, is in `requests/`.
 """
@@ -69,7 +69,7 @@ def _reason(request: Request, seen: Seen, now: float) -> str:
     if silent_s > SILENT_AFTER_S:
         return f"{request.name} fell silent {silent_s:.0f} s ago: is its daemon still running?"
     obstacle = _first(request.obstacles(seen))
-    state = words.described(seen.latest())
+    state = words.described(seen.states[-1].message)
     return _said(obstacle._replace(text=f"{obstacle.text} (last state: {state})"))
 
 

@@ -10,12 +10,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any
+from typing import Generic, TypeVar
 
 import msgspec
 
 from bridges.core.fields import Rmf
 from bridges.rmf import words
+from bridges.rmf.definitions import Message
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Transport, TransportError
 
@@ -135,11 +136,14 @@ def command_line(args: argparse.Namespace) -> CommandLine:
     return CommandLine(tuple(args.typed), tuple(options))
 
 
+M_co = TypeVar("M_co", bound=Message, covariant=True)
+
+
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Heard(Generic[M_co]):
     """A message and when it arrived (monotonic s)."""
 
-    message: Any
+    message: M_co
     at: float
 
 
@@ -152,15 +156,15 @@ class Inbox:
         *topics: AnyTopic,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._waiting: SimpleQueue[Heard] = SimpleQueue()
+        self._waiting: SimpleQueue[Heard[Message]] = SimpleQueue()
         self._clock = clock
         for topic in topics:
             transport.subscribe(topic, self._received)
 
-    def _received(self, message: Any) -> None:
+    def _received(self, message: Message) -> None:
         self._waiting.put(Heard(message, self._clock()))
 
-    def listen(self, timeout_s: float) -> list[Heard]:
+    def listen(self, timeout_s: float) -> list[Heard[Message]]:
         """Everything that has arrived, in order; waits up to `timeout_s` for the first."""
         heard = []
         try:

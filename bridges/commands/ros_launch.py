@@ -5,9 +5,8 @@ the launch files in `ros/launch/`, one for each kind, import this module; it nee
 """
 
 from pathlib import Path
-from typing import Any
 
-from launch import LaunchDescription
+from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
@@ -33,7 +32,7 @@ def daemon(kind: str) -> LaunchDescription:
     )
 
 
-def _actions(kind: str, context: Any) -> list[Any]:
+def _actions(kind: str, context: LaunchContext) -> list[Node]:
     file = str(Path(LaunchConfiguration("config").perform(context)).absolute())
     simulate = LaunchConfiguration("simulate").perform(context) == "true"
     _check(kind, file)
@@ -52,7 +51,7 @@ def _check(kind: str, file: str) -> None:
         )
 
 
-def _rmf_bridge(*arguments: str) -> Any:
+def _rmf_bridge(*arguments: str) -> Node:
     return Node(
         package="rmf_bridges", executable="rmf-bridge", arguments=arguments, output="screen"
     )

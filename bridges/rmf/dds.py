@@ -262,7 +262,7 @@ class DdsTransport:
 
 
 def _shared_domain(domain_id: int, configuration: str) -> Domain:
-    """The domain of this process with this configuration. Cyclone allows one, so participants share it."""
+    """This process's domain with this configuration. Cyclone allows only one: participants share it."""
     key = domain_id, configuration
     with _domains_lock:
         domain = _domains.get(key)

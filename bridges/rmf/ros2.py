@@ -211,7 +211,7 @@ class _Publisher:
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
     def matched(self) -> int:
-        """How many subscriptions are reached; 0 after close. Own ones that it must skip do not count."""
+        """How many subscriptions are reached, without own ones that it must skip; 0 after close."""
         try:
             count = int(self.end.get_subscription_count())
         except RuntimeError:

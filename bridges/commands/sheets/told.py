@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Sequence
-from typing import Any
 
 import msgspec
 
@@ -110,7 +109,7 @@ def _device(config: Config, name: str) -> Part:
     return Part(device=name, bus=bus, tables=[table for table in tables if table.rows])
 
 
-def _settings(settings: Any) -> Table:
+def _settings(settings: object) -> Table:
     """Durations and choices; the bus is told already, and accepted wires by a warning."""
     rows = (row for row in choices_of(settings) if row[0] not in ("bus", "driver", "accept_unsafe"))
     return Table("settings", SETTINGS, tuple(rows))
