@@ -6,7 +6,6 @@ A file in `config/` or a profile shows a value that works at a site; so examples
 import functools
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import yaml
@@ -21,7 +20,7 @@ from drivers.profiles import Profile
 CONFIG = Path(drivers.__file__).parents[1] / "config"
 LONGEST = 72
 
-WRITTEN: dict[str, Any] = {
+WRITTEN: dict[str, object] = {
     "topics": {"lift_states": "ward/lift_states"},
     "connect": ["tcp/192.168.1.10:7447"],
     "listen": ["tcp/0.0.0.0:7447"],
@@ -137,13 +136,13 @@ def _is_numbered(info: mi.Type) -> bool:
     return isinstance(key.type if isinstance(key, mi.Metadata) else key, mi.IntType)
 
 
-def _by_type(field: mi.Field) -> Any:
+def _by_type(field: mi.Field) -> object:
     if isinstance(field.default, str | int | float) and not isinstance(field.default, bool):
         return field.default
     return _any_of(field.type, field)
 
 
-def _any_of(info: mi.Type, field: mi.Field) -> Any:
+def _any_of(info: mi.Type, field: mi.Field) -> object:
     """Some value that may stand there."""
     match info:
         case mi.Metadata(type=part):

@@ -5,7 +5,7 @@ YAML, and a number must be written unambiguously (`scalars.py`).
 """
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec.inspect import (
@@ -30,7 +30,8 @@ from bridges.settings.nodes import either, is_plain, nearest, shown
 from bridges.settings.scalars import TRUTHS, number, reads_as, whole_number
 from bridges.settings.slips import has_unit, number_meant
 
-Extra = Mapping[str, Any]
+Extra = Mapping[str, str]
+"""What a field's `Meta(extra=…)` says: its `unit`, its `pattern` in words, its `check`."""
 
 
 class Wrong(Exception):
@@ -101,7 +102,7 @@ def _rank(wanted: Type) -> int:
     return isinstance(wanted.type if isinstance(wanted, Metadata) else wanted, StrType)
 
 
-def _annotation(wanted: Type) -> Any:
+def _annotation(wanted: Type) -> object:
     """The type that msgspec described, with its bounds, for `convert`."""
     if isinstance(wanted, EnumType):
         return wanted.cls

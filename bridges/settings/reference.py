@@ -8,7 +8,6 @@ import inspect
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 from msgspec import inspect as mi
@@ -19,6 +18,9 @@ from bridges.settings import names as named
 from bridges.settings.examples import example, flow
 from bridges.settings.leaves import Extra, choices, wanted_text
 from drivers.driver_type import AnyDriver
+
+Schema = dict[str, object]
+"""A JSON Schema."""
 
 KEYS = r"(?:^|(?<=[.;]\s))((?:`\w+`(?:,\s)?)+): "
 MEANING = re.compile(rf"{KEYS}(.*?)(?={KEYS}|\Z)", re.M | re.S)
@@ -48,11 +50,11 @@ def graph_kinds() -> list[AnyGraphKind]:
     return [kind for kind in kinds if isinstance(kind, GraphKind)]
 
 
-def schema() -> dict[str, Any]:
+def schema() -> Schema:
     """JSON Schema (2020-12) of a device YAML, for editors."""
     buses = {name: named.bus_called(name).settings for name in named.bus_types()}
     graph = [kind.settings for kind in graph_kinds()]
-    types = [Rmf, *buses.values(), *(shape.type.settings for shape in shapes()), *graph]
+    types: list[type] = [Rmf, *buses.values(), *(shape.type.settings for shape in shapes()), *graph]
     refs, components = msgspec.json.schema_components(types, ref_template="#/$defs/{name}")
     by_type = dict(zip(types, refs, strict=True))
     for bus in buses.values():
@@ -68,13 +70,13 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _allow_type(components: dict[str, Any], ref: dict[str, Any]) -> None:
+def _allow_type(components: dict[str, dict[str, dict[str, object]]], ref: Schema) -> None:
     """A bus's `type:` is read before its struct, and is not one of its fields."""
-    component = components[ref["$ref"].rsplit("/", 1)[1]]
+    component = components[str(ref["$ref"]).rsplit("/", 1)[1]]
     component["properties"].setdefault("type", {"type": "string"})
 
 
-def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[str, Any]:
+def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> Schema:
     """A file with this driver; a device may name another driver of the kind."""
     of_kind = [other for other in shapes() if other.kind == shape.kind]
     kinds_of_bus = [
@@ -103,13 +105,13 @@ def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[
     }
 
 
-def _named_by_device(driver: Shape, of_file: Shape) -> dict[str, Any]:
+def _named_by_device(driver: Shape, of_file: Shape) -> Schema:
     """Only the file's own driver need not be named by a device."""
     required = [] if driver == of_file else ["driver"]
     return {"required": required, "properties": {"driver": {"const": driver.driver}}}
 
 
-def _graph_file(kind: AnyGraphKind, by_type: dict[Any, Any]) -> dict[str, Any]:
+def _graph_file(kind: AnyGraphKind, by_type: dict[type, Schema]) -> Schema:
     return {
         "type": "object",
         "additionalProperties": False,

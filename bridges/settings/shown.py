@@ -4,7 +4,6 @@ Wires, maps and code tables are left out: their drivers tell them (`drivers/driv
 """
 
 from collections.abc import Iterator
-from typing import Any
 
 import msgspec
 from msgspec import inspect as mi
@@ -72,7 +71,7 @@ def _unit(info: mi.Type) -> str:
     return ""
 
 
-def _text(value: Any, unit: str) -> str:
+def _text(value: object, unit: str) -> str:
     value = getattr(value, "value", value)
     if value is None or value in ([], {}):
         return "-"

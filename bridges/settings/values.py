@@ -6,7 +6,8 @@ The structs, with their bounds and units, remain the only description of a file'
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from enum import Enum
+from typing import Final, TypeVar, overload
 
 from msgspec import inspect
 from msgspec.inspect import (
@@ -28,8 +29,16 @@ from bridges.settings.scalars import is_null, is_null_word
 VERBS = ("is", "has", "needs", "must", "says")
 """A problem that begins with one of these is said of the key that it points to."""
 
-BROKEN = object()
-"""Stands for a value that could not be made."""
+T = TypeVar("T")
+
+
+class Broken(Enum):
+    """The type of BROKEN, which stands for a value that could not be made."""
+
+    BROKEN = "broken"
+
+
+BROKEN: Final = Broken.BROKEN
 
 _LISTS = (ListType, VarTupleType)
 _MAPPINGS = (DictType, StructType)
@@ -120,7 +129,13 @@ class Values:
         self._checks = checks or {}
         self.structs: list[tuple[tuple[str, ...], object]] = []
 
-    def make(self, cls: Any, spot: Spot, besides: tuple[str, ...] = ()) -> Any:
+    @overload
+    def make(self, cls: type[T], spot: Spot, besides: tuple[str, ...] = ()) -> T | Broken: ...
+
+    @overload
+    def make(self, cls: object, spot: Spot, besides: tuple[str, ...] = ()) -> object: ...
+
+    def make(self, cls: object, spot: Spot, besides: tuple[str, ...] = ()) -> object:
         """Convert a node to a `cls` (a type, or msgspec's description of one); BROKEN if it fails.
 
         `besides`: keys of it that are read elsewhere.
