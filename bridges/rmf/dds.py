@@ -66,6 +66,8 @@ class DdsTransport:
     again what they retain. Raises TransportError when the domain cannot be joined.
     """
 
+    speaks = "dds"
+
     def __init__(self, node_name: str, domain_id: int, *, loopback: bool) -> None:
         self.name = node_name
         self.dropped: dict[str, int] = {}

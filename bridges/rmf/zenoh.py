@@ -50,6 +50,8 @@ class ZenohTransport:
     when no session can be opened. It is no error that no other node answers yet.
     """
 
+    speaks = "zenoh"
+
     def __init__(
         self, node_name: str, domain_id: int, *, loopback: bool, settings: Zenoh | None = None
     ) -> None:
