@@ -14,9 +14,9 @@ from typing import Generic, TypeVar
 
 import msgspec
 
-from bridges.core.fields import Rmf
 from bridges.rmf import words
 from bridges.rmf.definitions import Message
+from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Transport, TransportError
 

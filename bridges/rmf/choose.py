@@ -11,9 +11,9 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 
-from bridges.core.fields import Rmf
 from bridges.log import pairs
 from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport, TransportError
 
 log = logging.getLogger(__name__)

@@ -9,8 +9,8 @@ import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from bridges.core.fields import Rmf
 from bridges.log import pairs
+from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import TransportError
 
 log = logging.getLogger(__name__)

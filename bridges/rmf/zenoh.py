@@ -25,9 +25,9 @@ from typing import Final
 import zenoh
 from zenoh.handlers import Callback
 
-from bridges.core.fields import Zenoh
 from bridges.log import pairs
 from bridges.rmf import addresses, notices, zenoh_config
+from bridges.rmf.settings import Zenoh
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
 from bridges.rmf.zenoh_config import Configuration

@@ -7,8 +7,8 @@ Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's D
 import re
 from typing import Final
 
-from bridges import regular_file, secret_file
-from bridges.core.fields import Zenoh, ZenohTls
+from bridges import user_files
+from bridges.rmf.settings import Zenoh, ZenohTls
 from bridges.rmf.transport import TransportError
 
 Configuration = dict[str, object]
@@ -69,7 +69,7 @@ def on_the_site(zenoh: Zenoh) -> Configuration:
         wanted["connect/timeout_ms"] = 0  # do not wait for a router when a client's session opens
     try:
         return wanted | _tls(zenoh.tls) | _user(zenoh)
-    except secret_file.SecretError as error:
+    except user_files.SecretError as error:
         raise TransportError(str(error)) from None
 
 
@@ -93,7 +93,7 @@ def _tls(tls: ZenohTls | None) -> Configuration:
     if tls.ca:
         wanted["root_ca_certificate"] = _readable("ca", tls.ca)
     if tls.certificate and tls.private_key:
-        secret_file.content("private_key", tls.private_key)
+        user_files.secret("private_key", tls.private_key)
         certificate = _readable("certificate", tls.certificate)
         for side in ("connect", "listen"):
             wanted[f"{side}_certificate"] = certificate
@@ -104,7 +104,7 @@ def _tls(tls: ZenohTls | None) -> Configuration:
 
 def _readable(name: str, file: str) -> str:
     try:
-        regular_file.read(file, 0)
+        user_files.read(file, 0)
         return file
     except OSError as error:
         raise TransportError(f"{name} {file} cannot be read: {error.strerror}") from None
@@ -113,7 +113,7 @@ def _readable(name: str, file: str) -> str:
 def _user(zenoh: Zenoh) -> Configuration:
     if zenoh.user is None or zenoh.password_file is None:
         return {}
-    password = secret_file.one_line("password_file", zenoh.password_file, "password")
+    password = user_files.secret_line("password_file", zenoh.password_file, "password")
     return {
         "transport/auth/usrpwd/user": zenoh.user,
         "transport/auth/usrpwd/password": password,

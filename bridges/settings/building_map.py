@@ -18,13 +18,11 @@ from dataclasses import dataclass
 
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
+from bridges.core.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
 from bridges.settings.nodes import Page, Sort, compose, read
 
 MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)
 """Some seconds' worth of reading: what is longer is refused at once."""
-
-FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
-"""What a name on the map can name."""
 
 Lines = dict[str, int]
 """Name -> the line of its first occurrence."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bridges.core.fields import Rmf
+from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.nodes import Problem
 from drivers.driver_type import AnyDriver

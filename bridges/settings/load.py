@@ -2,7 +2,7 @@
 
     kind: lift              a folder of bridges/ that holds a KIND
     driver: dry_contact     a file of drivers/<kind>/; a device may name another as its own `driver:`
-    rmf: {...}              bridges.core.fields.Rmf
+    rmf: {...}              bridges.rmf.settings.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
     lifts: {name: {...}}    the kind's own key; what each holds is the driver's `settings`
 
@@ -17,9 +17,10 @@ from pathlib import Path
 import msgspec
 from yaml import MappingNode, Node, ScalarNode
 
-from bridges.core.fields import DeviceSettings, Name, Rmf
+from bridges.core.fields import DeviceSettings, Name
 from bridges.core.graph_kind import AnyGraphKind, AnyKind, GraphKind
 from bridges.rmf import topics
+from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config

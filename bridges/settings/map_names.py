@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Place
+from bridges.core.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT, Place
 from bridges.settings import names as named
-from bridges.settings.building_map import CHARGER, FLOOR, LIFT, WAYPOINT, BuildingMap
+from bridges.settings.building_map import BuildingMap
 from bridges.settings.load import Config
 from bridges.settings.nodes import Page, Problem, compose, nearest, shown
 from bridges.settings.values import Spot, locate
@@ -25,7 +25,7 @@ def places(config: Config) -> list[Place]:
     all_places: list[Place] = []
     for name, settings in config.devices.items():
         top = (kind.devices_key, name)
-        if config.kind in (LIFT, "door", CHARGER):
+        if config.kind in (LIFT, DOOR, CHARGER):
             all_places.append((top, config.kind, name))
         all_places += [((*top, *path), what, n) for path, what, n in kind.on_map(settings)]
     return all_places

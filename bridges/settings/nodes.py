@@ -15,7 +15,7 @@ import yaml
 from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNode, SequenceNode
 from yaml.reader import ReaderError
 
-from bridges import regular_file
+from bridges import user_files
 from bridges.settings import slips
 
 MAX_DEPTH = 32
@@ -169,7 +169,7 @@ def _children(node: Node | None) -> Iterator[Node]:
 def read(file: str, sort: Sort = DEVICE) -> bytes:
     """The file's bytes. Raises SettingsError if it is unreadable or too long."""
     try:
-        text = regular_file.read(file, sort.max_bytes).content
+        text = user_files.read(file, sort.max_bytes).content
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SettingsError([Problem(file, 1, 1, f"cannot be read: {reason}")]) from None

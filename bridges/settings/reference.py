@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import msgspec
 from msgspec import inspect as mi
 
-from bridges.core.fields import Rmf
 from bridges.core.graph_kind import AnyGraphKind, GraphKind
+from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.examples import example, flow
 from bridges.settings.leaves import Extra, choices, wanted_text

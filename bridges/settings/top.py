@@ -5,8 +5,8 @@ from typing import Final
 from msgspec.inspect import LiteralType
 from msgspec.structs import fields
 
-from bridges.core.fields import Rmf
 from bridges.core.graph_kind import AnyKind, GraphKind
+from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.nodes import either
 from bridges.settings.values import BROKEN, Entry, Values

@@ -46,7 +46,10 @@ def test_a_part_fails_and_is_mended(plant: LiftPlant, tmp_path: Path) -> None:
     ("words", "answer"),
     [
         (("press", "fire"), "Lift1 has no 'fire' to press; there are fire_alarm, code_blue"),
-        (("fail", "rope", "stuck"), "Lift1 has no part 'rope'; there are agv_mode, agv_mode_request"),
+        (
+            ("fail", "rope", "stuck"),
+            "Lift1 has no part 'rope'; there are agv_mode, agv_mode_request",
+        ),
         (("fail", "car", "garbage"), "car does not fail by 'garbage', but by off, stuck"),
         (("press", "fire_alarm", "--device", "Lift2"), "no device 'Lift2'; there are Lift1"),
     ],

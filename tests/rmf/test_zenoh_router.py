@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 import trustme
 
-from bridges.core.fields import Zenoh, ZenohTls
 from bridges.rmf import addresses, zenoh_config
 from bridges.rmf import definitions as d
+from bridges.rmf.settings import Zenoh, ZenohTls
 from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_STATES
 from bridges.rmf.transport import TransportError
 from bridges.rmf.zenoh import ZenohTransport
