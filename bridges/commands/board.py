@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from bridges.commands.columns import aligned
 from bridges.commands.graph import SILENT_AFTER_S, Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import words
@@ -228,9 +229,7 @@ def table(rows: Iterable[Row]) -> list[str]:
         for heading, *cells in zip(HEADINGS, *shown, strict=True)
         if heading not in optional or any(cells)
     ]
-    widths = [max(map(len, column)) for column in columns]
-    lines = zip(*columns, strict=True)
-    return ["  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in lines]
+    return aligned([*zip(*columns, strict=True)])
 
 
 def changes(before: list[Row], after: list[Row]) -> list[Row]:

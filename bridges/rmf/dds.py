@@ -30,11 +30,10 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.log import pairs
-from bridges.rmf import network, notices
+from bridges.rmf import addresses, cyclone, notices
 from bridges.rmf.dds_ends import DdsPublisher, DdsSubscription
 from bridges.rmf.graph import NodeOnGraph
 from bridges.rmf.idl import sample_type
-from bridges.rmf.loopback import LOOPBACK
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
 
@@ -48,7 +47,8 @@ CANNOT_JOIN: Final = (
 )
 LOOK_EVERY_S: Final = 1.0
 LOOK_EVERY_NS: Final = 1_000_000_000
-"""How often to look whether the network has changed."""
+"""How often to look whether the network has changed. Cyclone looks for an interface only once, when a
+node joins: with only `lo` up it stays there forever, and it never notices a changed address."""
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
 ERRORS: Final = 1 | 2
 """What Cyclone may log: errors, also fatal ones. It would warn of each malformed datagram, and anybody
@@ -83,7 +83,7 @@ class DdsTransport:
         self._stop = threading.Event()
         self._joined = False
         self._look_at = -math.inf
-        self._addresses: network.Addresses = frozenset()
+        self._addresses: addresses.Addresses = frozenset()
         try:
             with self._reporting(f"{CANNOT_JOIN} {domain_id}"):
                 self._join()
@@ -139,8 +139,8 @@ class DdsTransport:
         self._delete_entities()
 
     def _join(self) -> None:
-        self._addresses = network.addresses()
-        wanted = LOOPBACK if self._loopback else network.configuration(os.environ)
+        self._addresses = addresses.addresses()
+        wanted = cyclone.LOOPBACK if self._loopback else cyclone.configuration(os.environ)
         self._domain = _shared_domain(self._domain_id, wanted)
         userdata = Qos(Policy.Userdata(b"enclave=/;"))
         self._participant = self._keep(DomainParticipant(self._domain_id, qos=userdata))
@@ -157,7 +157,7 @@ class DdsTransport:
         if now < self._look_at or (self._loopback and self._joined):
             return
         self._look_at = now + LOOK_EVERY_S
-        found = network.addresses()
+        found = addresses.addresses()
         if found != self._addresses:
             log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
             self._join_anew()

@@ -32,8 +32,8 @@ from rclpy.qos import (
 
 from bridges.log import pairs
 from bridges.rmf import cdr, notices, topics
+from bridges.rmf.cyclone import LOOPBACK
 from bridges.rmf.definitions import Message
-from bridges.rmf.loopback import LOOPBACK
 from bridges.rmf.ros_types import ros_type
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, Receive, TransportError, any_type

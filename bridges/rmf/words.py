@@ -15,7 +15,7 @@ Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel
 
 
 def printable(text: str) -> str:
-    """The text with every control character spelt out, so that no name can move the cursor."""
+    """The text on one line, with control characters escaped, so that no name can move the cursor."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 

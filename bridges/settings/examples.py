@@ -15,6 +15,7 @@ import drivers
 from bridges.settings import names as named
 from bridges.settings.leaves import choices
 from bridges.settings.load import load
+from bridges.settings.shown import is_section
 from drivers.profiles import Profile
 
 CONFIG = Path(drivers.__file__).parents[1] / "config"
@@ -48,7 +49,7 @@ Found = dict[tuple[type, str], str]
 
 def example(struct: type, field: mi.Field) -> str:
     """`key: value` as a YAML has it; "" for a section, whose keys have their own."""
-    if _is_section(field.type):
+    if is_section(field.type):
         return ""
     shown = next(
         (_shown()[c, field.name] for c in struct.__mro__ if (c, field.name) in _shown()), ""
@@ -116,18 +117,6 @@ def flow(value: object) -> str:
         value, default_flow_style=True, width=10**6, allow_unicode=True, sort_keys=False
     )
     return text.removesuffix("\n...\n").strip()
-
-
-def _is_section(info: mi.Type) -> bool:
-    if isinstance(info, mi.UnionType):
-        return all(_is_section(t) for t in info.types if not isinstance(t, mi.NoneType))
-    if isinstance(info, mi.Metadata):
-        return _is_section(info.type)
-    if isinstance(info, mi.ListType | mi.VarTupleType):
-        return _is_section(info.item_type)
-    if isinstance(info, mi.DictType):
-        return _is_section(info.value_type)
-    return isinstance(info, mi.StructType)
 
 
 def _is_numbered(info: mi.Type) -> bool:

@@ -16,6 +16,7 @@ from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNod
 from yaml.reader import ReaderError
 
 from bridges import user_files
+from bridges.rmf.words import printable
 from bridges.settings import slips
 
 MAX_DEPTH = 32
@@ -77,11 +78,6 @@ class Page:
         """Raise SettingsError if anything was recorded."""
         if self.problems:
             raise SettingsError(self.problems)
-
-
-def printable(text: str) -> str:
-    """The text on one line, with invisible characters escaped."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def shown(text: str) -> str:

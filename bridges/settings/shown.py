@@ -29,9 +29,9 @@ def _rows(struct: object, path: tuple[str, ...], deep: bool) -> Iterator[Row]:
         value = getattr(struct, field.name)
         here = (*path, field.encode_name)
         if isinstance(value, msgspec.Struct):
-            if deep or not any(_holds_struct(f.type) for f in _fields(type(value))):
+            if deep or not any(is_section(f.type) for f in _fields(type(value))):
                 yield from _rows(value, here, deep)
-        elif _is_plain(value) and not _holds_struct(field.type):
+        elif _is_plain(value) and not is_section(field.type):
             unit = _unit(field.type)
             yield ".".join(here), _text(value, unit), _instead(field, value, unit)
 
@@ -42,13 +42,15 @@ def _fields(struct: type) -> tuple[mi.Field, ...]:
     return info.fields
 
 
-def _holds_struct(info: mi.Type) -> bool:
-    """Whether whatever stands there is a section of its own, or is made of such."""
+def is_section(info: mi.Type) -> bool:
+    """Whether a field holds a struct, or a list or mapping of structs."""
     match info:
         case mi.UnionType(types=types):
-            return all(_holds_struct(t) for t in types if not isinstance(t, mi.NoneType))
-        case mi.Metadata(type=part) | mi.ListType(item_type=part) | mi.DictType(value_type=part):
-            return _holds_struct(part)
+            return all(is_section(t) for t in types if not isinstance(t, mi.NoneType))
+        case mi.ListType(item_type=part) | mi.VarTupleType(item_type=part):
+            return is_section(part)
+        case mi.Metadata(type=part) | mi.DictType(value_type=part):
+            return is_section(part)
     return isinstance(info, mi.StructType)
 
 

@@ -1,8 +1,8 @@
 """What is told of a file, as lines for a terminal."""
 
-import unicodedata
 from collections.abc import Iterator, Sequence
 
+from bridges.commands.columns import aligned
 from bridges.commands.sheets.told import MEANINGS, WIRES, BusTold, Part, Told
 from bridges.core.table import Table
 
@@ -32,7 +32,7 @@ def _wiring(parts: Sequence[Part]) -> Iterator[str]:
         found = [(p.device, table) for p in parts for table in p.tables if table.title == title]
         headings = [("device", *table.headings) for _, table in found[:1]]
         rows = [(device, *row) for device, table in found for row in table.rows]
-        yield from aligned([*headings, *rows]) if rows else []
+        yield from _indented([*headings, *rows]) if rows else []
 
 
 def _tables(parts: Sequence[Part]) -> Iterator[str]:
@@ -51,22 +51,12 @@ def _tables(parts: Sequence[Part]) -> Iterator[str]:
 def _table(table: Table) -> list[str]:
     """Its lines; a column that is empty in every row is left out."""
     kept = [i for i in range(len(table.headings)) if any(row[i] for row in table.rows)]
-    return aligned([[row[i] for i in kept] for row in (table.headings, *table.rows)])
+    return _indented([[row[i] for i in kept] for row in (table.headings, *table.rows)])
+
+
+def _indented(rows: Sequence[Sequence[str]]) -> list[str]:
+    return [f"  {line}" for line in aligned(rows)]
 
 
 def _notes(told: Told) -> list[str]:
     return [*told.notes, ""] if told.notes else []
-
-
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of equal length as lines with their columns under each other."""
-    widths = [max(map(_width, column)) for column in zip(*rows, strict=True)]
-    return [
-        "".join(f"  {c}{' ' * (w - _width(c))}" for c, w in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-
-
-def _width(text: str) -> int:
-    """Columns on a terminal: 走 takes two."""
-    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
