@@ -67,7 +67,7 @@ class Place:
         self.key = keys.data(topic)
         self.token = keys.token(kind, topic, number)
         self.gid = zenoh_keys.gid(self.token)
-        self.peers: dict[str, zenoh_keys.End] = {}
+        self.peers: dict[str, zenoh_keys.Peer] = {}
         self.unheard: set[bytes] = set()
         self._keys = keys
         self._kind = kind
@@ -99,15 +99,15 @@ class Place:
         if sample.kind == SampleKind.DELETE:
             self.peers.pop(token, None)
             self.unheard.discard(zenoh_keys.gid(token))
-        elif (end := self._keys.end(token)) is None:
+        elif (peer := self._keys.peer(token)) is None:
             return
-        elif policy := self._incompatible(end):
+        elif policy := self._incompatible(peer):
             self.unheard.add(zenoh_keys.gid(token))
             self._misfit(token, policy)
         else:
-            self.peers[token] = end
+            self.peers[token] = peer
 
-    def _incompatible(self, theirs: zenoh_keys.End) -> str:
+    def _incompatible(self, theirs: zenoh_keys.Peer) -> str:
         """The QoS policy by which DDS would not match the two ends; "" if it would match them."""
         if theirs.type != self._keys.type(self._topic):
             return "type"

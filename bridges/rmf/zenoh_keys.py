@@ -28,7 +28,7 @@ GID_LENGTH: Final = 16
 
 
 @dataclass(frozen=True, slots=True)
-class End:
+class Peer:
     """What a token says of an end.
 
     `type`: the message type, with the hash where the token has one. `transient_local`: a publisher
@@ -52,7 +52,7 @@ class Keys(Protocol):
         """The key under which a topic's samples travel."""
 
     def type(self, topic: AnyTopic) -> str:
-        """The topic's type as `End.type` names it."""
+        """The topic's type as `Peer.type` names it."""
 
     def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
         """The token of an end. `number`: unique within the session."""
@@ -60,7 +60,7 @@ class Keys(Protocol):
     def others(self, kind: Kind, topic: AnyTopic) -> str:
         """A key expression that matches the tokens of all ends of this kind on a topic."""
 
-    def end(self, token: str) -> End | None:
+    def peer(self, token: str) -> Peer | None:
         """What a token says of its end; None for the token of anything else."""
 
 
@@ -96,12 +96,12 @@ class RmwZenoh:
     def others(self, kind: Kind, topic: AnyTopic) -> str:
         return f"@ros2_lv/{self._domain}/*/*/*/{kind}/*/*/*/{_name(topic, '%')}/**"
 
-    def end(self, token: str) -> End | None:
+    def peer(self, token: str) -> Peer | None:
         parts = token.split("/")
         qos = parts[12].split(":") if len(parts) > 12 else []
         if len(qos) < 6:
             return None
-        return End(parts[2], "/".join(parts[10:12]), qos[1] == "1")
+        return Peer(parts[2], "/".join(parts[10:12]), qos[1] == "1")
 
 
 class Ros2Dds:
@@ -132,12 +132,12 @@ class Ros2Dds:
     def others(self, kind: Kind, topic: AnyTopic) -> str:
         return f"@/*/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/*/*"
 
-    def end(self, token: str) -> End | None:
+    def peer(self, token: str) -> Peer | None:
         parts = token.split("/")
         qos = parts[6].split(":") if len(parts) > 6 else []
         if len(qos) < 4:
             return None
-        return End(parts[1], parts[5], qos[2] == "1")
+        return Peer(parts[1], parts[5], qos[2] == "1")
 
 
 WAYS: Final[dict[str, type[RmwZenoh] | type[Ros2Dds]]] = {

@@ -1,6 +1,6 @@
-"""An example for each key of the reference: from the shipped files, else its default, else by its type.
+"""An example for each key of the reference: from a shipped file, else its default, else by its type.
 
-A file in `config/` or a profile shows a value that works at a site; so examples cannot grow stale.
+Shipped files are tested, so these examples stay valid.
 """
 
 import functools
@@ -42,13 +42,13 @@ WRITTEN: dict[str, object] = {
     "doors": ["ward_door"],
     "lifts": ["Lift1"],
 }
-"""For texts that no shipped file has: by their keys, of which each means one thing everywhere."""
+"""Examples for keys that no shipped file has. Each of these keys means the same everywhere."""
 
 Found = dict[tuple[type, str], str]
 
 
 def example(struct: type, field: mi.Field) -> str:
-    """`key: value` as a YAML has it; "" for a section, whose keys have their own."""
+    """`key: value` as in a YAML; "" for a section, whose keys have examples of their own."""
     if is_section(field.type):
         return ""
     shown = next(
@@ -62,7 +62,7 @@ def example(struct: type, field: mi.Field) -> str:
 
 @functools.cache
 def _shown() -> Found:
-    """What shipped files have at each field of each struct: the shortest that is no default."""
+    """The shortest value of each struct's field in the shipped files that is not its default."""
     found: Found = {}
     for file in sorted(CONFIG.glob("*.yaml")):
         config = load(file)
@@ -105,14 +105,14 @@ def _note(found: Found, struct: type, name: str, text: str) -> None:
 
 
 def _names(base: type) -> tuple[str, ...]:
-    """The fields of a struct; none of what structs are made of."""
+    """The fields of a struct; none for msgspec.Struct and its bases."""
     if not issubclass(base, msgspec.Struct) or base is msgspec.Struct:
         return ()
     return base.__struct_fields__
 
 
 def flow(value: object) -> str:
-    """On one line, as a person writes it."""
+    """A value as YAML on one line."""
     text = yaml.safe_dump(
         value, default_flow_style=True, width=10**6, allow_unicode=True, sort_keys=False
     )
@@ -120,7 +120,7 @@ def flow(value: object) -> str:
 
 
 def _is_numbered(info: mi.Type) -> bool:
-    """A mapping whose keys are numbers."""
+    """Whether it is a mapping whose keys are numbers."""
     key = info.key_type if isinstance(info, mi.DictType) else None
     return isinstance(key.type if isinstance(key, mi.Metadata) else key, mi.IntType)
 
@@ -132,7 +132,7 @@ def _by_type(field: mi.Field) -> object:
 
 
 def _any_of(info: mi.Type, field: mi.Field) -> object:
-    """Some value that may stand there."""
+    """Some valid value of this type."""
     match info:
         case mi.Metadata(type=part):
             return _any_of(part, field)

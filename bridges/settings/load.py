@@ -132,7 +132,7 @@ class _Reading:
             self._driver = named.driver_called(self._kind_name, name)
 
     def _read_own_drivers(self, devices: Node) -> None:
-        """The devices that name a driver of their own; None where there is none of that name."""
+        """Read the drivers that devices name themselves; None for a driver that does not exist."""
         for key, value in devices.value if isinstance(devices, MappingNode) else ():
             own = below(value, "driver")
             if own and isinstance(key, ScalarNode) and not is_none(own.value):
@@ -273,7 +273,7 @@ class _Reading:
             self._page.note(locate(spot, path).where(), text)
 
     def _check_reach(self, wiring: Wiring, bus: str | None) -> None:
-        """Points that no bus of these settings can have."""
+        """Note points that no bus with these settings can have."""
         read = self._buses[bus] if bus else None
         for use in wiring.uses if read and read.hal and read.settings is not BROKEN else ():
             assert read

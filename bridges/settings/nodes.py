@@ -80,8 +80,8 @@ class Page:
             raise SettingsError(self.problems)
 
 
-def shown(text: str) -> str:
-    """A value for an error text, shortened to 40 characters."""
+def short(text: str) -> str:
+    """A text, shortened to 40 characters for a message."""
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
@@ -100,9 +100,9 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
     """The error text for an unknown name, with the nearest known one and all of them."""
     names = list(dict.fromkeys(known))
     near = nearest(name, names)
-    meant = f"did you mean '{shown(near)}'? " if near else ""
-    there = f"known here: {', '.join(map(shown, names))}" if names else "there is none"
-    return f"unknown {what} '{shown(name)}': {meant}{there}"
+    meant = f"did you mean '{short(near)}'? " if near else ""
+    there = f"known here: {', '.join(map(short, names))}" if names else "there is none"
+    return f"unknown {what} '{short(name)}': {meant}{there}"
 
 
 class _Refused(MarkedYAMLError):

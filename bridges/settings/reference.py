@@ -1,7 +1,7 @@
-"""Generates the configuration reference, as JSON Schema and as a page, from the structs of the YAML.
+"""Generates the configuration reference from the structs of the YAML, as JSON Schema and as a page.
 
-Keys, types, bounds, units and defaults come from the structs; a key's meaning is the part of its
-struct's docstring that begins with the key.
+Keys, types, bounds, units and defaults come from the structs. A key's meaning is the part of its
+struct's docstring that begins with that key.
 """
 
 import inspect
@@ -71,7 +71,7 @@ def schema() -> Schema:
 
 
 def _allow_type(components: dict[str, dict[str, dict[str, object]]], ref: Schema) -> None:
-    """A bus's `type:` is read before its struct, and is not one of its fields."""
+    """Add `type:` to a bus: it is read before the struct, and is not one of its fields."""
     component = components[str(ref["$ref"]).rsplit("/", 1)[1]]
     component["properties"].setdefault("type", {"type": "string"})
 
@@ -106,7 +106,7 @@ def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> 
 
 
 def _named_by_device(driver: Shape, of_file: Shape) -> Schema:
-    """Only the file's own driver need not be named by a device."""
+    """A device must name its driver, unless it is the file's own."""
     required = [] if driver == of_file else ["driver"]
     return {"required": required, "properties": {"driver": {"const": driver.driver}}}
 
@@ -187,7 +187,7 @@ def _example(struct: type, field: mi.Field) -> str:
 
 
 def _docstring(struct: type) -> tuple[str, dict[str, str]]:
-    """What a struct is for, and the meanings of its fields, including inherited ones."""
+    """The purpose of a struct, and the meanings of its fields, including inherited ones."""
     meanings: dict[str, str] = {}
     for base in reversed(struct.__mro__):
         for names, text, _ in MEANING.findall(inspect.cleandoc(base.__dict__.get("__doc__") or "")):

@@ -1,6 +1,6 @@
-"""A struct's plain settings as a person reads them: numbers with units, and what a default would be.
+"""A struct's plain settings as text: numbers with units, and the default where the value differs.
 
-Wires, maps and code tables are left out: their drivers tell them (`drivers/driver_type.py`).
+Wires, maps and code tables are left out: their drivers describe them (`drivers/driver_type.py`).
 """
 
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ import msgspec
 from msgspec import inspect as mi
 
 Row = tuple[str, str, str]
-"""Its key (with dots), its value with the unit, and what the default is where it is not that."""
+"""(key with dots, value with its unit, the default if the value differs from it)."""
 
 _LEAVES = (str, int, float, bool, type(None))
 
@@ -20,7 +20,7 @@ def plain(struct: object) -> list[Row]:
 
 
 def choices_of(device: object) -> list[Row]:
-    """A device's own numbers and words, and those of its sections that hold nothing else."""
+    """The plain settings of a device, and of its sections that have no sections themselves."""
     return list(_rows(device, (), deep=False))
 
 
@@ -55,7 +55,7 @@ def is_section(info: mi.Type) -> bool:
 
 
 def _is_plain(value: object) -> bool:
-    """Whether it is a word, a number, or some of them."""
+    """Whether it is a word or a number, or a list or mapping of these."""
     value = getattr(value, "value", value)
     if isinstance(value, dict):
         value = list(value.values())
@@ -65,7 +65,7 @@ def _is_plain(value: object) -> bool:
 
 
 def _unit(info: mi.Type) -> str:
-    """The unit of a number; "" where it has none."""
+    """The unit of a number; "" if it has none."""
     if isinstance(info, mi.Metadata):
         return (info.extra or {}).get("unit", "") or _unit(info.type)
     if isinstance(info, mi.UnionType):
@@ -89,7 +89,7 @@ def _text(value: object, unit: str) -> str:
 
 
 def _instead(field: mi.Field, value: object, unit: str) -> str:
-    """What the default is, where this is another value."""
+    """The default, if the value differs from it."""
     if field.required or field.default in (msgspec.NODEFAULT, None, value):
         return ""
     return f"default: {_text(field.default, unit)}"

@@ -117,7 +117,7 @@ SLIPS = {
     ),
     "curly quotes": (
         changed("lanes: [in, out]", "lanes: [\u201cin\u201d, out]"),
-        ["8:13: \u201c is no quote to YAML: write \" or '"],
+        ["8:13: YAML does not read \u201c as a quote: write \" or '"],
     ),
 }
 
