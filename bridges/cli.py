@@ -9,6 +9,10 @@ from collections.abc import Container
 from bridges import __version__
 
 COMMANDS = {
+    "init": (
+        "write a first YAML for the device in front of you",
+        "init my_lift.yaml --kind lift --wiring gpio --floors L1,L2,L3 --yes",
+    ),
     "run": (
         "serve a device, from its YAML, until SIGTERM or SIGINT",
         "run my_lift.yaml --simulate",

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import msgspec
 from msgspec import inspect as mi
 
+from bridges import __version__
 from bridges.core.graph_kind import AnyGraphKind, GraphKind
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
@@ -61,6 +62,7 @@ def schema() -> Schema:
         _allow_type(components, by_type[bus])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:rmf-bridges:device:{__version__}",
         "title": "rmf-bridges device",
         "oneOf": [
             *(_file(shape, buses, by_type) for shape in shapes()),
