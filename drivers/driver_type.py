@@ -25,20 +25,21 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     """One driver.
 
     `settings`: a struct that derives from the kind's (`bridges.lift.settings.LiftSettings`…) and adds
-    the wiring. `buses`: the bus types that it works on, as the names of files in `drivers/hal/`.
-    `create(name, settings, bus)`: one device on its bus; sends nothing before `open`.
+    the wiring. `buses`: the bus types that it works on, by their file names in `drivers/hal/`.
+    `create(name, settings, bus)`: makes one device on its bus; sends nothing before `open`.
 
     The rest is optional:
-    `wires(settings)`: the table that an electrician checks (`drivers/hal/points.py`).
+    `wires(settings)`: the wiring table, for electricians (`drivers/hal/points.py`).
     `debounce(settings)`: how long a change of each signal or group must last (s).
-    `describe(settings, bus's settings)`: where there are no wires, rows for `check` (what, meaning).
+    `describe(settings, settings of the bus)`: without wires, rows (what, meaning) for `check`.
     `tables(settings)`: codes, pulses and frames, for `check` (`bridges/core/table.py`).
-    `claims(settings)`: (place, path) of what no other device of its bus may use, beside the wires'.
-    `warnings(settings)`: (path, text) of what is legal but worth a look.
-    `notes(settings)`: (path, text) of what a site may well want so, and should know.
-    `unwired(settings)`: signals without a wire of which `accept_unsafe` may speak as well.
-    `fake`: the module that stands in for the hardware in `run --simulate`, by its name, as nothing real
-    imports a fake (`hal_fakes/fake.py`); the plant of its kind, on its wires, where it names none.
+    `claims(settings)`: (place, path) of what only this device of its bus may use, besides its wires.
+    `warnings(settings)`: (path, text) of legal settings that may be a mistake.
+    `notes(settings)`: (path, text) of settings that a site may want, and should know about.
+    `unwired(settings)`: signals without a wire that `accept_unsafe` may also name.
+    `fake`: the name of the module that replaces the hardware in `run --simulate` (`hal_fakes/fake.py`).
+    It is a name because product code never imports a fake. Without it, the kind's plant is connected
+    to the driver's wires.
     """
 
     settings: type[Settings]
@@ -56,4 +57,4 @@ class DriverType(Generic[Settings, Sample, Outputs]):
 
 
 AnyDriver: TypeAlias = DriverType[Any, Any, Any]
-"""A driver found by its name; its kind determines its settings, sample and outputs."""
+"""A driver found by its name; its kind decides its settings, sample and outputs."""

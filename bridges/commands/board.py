@@ -26,8 +26,8 @@ SECONDS: Final = re.compile(r"\d+(\.\d+)? s\b")
 class Row:
     """One device, the charger coordinator, or a robot with its assigned place.
 
-    `waiting`: the supervisor's or coordinator's queue. `age`: age of the reading. `mark`: why not to
-    trust the row. `simulated`: no hardware is behind it. `faults`: those that its daemons report.
+    `waiting`: the supervisor's or coordinator's queue. `age`: age of the reading. `mark`: why the row
+    may be wrong. `simulated`: no hardware is behind it. `faults`: those that its daemons report.
     """
 
     kind: str
@@ -54,7 +54,7 @@ class Row:
         return (*state, self.waiting, self.age, marks, self.faults)
 
     def news(self) -> tuple[object, ...]:
-        """The parts whose change is worth a line: running seconds are left out."""
+        """The parts whose change is printed: seconds that only count on are left out."""
         told = (self.state, self.held_by, self.waiting, self.mark, self.faults)
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 

@@ -1,4 +1,4 @@
-"""What `watch` and `send` share: options that name a graph, joining it, listening and leaving."""
+"""What `watch` and `send` share: the options that name a graph, joining it, and listening."""
 
 import argparse
 import shlex
@@ -39,7 +39,7 @@ def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--transport",
         choices=TRANSPORTS,
-        help="ros2 is rclpy, dds and zenoh need no ROS; auto takes the first that is here (default)",
+        help="ros2 needs rclpy, dds and zenoh need no ROS; auto (default) takes the first one here",
     )
     parser.add_argument(
         "--localhost",
@@ -63,7 +63,7 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
 
 
 def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
-    """A YAML's `rmf:` section, with what the command line says instead."""
+    """A YAML's `rmf:` section, changed by the options of the command line."""
     if args.domain_id is not None:
         rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
     if args.transport is not None:
@@ -98,7 +98,7 @@ def interruptible() -> Iterator[None]:
 
 
 def complain(command: str, text: object) -> None:
-    """One line to standard error, under the command's name, without control characters."""
+    """Write one line to standard error: the command's name and the text, control characters escaped."""
     sys.stderr.write(words.printable(f"rmf-bridge {command}: {text}") + "\n")
 
 

@@ -1,4 +1,4 @@
-"""What `ros2 launch rmf_bridges <kind>.launch.py config:=FILE` starts: the daemon, as a ROS node.
+"""Starts the daemon as a ROS node: `ros2 launch rmf_bridges <kind>.launch.py config:=FILE`.
 
 After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/serve/guard.py`). Only
 the launch files in `ros/launch/`, one for each kind, import this module; it needs ROS's `launch`.

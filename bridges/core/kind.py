@@ -1,4 +1,4 @@
-"""How the daemon sees a kind of device: its topics, and the pure functions of its folder.
+"""The record of a kind of device: its topics, and the pure functions of its folder.
 
 `bridges/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or doors. Each
 `KIND` states its types, so mypy proves that its functions fit together.

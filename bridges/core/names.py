@@ -1,4 +1,4 @@
-"""The longest texts that are taken from the graph: anybody can send them, and they are stored."""
+"""The longest texts that are accepted from the graph. Anybody can send them, and they are stored."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""What is told of files, as JSON: each row of a table is an object, by the table's headings."""
+"""The findings as JSON: each row of a table is an object whose keys are the table's headings."""
 
 from collections.abc import Sequence
 

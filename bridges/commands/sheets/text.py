@@ -1,4 +1,4 @@
-"""What is told of a file, as lines for a terminal."""
+"""The findings about a file, as lines for a terminal."""
 
 from collections.abc import Iterator, Sequence
 
@@ -8,7 +8,7 @@ from bridges.core.table import Table
 
 
 def lines(told: Told) -> list[str]:
-    """A file that could be read: what it is, and its wiring or what it talks to; a blank line last."""
+    """A valid file: its kind and driver, its wiring or messages, and a blank line at the end."""
     driver = f", driver {told.driver}" if told.driver else ""
     return [f"{told.file}: {told.kind}{driver}", "", *_body(told), *_notes(told)]
 
@@ -27,7 +27,7 @@ def _bus(bus: BusTold) -> str:
 
 
 def _wiring(parts: Sequence[Part]) -> Iterator[str]:
-    """The wires of all devices of a bus under one heading; then what those say that have none."""
+    """The wires of all devices of a bus in one table; then the meanings of those without wires."""
     for title in (WIRES, MEANINGS):
         found = [(p.device, table) for p in parts for table in p.tables if table.title == title]
         headings = [("device", *table.headings) for _, table in found[:1]]
@@ -36,7 +36,7 @@ def _wiring(parts: Sequence[Part]) -> Iterator[str]:
 
 
 def _tables(parts: Sequence[Part]) -> Iterator[str]:
-    """The other tables; what several devices have alike is printed once."""
+    """The other tables. Equal tables of several devices are printed once."""
     alike: dict[Table, list[str]] = {}
     for part in parts:
         for table in part.tables:
@@ -49,7 +49,7 @@ def _tables(parts: Sequence[Part]) -> Iterator[str]:
 
 
 def _table(table: Table) -> list[str]:
-    """Its lines; a column that is empty in every row is left out."""
+    """The lines of a table, without columns that are empty in every row."""
     kept = [i for i in range(len(table.headings)) if any(row[i] for row in table.rows)]
     return _indented([[row[i] for i in kept] for row in (table.headings, *table.rows)])
 
