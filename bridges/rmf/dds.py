@@ -16,8 +16,7 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Final, TypeVar
 from weakref import WeakValueDictionary
 
@@ -34,6 +33,7 @@ from bridges.rmf import addresses, cyclone, notices
 from bridges.rmf.dds_ends import DdsPublisher, DdsSubscription
 from bridges.rmf.graph import NodeOnGraph
 from bridges.rmf.idl import sample_type
+from bridges.rmf.threaded import Threaded
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
 
@@ -58,7 +58,7 @@ _domains: WeakValueDictionary[tuple[int, str], Domain] = WeakValueDictionary()
 _domains_lock = threading.Lock()
 
 
-class DdsTransport:
+class DdsTransport(Threaded):
     """One node: a participant, its reader thread, its publishers and subscriptions.
 
     `loopback`: stay on this machine, whatever CYCLONEDDS_URI says. Otherwise, when the machine's
@@ -68,11 +68,10 @@ class DdsTransport:
 
     speaks = "dds"
 
+    refusals = (DDSException,)
+
     def __init__(self, node_name: str, domain_id: int, *, loopback: bool) -> None:
-        self.name = node_name
-        self.dropped: dict[str, int] = {}
-        self._lock = threading.Lock()
-        self._closed = False
+        super().__init__(node_name)
         self._failed = False
         self._entities: list[core.Entity] = []
         self._topics: dict[str, DdsTopic] = {}
@@ -90,8 +89,7 @@ class DdsTransport:
         except TransportError:
             self._delete_entities()
             raise
-        self._thread = threading.Thread(target=self._read, name=f"{node_name}-dds", daemon=True)
-        self._thread.start()
+        self._start(self._read, "dds")
 
     def publisher(self, topic: AnyTopic) -> DdsPublisher:
         """Declare a publisher with `topic.publish` QoS."""
@@ -116,15 +114,6 @@ class DdsTransport:
             self._subscriptions += (subscription,)
         return subscription
 
-    @property
-    def lives(self) -> bool:
-        """Whether its thread runs; also true without a network."""
-        return not self._closed and self._thread.is_alive()
-
-    def wall(self) -> float:
-        """The wall clock (s since the epoch)."""
-        return time.time()
-
     def close(self) -> None:
         """Leave the graph at once. Deletes each entity, without waiting for the garbage collector."""
         with self._lock:
@@ -134,8 +123,7 @@ class DdsTransport:
             self._stop.set()
             if self._joined:
                 self._leaving.set(True)
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
+        self._join_thread()
         self._delete_entities()
 
     def _join(self) -> None:
@@ -252,15 +240,6 @@ class DdsTransport:
         while self._entities:
             self._entities.pop().__del__()  # deletes the C entity; a second call does nothing
         self._domain = None
-
-    @contextmanager
-    def _reporting(self, text: str) -> Iterator[None]:
-        if self._closed:
-            raise TransportError(f"{text}: {self.name} has left the graph")
-        try:
-            yield
-        except DDSException as error:
-            raise TransportError(f"{text}: {error}") from error
 
 
 def _shared_domain(domain_id: int, configuration: str) -> Domain:

@@ -35,6 +35,7 @@ from bridges.rmf import cdr, notices, topics
 from bridges.rmf.cyclone import LOOPBACK
 from bridges.rmf.definitions import Message
 from bridges.rmf.ros_types import ros_type
+from bridges.rmf.threaded import Threaded
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, Receive, TransportError, any_type
 
@@ -58,7 +59,7 @@ YIELD_S: Final = 50e-6
 that the message has woken run first."""
 
 
-class Ros2Transport:
+class Ros2Transport(Threaded):
     """One rclpy node, its context and its executor's thread.
 
     `ros_args`: the arguments after `--ros-args` on the command line: name, namespace, remappings and
@@ -68,6 +69,8 @@ class Ros2Transport:
 
     speaks = "ros2"
 
+    refusals = (RuntimeError, NameValidationException)
+
     def __init__(
         self,
         node_name: str,
@@ -76,10 +79,7 @@ class Ros2Transport:
         loopback: bool,
         ros_args: Sequence[str] = (),
     ) -> None:
-        self.name = node_name
-        self.dropped: dict[str, int] = {}
-        self._lock = threading.Lock()
-        self._closed = False
+        super().__init__(node_name)
         self._pause = threading.Event()
         self._publishers: list[_Publisher] = []
         self._deaf: list[_Subscription] = []
@@ -90,8 +90,7 @@ class Ros2Transport:
         except (RuntimeError, NameValidationException) as error:
             self._context.try_shutdown()
             raise TransportError(f"cannot join ROS domain {domain_id}: {error}") from error
-        self._thread = threading.Thread(target=self._spin, name=f"{self.name}-ros2", daemon=True)
-        self._thread.start()
+        self._start(self._spin, "ros2")
 
     def publisher(self, topic: AnyTopic) -> "_Publisher":
         """Declare a publisher with `topic.publish` QoS. Raises TransportError, also for a missing ROS
@@ -123,16 +122,10 @@ class Ros2Transport:
             self._closed = True
         self._pause.set()
         self._leaving.trigger()
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
+        self._join_thread()
         self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()
-
-    @property
-    def lives(self) -> bool:
-        """Whether it is on the graph and its thread runs."""
-        return not self._closed and self._thread.is_alive()
 
     def heard_back(self, topic: AnyTopic) -> "list[_Subscription]":
         """The subscriptions of this node that must not hear what it publishes on the topic."""
@@ -176,15 +169,6 @@ class Ros2Transport:
                 if failures == 1:
                     log.exception(pairs("reader_failed", node=self.name, reason=error))
                 self._pause.wait(AGAIN_S)
-
-    @contextmanager
-    def _reporting(self, text: str) -> Iterator[None]:
-        if self._closed:
-            raise TransportError(f"{text}: {self.name} has left the graph")
-        try:
-            yield
-        except (RuntimeError, NameValidationException) as error:
-            raise TransportError(f"{text}: {error}") from error
 
 
 class _Publisher:

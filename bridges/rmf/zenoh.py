@@ -15,8 +15,8 @@ import json
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from itertools import count
 from queue import Empty, SimpleQueue
@@ -28,6 +28,7 @@ from zenoh.handlers import Callback
 from bridges.log import pairs
 from bridges.rmf import addresses, notices, zenoh_config
 from bridges.rmf.settings import Zenoh
+from bridges.rmf.threaded import Threaded
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
 from bridges.rmf.zenoh_config import Configuration
@@ -43,7 +44,7 @@ NO_ROUTER: Final = (
 ROUTER: Final = "a router has connected to this machine's nodes, and would forward simulated states"
 
 
-class ZenohTransport:
+class ZenohTransport(Threaded):
     """One node: a session, its publishers and subscriptions, and the thread that hands on messages.
 
     `loopback`: stay on this machine, without a router, whatever `settings` say. Raises TransportError
@@ -52,16 +53,15 @@ class ZenohTransport:
 
     speaks = "zenoh"
 
+    refusals = (zenoh.ZError,)
+
     def __init__(
         self, node_name: str, domain_id: int, *, loopback: bool, settings: Zenoh | None = None
     ) -> None:
-        self.name = node_name
-        self.dropped: dict[str, int] = {}
+        super().__init__(node_name)
         self._settings = settings or Zenoh()
         self._domain_id = domain_id
         self._loopback = loopback
-        self._lock = threading.Lock()
-        self._closed = False
         self._failed = False
         self._ends: tuple[ZenohEnd, ...] = ()
         self._deaf: set[str] = set()
@@ -79,8 +79,7 @@ class ZenohTransport:
             raise TransportError(f"cannot open a zenoh session: {self._why_unlinked}")
         # A session that is still open aborts the interpreter when it exits.
         atexit.register(self.close)
-        self._thread = threading.Thread(target=self._listen, name=f"{node_name}-zenoh", daemon=True)
-        self._thread.start()
+        self._start(self._listen, "zenoh")
 
     def publisher(self, topic: AnyTopic) -> ZenohPublisher:
         """Declare a publisher with `topic.publish` QoS."""
@@ -109,15 +108,6 @@ class ZenohTransport:
             self._ends += (subscription,)
         return subscription
 
-    def wall(self) -> float:
-        """The wall clock (s since the epoch)."""
-        return time.time()
-
-    @property
-    def lives(self) -> bool:
-        """Whether its thread runs; also true without a router."""
-        return not self._closed and self._thread.is_alive()
-
     def close(self) -> None:
         """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
         with self._lock:
@@ -126,8 +116,7 @@ class ZenohTransport:
             self._closed = True
         atexit.unregister(self.close)
         self._orders.put(_nothing)
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
+        self._join_thread()
         with self._lock:
             self._leave()
         for closing in self._closing:
@@ -281,15 +270,6 @@ class ZenohTransport:
         else:
             reason = self._why_unlinked or NO_ROUTER
             log.warning(pairs("not_linked", node=self.name, connect=where, reason=reason))
-
-    @contextmanager
-    def _reporting(self, text: str) -> Iterator[None]:
-        if self._closed:
-            raise TransportError(f"{text}: {self.name} has left the graph")
-        try:
-            yield
-        except zenoh.ZError as error:
-            raise TransportError(f"{text}: {error}") from error
 
 
 def _opened(ways: list[Configuration]) -> zenoh.Session:
