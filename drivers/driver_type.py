@@ -1,6 +1,6 @@
 """The record that describes a driver: the `DRIVER` at the end of its file.
 
-`drivers/<kind>/<driver>.py` is named after the YAML's `kind:` and `driver:`; there is no table of
+The YAML's `kind:` and `driver:` name the file `drivers/<kind>/<driver>.py`, so there is no table of
 drivers to edit. Only `bridges/settings/names.py` imports a driver by its name.
 """
 
@@ -25,21 +25,20 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     """One driver.
 
     `settings`: a struct that derives from the kind's (`bridges.lift.settings.LiftSettings`…) and adds
-    the wiring. `buses`: the bus types that it works on, by their file names in `drivers/hal/`.
-    `create(name, settings, bus)`: makes one device on its bus; sends nothing before `open`.
+    the wiring. `buses`: the bus types that it works on, as the names of files in `drivers/hal/`.
+    `create(name, settings, bus)`: makes the driver of one device; it sends nothing before `open`.
 
     The rest is optional:
-    `wires(settings)`: the wiring table, for electricians (`drivers/hal/points.py`).
-    `debounce(settings)`: how long a change of each signal or group must last (s).
-    `describe(settings, settings of the bus)`: without wires, rows (what, meaning) for `check`.
+    `wires(settings)`: the wiring table that an electrician checks (`drivers/hal/points.py`).
+    `debounce(settings)`: signal or group -> how long a change must last (s).
+    `describe(settings, bus's settings)`: rows for `check` (what, meaning) if there are no wires.
     `tables(settings)`: codes, pulses and frames, for `check` (`bridges/core/table.py`).
-    `claims(settings)`: (place, path) of what only this device of its bus may use, besides its wires.
-    `warnings(settings)`: (path, text) of legal settings that may be a mistake.
+    `claims(settings)`: (place, path) of each place, besides the wires', that no other device may use.
+    `warnings(settings)`: (path, text) of valid settings that may be a mistake.
     `notes(settings)`: (path, text) of settings that a site may want, and should know about.
-    `unwired(settings)`: signals without a wire that `accept_unsafe` may also name.
-    `fake`: the name of the module that replaces the hardware in `run --simulate` (`hal_fakes/fake.py`).
-    It is a name because product code never imports a fake. Without it, the kind's plant is connected
-    to the driver's wires.
+    `unwired(settings)`: signals without a wire that `accept_unsafe` may name too.
+    `fake`: the name of the module that stands in for the hardware in `run --simulate`
+    (`hal_fakes/fake.py`). Without a name, the kind's plant stands at the far end of the wires.
     """
 
     settings: type[Settings]
@@ -57,4 +56,4 @@ class DriverType(Generic[Settings, Sample, Outputs]):
 
 
 AnyDriver: TypeAlias = DriverType[Any, Any, Any]
-"""A driver found by its name; its kind decides its settings, sample and outputs."""
+"""A driver found by its name; its kind determines its settings, sample and outputs."""
