@@ -23,11 +23,11 @@ from bridges.commands.requests import Request
 from bridges.commands.requests.charger import Charge, ChargeCancel
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
-from bridges.core.fields import Rmf
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.choose import open_transport
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
 from bridges.settings.load import load
