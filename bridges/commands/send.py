@@ -9,7 +9,7 @@ import sys
 import time
 from contextlib import closing, suppress
 from dataclasses import replace
-from typing import Any, TextIO
+from typing import TextIO
 from uuid import uuid4
 
 from bridges.commands.exchange import step
@@ -199,7 +199,7 @@ class _Exchange:
         self, transport: Transport, request: Request, timeout_s: float, out: TextIO
     ) -> None:
         self.request, self.out, self.transport = request, out, transport
-        self.publishers: dict[str, Publisher[Any]] = {}
+        self.publishers: dict[str, Publisher[d.Message]] = {}
         self.publisher = self._publisher(request.topic)
         heard = request.states, topics.DOOR_SUPERVISOR_HEARTBEAT, topics.DIAGNOSTICS
         self.inbox = Inbox(transport, *heard)
@@ -229,7 +229,7 @@ class _Exchange:
             self._send(todo.send, now, self.request.own if todo.direct else self.request.topic)
         return None
 
-    def _publisher(self, topic: topics.AnyTopic) -> Publisher[Any]:
+    def _publisher(self, topic: topics.AnyTopic) -> Publisher[d.Message]:
         if topic.name not in self.publishers:
             self.publishers[topic.name] = self.transport.publisher(topic)
         return self.publishers[topic.name]
@@ -240,20 +240,15 @@ class _Exchange:
             return 0
         return self.publisher.matched()
 
-    def _take(self, heard: Heard) -> None:
-        if isinstance(heard.message, d.SupervisorHeartbeat):
-            self.seen = replace(self.seen, heartbeat=heard)
-            return
+    def _take(self, heard: Heard[d.Message]) -> None:
         if isinstance(heard.message, d.DiagnosticArray):
             boarded = _boarded(heard.message, self.request.name)
             self.seen = replace(self.seen, boarded=boarded or self.seen.boarded)
             return
-        name = words.device(heard.message)
-        self.seen = replace(self.seen, names=self.seen.names | {name})
-        if not self.request.about(heard.message):
+        before, self.seen = self.seen, self.seen.hears(heard, self.request.about)
+        if self.seen.states == before.states:
             return
-        self.seen = replace(self.seen, states=(*self.seen.states, heard))
-        text = words.described(heard.message)
+        text = words.described(self.seen.states[-1].message)
         if text != self.described:
             self.described = text
             self._line(heard.at, "state", text)
@@ -264,8 +259,7 @@ class _Exchange:
         if topic.name not in self.asked:
             self.asked.add(topic.name)
             self._line(now, "request", f"{words.request(message)} on {topic.name}")
-        first = now if self.seen.first_sent_at is None else self.seen.first_sent_at
-        self.seen = replace(self.seen, first_sent_at=first, last_sent_at=now)
+        self.seen = self.seen.sends(now)
         self._publisher(topic).publish(message)
 
     def _finish(self, outcome: Done | Failed) -> int:

@@ -1,12 +1,12 @@
-"""The ends of the `dds` transport: what a publisher and a subscription are in DDS.
+"""The ends of the `dds` transport: its publishers and subscriptions.
 
-An end outlives its writer or reader: when the transport joins anew, it is given another one.
+An end outlives its writer or reader: when the transport joins again, the end gets a new one.
 """
 
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Final, Generic, TypeVar
+from typing import Final, Protocol
 
 from cyclonedds.core import DDSException, DDSStatus
 from cyclonedds.domain import DomainParticipant
@@ -18,45 +18,43 @@ from cyclonedds.topic import Topic as DdsTopic
 from bridges.rmf import notices, topics
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
-from bridges.rmf.idl import SampleType, sample_type
+from bridges.rmf.idl import Sample, sample_type
 from bridges.rmf.peers import Peers
 from bridges.rmf.releases import Release
 from bridges.rmf.rihs01 import type_hash
-from bridges.rmf.topics import AnyTopic, Topic
-from bridges.rmf.transport import TransportError
-
-M = TypeVar("M", bound=Message)
+from bridges.rmf.topics import AnyTopic
+from bridges.rmf.transport import Receive, TransportError
 
 WRITE_BLOCKS_NS: Final = 20_000_000
-"""A writer that waits for a peer holds Python's lock meanwhile: keep it below one scan."""
+"""A writer that waits for a peer holds Python's lock: keep this shorter than a scan."""
 AT_ONCE: Final = 100
-"""How many samples are taken from one subscription before it is the others' turn."""
+"""The most samples taken from one subscription before the others have their turn."""
 POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation", 24: "type"}
 
 
-class DdsPublisher(Generic[M]):
-    """One topic's sending end. `withdraw`: takes it off the graph."""
+class DdsPublisher:
+    """The publisher of one topic. `withdraw(publisher, writer)`: takes it off the graph."""
 
     def __init__(
         self,
-        topic: Topic[M],
+        topic: AnyTopic,
         reader_thread: threading.Thread,
-        withdraw: Callable[["AnyPublisher", DataWriter], None],
+        withdraw: Callable[["DdsPublisher", DataWriter], None],
     ) -> None:
         self.topic = topic
         self._withdraw = withdraw
         self._writer: DataWriter = None
         self._reader_thread = reader_thread
         depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
-        self._retained: deque[M] = deque(maxlen=depth)
-        self._sample: SampleType = None
+        self._retained: deque[Message] = deque(maxlen=depth)
+        self._sample: type[Sample] | None = None
 
     watched = DDSStatus.OfferedIncompatibleQos
 
     def create(
         self, participant: DomainParticipant, topic: DdsTopic, release: Release
     ) -> DataWriter:
-        """The writer, in place of any that was."""
+        """Make its writer; it replaces an earlier one."""
         qos = _writer_qos(self.topic.publish, type_hash(self.topic.type, release))
         self._sample = sample_type(self.topic.type, release)
         self._writer = DataWriter(participant, topic, qos=qos)
@@ -67,12 +65,12 @@ class DdsPublisher(Generic[M]):
         self._writer = None
 
     def send_retained(self) -> None:
-        """Give late joiners what the writer before this one kept for them."""
+        """Send again what the earlier writer retained for late joiners."""
         for message in list(self._retained):
-            self._writer.write(self._sample(message))
+            self._write(message)
 
-    def publish(self, message: M) -> None:
-        """Send; blocks for 20 ms at most. Raises TransportError when it was not sent."""
+    def publish(self, message: Message) -> None:
+        """Send; blocks for 20 ms at most. Raises TransportError if it was not sent."""
         if self._writer is None:
             why = "there is no network, or RMF's release lacks the message"
             raise TransportError(f"topic {self.topic.name}: not sent: {why}")
@@ -80,7 +78,7 @@ class DdsPublisher(Generic[M]):
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
         self._retained.append(message)
         try:
-            self._writer.write(self._sample(message))
+            self._write(message)
         except DDSException as error:
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
@@ -95,6 +93,10 @@ class DdsPublisher(Generic[M]):
         """Take this end off the graph."""
         self._withdraw(self, self._writer)
 
+    def _write(self, message: Message) -> None:
+        assert self._sample is not None
+        self._writer.write(self._sample(message))
+
     def log_misfits(self, peers: Peers) -> None:
         """Log each new subscription of this topic whose QoS does not match."""
         if self._writer is None:
@@ -104,13 +106,13 @@ class DdsPublisher(Generic[M]):
             _log_misfit(self.topic, notices.NOT_SERVED, status, peers)
 
 
-class DdsSubscription(Generic[M]):
-    """One topic's receiving end. `dropped`: counts samples that are no messages, by topic."""
+class DdsSubscription:
+    """The subscription of one topic. `dropped`: counts invalid samples, by topic name."""
 
     def __init__(
         self,
-        topic: Topic[M],
-        received: Callable[[M], None],
+        topic: AnyTopic,
+        received: Receive,
         dropped: dict[str, int],
         *,
         others_only: bool,
@@ -126,7 +128,7 @@ class DdsSubscription(Generic[M]):
     def create(
         self, participant: DomainParticipant, topic: DdsTopic, release: Release
     ) -> DataReader:
-        """The reader, in place of any that was."""
+        """Make its reader; it replaces an earlier one."""
         hashed = type_hash(self.topic.type, release)
         qos = _reader_qos(self.topic.subscribe, hashed, others_only=self._others_only)
         self._reader = DataReader(participant, topic, qos=qos)
@@ -144,7 +146,7 @@ class DdsSubscription(Generic[M]):
             return 0
 
     def take(self) -> bool:
-        """Hand on what has arrived; False when nothing had."""
+        """Deliver what has arrived; False if nothing had."""
         if self._reader is None:
             return False
         for taken in range(AT_ONCE):
@@ -168,11 +170,13 @@ class DdsSubscription(Generic[M]):
             _log_misfit(self.topic, notices.NOT_HEARD, status, peers)
 
 
-AnyPublisher = DdsPublisher[Any]
-AnySubscription = DdsSubscription[Any]
+class _Misfits(Protocol):
+    """Cyclone's status of an end that has met peers whose QoS does not fit."""
+
+    last_policy_id: int
 
 
-def _log_misfit(topic: AnyTopic, text: str, status: SampleType, peers: Peers) -> None:
+def _log_misfit(topic: AnyTopic, text: str, status: _Misfits, peers: Peers) -> None:
     policy = POLICIES.get(status.last_policy_id, f"QoS policy {status.last_policy_id}")
     if policy == "type":
         peers.name(topic, published=text == notices.NOT_HEARD)

@@ -1,20 +1,34 @@
 """What the ends on a DDS graph announce: topic, type, and in their user data the type hash."""
 
 import re
-from typing import Final
+from collections.abc import Hashable
+from typing import Final, Protocol
 
 from cyclonedds import builtin
 from cyclonedds.core import InstanceState
 from cyclonedds.domain import DomainParticipant
-from cyclonedds.qos import Policy
+from cyclonedds.qos import Policy, Qos
 
-from bridges.rmf.idl import SampleType
 from bridges.rmf.peers import Announced, Peers
 
 AT_ONCE: Final = 100
 HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 TYPE: Final = re.compile(r"(\w+)::msg::dds_::(\w+)_")
 """A message's name, as ROS writes it in DDS."""
+
+
+class _State(Protocol):
+    instance_state: int
+
+
+class _End(Protocol):
+    """What DDS announces of an end (cyclonedds.builtin.DcpsEndpoint)."""
+
+    key: Hashable
+    topic_name: str
+    type_name: str | None
+    qos: Qos
+    sample_info: _State
 
 
 class DdsPeers:
@@ -42,7 +56,7 @@ class DdsPeers:
                     self._take(sample, bool(publishes))
         return news
 
-    def _take(self, sample: SampleType, publishes: bool) -> None:
+    def _take(self, sample: _End, publishes: bool) -> None:
         if sample.sample_info.instance_state != InstanceState.Alive:
             self._peers.gone(sample.key)
             return
@@ -54,7 +68,7 @@ class DdsPeers:
         self._peers.seen(sample.key, end)
 
 
-def _hash(qos: SampleType) -> str:
+def _hash(qos: Qos) -> str:
     """The type hash in an end's user data; "" without one."""
     if Policy.Userdata not in qos:
         return ""

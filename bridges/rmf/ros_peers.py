@@ -1,6 +1,6 @@
 """What rclpy knows of the other ends on our topics: their types and type hashes."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from bridges.rmf.peers import Announced, Peers
@@ -10,18 +10,21 @@ from bridges.rmf.topics import AnyTopic
 class EndpointInfo(Protocol):
     """rclpy's TopicEndpointInfo, as far as it is read here."""
 
-    topic_type: str
-    topic_type_hash: object
-    endpoint_gid: Iterable[int]
+    @property
+    def topic_type(self) -> str: ...
+    @property
+    def topic_type_hash(self) -> object: ...
+    @property
+    def endpoint_gid(self) -> Iterable[int]: ...
 
 
 class Graph(Protocol):
     """The graph queries of an rclpy node."""
 
-    def get_publishers_info_by_topic(self, topic_name: str) -> list[EndpointInfo]:
+    def get_publishers_info_by_topic(self, topic_name: str) -> Sequence[EndpointInfo]:
         """Every publisher of a topic."""
 
-    def get_subscriptions_info_by_topic(self, topic_name: str) -> list[EndpointInfo]:
+    def get_subscriptions_info_by_topic(self, topic_name: str) -> Sequence[EndpointInfo]:
         """Every subscription of a topic."""
 
 

@@ -39,5 +39,5 @@ class ZenohPeers:
 
     def _token(self, sample: zenoh.Sample, keys: Keys) -> None:
         token = str(sample.key_expr)
-        end = keys.end(token) if sample.kind == zenoh.SampleKind.PUT else None
-        self.tell(token, end.announced if end else None)
+        peer = keys.peer(token) if sample.kind == zenoh.SampleKind.PUT else None
+        self.tell(token, peer.announced if peer else None)

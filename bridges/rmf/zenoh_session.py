@@ -3,13 +3,14 @@
 import ctypes
 import json
 from contextlib import suppress
-from typing import Any
 
 import zenoh
 
+from bridges.rmf.zenoh_config import Configuration
 
-def opened(ways: list[dict[str, Any]]) -> zenoh.Session:
-    """A session by the first of these configurations that serves. Raises ZError when none does."""
+
+def opened(ways: list[Configuration]) -> zenoh.Session:
+    """A session with the first of these configurations that works. Raises ZError if none does."""
     wanted, *further = ways
     config = zenoh.Config()
     for key, value in wanted.items():
@@ -22,13 +23,13 @@ def opened(ways: list[dict[str, Any]]) -> zenoh.Session:
         raise
 
 
-def closed(session: zenoh.Session, held: list[Any]) -> None:
-    with suppress(zenoh.ZError):  # by a dead link nobody hears the farewell
+def closed(session: zenoh.Session, held: list[object]) -> None:
+    with suppress(zenoh.ZError):  # on a dead link the farewell is lost
         session.close()  # type: ignore[no-untyped-call]
     held.clear()
 
 
-def give_back() -> None:
-    """Return freed memory to the machine: opening a session leaves 2.5 MB of it in this process."""
+def trim_memory() -> None:
+    """Return freed memory to the system: opening a session leaves 2.5 MB of it in this process."""
     with suppress(AttributeError):  # a C library other than glibc has no such call
         ctypes.CDLL(None).malloc_trim(0)

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
-from bridges.core.fields import Zenoh
 from bridges.rmf.choose import missing_of_dds, missing_of_ros
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.releases import NEWEST, Release
 from bridges.rmf.ros_types import installed
+from bridges.rmf.settings import Zenoh
 from bridges.rmf.transport import Transport
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf.domains import domain_of_this_run

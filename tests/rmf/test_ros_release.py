@@ -12,6 +12,7 @@ from bridges.rmf.peers import Peers
 from bridges.rmf.releases import JAZZY, KILTED, RELEASES, Release
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.ros_types import fields_of, installed, ros_type
+from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import TransportError
 
 
@@ -76,7 +77,8 @@ class Graph:
 def test_a_peer_whose_type_does_not_fit_is_counted_on_ros_too(
     hashed: str, fits: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
-    peers, ours = Peers(JAZZY), [(topics.FLEET_STATES, False), (topics.LIFT_STATES, True)]
+    peers = Peers(JAZZY)
+    ours: list[tuple[AnyTopic, bool]] = [(topics.FLEET_STATES, False), (topics.LIFT_STATES, True)]
     for _ in range(3):
         ros_peers.look(Graph(hashed), peers, ours)
     fault = ("TYPE_MISFIT", "fleet_states: 1 of another definition than ours (jazzy)")

@@ -1,26 +1,29 @@
-"""The network under the `dds` transport: what ROS's variables ask for, and whether it has changed.
-
-Cyclone looks for an interface once, when a node joins. With only `lo` up it stays there for ever; of an
-address that comes, goes or changes later it learns nothing. So we look, and join again.
-"""
+"""Configurations of Cyclone DDS, for `dds` and for ROS on Cyclone: on the network, or only on this
+machine."""
 
 from collections.abc import Mapping
 from typing import Final
 from xml.sax.saxutils import quoteattr
 
-from bridges.rmf.addresses import Addresses, addresses
-
-__all__ = ["Addresses", "addresses", "configuration", "static_peers"]
+LOOPBACK: Final = (
+    "<CycloneDDS><Domain><General>"
+    '<Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
+    "<AllowMulticast>false</AllowMulticast></General>"
+    "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+    "<MaxAutoParticipantIndex>30</MaxAutoParticipantIndex>"
+    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
+)
+"""Keeps a node on this machine: unicast on `lo`, for up to 31 processes."""
 
 MOST_PROCESSES: Final = 32
 
 
 def configuration(environ: Mapping[str, str]) -> str:
-    """Cyclone's configuration for a node that leaves its machine: ours, then CYCLONEDDS_URI's.
+    """The configuration of a node on the network: ours, then CYCLONEDDS_URI's.
 
-    As rmw_cyclonedds makes it (ROS 2 Jazzy, rmw_node.cpp:1115-1220): peers by unicast beside multicast,
-    and participant indices that such a peer can guess. LOCALHOST is without multicast: this machine
-    and the peers. SYSTEM_DEFAULT leaves everything to Cyclone.
+    As rmw_cyclonedds makes it (ROS 2 Jazzy, rmw_node.cpp): static peers by unicast beside multicast,
+    and participant indices that peers can guess. LOCALHOST is without multicast: this machine and the
+    peers. SYSTEM_DEFAULT leaves everything to Cyclone.
     """
     own = environ.get("CYCLONEDDS_URI", "")
     wanted = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
