@@ -151,6 +151,8 @@ class Request(ABC):
     def nobody(self) -> Obstacle:
         """No supervisor or daemon subscribes to the request."""
         silence = f"no node subscribes to {self.topic.name}"
+        if self.supervisor is not None:
+            silence = f"no node publishes {self.supervisor.name}"
         if self.topic == self.own:
             listener = self.listener or f"{self.kind} daemon"
             return Obstacle(True, f"no {listener} runs in this domain: {silence}", self._loopback())

@@ -135,6 +135,13 @@ class LiftEnd(_Lift):
         late = now >= asked_at + OBEYS_WITHIN_S
         return self.falls_back and not self.direct and late and self._outside(seen)
 
+    def nobody(self) -> Obstacle:
+        """Without a supervisor too, a robot may be in the car."""
+        found = super(LiftEnd, self).nobody()
+        if self.direct or self.car_empty or not self.falls_back:
+            return found
+        return found._replace(remedy=f"if the car is empty: {self.line.again_with('--car-empty')}")
+
     def _outside(self, seen: Seen) -> bool:
         return self.car_empty or seen.boarded == "no"
 
