@@ -1,12 +1,11 @@
 """A lift's codes and outputs as tables: each number with its lines, and what a cut makes of it."""
 
-from collections.abc import Iterator, Mapping
-
-import msgspec
+from collections.abc import Iterator, Mapping, Sequence
 
 from bridges.core.table import Table
 from bridges.lift.signals import Side
 from drivers.hal.points import Wire
+from drivers.lift import codes
 from drivers.lift.table import wires
 from drivers.lift.wiring import FloorCode, LiftWiring
 from drivers.tables import lines_on, one_cut, told_of_cuts
@@ -44,36 +43,19 @@ def _place(i: int, many: int) -> str:
 
 
 def _floor_code(wiring: LiftWiring, table: Mapping[str, Wire]) -> Table:
-    code = wiring.floor_code
+    code, levels = wiring.floor_code, wiring.levels()
     rows = []
-    for number, level in _numbers(wiring):
-        shown = _shown(code, number, level)
+    for number, level, shown in sorted(code.shows(), key=lambda at: _height(at[1], levels)):
         cuts = [(signal, _landing(code, cut)) for signal, cut in one_cut(shown, table)]
         told = told_of_cuts([(s, r) for s, r in cuts if r != (level or BETWEEN)])
-        rows.append((level or BETWEEN, number, lines_on(shown), told))
+        numbered = "-" if number is None else str(number)
+        rows.append((level or BETWEEN, numbered, lines_on(shown), told))
     return Table(f"floor code ({code.encoding})", ("car at", "code", "lines on", CUT), tuple(rows))
 
 
-def _numbers(wiring: LiftWiring) -> Iterator[tuple[str, str | None]]:
-    """(code as text, landing or None between floors), landings from the lowest up."""
-    code = wiring.floor_code
-    if code.encoding == "one_hot":
-        yield "-", None
-        yield from (("-", level) for level in wiring.levels())
-        return
-    yield from ((str(number), None) for number in code.between_floors)
-    for level in wiring.levels():
-        yield from ((str(n), level) for n, named in code.codes.items() if named == level)
-
-
-def _shown(code: FloorCode, number: str, level: str | None) -> dict[str, bool]:
-    """The lines of this very number: a landing may have several."""
-    if number == "-":
-        return code.show(level)
-    codes = {int(number): level} if level else {}
-    between = [] if level else [int(number)]
-    only = msgspec.structs.replace(code, codes=codes, between_floors=between)
-    return only.show(level)
+def _height(level: str | None, levels: Sequence[str]) -> int:
+    """Between floors first, then the landings from the lowest up."""
+    return -1 if level is None else levels.index(level)
 
 
 def _landing(code: FloorCode, shown: Mapping[str, bool]) -> str:
@@ -81,20 +63,22 @@ def _landing(code: FloorCode, shown: Mapping[str, bool]) -> str:
     return FAULT if why else level or BETWEEN
 
 
-def _code(name: str, width: int, codes: Mapping[int, str], table: Mapping[str, Wire]) -> Table:
+def _code(
+    name: str, width: int, meanings: Mapping[int, str], table: Mapping[str, Wire]
+) -> Table:
     """A number on plain binary lines: every number that the lines can show."""
+
+    def read(shown: Mapping[str, bool]) -> str:
+        return meanings.get(codes.shown_number(name, shown, width), FAULT)
+
     rows = []
     for number in range(2**width):
-        shown = {f"{name}_bit{i}": bool(number >> i & 1) for i in range(width)}
-        means = codes.get(number, FAULT)
-        cuts = [(s, codes.get(_number(cut), FAULT)) for s, cut in one_cut(shown, table)]
+        shown = codes.lines(name, number, width)
+        means = meanings.get(number, FAULT)
+        cuts = [(s, read(cut)) for s, cut in one_cut(shown, table)]
         told = told_of_cuts([(s, r) for s, r in cuts if r != means])
         rows.append((means, str(number), lines_on(shown), told))
     return Table(f"{name} code", ("means", "code", "lines on", CUT), tuple(rows))
-
-
-def _number(shown: Mapping[str, bool]) -> int:
-    return sum(on << i for i, on in enumerate(shown.values()))
 
 
 def _outputs(wiring: LiftWiring) -> Table:
