@@ -53,6 +53,11 @@ def send(bus: Calls, call: Call | None, safe: bool = False) -> None:
         bus.send(call.path, call.method, call.body, safe)
 
 
+def claim(call: Call) -> str:
+    """The command as a claim: what no other device of this bus may send."""
+    return f"{call.method} {call.path}{f' {call.body}' if call.body else ''}"
+
+
 def told(call: Call, api: http.Base) -> str:
     """The command as `check` prints it: method, address and body."""
     return f"{call.method} {api.url(call.path)}{f' {call.body}' if call.body else ''}"

@@ -31,7 +31,7 @@ from drivers.charger.rules import Errors, Rule, judged
 from drivers.charger.state_codes import CODE_MAX, Code, Codes, first_side
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, Calls, send, told
+from drivers.http_call import Call, Calls, claim, send, told
 from drivers.json_fields import Field, Flag
 from drivers.unsafe import unaccepted
 
@@ -166,8 +166,11 @@ def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
 
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """The station's own state, which no other charger can have."""
+    """The station's own state and commands, which no other charger can have."""
     yield f"{settings.fields.state} of {settings.state_path}", ("state_path",)
+    for name in ("start", "stop"):
+        if call := getattr(settings, name):
+            yield claim(call), (name, "path")
 
 
 def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str, str]]:

@@ -17,7 +17,7 @@ from drivers import DriverError, json_fields
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, InsistentCalls, send, told
+from drivers.http_call import Call, InsistentCalls, claim, send, told
 from drivers.json_fields import Flag
 from drivers.unsafe import Unsafe, unaccepted
 
@@ -90,6 +90,13 @@ def _unsafe(settings: Settings) -> Iterator[Unsafe]:
             " write that as switches_off_after_s"
         )
         yield HOLD, ("hold",), text
+
+
+def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """(command, path): a second door with these commands would release this one."""
+    yield claim(settings.hold), ("hold", "path")
+    if settings.release != settings.hold:
+        yield claim(settings.release), ("release", "path")
 
 
 def describe(settings: Settings, bus: http.Settings) -> Iterator[tuple[str, str]]:
@@ -210,6 +217,7 @@ DRIVER = DriverType(
     buses=("http",),
     create=create,
     describe=describe,
+    claims=claims,
     warnings=warnings,
     unwired=lambda settings: (HOLD,),
     fake="hal_fakes.http_door",

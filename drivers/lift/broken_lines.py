@@ -17,6 +17,7 @@ SERVES = {"agv_mode": 0, "normal": 1, "overload": 1}
 """How much a state restricts RMF; every state that is not listed takes the lift away from RMF."""
 TAKEN_AWAY = 2
 
+
 class Misread(NamedTuple):
     """With `line` broken (`how`: cut or shorted), the code for `shown` reads as `reads`."""
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from bridges.core.table import Table
+from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Side
 from drivers.hal.points import Wire
 from drivers.lift import codes
@@ -18,7 +19,7 @@ BETWEEN = "between floors"
 def tables(wiring: LiftWiring) -> Iterator[Table]:
     """The floors from the lowest up, the other codes, and how each output is driven."""
     table = {wire.signal: wire for wire in wires(wiring)}
-    yield _floors(wiring)
+    yield floors(wiring)
     yield _floor_code(wiring, table)
     for name, section in (("service", wiring.inputs.service), ("motion", wiring.inputs.motion)):
         if section is not None:
@@ -26,7 +27,7 @@ def tables(wiring: LiftWiring) -> Iterator[Table]:
     yield _outputs(wiring)
 
 
-def _floors(wiring: LiftWiring) -> Table:
+def floors(wiring: LiftSettings) -> Table:
     """RMF's floors, so that a list that is upside down shows."""
     stops = list(wiring.stops().items())
     rows = [
@@ -63,9 +64,7 @@ def _landing(code: FloorCode, shown: Mapping[str, bool]) -> str:
     return FAULT if why else level or BETWEEN
 
 
-def _code(
-    name: str, width: int, meanings: Mapping[int, str], table: Mapping[str, Wire]
-) -> Table:
+def _code(name: str, width: int, meanings: Mapping[int, str], table: Mapping[str, Wire]) -> Table:
     """A number on plain binary lines: every number that the lines can show."""
 
     def read(shown: Mapping[str, bool]) -> str:
@@ -82,19 +81,27 @@ def _code(
 
 
 def _outputs(wiring: LiftWiring) -> Table:
-    limits = wiring.limits
+    have = [name for name in _DRIVEN if getattr(wiring.outputs, name) is not None]
+    rows = [(name, name) for name in have]
+    rows += [(f"call {level}", _call(wiring, level)) for level in wiring.levels()]
+    told = tuple((output, lines, how_long(wiring, output)) for output, lines in rows)
+    return Table("outputs", ("output", "lines on", "how long"), told)
+
+
+_DRIVEN = {
+    "agv_mode_request": "on while a robot holds the lift, and {grace_s:g} s longer",
+    "door_open": "on while the car stands for a robot",
+    "rear_door_open": "on while the car stands for a robot, at a floor of the rear door",
+}
+
+
+def how_long(settings: LiftSettings, output: str) -> str:
+    """For how long an output is driven; one that is not listed is a call."""
+    limits = settings.limits
+    if output in _DRIVEN:
+        return _DRIVEN[output].format(grace_s=limits.release_grace_s)
     pulse_s = limits.call_pulse_s
-    called = "on until the car is there" if pulse_s is None else f"one pulse of {pulse_s:g} s"
-    holds = f"on while a robot holds the lift, and {limits.release_grace_s:g} s longer"
-    driven = {
-        "agv_mode_request": holds,
-        "door_open": "on while the car stands for a robot",
-        "rear_door_open": "on while the car stands for a robot, at a floor of the rear door",
-    }
-    have = [name for name in driven if getattr(wiring.outputs, name) is not None]
-    rows = [(name, name, driven[name]) for name in have]
-    rows += [(f"call {level}", _call(wiring, level), called) for level in wiring.levels()]
-    return Table("outputs", ("output", "lines on", "how long"), tuple(rows))
+    return "on until the car is there" if pulse_s is None else f"one pulse of {pulse_s:g} s"
 
 
 def _call(wiring: LiftWiring, level: str) -> str:

@@ -8,7 +8,7 @@ import pytest
 
 from bridges.charger.signals import Activity, ChargerSample, Measured
 from bridges.settings.load import SettingsError, load
-from drivers.charger.register import Settings, decode
+from drivers.charger.register import Settings, decode, tables
 from drivers.charger.register_map import ChargerMap, Number
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_register.yaml"
@@ -116,3 +116,29 @@ def test_without_power_it_is_only_observed() -> None:
     made = msgspec.convert(plain, Settings)
     assert not made.can_stop()
     assert isinstance(made.map, ChargerMap)
+
+
+def test_each_value_is_told_by_what_its_registers_hold() -> None:
+    wide = Number(at="input register 9", words=2, low_first=True, scale=0.001)
+    flag = Number(at="input register 2", bit=3)
+    found = msgspec.structs.replace(
+        SETTINGS.map, values={**SETTINGS.map.values, "volts": wide, "flags": flag}
+    )
+    (table,) = tables(msgspec.structs.replace(SETTINGS, map=found))
+    state, others = "unit 3 input register 0", " while its other bits are 0"
+    volts = "unit 3 input register 10 and unit 3 input register 9"
+    assert table.rows == (
+        ("state", state, "0x0000", "0: idle"),
+        ("state", state, "0x0001", "1: handshake"),
+        ("state", state, "0x0002", "2: handshake"),
+        ("state", state, "0x0004", "4: charging"),
+        ("state", state, "0x0005", "5: released"),
+        ("state", state, "0x0009", "9: error"),
+        ("fault", "unit 3 input register 1", "0x0001", "1"),
+        ("flags", "unit 3 input register 2", f"0x0000{others}", "0"),
+        ("flags", "unit 3 input register 2", f"0x0008{others}", "1"),
+        ("volts", volts, "0x0000 and 0x64C8", "25.8 V"),
+        ("amps", "unit 3 input register 4", "0x050A", "12.9 A"),
+        ("in_range", "unit 3 discrete input 0", "0", "0"),
+        ("in_range", "unit 3 discrete input 0", "1", "1"),
+    )

@@ -8,7 +8,7 @@ import pytest
 
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from bridges.settings.load import load
-from drivers.lift.register import Settings, decode, encode, warnings
+from drivers.lift.register import Settings, decode, encode, tables, warnings
 from tests.settings.reading import problems_of
 
 CONFIG = Path(__file__).parents[3] / "config" / "lift_gateway.yaml"
@@ -145,4 +145,54 @@ def test_commands_that_cannot_be_read_back_are_warned_of() -> None:
             ("map", "commands", "read_back"),
             "commands cannot be read back: that they are off is not verified",
         )
+    ]
+
+
+def told(title: str) -> list[tuple[str, ...]]:
+    """The rows of one table of the shipped lift."""
+    return next(list(table.rows) for table in tables(shipped()) if table.title == title)
+
+
+def test_each_number_is_a_row_with_what_its_register_then_reads() -> None:
+    others = " while its other bits are 0"
+    assert told("floor numbers") == [
+        ("between floors", "0", f"0x0000{others}"),
+        ("L1", "1", f"0x0001{others}"),
+        ("L2", "2", f"0x0002{others}"),
+        ("L3", "3", f"0x0003{others}"),
+        ("L4", "4", f"0x0004{others}"),
+        ("a fault", "any other", "-"),
+    ]
+    assert told("motion numbers") == [
+        ("stopped", "0", f"0x0000{others}"),
+        ("up", "1", f"0x0100{others}"),
+        ("down", "2", f"0x0200{others}"),
+        ("a car that moves", "any other", "-"),
+    ]
+    assert told("door numbers")[-1] == ("neither open nor closed", "any other", "-")
+    assert told("service numbers")[-1] == ("out_of_service", "any other", "-")
+
+
+def test_each_command_is_a_row_with_what_is_written() -> None:
+    called = "on until the car is there"
+    held = "on while a robot holds the lift, and 3 s longer"
+    assert told("outputs") == [
+        ("agv_mode_request", "holding register 10: 1", "0", held),
+        ("door_open", "holding register 10: 2", "0", "on while the car stands for a robot"),
+        ("call L1", "holding register 11: 1", "0", called),
+        ("call L2", "holding register 11: 2", "0", called),
+        ("call L3", "holding register 11: 3", "0", called),
+        ("call L4", "holding register 11: 4", "0", called),
+    ]
+
+
+def test_floors_the_wrong_way_round_show() -> None:
+    settings = shipped()
+    turned = msgspec.structs.replace(settings, floors=settings.floors[::-1])
+    first = next(iter(tables(turned)))
+    assert [row[:2] for row in first.rows] == [
+        ("lowest", "L4"),
+        ("2", "L3"),
+        ("3", "L2"),
+        ("highest", "L1"),
     ]
