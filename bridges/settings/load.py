@@ -347,7 +347,7 @@ class _Reading:
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
     def _collect_kept(self) -> None:
-        """Collect what is to be said of outputs that outlive the daemon's machine, once for each bus."""
+        """Collect what is to be said of outputs that outlive this machine, once for each bus."""
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             kept = bus.hal.kept(bus.settings, self._written.get(name, ()))

@@ -1,7 +1,7 @@
 """What a lift's codes read as when one of their lines is cut or shorted.
 
-A service or motion code that then reads safer than the lift really is, is unsafe. A floor code that then
-reads as another floor gives a warning.
+A service or motion code that then reads safer than the lift really is, is unsafe. A floor code that
+then reads as another floor gives a warning.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
