@@ -51,7 +51,7 @@ def _held(number: Number, points: list[Point], value: float) -> str:
     words = number.encoded(value)
     if _is_single(points):
         return str(words[0])
-    others = "" if number.bit is None else " while its other bits are 0"
+    others = "" if number.bit is None else ", other bits 0"
     return " and ".join(f"0x{word:04X}" for word in words) + others
 
 

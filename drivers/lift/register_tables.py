@@ -23,7 +23,7 @@ def _numbers(part: Number) -> Iterator[tuple[str, str, str]]:
     meanings = [(number, str(meaning)) for number, meaning in part.codes.items()]
     if isinstance(part, FloorField):
         meanings += [(number, BETWEEN) for number in part.between_floors]
-    others = " while its other bits are 0" if part.bits else ""
+    others = ", other bits 0" if part.bits else ""
     for number, meaning in sorted(meanings):
         yield meaning, str(number), f"0x{part.word(number):04X}{others}"
     yield _unlisted(part), "any other", "-"

@@ -50,8 +50,8 @@ def _tables(parts: Sequence[Part]) -> Iterator[str]:
 
 def _table(table: Table) -> list[str]:
     """Its lines; a column that is empty in every row is left out."""
-    kept = [i for i in range(len(table.headings)) if any(row[i] for row in table.rows)]
-    return aligned([[row[i] for i in kept] for row in (table.headings, *table.rows)])
+    filled = table.filled()
+    return aligned([filled.headings, *filled.rows])
 
 
 def _notes(told: Told) -> list[str]:

@@ -125,7 +125,7 @@ def test_each_value_is_told_by_what_its_registers_hold() -> None:
         SETTINGS.map, values={**SETTINGS.map.values, "volts": wide, "flags": flag}
     )
     (table,) = tables(msgspec.structs.replace(SETTINGS, map=found))
-    state, others = "unit 3 input register 0", " while its other bits are 0"
+    state, others = "unit 3 input register 0", ", other bits 0"
     volts = "unit 3 input register 10 and unit 3 input register 9"
     assert table.rows == (
         ("state", state, "0x0000", "0: idle"),

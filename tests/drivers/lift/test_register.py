@@ -154,7 +154,7 @@ def told(title: str) -> list[tuple[str, ...]]:
 
 
 def test_each_number_is_a_row_with_what_its_register_then_reads() -> None:
-    others = " while its other bits are 0"
+    others = ", other bits 0"
     assert told("floor numbers") == [
         ("between floors", "0", f"0x0000{others}"),
         ("L1", "1", f"0x0001{others}"),
