@@ -18,6 +18,7 @@ from drivers.charger.state_codes import Codes
 from drivers.hal.can import named
 from drivers.profiles import Profile
 
+STATE_IS_NEEDED: Final = "needs state (its number, and what that means), or rules"
 Problems = Iterator[tuple[tuple[str, ...], str]]
 Signal = Annotated[
     str,
@@ -113,7 +114,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             frame, _, name = signal.partition(".")
             yield from _lacks(found, path, frame, name or "?")
         for path, text in by_rules.problems(self.rules, self.state is not None):
-            yield ("state",) if path == ("codes",) else path, text
+            yield (path, text) if path != ("codes",) else (("state",), STATE_IS_NEEDED)
         for name in self.masks:
             yield from _lacks(found, ("masks", name), name)
         for n, sent in enumerate(self.send):

@@ -227,7 +227,9 @@ def judged(station: "Station", read: Read, code: int | str | None) -> Judged:
 
     An entry of `errors` makes it an error, whatever the state is. Raises DriverError.
     """
-    return with_errors(meaning(station.rules, station.codes, read, code), station.errors.found(read))
+    return with_errors(
+        meaning(station.rules, station.codes, read, code), station.errors.found(read)
+    )
 
 
 class Meant(NamedTuple):
