@@ -72,10 +72,35 @@ def _setpoint_problems(settings: Settings) -> Problems:
         yield ("setpoints",), f"needs '{name}', which is sent to the charger while it charges"
     for name in sorted(given - wanted):
         yield ("setpoints", name), unknown("setpoint", name, sorted(wanted))
-    if wanted == given:
+    yield from _beyond(settings.setpoints)
+    if wanted != given:
+        return
+    impossible = list(_impossible(settings, found))
+    yield from impossible
+    if not impossible:
         for sent in found.send:
             for on in (True, False):
                 yield from _encoding_problems(settings, sent, on)
+
+
+def _beyond(setpoints: Mapping[str, float]) -> Problems:
+    """A setpoint above its own limit, as volts above max_volts."""
+    for name, value in setpoints.items():
+        most = setpoints.get(f"max_{name}", value)
+        if value > most:
+            yield ("setpoints", name), f"is {value:g}, above max_{name}, which is {most:g}"
+
+
+def _impossible(settings: Settings, found: FrameMap) -> Problems:
+    """A setpoint that its signal cannot hold."""
+    frames = dbc.load(found.dbc)
+    for sent in found.send:
+        for signal, name in sent.setpoints.items():
+            value, (low, high) = settings.setpoints[name], frames.bounds(sent.frame, signal)
+            if not low <= value <= high:
+                unit = frames.unit(sent.frame, signal)
+                allowed = f"{low:g} to {high:g} {unit}".rstrip()
+                yield ("setpoints", name), f"is {value:g}: {sent.frame}.{signal} takes {allowed}"
 
 
 def _encoding_problems(settings: Settings, sent: Sent, on: bool) -> Problems:

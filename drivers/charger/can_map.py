@@ -78,8 +78,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     `dbc`: the DBC file, in drivers/profiles/ or by its absolute path.
     `masks`: frame -> the bits of its id that are compared, for ids that contain a node id.
     `state`: the charger's state as a number; not needed with `rules`.
-    `state_timeout_s`: the state is stale when its frame, or one that a rule tests, has not come for this
-    long.
+    `state_timeout_s`: the state is stale when its frame, or one that a rule tests, has not come for
+    this long.
     `others_timeout_s`: the same for all other frames.
     `volts`, `amps`: at the battery.
     `receiver`: the receiver's id as a number; 0 is none. Without its frame there is no reading.

@@ -13,14 +13,16 @@ STYLE = """
 body { font: 8pt/1.2 sans-serif; margin: 1.5em; color: #000; background: #fff; }
 section { page-break-after: always; break-after: page; }
 section:last-of-type { page-break-after: auto; break-after: auto; }
-h1 { font-size: 12pt; margin: 0 0 .2em; } h2 { font-size: 9pt; margin: .7em 0 .2em; break-after: avoid; }
+h1 { font-size: 12pt; margin: 0 0 .2em; } h2 { font-size: 9pt; margin: .7em 0 .2em; }
+h2 { break-after: avoid; }
 p { margin: .2em 0; } .file { font-family: monospace; font-size: 7pt; word-break: break-all; }
 table { border-collapse: collapse; width: calc(100% - 1px); } tr { break-inside: avoid; }
 th, td { border: 1px solid #888; padding: 0 .3em; text-align: left; vertical-align: top; }
 th { background: #eee; } .box { width: 2.2em; text-align: center; } .seen { min-width: 6em; }
 .short { white-space: nowrap; } .warning { border-left: 4px solid #000; padding-left: .6em; }
 .narrow { columns: 2; column-gap: 1.2em; margin-top: .7em; padding-right: 1px; }
-.narrow div { break-inside: avoid; } .narrow h2 { margin-top: 0; } .narrow table { margin-bottom: .7em; }
+.narrow div { break-inside: avoid; } .narrow h2 { margin-top: 0; }
+.narrow table { margin-bottom: .7em; }
 .trials { break-inside: avoid; } .sign td { height: 2.2em; width: 33%; font-size: 7pt; }
 @page { size: A4; margin: 9mm; } @media print { body { margin: 0; } }
 """

@@ -40,6 +40,7 @@ MAP: dict[str, Any] = {
     },
     "send": [{"frame": "Command", "every_s": 0.5, "on": {"Enable": 1}, "off": {"Enable": 0}}],
 }
+BOTH = "too hot; no receiver answers"
 SETTINGS = msgspec.convert({"map": MAP}, Settings)
 
 
@@ -81,7 +82,7 @@ def charger() -> Iterator[Charger]:
         ("0081 0102 01 11 00 00", (Activity.ERROR, "rule 1", "foreign object", "station", True)),
         ("0000 0000 01 21 00 00", (Activity.ERROR, "rule 2", "no receiver answers", "robot", False)),
         ("0000 0000 01 07 00 00", (Activity.ERROR, "rule 2", "error 7", "", False)),
-        ("0000 0000 00 21 02 00", (Activity.ERROR, "rule 3", "too hot; no receiver answers", "station", False)),
+        ("0000 0000 00 21 02 00", (Activity.ERROR, "rule 3", BOTH, "station", False)),
         ("0000 0000 00 00 50 00", (Activity.ERROR, "rule 3", "error bit 4; error bit 6", "", False)),
         ("0000 0000 00 00 08 00", (Activity.ERROR, "rule 3", "battery", "robot", False)),
     ],
