@@ -76,15 +76,16 @@ WRONG: dict[str, tuple[str, str]] = {
         "stat: {at: input register 0}",
         "'values' needs 'state', of which codes speaks",
     ),
-    "{at: flags, ignore": ("{at: flagz, ignore", "'flagz' is no value of this map"),
+    "{at: flags, ignore": ("{at: flagz, ignore", "unknown value 'flagz': did you mean 'flags'?"),
     "{at: coil 0, start: 1, stop: 0}": (
         "{at: coil 0, start: 1, stop: 1}",
         "'stop' is the value of start",
     ),
     "{at: input register 4, scale: 0.01, signed: true}": (
         "{at: input register 4, bit: 16}",
-        "1 registers have bits 0 to 15",
+        "a register has bits 0 to 15",
     ),
+    "amps: {at:": ("aps: {at:", "unknown value 'aps': did you mean 'amps'?"),
     "in_range: {at: discrete input 0}": (
         "in_range: {at: discrete input 0, words: 2}",
         "'at' is one bit: leave words, signed and bit out",
