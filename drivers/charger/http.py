@@ -31,7 +31,7 @@ from drivers.charger.rules import Errors, Rule, judged
 from drivers.charger.state_codes import CODE_MAX, Code, Codes, first_side
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, Calls, claim, send, told
+from drivers.http_call import Call, Calls, claim, send, timer_unseen, told
 from drivers.json_fields import Field, Flag
 from drivers.unsafe import unaccepted
 
@@ -226,6 +226,10 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield (), f"{sort}without {' and '.join(missing)}, {what}"
     if not _lacks(settings, "receiver_id") and not settings.receivers:
         yield ("fields",), "receiver_id is read, but without receivers nobody is verified"
+    off_s = settings.switches_off_after_s
+    if settings.start and off_s is not None and timer_unseen(settings.start, off_s):
+        text = f"start sets no timer of {off_s:g} s that can be seen in it: compare the two"
+        yield ("start", "path"), text
     if settings.codes and not settings.codes.error:
         yield ("codes",), "no code means error: each of them will be shown as an unknown state"
 

@@ -50,8 +50,8 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         ):
             yield ("at",), "is one bit: leave words, signed and bit out"
         if self.bit is not None and self.bit >= 16 * self.words:
-            have = "two registers have bits 0 to 31" if self.words == 2 else "a register has bits 0 to 15"
-            yield ("bit",), have
+            have = "two registers have" if self.words == 2 else "a register has"
+            yield ("bit",), f"{have} bits 0 to {16 * self.words - 1}"
         if self.low_first and self.words == 1:
             yield ("low_first",), "is for two registers: words: 2"
 

@@ -296,7 +296,10 @@ def problems(rules: list[Rule], has_codes: bool) -> Problems:
         yield ("codes",), "needs codes (what the maker's state numbers mean), or rules"
     for n, rule in enumerate(rules[:-1]):
         if not rule.when:
-            yield ("rules", str(n)), "always holds: the rules below it are never asked"
+            yield (
+                ("rules", str(n)),
+                f"rule {n + 1} always holds: the rules below it are never asked",
+            )
             return
     means = {rule.means for rule in rules}
     if rules and not has_codes and not {"idle", "charging"} <= means:

@@ -17,7 +17,7 @@ from drivers import DriverError, json_fields
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, InsistentCalls, claim, send, told
+from drivers.http_call import Call, InsistentCalls, claim, send, timer_unseen, told
 from drivers.json_fields import Flag
 from drivers.unsafe import Unsafe, unaccepted
 
@@ -127,6 +127,11 @@ def warnings(settings: Settings) -> Problems:
             "pull the network plug while the door is held, and see that it is released in this time"
         )
         yield ("switches_off_after_s",), text
+        if timer_unseen(settings.hold, settings.switches_off_after_s):
+            text = (
+                f"hold sets no timer of {settings.switches_off_after_s:g} s that can be seen in it"
+            )
+            yield ("hold", "path"), f"{text}: compare the two"
         if HOLD in settings.accept_unsafe:
             yield ("accept_unsafe", HOLD), f"nothing is unsafe about {HOLD}: delete this"
     if settings.held is None:

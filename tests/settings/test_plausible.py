@@ -66,7 +66,9 @@ def test_why_a_unit_may_keep_its_outputs_is_noted(file: Path) -> None:
     assert warnings_of(file, door().replace("{1: a bench}", "{1: a bench, 3: x}")) == [
         "5:87: warning: bus 'module': nothing is written to unit 3: delete this"
     ]
-    assert problems_of(file, WATCHED) == ["5:125: unit 1 has a module_watchdog too: delete one"]
+    assert problems_of(file, WATCHED) == [
+        "5:125: 'without_watchdog': unit 1 has a module_watchdog too: delete one"
+    ]
 
 
 REFUSED = {
@@ -93,7 +95,7 @@ REFUSED = {
     ),
     "a rate that no unit has": (
         door(LINE.replace("9600", "9800")),
-        "5:72: 9800 is no rate that units have: 300, 600, 1200, 2400, 4800, 9600, ",
+        "5:72: 'baudrate': 9800 is no rate that units have: 300, 600, 1200, 2400, 4800, 9600, ",
     ),
 }
 

@@ -92,7 +92,7 @@ WRONG: dict[str, tuple[str, str]] = {
     ),
     "    unit: 3\n": (
         "    unit: 3\n    receivers: {a: fleet/robot}\n",
-        "the map needs the value rec",
+        "'receivers': the map needs the value rec",
     ),
 }
 

@@ -216,8 +216,8 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
     ("old", "new", "wanted"),
     [
         ("unit: 1", "unit: 1", []),
-        ("moving: [1]", "moving: [1, 2]", ["9:63: 2 is listed under open already"]),
-        ("{4: blocked}", "{0: blocked}", ["9:87: 0 is listed under closed already"]),
+        ("moving: [1]", "moving: [1, 2]", ["9:63: 'moving': 2 is listed under open already"]),
+        ("{4: blocked}", "{0: blocked}", ["9:87: 'faults': 0 is listed under closed already"]),
         ("open: [2], ", "", ["9:7: 'status' needs 'open': a list ([...])"]),
         ("open: [2]", "open: []", ["9:64: 'open' has 0 entries: at least 1 are needed"]),
         (
@@ -234,29 +234,29 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
             ],
         ),
         ("hold: 1, release: 0", "hold: 1, release: 1", ["10:47: 'release' is the value of hold"]),
-        ("hold: 1", "hold: 2", ["10:35: a coil is 0 or 1"]),
+        ("hold: 1", "hold: 2", ["10:35: 'hold': a coil is 0 or 1"]),
         (
             "unit: 1",
             "unit: 1\n    profile: generic-register-door",
-            ["8:14: 'map' is written out as well: delete one of the two"],
+            ["8:14: 'profile': 'map' is written out as well: delete one of the two"],
         ),
         (
             "unit: 1",
             "unit: 1\n    profile: generic-door",
-            ["8:14: 'map' is written out as well: delete one of the two"],
+            ["8:14: 'profile': 'map' is written out as well: delete one of the two"],
         ),
         (
             "unit: 1",
             "unit: 1\n    base_address: 65535\n    feedback: estimated",
             [
                 "9:15: the status says where the door is: leave feedback out",
-                "6:3: feedback: estimated needs open_delay_s, the time the door takes to open",
+                "6:3: 'front': feedback: estimated needs open_delay_s, the time the door takes to open",
             ],
         ),
         (
             "unit: 1",
             "unit: 1\n    on_fire: open",
-            ["8:14: an operator on registers has no fire input: leave this out"],
+            ["8:14: 'on_fire': an operator on registers has no fire input: leave this out"],
         ),
     ],
 )  # fmt: skip

@@ -92,8 +92,12 @@ MODEL = "looks like a number of the data model, which begins at 1"
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ("4: L4}\n        between", "4: L1}\n        between", "28:9: no code for L4"),
-        ("between_floors: [0]", "between_floors: [1]", "28:20: 1 means between floors as well"),
+        ("4: L4}\n        between", "4: L1}\n        between", "28:9: 'codes': no code for L4"),
+        (
+            "between_floors: [0]",
+            "between_floors: [1]",
+            "28:20: 'codes': 1 means between floors as well",
+        ),
         (
             "at: input register 1\n",
             "at: input register 30002\n",
@@ -105,25 +109,29 @@ MODEL = "looks like a number of the data model, which begins at 1"
             "coil 0\n        bits: [8",
             "32:13: 'coil 0': write 'holding register 0' or 'input register 0'; addresses begin at 0",
         ),
-        ("bits: [8, 9]", "bits: [8, 8]", "33:9: a bit stands here twice"),
-        ("2: down}", "4: down}", "34:39: 4 does not fit on 2 bits"),
+        ("bits: [8, 9]", "bits: [8, 8]", "33:9: 'bits': a bit stands here twice"),
+        ("2: down}", "4: down}", "34:39: 'codes': 4 does not fit on 2 bits"),
         (
             "0: closed, 1: moving, 2: open",
             "0: moving, 1: moving, 2: open",
             "37:9: 'codes' needs a code for open and one for closed",
         ),
-        ("bit: 0, active", "active", "41:7: a flag is one bit of a register: say which"),
+        (
+            "bit: 0, active",
+            "active",
+            "41:7: 'overload': a flag is one bit of a register: say which",
+        ),
         (
             "ask: 2, release: 0",
             "ask: 3, release: 0",
-            "44:51: another command has these bits of holding register 10 already",
+            "44:51: 'ask': another command has these bits of holding register 10 already",
         ),
-        ("none: 0", "none: 4", "47:43: 4 is no call, as none says"),
-        (", 4: L4}\n          none", "}\n          none", "47:11: no code for L4"),
+        ("none: 0", "none: 4", "47:43: 'codes': 4 is no call, as none says"),
+        (", 4: L4}\n          none", "}\n          none", "47:11: 'codes': no code for L4"),
         (
             "    floors:",
             "    agv_mode: by_call\n    floors:",
-            "44:9: agv_mode is by_call, so calls ask for AGV mode: delete one of the two",
+            "44:9: 'agv_mode_request': agv_mode is by_call, so calls ask for AGV mode: delete one of the two",
         ),
     ],
 )
