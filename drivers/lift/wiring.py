@@ -190,12 +190,12 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
                 yield None, level, {f"floor_{name}": name == level for name in self.lines}
             return
         for number in self.between_floors:
-            yield number, None, self._lines(number)
+            yield number, None, self._lines(self.encoding, number)
         for number, level in self.codes.items():
-            yield number, level, self._lines(number)
+            yield number, level, self._lines(self.encoding, number)
 
-    def _lines(self, number: int) -> dict[str, bool]:
-        lines = codes.encode(self.encoding, number, len(self.bits))
+    def _lines(self, encoding: codes.Encoding, number: int) -> dict[str, bool]:
+        lines = codes.encode(encoding, number, len(self.bits))
         shown = {f"floor_bit{i}": on for i, on in enumerate(lines)}
         if self.parity:
             shown["floor_parity"] = sum(lines) % 2 != (self.parity.total == "odd")

@@ -122,6 +122,7 @@ def test_without_power_it_is_only_observed() -> None:
 def test_each_value_is_told_by_what_its_registers_hold() -> None:
     wide = Number(at="input register 9", words=2, low_first=True, scale=0.001)
     flag = Number(at="input register 2", bit=3)
+    assert SETTINGS.map
     found = msgspec.structs.replace(
         SETTINGS.map, values={**SETTINGS.map.values, "volts": wide, "flags": flag}
     )

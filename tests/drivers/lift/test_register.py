@@ -131,7 +131,8 @@ MODEL = "looks like a number of the data model, which begins at 1"
         (
             "    floors:",
             "    agv_mode: by_call\n    floors:",
-            "44:9: 'agv_mode_request': agv_mode is by_call, so calls ask for AGV mode: delete one of the two",
+            "44:9: 'agv_mode_request': agv_mode is by_call, so calls ask for AGV mode:"
+            " delete one of the two",
         ),
     ],
 )
@@ -196,7 +197,7 @@ def test_each_command_is_a_row_with_what_is_written() -> None:
 
 def test_floors_the_wrong_way_round_show() -> None:
     settings = shipped()
-    turned = msgspec.structs.replace(settings, floors=settings.floors[::-1])
+    turned = msgspec.structs.replace(settings, floors=list(settings.floors)[::-1])
     first = next(iter(tables(turned)))
     assert [row[:2] for row in first.rows] == [
         ("lowest", "L4"),
