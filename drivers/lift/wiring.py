@@ -10,6 +10,7 @@ from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Hazard
 from drivers.hal.points import Input, Output
 from drivers.lift import codes
+from drivers.lift.codes import Encoding
 
 Number = Annotated[int, msgspec.Meta(ge=0, le=65535)]
 """A number that a controller shows on several lines."""
@@ -194,7 +195,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         for number, level in self.codes.items():
             yield number, level, self._lines(self.encoding, number)
 
-    def _lines(self, encoding: codes.Encoding, number: int) -> dict[str, bool]:
+    def _lines(self, encoding: Encoding, number: int) -> dict[str, bool]:
         lines = codes.encode(encoding, number, len(self.bits))
         shown = {f"floor_bit{i}": on for i, on in enumerate(lines)}
         if self.parity:
