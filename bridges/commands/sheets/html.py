@@ -1,6 +1,6 @@
-"""The commissioning sheet: an HTML file to print, a page for each controller, to tick and to sign.
+"""The commissioning sheet: an HTML file to print, tick and sign, with a page for each controller.
 
-It needs nothing beside itself. What a YAML says is text here, never markup.
+It needs no other file. Texts from a YAML are escaped, never markup.
 """
 
 from collections.abc import Iterator, Sequence
@@ -117,7 +117,7 @@ def _cell(text: str) -> str:
 
 
 def _trials(part: Part) -> Iterator[str]:
-    """What no file can say of a controller."""
+    """Trials on the controller itself."""
     if part.bus:
         trials = Table("to be tried", ("trial",), tuple((trial,) for trial in TO_TRY))
         yield from _table(trials, seen=True)
