@@ -81,7 +81,7 @@ class Site:
 
     def point_at(self, replace: dict[str, Any]) -> None:
         """Write the file, with its bus pointed at this far side."""
-        bus = json.dumps(self._bus | replace)
+        bus = json.dumps(self._bus | replace).replace('"1":', "1:")  # JSON has no numbers as keys
         self.file.write_text(self._text.format(domain=self._domain, bus=bus))
 
     def check(self) -> list[str]:
