@@ -122,8 +122,8 @@ def test_faults_have_a_column_when_there_are_any_and_are_a_change() -> None:
     assert change_line(row, WALL).endswith("age 0.0 s  DOOR_SILENT")
     assert repaint(faulty, 0, columns=80, lines=24)[0].count("\x1b[31m") == 1
     assert "\x1b[31m" not in repaint(faulty, 0, columns=80, lines=24, coloured=False)[0]
-    told = json.loads(json_line(row, WALL))
-    assert (told["at"], told["name"], told["faults"]) == (WALL, "ward", "DOOR_SILENT")
+    line = json.loads(json_line(row, WALL))
+    assert (line["at"], line["name"], line["faults"]) == (WALL, "ward", "DOOR_SILENT")
 
 
 def test_a_pipe_gets_a_line_for_a_change_and_none_for_an_age() -> None:
