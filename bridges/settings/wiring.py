@@ -7,11 +7,10 @@ The bus type knows how its points are spelled and which wires are impossible (`c
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import msgspec
 from yaml import Node
 
 from bridges.settings.nodes import Page, unknown
-from bridges.settings.values import BROKEN, Broken, Check, Spot, below, locate
+from bridges.settings.values import BROKEN, Check, Spot, below, locate
 from drivers.hal import AnyBus
 from drivers.hal.points import Input, Output, Wire
 
@@ -91,7 +90,7 @@ class Wiring:
             self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
             self.written.append(text)
 
-    def reach(self, bus: msgspec.Struct | Broken) -> None:
+    def reach(self, bus: object) -> None:
         """Note points that no bus of these settings (BROKEN where they are not known) can have."""
         for use in self.uses if self._hal and bus is not BROKEN else ():
             assert self._hal
