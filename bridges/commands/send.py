@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any, TextIO
 from uuid import uuid4
 
+from bridges.charger.refusals import Refusal, read
 from bridges.commands.exchange import step
 from bridges.commands.graph import (
     Heard,
@@ -27,7 +28,7 @@ from bridges.commands.requests.charger import Charge, ChargeCancel, QueuedCancel
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
 from bridges.rmf import definitions as d
-from bridges.rmf import topics, words
+from bridges.rmf import words
 from bridges.rmf.stamps import stamp
 from bridges.rmf.transport import Publisher, Transport, TransportError
 
@@ -199,7 +200,7 @@ class _Exchange:
     ) -> None:
         self.request, self.out = request, out
         self.publisher: Publisher[Any] = transport.publisher(request.topic)
-        self.inbox = Inbox(transport, request.states, topics.DOOR_SUPERVISOR_HEARTBEAT)
+        self.inbox = Inbox(transport, request.states, *request.answers)
         self.seen = Seen(began_at=time.monotonic(), timeout_s=timeout_s)
         self.said: set[str] = set()
         self.described = ""
@@ -224,6 +225,9 @@ class _Exchange:
         if isinstance(heard.message, d.SupervisorHeartbeat):
             self.seen = replace(self.seen, heartbeat=heard)
             return
+        if isinstance(heard.message, d.DiagnosticStatus):
+            self._take_refusal(read(heard.message))
+            return
         name = words.device(heard.message)
         self.seen = replace(self.seen, names=self.seen.names | {name})
         if not self.request.about(heard.message):
@@ -233,6 +237,12 @@ class _Exchange:
         if text != self.described:
             self.described = text
             self._line(heard.at, "state", text)
+
+    def _take_refusal(self, refusal: Refusal | None) -> None:
+        """Only one that follows our request counts."""
+        sent = self.seen.first_sent_at is not None
+        if sent and refusal is not None and self.request.refused_by(refusal):
+            self.seen = replace(self.seen, refusal=refusal)
 
     def _send(self, message: words.Requested, now: float) -> None:
         if isinstance(message, d.LiftRequest | d.DoorRequest):

@@ -371,6 +371,7 @@ Message = (
     | Alert
     | Bool
     | EmergencySignal
+    | DiagnosticStatus
     | DiagnosticArray
 )
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, ClassVar, NamedTuple
 
+from bridges.charger.refusals import Refusal
 from bridges.commands.graph import CommandLine, Heard
 from bridges.rmf import words
 from bridges.rmf.topics import AnyTopic
@@ -21,7 +22,7 @@ class Seen:
 
     `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
     request, in order. `names`: every device of the kind that was heard. `heartbeat`: the latest of the
-    door supervisor.
+    door supervisor. `refusal`: the latest of a charger's that names our request.
     """
 
     began_at: float
@@ -32,6 +33,7 @@ class Seen:
     states: tuple[Heard, ...] = ()
     names: frozenset[str] = frozenset()
     heartbeat: Heard | None = None
+    refusal: Refusal | None = None
 
     def latest(self) -> Any:
         """The last state heard, None before the first."""
@@ -81,7 +83,10 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request about the device of this `name`: to its daemon if `direct`, else to the supervisor."""
+    """A request about the device of this `name`: to its daemon if `direct`, else to the supervisor.
+
+    `answers`: topics that are heard beside the states.
+    """
 
     name: str
     direct: bool = field(default=False, kw_only=True)
@@ -92,6 +97,7 @@ class Request:
     own: ClassVar[AnyTopic]
     adapter: ClassVar[AnyTopic | None] = None
     listener: ClassVar[str] = ""
+    answers: ClassVar[tuple[AnyTopic, ...]] = ()
 
     @property
     def topic(self) -> AnyTopic:
@@ -113,6 +119,10 @@ class Request:
     def about(self, state: words.Stated) -> bool:
         """Whether the state is of this device."""
         return words.device(state) == self.name
+
+    def refused_by(self, refusal: Refusal) -> bool:
+        """Whether this answers our request."""
+        return False
 
     def ready(self, seen: Seen) -> bool:
         """Whether the device has been heard."""
