@@ -246,23 +246,31 @@ class FrameDriver:
         return Measured(
             receiver_id=_receiver(receiver),
             in_range=None if out is None else not out,
+            range_ok=_flag(values, found.range_ok),
+            at_height=_flag(values, found.at_height),
             volts=_rounded(values.get(found.volts or "")),
             amps=_rounded(values.get(found.amps or "")),
+            temperatures=tuple(
+                (name, round(values[signal], 3))
+                for name, signal in found.temperatures.items()
+                if signal in values and self._dbc.in_range(signal, values[signal])
+            ),
         )
 
 
 def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
-    """The frames to receive. A reading needs those of the state, the receiver and the rules."""
+    """The frames to receive. A reading needs those of the state, the pad and the rules."""
     state, *_ = found.frames()
-    receiver = (found.receiver or "").split(".")[0]
-    ruled = {signal.split(".")[0] for _, signal in places(found.rules)}
+    pad = (found.receiver, found.range_ok, found.at_height)
+    needed = [signal for _, signal in places(found.rules)] + [signal for signal in pad if signal]
+    frames_needed = {state, *(signal.split(".")[0] for signal in needed)}
     return {
         name: Said(
             id=frames.id(name),
             mask=found.masks.get(name, 0x1FFF_FFFF),
             length=frames.length(name),
             fresh_s=found.state_timeout_s if name == state else found.others_timeout_s,
-            needed=name in {state, receiver, *ruled},
+            needed=name in frames_needed,
         )
         for name in found.frames()
     }
@@ -272,6 +280,11 @@ def _heard(values: Mapping[str, float], signal: str) -> float:
     if signal not in values:
         raise DriverError(f"{signal} is not heard, and a rule looks at it")
     return values[signal]
+
+
+def _flag(values: Mapping[str, float], signal: str | None) -> bool | None:
+    """None where the map has no such signal."""
+    return None if signal is None else bool(values[signal])
 
 
 def _receiver(number: float | None) -> str | None:

@@ -75,6 +75,13 @@ class Dbc:
         """A signal's unit, or ""."""
         return str(self._messages[frame].get_signal_by_name(signal).unit or "")
 
+    def in_range(self, signal: str, value: float) -> bool:
+        """Whether Frame.Signal may have this value: the file's [min|max]; one outside is invalid."""
+        frame, _, name = signal.partition(".")
+        found = self._messages[frame].get_signal_by_name(name)
+        low, high = found.minimum, found.maximum
+        return (low is None or value >= low) and (high is None or value <= high)
+
     def sample(self, frame: str, signal: str, value: float) -> bytes | None:
         """A frame whose one signal says this and all others 0; None where it has no such frame."""
         from cantools.database.errors import Error

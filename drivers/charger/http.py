@@ -24,7 +24,7 @@ from bridges.charger.signals import (
     FaultSide,
     Measured,
 )
-from bridges.core.fields import Timeout
+from bridges.core.fields import Name, Timeout
 from drivers import json_fields
 from drivers.charger import rules
 from drivers.charger.rules import Errors, Rule, judged
@@ -65,10 +65,14 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     no error (`OK`). For other texts `codes` gives the side, if it can.
     `receiver_id`: the id of the receiver that it sees; null or "" when it sees none.
     `in_range`: whether the robot stands where it can be charged.
+    `range_ok`: likewise, where the station says so all the time: without it there is no power.
+    `at_height`: whether a pad that the station moves is where it charges: without it there is no power,
+    and a fault if it is lost while current flows.
     `volts`: the voltage at the battery.
     `amps`: the current into the battery.
     `battery_percent`: the battery's charge, 0 to 100.
     `time_to_full_s`: the time until the battery is full (s).
+    `temperatures`: name -> a temperature (°C), shown in status and diagnostics.
     """
 
     state: Field = "state"
@@ -76,10 +80,13 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     error_texts: dict[Word, TextMeans] = msgspec.field(default_factory=dict)
     receiver_id: Field | None = None
     in_range: InRange | None = None
+    range_ok: Flag | None = None
+    at_height: Flag | None = None
     volts: Number | None = None
     amps: Number | None = None
     battery_percent: Number | None = None
     time_to_full_s: Number | None = None
+    temperatures: dict[Name, Number] = msgspec.field(default_factory=dict)
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -185,10 +192,12 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
         rows.append(("clear error", clear))
     for name in fields.__struct_fields__ if fields != Fields() else ():
         place = getattr(fields, name)
-        if place is fields.error_texts or (name == "state" and settings.codes is None):
+        if isinstance(place, dict) or (name == "state" and settings.codes is None):
             continue
         if place:
             rows.append((f"field {name}", _place(place)))
+    for name, number in fields.temperatures.items():
+        rows.append((f"temperature {name}", _place(number)))
     for text, means in fields.error_texts.items():
         rows.append((f"text {text}", "no error" if means == "none" else f"{means}'s error"))
     rows += [(f"word {word}", str(code)) for word, code in settings.state_words.items()]
@@ -354,15 +363,23 @@ def _measured(answer: Mapping[str, Any], fields: Fields) -> Measured:
         assert fields.time_to_full_s
         raise json_fields.wrong(fields.time_to_full_s.field, left_s, "0 s to a week")
     receiver = fields.receiver_id and json_fields.name(answer, fields.receiver_id)
-    return Measured(receiver_id=receiver, in_range=_in_range(answer, fields.in_range), **found)
+    celsius = ((n, _number(answer, place)) for n, place in fields.temperatures.items())
+    return Measured(
+        receiver_id=receiver,
+        in_range=_flag(answer, fields.in_range),
+        range_ok=_flag(answer, fields.range_ok),
+        at_height=_flag(answer, fields.at_height),
+        temperatures=tuple((n, value) for n, value in celsius if value is not None),
+        **found,
+    )
 
 
 def _number(answer: Mapping[str, Any], number: Number | None) -> float | None:
     return json_fields.number(answer, number.field, number.scale) if number else None
 
 
-def _in_range(answer: Mapping[str, Any], place: InRange | None) -> bool | None:
-    """Null means not in range."""
+def _flag(answer: Mapping[str, Any], place: Flag | None) -> bool | None:
+    """Null means no."""
     return None if place is None else json_fields.flag(answer, place)
 
 

@@ -121,6 +121,14 @@ class FrameCharger:
         shown = {FLAGS[fault] for fault in reading.faults}
         for signal in (*known.errors.station, *known.errors.robot):
             values[signal] = float(signal.split(".")[1] in shown)
+        for signal in known.temperatures.values():
+            values[signal] = round(reading.coil_c)
+        for flag, holds in (
+            (known.range_ok, reading.in_range),
+            (known.at_height, reading.at_height),
+        ):
+            if flag:
+                values[flag] = float(holds)
         if known.out_of_range:
             values[known.out_of_range] = float(reading.robot and not reading.in_range)
         return values

@@ -193,3 +193,51 @@ class ChargerContract(ABC):
         wait_until(lambda: bench.patiently() is Activity.CHARGING, "back")
         bench.scan(ON)
         assert bench.switched() == [True]
+
+
+class MovingPadContract(ABC):
+    """A driver that says whether the pad is at its height and whether a robot is in range."""
+
+    celsius: ClassVar[tuple[str, ...]] = ()
+    """The temperatures that it reads."""
+    down: ClassVar[str] = "pad_down"
+    badly: ClassVar[str] = "out_of_range"
+    """What is pressed for a pad that is down, and for a robot that stands badly."""
+
+    @abstractmethod
+    def benches(self) -> contextlib.AbstractContextManager[Bench]:
+        """A bench whose settings name the signals."""
+
+    @pytest.fixture
+    def bench(self) -> Iterator[Bench]:
+        with self.benches() as bench:
+            bench.driver.open()
+            yield bench
+            bench.driver.close()
+
+    def test_height_and_range_are_read_as_they_are(self, bench: Bench) -> None:
+        assert self.pad(bench, (False, False))
+        bench.press("robot")
+        assert self.pad(bench, (True, True))
+        bench.press(self.badly)
+        assert self.pad(bench, (True, False))
+        bench.press(self.badly, False)
+        bench.press(self.down)
+        assert self.pad(bench, (False, True))
+
+    def test_temperatures_are_read_by_their_names(self, bench: Bench) -> None:
+        bench.scan(OFF)
+        found = at_last(bench.driver.read, "a reading", bench.a_moment).measured.temperatures
+        assert tuple(name for name, _ in found) == self.celsius
+        assert all(20 <= celsius <= 30 for _, celsius in found)
+
+    def pad(self, bench: Bench, wanted: tuple[bool, bool]) -> bool:
+        """Height and range, once they are read so."""
+
+        def shown() -> bool:
+            bench.scan(OFF)
+            found = bench.driver.read().measured
+            return (found.at_height, found.range_ok) == wanted
+
+        wait_until(shown, f"height and range are {wanted}")
+        return True

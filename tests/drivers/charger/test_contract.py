@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import msgspec
 
@@ -42,10 +42,13 @@ class TestAnotherMakeOnHttp(ChargerContract):
     link: ClassVar = "server"
     example: ClassVar = ("charger_http_full.yaml", "charger_b")
 
+    def settings(self) -> Any:
+        file, device = self.example
+        return load(CONFIG / file).devices[device]
+
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        file, device = self.example
-        settings = load(CONFIG / file).devices[device]
+        settings = self.settings()
         asked = settings.range_check is not None
         plant = ChargerPlant("a", settings.receivers, commanded=True, asked=asked, pace=PACE)
         world, clock = RealTime({"a": plant}), Time()
@@ -85,9 +88,12 @@ class RcuBench(Bench):
 class TestAReceiverOnModbus(ChargerContract):
     link: ClassVar = "unit"
 
+    def settings(self) -> Any:
+        return load(CONFIG / "charger_modbus.yaml").devices["charger_c"]
+
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = load(CONFIG / "charger_modbus.yaml").devices["charger_c"]
+        settings = self.settings()
         world, clock = RealTime({"a": PadPlant("a", pace=PACE)}), Time()
         server = ModbusServer([ModbusRcu(world.plants["a"], settings)], slow_s=0.3)
         plain = {"type": "modbus", "timeout_s": 0.2, **server.replace}
@@ -111,9 +117,12 @@ class TestAReceiverOnModbus(ChargerContract):
 class TestAnyMakeOnRegisters(ChargerContract):
     link: ClassVar = "unit"
 
+    def settings(self) -> Any:
+        return load(CONFIG / "charger_register.yaml").devices["charger_f"]
+
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = load(CONFIG / "charger_register.yaml").devices["charger_f"]
+        settings = self.settings()
         plant = ChargerPlant("a", commanded=True, asked=True, pace=PACE, parts=PARTS)
         world, clock = RealTime({"a": plant}), Time()
         server = ModbusServer([RegisterCharger(world.plants["a"], settings)], slow_s=0.3)
@@ -145,9 +154,12 @@ class TestContactsAtAModule(ChargerContract):
     measures: ClassVar = False
     foreign_object: ClassVar = "the fault contact"
 
+    def settings(self) -> Any:
+        return load(CONFIG / "charger_contacts.yaml").devices["charger_e"]
+
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = load(CONFIG / "charger_contacts.yaml").devices["charger_e"]
+        settings = self.settings()
         table = charger_contacts.wires(settings)
         world, clock = RealTime({"a": ContactCharger("a", table, pace=PACE)}), Time()
         wiring = Wiring(world.plants["a"], table, modbus.canonical)

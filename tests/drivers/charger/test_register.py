@@ -13,7 +13,15 @@ from drivers.charger.register_map import ChargerMap, Number
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_register.yaml"
 SETTINGS: Settings = load(EXAMPLE).devices["charger_f"]
-WELL = {"state": 0.0, "fault": 0.0, "flags": 0.0, "volts": 48.5, "amps": 0.0, "in_range": 1.0}
+WELL = {
+    "state": 0.0,
+    "fault": 0.0,
+    "flags": 0.0,
+    "volts": 48.5,
+    "amps": 0.0,
+    "in_range": 1.0,
+    "coil": 31.0,
+}
 
 
 @pytest.mark.parametrize(
@@ -66,7 +74,7 @@ def test_what_it_measures_is_told() -> None:
     assert SETTINGS.map
     values = {**WELL, "receiver": 4711.0}
     assert decode(SETTINGS.map, values) == ChargerSample(
-        Activity.IDLE, 0, measured=Measured("4711", True, 48.5, 0.0)
+        Activity.IDLE, 0, measured=Measured("4711", True, 48.5, 0.0, temperatures=(("coil", 31.0),))
     )
     assert decode(SETTINGS.map, {**WELL, "receiver": 0}).measured.receiver_id == ""
 
