@@ -43,6 +43,7 @@ def test_an_operator_has_the_robot_on_the_pad_charged_ad_hoc() -> None:
     site = yard()
     robot = site.fleet.robots["AMR01"]
     robot.place = robot.dedicated = "charger_a"
+    robot.doing, robot.task_id, robot.battery_percent = "work", "work-1", 40.0
     site.run(7.0)
     site.wants("AMR01")
     assert site.run(30.0) == [
