@@ -53,6 +53,8 @@ TITLES: Final = {
     "RECEIVER_ERROR": "A robot's receiver reports an error",
     "REQUEST_NOT_TAKEN": "A charger takes no request",
 }
+ASKS_S: Final = 5.0
+"""A robot that comes to a pad unannounced asks for it by its fleet's state, a few seconds later."""
 ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
 
 
@@ -116,7 +118,7 @@ def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
         if now >= memory.silent_since(name):
             yield Fault("STATION_SILENT", f"{name}: no ChargerState comes")
         elif name in memory.stations:
-            yield from _shown(memory, name, memory.stations[name], site)
+            yield from _shown(memory, name, memory.stations[name], now, site)
         if now < memory.shunned.get(name, now):
             yield Fault("REQUEST_NOT_TAKEN", f"{name}: its daemon's log says why")
     for one in astray.found(memory, now, site).values():
@@ -127,14 +129,15 @@ def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
             yield Fault("RECEIVER_ERROR", f"the receiver on {who}: {error}")
 
 
-def _shown(memory: Memory, name: str, seen: Seen, site: Site) -> Iterator[Fault]:
+def _shown(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Iterator[Fault]:
     """Faults that a station's state shows."""
     if seen.diagnosis in (Diagnosis.STATION, Diagnosis.LOST, Diagnosis.UNCLEAR):
         yield Fault("STATION_OUT_OF_SERVICE", f"{name}: {seen.error}")
     if seen.diagnosis is not Diagnosis.PAD:
         return
     who = astray.on_pad(seen.error, site)
-    if who is None or memory.station_of(who) is None:
+    unasked = who is not None and memory.station_of(who) is None and now >= seen.since + ASKS_S
+    if who is None or unasked:
         what = who or _stranger(seen.error)
         yield Fault("WRONG_STATION", f"{what} stands at {name}, nobody asked for that")
 
@@ -178,10 +181,11 @@ def messages(
 
 
 def due(memory: Memory) -> list[float]:
-    """When requests and cancels are due."""
+    """When requests, cancels and faults are due."""
     if not memory.may_speak:
         return []
-    return [_due_at(memory, name, grant) for name, grant in memory.grants.items()]
+    asks = [seen.since + ASKS_S for seen in memory.stations.values()]
+    return asks + [_due_at(memory, name, grant) for name, grant in memory.grants.items()]
 
 
 def _due_at(memory: Memory, name: str, grant: Grant) -> float:

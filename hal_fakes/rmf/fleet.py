@@ -38,7 +38,8 @@ class AdapterCrashed(Exception):
 class FleetRobot:
     """`place`: the waypoint at which it stands; "" on the road. `goes_to`: where it drives.
     `dedicated`, `waits`: its charging assignment. `doing`: its task, or what it does without one.
-    `task_id`: "" without a task. `mode`: the last that a phase has set."""
+    `task_id`: "" without a task. `mode`: the last that a phase has set. `stuck`: it
+    drives nowhere."""
 
     name: str
     place: str
@@ -51,6 +52,7 @@ class FleetRobot:
     arrives_at: float = 0.0
     came_from: str = ""
     mode: d.RobotModeValue = d.RobotModeValue.MODE_IDLE
+    stuck: bool = False
 
     @property
     def charges(self) -> bool:
@@ -163,6 +165,8 @@ class Fleet:
         if robot.place == place:
             robot.goes_to = ""
             self._arrived(robot)
+            return
+        if robot.stuck:
             return
         robot.came_from = robot.place or robot.came_from
         robot.place, robot.goes_to, robot.arrives_at = "", place, now + self.drive_s
