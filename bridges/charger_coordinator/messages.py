@@ -156,4 +156,5 @@ def summary(report: SiteReport, now: float) -> Mapping[str, str]:
         "assigns": report.assigns,
         **({"schedule": "; ".join(report.schedule)} if report.schedule else {}),
         "queue": "; ".join(report.queue) or "-",
+        **({"did not come": ", ".join(map(str, report.absent))} if report.absent else {}),
     }

@@ -62,7 +62,7 @@ class SiteReport(msgspec.Struct, frozen=True):
     """The site as it is shown. `read_at`: when a station was last heard (monotonic s). `stations`:
     (station, its state, its robot and who wanted that). `queue`: the robots that wait, in order, each
     with what it waits for. `waiting`: the same robots alone. `assigns`: who tells the robots where to
-    charge. `schedule`: its times."""
+    charge. `schedule`: its times. `absent`: robots that were called and did not come."""
 
     read_at: float | None
     stations: tuple[tuple[str, str], ...] = ()
@@ -70,11 +70,12 @@ class SiteReport(msgspec.Struct, frozen=True):
     waiting: tuple[Robot, ...] = ()
     assigns: str = ""
     schedule: tuple[str, ...] = ()
+    absent: tuple[Robot, ...] = ()
     faults: tuple[Fault, ...] = ()
 
     def news(self) -> Any:
         """What is worth a line in the log: not the time that passes."""
-        return self.stations, self.waiting, self.assigns, self.schedule
+        return self.stations, self.waiting, self.assigns, self.schedule, self.absent
 
 
 def report(memory: Memory, now: float, site: Site) -> SiteReport:
@@ -87,6 +88,7 @@ def report(memory: Memory, now: float, site: Site) -> SiteReport:
         waiting=tuple(wish.robot for wish in waiting),
         assigns=_assigns(memory),
         schedule=tuple(one.text(memory.when) for one in site.schedule),
+        absent=tuple(who for who, until in memory.absent.items() if now < until),
         faults=tuple(_faults(memory, now, site)),
     )
 
