@@ -18,9 +18,11 @@ from bridges.rmf.topics import Topic
 
 @dataclass(frozen=True, slots=True)
 class MaySpeak:
-    """Whether the core may publish. It may not during the quiet start or while a rival publishes."""
+    """Whether the core may publish. It may not during the quiet start or while a rival publishes.
+    `alone`: no other node publishes on a topic of `yields`."""
 
     yes: bool
+    alone: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +42,7 @@ class GraphKind(Generic[S, L, M, E, R]):
     `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
     RequestRefused; `wall` is our clock (s since the epoch).
     `publishes`: the topics that it sends on. `sole`: those on which only one node may send; while
-    another node does, ours only listens.
+    another node does, ours only listens. `yields`: those on which it alone falls silent then.
     `device_name`: which subject a message is about. `shown_by`: the topic on which a subject publishes
     its own states, which proves that it exists (a request may name anything); None if there is only
     one subject. `reserved(settings)`: the subjects that the YAML names.
@@ -83,6 +85,7 @@ class GraphKind(Generic[S, L, M, E, R]):
     warnings: Callable[[S], Iterable[tuple[tuple[str, ...], str]]] | None = None
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
     speaks_of: Callable[[S], Iterable[Place]] = lambda settings: ()
+    yields: tuple[Topic[Message], ...] = ()
     shown_by: Topic[Message] | None = None
     reserved: Callable[[S], Collection[str]] = lambda settings: ()
 

@@ -61,6 +61,8 @@ CHARGER_REFUSALS = Topic("charger_refusals", d.DiagnosticStatus)
 # Where wishes for any charger go; RMF has no name for it.
 ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
 ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
+# Nothing is sent on it. Its publisher shows that a coordinator serves the graph: a second one waits.
+CHARGER_COORDINATOR = Topic("charger_coordinator", d.Bool)
 FLEET_STATES = Topic("fleet_states", d.FleetState)
 # rmf_charging_schedule publishes it retained, and a fleet adapter that starts later wants it.
 CHARGING_ASSIGNMENTS = Topic(

@@ -67,6 +67,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         self.name = f"graph-{kind.name}"
         self.inbox: Inbox[tuple[Topic[Message], E]] = Inbox()
         self.presence = Presence(kind.name, kind.quiet_s(settings))
+        on = ", ".join(topic.name for topic in kind.yields)
+        self.alone = Presence(f"{kind.name} on {on}", 0.0) if on else None
         self.subjects: dict[str, Subject[M, GraphEvent[E], None, R]] = {}
         self._kind = kind
         self._settings = settings
@@ -89,6 +91,8 @@ class GraphNode(Generic[S, L, M, E, R]):
     def subscribe(self) -> None:
         """Subscribe to every topic. Retained messages arrive at once."""
         self.presence.listen(self._transport, map(self._named, self._kind.sole))
+        if self.alone:
+            self.alone.listen(self._transport, map(self._named, self._kind.yields))
         for topic in self._kind.requests:
             others_only = topic in self._kind.publishes
             hear = self._to_inbox(topic)
@@ -115,7 +119,8 @@ class GraphNode(Generic[S, L, M, E, R]):
     def wake_at(self) -> float:
         """When the next round is due if no message arrives (monotonic s)."""
         due = (subject.wake_at for subject in self.subjects.values())
-        return min(self.presence.look_at, self._keeper.wake_at, *due)
+        looks = [look.look_at for look in (self.presence, self.alone) if look]
+        return min(*looks, self._keeper.wake_at, *due)
 
     def round(self) -> None:
         """Take the messages that arrived, wake the subjects that are due, publish."""
@@ -181,13 +186,17 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _look_around(self) -> None:
         """Declare our publishers when we may speak, and withdraw them when not."""
-        if not self.presence.look(self._clock.monotonic()):
+        now = self._clock.monotonic()
+        changed = [look.look(now) for look in (self.presence, self.alone) if look]
+        if not any(changed):
             return
-        if self.presence.may_speak:
-            self._outlet.open(self._kind.publishes)
-        else:
-            self._outlet.close()
-        self._decide_all(MaySpeak(self.presence.may_speak))
+        may = self._may_speak()
+        silent = self._kind.publishes if not may.yes else () if may.alone else self._kind.yields
+        self._outlet.open(t for t in self._kind.publishes if t not in silent)
+        self._decide_all(may)
+
+    def _may_speak(self) -> MaySpeak:
+        return MaySpeak(self.presence.may_speak, self.alone is None or self.alone.may_speak)
 
     def _wake(self) -> None:
         now = self._clock.monotonic()
@@ -231,7 +240,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         refusals, clock = self._refusals, self._clock
         subject = Subject(name, memory, self._core, self._will_say, refusals, clock)
         self.subjects[name] = subject
-        self._decide(subject, MaySpeak(self.presence.may_speak))
+        self._decide(subject, self._may_speak())
         return subject
 
     def _decide(self, subject: Subject[M, GraphEvent[E], None, R], event: GraphEvent[E]) -> None:

@@ -15,7 +15,7 @@ Named = Callable[[Topic[Message]], Topic[Message]]
 
 
 class Outlet:
-    """Publishers that are declared and withdrawn together."""
+    """Publishers that are declared while their node may speak."""
 
     def __init__(self, transport: Transport, named: Named) -> None:
         self._transport = transport
@@ -23,9 +23,13 @@ class Outlet:
         self._ends: dict[str, Publisher[Message]] = {}
 
     def open(self, topics: Iterable[Topic[Message]]) -> None:
-        """Declare them. Raises TransportError."""
-        for topic in topics:
-            self._ends[topic.name] = self._transport.publisher(self._named(topic))
+        """Declare these, and withdraw all others. Raises TransportError."""
+        wanted = {topic.name: topic for topic in topics}
+        for name in self._ends.keys() - wanted.keys():
+            self._ends.pop(name).close()
+        for name, topic in wanted.items():
+            if name not in self._ends:
+                self._ends[name] = self._transport.publisher(self._named(topic))
 
     def publish(self, topic: Topic[Message], message: Message) -> None:
         """Publish. A failure is logged: the next message may get through."""
@@ -37,9 +41,3 @@ class Outlet:
     def heard_by(self) -> dict[str, int]:
         """The number of subscriptions that receive each topic, by the topic's name."""
         return {name: end.matched() for name, end in self._ends.copy().items()}
-
-    def close(self) -> None:
-        """Withdraw every publisher."""
-        for end in self._ends.values():
-            end.close()
-        self._ends.clear()

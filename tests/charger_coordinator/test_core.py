@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from bridges.charger.report import LOST, Diagnosis, diagnosis
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator import core, keep
+from bridges.charger_coordinator.astray import on_pad
 from bridges.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
@@ -19,7 +20,6 @@ from bridges.charger_coordinator.memory import (
     Memory,
     Site,
 )
-from bridges.charger_coordinator.report import on_pad
 from bridges.charger_coordinator.signals import FleetSeen, Sighting, StateHeard, Wanted
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf import definitions as d

@@ -74,7 +74,9 @@ def test_assignments_by_others_count_if_they_are_to_one_of_our_chargers() -> Non
             d.ChargingAssignment("stranger", "dock_b", 0),
         ),
     )
-    assert messages.accept_assignments(message, SETTINGS, 0.0) == Dedicated(((ONE, "charger_b"),))
+    two, three = Robot("tiny", "AMR02"), Robot("tiny", "AMR03")
+    dedicated = Dedicated(((ONE, "charger_b"), (two, ""), (three, "")))
+    assert messages.accept_assignments(message, SETTINGS, 0.0) == dedicated
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import duration
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
-from hal_fakes.rmf.fleet import Fleet
+from hal_fakes.rmf.fleet import Finishing, Fleet
 from tests.serve.virtual_graph import Disk
 
 STEP_S = 0.25
@@ -64,8 +64,8 @@ def settings(**changes: Any) -> Settings:
 class Charger:
     """A charger's daemon: its own core, and a station under it.
 
-    To break: `broken` (the station's fault once it energises), `refuses` (receivers whose handshake
-    fails), `unplugged` (it does not answer its daemon), `dead` (the daemon itself).
+    To break: `broken` (an error once it energises, of the side `fails`), `refuses` (receivers whose
+    handshake fails), `unplugged` (it does not answer its daemon), `dead` (the daemon itself).
     """
 
     def __init__(self, name: str, knows: bool = True) -> None:
@@ -75,6 +75,8 @@ class Charger:
         self.memory = charger.initial(self.limits, 0.0)
         self.pad = ""
         self.percent = 0.0
+        self.full_in_s: float | None = None
+        self.fails: FaultSide = "station"
         self.broken = self.unplugged = self.dead = False
         self.refuses: set[str] = set()
         self.activity = Activity.IDLE
@@ -92,7 +94,9 @@ class Charger:
             return self.decide(IoFailed("no route to host"), now)
         side, text = self.error or NO_ERROR
         full = self.percent if self.activity is Activity.CHARGING else None
-        measured = Measured(receiver_id=self.pad, battery_percent=full)
+        measured = Measured(
+            receiver_id=self.pad, battery_percent=full, time_to_full_s=self.full_in_s
+        )
         return self.decide(Sampled(ChargerSample(self.activity, 0, text, measured, side)), now)
 
     def decide(self, event: Any, now: float) -> d.ChargerState | None:
@@ -124,7 +128,7 @@ class Charger:
 
     def _energise(self) -> None:
         if self.broken:
-            self.error = ("station", "over temperature")
+            self.error = (self.fails, "over temperature")
         elif self.pad in self.refuses:
             self.error = ("robot", "authentication timeout")
         else:
@@ -139,6 +143,7 @@ class Yard:
     knows: bool = True
     fills: float = 5.0
     drive_s: float = 4.0
+    finishing: Finishing = "nothing"
     now: float = 0.0
     story: list[tuple[float, str]] = field(default_factory=list)
 
@@ -147,7 +152,7 @@ class Yard:
         self.rmf = MemoryTransport(self.network, "rmf")
         self.chargers = {name: Charger(name, self.knows) for name in PLACES}
         homes = {f"AMR0{i}": f"wait_{i}" for i in (1, 2, 3)}
-        self.fleet = Fleet("tiny", GRAPH, homes, self.drive_s)
+        self.fleet = Fleet("tiny", GRAPH, homes, self.drive_s, self.finishing)
         self.states = self.rmf.publisher(topics.CHARGER_STATES)
         self.fleets: Any = self.rmf.publisher(topics.FLEET_STATES)
         self.wishes = self.rmf.publisher(topics.ADAPTER_CHARGER_REQUESTS)
