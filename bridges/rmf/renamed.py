@@ -14,7 +14,7 @@ class Renamed:
     """`Transport`. `names`: RMF's topic name -> the site's."""
 
     def __init__(self, transport: Transport, names: Mapping[str, str]) -> None:
-        self.name, self.dropped = transport.name, transport.dropped
+        self.name, self.speaks, self.dropped = transport.name, transport.speaks, transport.dropped
         self.wall, self.close = transport.wall, transport.close
         self._transport = transport
         self._names = names

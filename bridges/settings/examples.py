@@ -63,11 +63,16 @@ def example(struct: type, field: mi.Field) -> str:
     return f"{field.encode_name}: {shown}"
 
 
+def device_yamls() -> list[Path]:
+    """The shipped device YAMLs; `fleet_*.yaml` are configurations of RMF's fleet adapters."""
+    return sorted(f for f in CONFIG.glob("*.yaml") if not f.name.startswith("fleet_"))
+
+
 @functools.cache
 def _shown() -> Found:
     """What shipped files have at each field of each struct: the shortest that is no default."""
     found: Found = {}
-    for file in sorted(CONFIG.glob("*.yaml")):
+    for file in device_yamls():
         config = load(file)
         tops = [config.rmf, *config.buses.values(), *config.devices.values(), config.section]
         for top in tops:

@@ -30,12 +30,13 @@ from bridges.commands.sheets.text import lines
 from bridges.commands.sheets.told import told
 from bridges.core.fields import Rmf
 from bridges.settings import names as named
+from bridges.settings.examples import device_yamls
 from bridges.settings.load import load
 from tests.depth import DEEP, depth, part
 from tests.settings.reading import problems_of
 
 CONFIG = Path(__file__).parents[2] / "config"
-FILES = sorted(CONFIG.glob("*.yaml"))
+FILES = device_yamls()
 NAMES = ['"17"', "x", ""]  # where a name may stand, these are wrong elsewhere or not at all
 TRAPS = ["017", "1:30", "no", "1e3", "~", "1.0", "17", "[]", *NAMES]
 
