@@ -8,8 +8,10 @@ that every ROS machine has, whose fields `ros2 topic echo` shows by their names.
 from collections.abc import Mapping
 
 import msgspec
+from msgspec.structs import replace
 
 from bridges.charger.report import ChargerReport
+from bridges.charger.settings import Robot
 from bridges.charger.signals import Requested
 from bridges.core.kind import Answer
 from bridges.core.names import LONGEST_NAME
@@ -62,6 +64,16 @@ def read(status: DiagnosticStatus) -> Refusal | None:
     return Refusal(**{key: values.get(key, "") for key in Refusal.__struct_fields__})
 
 
+def refused(request_id: str, charger: str, who: Robot, reason: str) -> Refusal:
+    """The refusal of a request, which may be malformed: a name may be of any length."""
+    return Refusal(
+        request_id=_cut(request_id),
+        charger=_cut(charger),
+        robot=f"{_cut(who.fleet)}/{_cut(who.name)}",
+        reason=reason[:LONGEST_REASON],
+    )
+
+
 def answer(name: str, asked: object, reason: str, report: ChargerReport) -> Answer | None:
     """What is said when charger `name` refuses this; None for what is not a request.
 
@@ -74,11 +86,8 @@ def answer(name: str, asked: object, reason: str, report: ChargerReport) -> Answ
             request_id, fleet, robot = asked.request_id, asked.fleet, asked.robot
         case _:
             return None
-    refusal = Refusal(
-        request_id=_cut(request_id),
-        charger=name,
-        robot=f"{_cut(fleet)}/{_cut(robot)}",
-        reason=reason[:LONGEST_REASON],
+    refusal = replace(
+        refused(request_id, name, Robot(fleet, robot), reason),
         state=report.state.name.removeprefix("CHARGER_"),
         held_by=f"{report.fleet}/{report.robot}" if report.robot else "",
         held_request=report.request_id,
@@ -88,5 +97,4 @@ def answer(name: str, asked: object, reason: str, report: ChargerReport) -> Answ
 
 
 def _cut(text: str) -> str:
-    """A malformed name may be of any length."""
     return text[:LONGEST_NAME]

@@ -5,8 +5,7 @@ owns the device's bus calls it; nothing here waits or keeps a thread.
 """
 
 import logging
-from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any, Generic
 
 from bridges.core.decision import (
@@ -24,21 +23,19 @@ from bridges.core.decision import (
     X,
 )
 from bridges.core.durations import AGES_AGO
-from bridges.core.kind import DeviceEvent, E, Kind, L, S
+from bridges.core.kind import Answer, DeviceEvent, E, Kind, L, S
 from bridges.log import pairs, plain
 from bridges.rmf.definitions import Message
 from bridges.rmf.stamps import ClockError
 from bridges.rmf.topics import Topic
-from bridges.serve.clock import TELL_GAP_S, Clock, Pace
+from bridges.serve.answers import Answers
+from bridges.serve.clock import Clock, Pace
 from bridges.serve.contained import Contained
 from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Publish, Status, Subject
 from drivers import Driver, DriverError
 
 log = logging.getLogger(__name__)
-
-MOST_ANSWERS = 10
-"""At most so many refusals are answered at once, the last ones: a flood of requests causes no other."""
 
 
 class Node(Generic[S, L, M, X, E, O, R]):
@@ -71,9 +68,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         )
         self.subject = Subject(name, memory, core, publish, self._refusals, clock)
         self._pace = Pace()
-        self._unanswered: deque[tuple[object, str]] = deque(maxlen=MOST_ANSWERS)
-        self._answered_at = AGES_AGO
-        self._last_refusal: Mapping[str, str] = {}
+        self._answers = Answers()
         self._open = False
         self._has_read = False
         self._io_fault = ""
@@ -94,7 +89,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             return self._kind.requests[topic](message, self._settings)
         except RequestRefused as refusal:
             self._refusals.add(refusal.kind, refusal.detail, device=self.name)
-            self._unanswered.append((message, str(refusal)))
+            self._answers.add(message, str(refusal))
             return None
 
     def was_suspended(self, for_s: float) -> None:
@@ -140,7 +135,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             return {}
         outputs = plain(decision.outputs)
         shown = {**self.subject.status(), "outputs": outputs, "refused": self.refused}
-        return shown | ({"last_refusal": self._last_refusal} if self._last_refusal else {})
+        return {**shown, **self._answers.shown()}
 
     def _read(self) -> Sampled[X] | IoFailed:
         try:
@@ -165,7 +160,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
     def _decide(self, event: DeviceEvent[X, E]) -> None:
         decision = self.subject.decide(event)
         if decision.refused:
-            self._unanswered.append((event, decision.refused))
+            self._answers.add(event, decision.refused)
         outputs = decision.outputs
         self._logged_outputs = outputs if self._logged_outputs is None else self._logged_outputs
 
@@ -182,24 +177,14 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self.wake_at = min(subject.wake_at, self._pace.due_at(news))
 
     def _answer(self) -> None:
-        """Tell who asked in vain why, and who has the device; at most 10 times a second."""
-        now = self._clock.monotonic()
-        if not self._unanswered:
-            return
-        if now < self._answered_at + TELL_GAP_S:
-            self.wake_at = min(self.wake_at, self._answered_at + TELL_GAP_S)
-            return
-        self._answered_at = now
-        for _ in range(len(self._unanswered)):
-            self._answer_one(*self._unanswered.popleft())
+        """Tell who asked in vain why, and who has the device."""
+        self._answers.say(self._clock.monotonic(), self._answered, self._publish)
+        self.wake_at = min(self.wake_at, self._answers.due_at)
 
-    def _answer_one(self, asked: object, reason: str) -> None:
+    def _answered(self, asked: object, reason: str) -> Answer | None:
         decision = self.subject.decision
         assert decision is not None
-        answer = self._kind.answer(self.name, asked, reason, decision.report)
-        if answer is not None:
-            self._last_refusal = answer.told
-            self._publish(answer.topic, answer.message)
+        return self._kind.answer(self.name, asked, reason, decision.report)
 
     def _send(self, report: R) -> None:
         try:

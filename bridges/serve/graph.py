@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any, Generic
 
 from bridges.core.decision import Fault, M, OperatorReset, R, RequestRefused
+from bridges.core.durations import NEVER
 from bridges.core.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
 from bridges.core.kind import E, L, S
 from bridges.log import pairs
@@ -17,6 +18,7 @@ from bridges.rmf.definitions import Message
 from bridges.rmf.stamps import ClockError, stamp
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Subscription, Transport
+from bridges.serve.answers import Answers
 from bridges.serve.clock import Clock
 from bridges.serve.inbox import Inbox
 from bridges.serve.keeper import Keeper, Kept
@@ -78,6 +80,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._named = named
         self._outlet = Outlet(transport, named)
         self._refusals = Refusals()
+        self._answers = Answers()
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
         self._reset = False
@@ -120,7 +123,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         """When the next round is due if no message arrives (monotonic s)."""
         due = (subject.wake_at for subject in self.subjects.values())
         looks = [look.look_at for look in (self.presence, self.alone) if look]
-        return min(*looks, self._keeper.wake_at, *due)
+        answers_at = self._answers.due_at if self.presence.may_speak else NEVER
+        return min(*looks, self._keeper.wake_at, answers_at, *due)
 
     def round(self) -> None:
         """Take the messages that arrived, wake the subjects that are due, publish."""
@@ -136,6 +140,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         now = self._clock.monotonic()
         self._keeper.keep(self._real(memories), now)
         self._say()
+        if self.presence.may_speak:
+            self._answers.say(now, self._kind.answer, self._publish)
         self._keeper.tell(memories, now, self.presence.may_speak)
 
     def end(self) -> bool:
@@ -153,6 +159,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
             "refused": self.refused,
+            **self._answers.shown(),
             "faults": [{"code": f.code, "detail": f.detail} for f in self._keeper.faults],
             "heard_by": self._outlet.heard_by(),
             "hears": {name: end.matched() for name, end in self._hears.items()},
@@ -166,19 +173,21 @@ class GraphNode(Generic[S, L, M, E, R]):
         """A callback for the transport's thread. Only what is accepted waits: it is not endless."""
 
         def put(message: Message) -> None:
-            with self._counting(topic.name):
+            with self._counting(topic.name, message):
                 event = self._kind.requests[topic](message, self._settings, self._clock.wall())
                 self.inbox.put(self._kind.device_name(message), (topic, event))
 
         return put
 
     @contextmanager
-    def _counting(self, about: str) -> Iterator[None]:
+    def _counting(self, about: str, message: object = None) -> Iterator[None]:
         """What is not obeyed, or fails for a defect of ours: a core that fails has changed nothing."""
         try:
             yield
         except RequestRefused as refusal:
             self._refusals.add(refusal.kind, refusal.detail)
+            if message is not None:
+                self._answers.add(message, str(refusal))
         except Exception as error:
             if not self._refusals.counts().get(DEFECT):
                 log.exception(pairs("defect", kind=self._kind.name, about=about, reason=error))
@@ -244,7 +253,10 @@ class GraphNode(Generic[S, L, M, E, R]):
         return subject
 
     def _decide(self, subject: Subject[M, GraphEvent[E], None, R], event: GraphEvent[E]) -> None:
-        subject.log(subject.decide(event).report)
+        decision = subject.decide(event)
+        if decision.refused:
+            self._answers.add(event, decision.refused)
+        subject.log(decision.report)
 
     def _decide_all(self, event: GraphEvent[E]) -> None:
         for subject in self.subjects.values():

@@ -20,7 +20,7 @@ def tutorial_fleet(file: Path, graph: Graph, drive_s: float, only: Collection[st
         _, waypoint = robot.waypoint()
         if only and name not in only:
             continue
-        if waypoint not in graph:
+        if waypoint is None or waypoint not in graph:
             raise ValueError(f"{file}: '{name}' has its charger at {waypoint!r}, not in the graph")
         places[name] = waypoint
     request = found.fleet.finishing_request or "nothing"
