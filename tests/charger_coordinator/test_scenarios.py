@@ -259,11 +259,14 @@ def test_3_a_robot_whose_charging_task_runs_is_sent_off_the_pad_that_another_wai
         (25.5, "AMR03 -> WAIT wait_3"),
     ]
     site.fleet.robots["AMR03"].stuck = False
-    assert site.run(100.0)[:4] == [
+    assert site.run(100.0) == [
         (85.5, "AMR03 -> CHARGE wait_3"),
-        (86.25, "charger_b: IDLE"),
+        (85.75, "charger_b: IDLE"),
+        (85.75, "AMR03 -> WAIT wait_3"),
         (86.25, "charger_b <- charge AMR01"),
         (86.25, "charger_b: ASSIGNED AMR01"),
+        (86.25, "AMR01 -> CHARGE dock_b"),
+        (92.25, "charger_b: CHARGING AMR01"),
     ]
 
 
