@@ -223,9 +223,9 @@ class Judged:
 
 
 def judged(station: "Station", read: Read, code: int | str | None, told: FaultSide = "") -> Judged:
-    """The state from rules, codes and errors. `code`: the maker's state, if there are codes. `told`: whose
-    fault it is by the station's own text.
+    """The state from rules, codes and errors.
 
+    `code`: the maker's state, if there are codes. `told`: whose fault it is by the station's own text.
     An entry of `errors` makes it an error, whatever the state is. Raises DriverError.
     """
     rule = judge(station.rules, read)
