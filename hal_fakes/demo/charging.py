@@ -39,7 +39,7 @@ def live(world: World) -> None:
     """All scenarios, in their order."""
     yard = Yard(world, load(COORDINATOR).section)
     world.join(yard)
-    with world.leg("1 scheduled", f"from 00:00 to 00:00 {ONE} is to be charged to 96 %"):
+    with world.leg("1 scheduled", f"all day {ONE} is to be charged to 96 %"):
         _scheduled(world, yard)
     with world.leg("2 ad-hoc", "a robot asks for itself, and an operator for one on the pad"):
         _ad_hoc(world, yard)
@@ -60,6 +60,11 @@ def _idle(world: World) -> bool:
 def _charges(world: World, charger: str, who: str, within_s: float = 12) -> None:
     charging = f"{who} is charged at {charger}"
     world.shows(charging, lambda: world.charger_is(charger, "CHARGING", who), within_s)
+
+
+def _shown(world: World, yard: Yard, charger: str, text: str) -> None:
+    seen = f"the coordinator shows {charger}: {text}"
+    world.shows(seen, lambda: yard.shown.get(charger) == text)
 
 
 def _sent(world: World, who: str, place: str, within_s: float = 10) -> None:
@@ -102,6 +107,7 @@ def _scheduled(world: World, yard: Yard) -> None:
     world.pause(3.0)
     yard.rests(ONE, 92)
     _sent(world, ONE, f"charge at {A}")
+    _shown(world, yard, A, f"ASSIGNED tiny/{ONE}, by the schedule")
     _charges(world, A, ONE)
     _sent(world, ONE, "wait at wait_1")
     _free(world)
@@ -116,7 +122,9 @@ def _ad_hoc(world: World, yard: Yard) -> None:
     request = d.ChargerRequest("", "porter", PORTER, duration(30.0), "operator-1")
     world.say([(topics.ADAPTER_CHARGER_REQUESTS, request)])
     _charges(world, B, PORTER)
+    _shown(world, yard, B, f"CHARGING porter/{PORTER}, by an operator")
     _charges(world, A, TWO)
+    _shown(world, yard, A, f"CHARGING tiny/{TWO}, by the robot")
     full = "both are full, and their chargers have let them go"
     world.shows(full, lambda: world.charger_is(A, "IDLE") and world.charger_is(B, "RELEASED"))
 

@@ -23,13 +23,15 @@ FINISHING: Final[dict[str, Finishing]] = {"tiny": "charge", "porter": "nothing"}
 
 
 class Yard:
-    """Both fleets, as one party on RMF's side; and the coordinator's queue, as /diagnostics has it."""
+    """Both fleets, as one party on RMF's side; and what the coordinator shows on /diagnostics: its
+    `queue`, and all of it, `shown`, by its key."""
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS, DIAGNOSTICS)
 
     def __init__(self, world: World, site: Settings) -> None:
         self.world = world
         self.queue = "-"
+        self.shown: dict[str, str] = {}
         self.fleets = {name: _fleet(name, site) for name in site.fleets}
         self._who = {who.name: who for who in site.robots()}
         self._stations = {
@@ -99,7 +101,7 @@ class Yard:
             if values.get("kind") == "charger_coordinator" and "queue" in values:
                 if values["queue"] != self.queue and values["queue"] != "-":
                     self.world.note(f"   queue: {values['queue']}")
-                self.queue = values["queue"]
+                self.queue, self.shown = values["queue"], values
 
     def _fill(self, now: float) -> None:
         passed_s, self._filled_at = now - self._filled_at, now

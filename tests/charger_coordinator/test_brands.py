@@ -46,8 +46,8 @@ def test_two_brands_are_charged_at_the_same_stations_one_after_the_other() -> No
         (26.5, "charger_b: RELEASED AMR01"),
         (26.5, "charger_a <- charge AMR02"),
         (26.5, "charger_a: ASSIGNED AMR02"),
-        (26.5, "AMR01 -> WAIT wait_1"),
         (26.5, "AMR02 -> CHARGE charger_a"),
+        (26.5, "AMR01 -> WAIT wait_1"),
         (27.5, "charger_b: IDLE"),
         (32.5, "charger_a: CHARGING AMR02"),
     ]
