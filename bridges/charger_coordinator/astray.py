@@ -93,19 +93,20 @@ def _strayed(memory: Memory, now: float, site: Site) -> Iterator[Astray]:
     for name, grant in memory.grants.items():
         if grant.over or grant.started:
             continue
-        at, came_at = _stands(memory, grant.robot, site)
-        since = came_at if came_at > grant.made_at else grant.made_at + LEAVES_S
+        at, came_at, settled_at = _stands(memory, grant.robot, site)
+        since = settled_at if came_at > grant.made_at else grant.made_at + LEAVES_S
         if at is not None and at != name and since <= now:
             yield Astray(grant.robot, at, since, grant.request_id, TRIES, expected=name)
 
 
-def _stands(memory: Memory, who: Robot, site: Site) -> tuple[str | None, float]:
-    """The station where it stands, by its fleet or by that station, and since when it counts."""
+def _stands(memory: Memory, who: Robot, site: Site) -> tuple[str | None, float, float]:
+    """The station where it stands, by its fleet or by that station; since when; from when it counts."""
     for name, seen in memory.stations.items():
         if seen.diagnosis is Diagnosis.PAD and on_pad(seen.error, site) == who:
-            return name, seen.since
+            return name, seen.since, seen.since
     standing, at = memory.robots.get(who), memory.stands_at(who, site)
-    return at, standing.here_since + SETTLES_S if standing else AGES_AGO
+    came_at = standing.here_since if standing else AGES_AGO
+    return at, came_at, came_at + SETTLES_S
 
 
 def _blocking(memory: Memory, now: float, site: Site) -> Iterator[Astray]:

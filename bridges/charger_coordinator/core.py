@@ -113,9 +113,7 @@ def _wake_at(memory: Memory, now: float, site: Site) -> float:
             due.append(stations.absent_at(memory, name, grant, site))
         else:
             due.append(grant.made_at + stations.TAKEN_S)
-    for who, failed_at in memory.strikes.items():
-        due.append(stations.proven_at(memory, who))
-        due += [stations.found_at(memory, who, name, site) for name in failed_at]
+    due += [stations.proven_at(memory, who) for who in memory.strikes]
     due += report.due(memory)
     due += astray.due(memory, now, site)
     return min((at for at in due if at > now), default=NEVER)

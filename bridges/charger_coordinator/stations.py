@@ -8,8 +8,8 @@
    error of the robot, or one of an unclear side, also counts as a failure of the robot. After its
    second failure (at a second station if it has one) it is not tried again, and a technician is told.
 3. A failure no longer counts once the robot has been charged for PROVEN_S, or to its end; and once the
-   station where it failed is found faulty: its error names its own side, or stays for PROVEN_S after
-   the robot has left.
+   station where it failed is found faulty: its error names its own side, or it was mended when the
+   robot had been gone for PROVEN_S.
 4. If another robot is on the pad, the assigned one keeps the station for its start_timeout. A station
    that cannot be reached says nothing about the charge. A robot that was charging there keeps it; one
    that was on its way gets another station after LOST_S.
@@ -54,6 +54,7 @@ def heard(memory: Memory, state: StateHeard, now: float, site: Site) -> Memory:
         state.state, state.request_id, state.robot, state.error, now, since, state.full_in_s
     )
     memory = replace(memory, stations={**memory.stations, name: seen})
+    memory = _acquitted(memory, name, before, now, site)
     grant = memory.grants.get(name)
     if grant is not None:
         if state.state is not IDLE and state.request_id == grant.request_id:
@@ -154,7 +155,7 @@ def in_time(memory: Memory, now: float, site: Site) -> Memory:
             memory = memory.takes_back(grant.robot)
         elif now >= absent_at(memory, name, grant, site):
             memory = gives_up(memory, grant.robot, now)
-    return _cleared(memory, now, site)
+    return _proven(memory, now)
 
 
 def hopeless_at(memory: Memory, name: str, grant: Grant) -> float:
@@ -177,16 +178,34 @@ def absent_at(memory: Memory, name: str, grant: Grant, site: Site) -> float:
 # ---- whose fault
 
 
-def _cleared(memory: Memory, now: float, site: Site) -> Memory:
-    """Forget the failures that were none of the robot's."""
+def _acquitted(memory: Memory, name: str, before: Seen | None, now: float, site: Site) -> Memory:
+    """Forget the failures at this station that turn out to be its own."""
     for who, failed_at in memory.strikes.items():
-        if now >= proven_at(memory, who):
-            memory = replace(memory, strikes=without(memory.strikes, who))
-            continue
-        left = tuple(s for s in failed_at if now < found_at(memory, who, s, site))
-        if left != failed_at:
+        if name in failed_at and _was_the_stations(memory, who, name, before, now, site):
+            left = tuple(station for station in failed_at if station != name)
             rest = without(memory.strikes, who)
             memory = replace(memory, strikes=rest | ({who: left} if left else {}))
+    return memory
+
+
+def _was_the_stations(
+    memory: Memory, who: Robot, name: str, before: Seen | None, now: float, site: Site
+) -> bool:
+    """Does the station name its own side, or was it mended long after the robot had left?"""
+    seen, standing = memory.stations[name], memory.robots.get(who)
+    if seen.state is ERROR:
+        return diagnosis(seen.error.removeprefix(OUT_OF_SERVICE)) is Diagnosis.STATION
+    failed = before and before.diagnosis in (Diagnosis.STATION, Diagnosis.UNCLEAR)
+    if not failed or standing is None or memory.stands_at(who, site) == name:
+        return False
+    return now >= standing.here_since + PROVEN_S
+
+
+def _proven(memory: Memory, now: float) -> Memory:
+    """Forget the failures of robots that are being charged."""
+    for who in memory.strikes:
+        if now >= proven_at(memory, who):
+            memory = replace(memory, strikes=without(memory.strikes, who))
     return memory
 
 
@@ -197,17 +216,3 @@ def proven_at(memory: Memory, who: Robot) -> float:
     if station is None or seen is None or not memory.grants[station].started:
         return NEVER
     return seen.since + PROVEN_S if seen.state is CHARGING else NEVER
-
-
-def found_at(memory: Memory, who: Robot, name: str, site: Site) -> float:
-    """When the station at which this robot has failed is found faulty."""
-    seen, standing = memory.stations.get(name), memory.robots.get(who)
-    if seen is None or seen.state is not ERROR:
-        return NEVER
-    side = diagnosis(seen.error.removeprefix(OUT_OF_SERVICE))
-    if side is Diagnosis.STATION:
-        return AGES_AGO
-    unclear = seen.diagnosis is Diagnosis.UNCLEAR and standing is not None
-    if not unclear or standing is None or memory.stands_at(who, site) == name:
-        return NEVER
-    return max(seen.since, standing.here_since) + PROVEN_S

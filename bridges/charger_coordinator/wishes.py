@@ -7,7 +7,8 @@ and DockRobot alone set). So, of a robot that has stood at one of our waypoints 
 2. Above that, and below `full_percent`, only a task that shows CHARGING or DOCKING is believed. A robot
    that was charged in that task is not served again. One that was charged, and has not left our
    waypoints since, may be waiting for traffic on its pad: it is believed after LINGERS_S.
-3. Without a task, it wants to be charged where a schedule says so, once for each of its times.
+3. Without a task, it wants to be charged where a schedule says so; after that, not again in the same
+   time before it has worked.
 4. A wish lasts while the robot stands at one of our waypoints so, and while it drives there: in the
    same task, or without one while a station is kept for it. A task that begins within COMES_S of
    the call is that drive: RMF's automatic retreat, or its ChargeBattery started again.
@@ -130,10 +131,11 @@ def _served(memory: Memory, sighting: Sighting) -> Memory:
 
 
 def _rested(memory: Memory, sighting: Sighting, site: Site) -> Memory:
-    """Full enough for the schedule's present time; or that time is over."""
+    """Full enough for the schedule's present time; until that is over, or the robot has worked."""
     who = sighting.who
     aim = schedule.target(site.schedule, who, memory.when)
-    if not aim:
+    worked = bool(sighting.task_id) and sighting.place is None
+    if not aim or worked:
         return replace(memory, rested=memory.rested - {who})
     if sighting.battery_percent >= aim:
         return replace(memory, rested=memory.rested | {who})

@@ -171,12 +171,13 @@ class FrameDriver:
         if rule and rule.text:
             found = [(side, rule.text), *found]
         self._seen = True
+        side = first_side([side, *(whose for whose, _ in found)])
         return ChargerSample(
             Activity.ERROR if found else activity,
             code,
             "; ".join(text for _, text in found),
             self._measured(values),
-            side=first_side([side, *(whose for whose, _ in found)]),
+            side=side or self._map.state.codes.unnamed_side(code),
             charges=bool(found) and activity is Activity.CHARGING,
         )
 

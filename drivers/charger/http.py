@@ -28,7 +28,7 @@ from bridges.core.fields import Name, Timeout
 from drivers import json_fields
 from drivers.charger import rules
 from drivers.charger.rules import Errors, Rule, judged
-from drivers.charger.state_codes import CODE_MAX, Code, Codes, first_side
+from drivers.charger.state_codes import CODE_MAX, Code, Codes
 from drivers.driver_type import DriverType
 from drivers.hal import http
 from drivers.http_call import Call, Calls, send, told
@@ -276,8 +276,8 @@ class HttpCharger:
         words, code = self._settings.state_words, None
         if self._settings.codes is not None:
             code = _code(answer, fields.state, words)
-        found = judged(self._settings, lambda at: json_fields.needed(answer, at), code)
-        said, text_side = _error(answer, fields)
+        said, side = _error(answer, fields)
+        found = judged(self._settings, lambda at: json_fields.needed(answer, at), code, side)
         shown = Activity.ERROR if said else found.activity
         self._activity, self._at_fault = found.does, shown in AT_FAULT
         return ChargerSample(
@@ -285,7 +285,7 @@ class HttpCharger:
             found.code,
             "; ".join(filter(None, (found.text, said))),
             _measured(answer, fields),
-            first_side((found.side, text_side)),
+            found.side,
             charges=shown is Activity.ERROR and found.does is Activity.CHARGING,
         )
 

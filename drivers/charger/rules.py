@@ -222,9 +222,10 @@ class Judged:
         return self.activity is Activity.ERROR and self.does is Activity.CHARGING
 
 
-def judged(station: "Station", read: Read, code: int | str | None) -> Judged:
-    """The state from rules, codes and errors. `code`: the maker's state, if there are codes.
+def judged(station: "Station", read: Read, code: int | str | None, told: FaultSide = "") -> Judged:
+    """The state from rules, codes and errors.
 
+    `code`: the maker's state, if there are codes. `told`: whose fault it is by the station's own text.
     An entry of `errors` makes it an error, whatever the state is. Raises DriverError.
     """
     rule = judge(station.rules, read)
@@ -239,7 +240,9 @@ def judged(station: "Station", read: Read, code: int | str | None) -> Judged:
     if rule is not None and rule.text:
         wrong = [(side, rule.text), *wrong]
     shown = Activity.ERROR if wrong else activity
-    side = first_side([side, *(whose for whose, _ in wrong)])
+    side = first_side([side, told, *(whose for whose, _ in wrong)])
+    if station.codes is not None:
+        side = side or station.codes.unnamed_side(code)
     return Judged(shown, side, "" if code is None else code, said(wrong), activity)
 
 

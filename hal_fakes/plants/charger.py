@@ -6,7 +6,7 @@ To press: `robot` (one stands on the pad), or a robot of the YAML's `receivers` 
 whoever comes, stays down or sinks. `foreign_object` (something lies on the pad),
 `over_temperature`. A robot comes with its battery 40 % full; the station shakes hands, charges, ramps
 down when it is full, waits, and is idle again until another robot comes. An error stays until it is
-cleared after its cause has gone.
+cleared after its cause has gone, one of the robot's (ROBOTS_FAULTS) until the robot leaves.
 
 To drive: `clear_error`, and where the station can be commanded `power` (without it, it charges nobody)
 and `range_check` (its result is there a moment later; a station that needs none knows at once).
@@ -201,6 +201,9 @@ class ChargerPlant(Machine):
         """What is due ends, and what the pad and the causes demand begins."""
         if self.now >= self._until:
             self._end()
+        if self.error_text in ROBOTS_FAULTS and not self._here:
+            self.error_text = ""
+            self._enter(Activity.IDLE)
         cause = next((c for c in CAUSES if self._pressed[c]), None)
         busy = self.activity in (*CURRENT_FLOWS, Activity.HANDSHAKE)
         if cause and busy:

@@ -33,9 +33,20 @@ GRAPH = {
     "wait_3": ("L1", 0.0, 6.0),
     "ward": ("L1", 50.0, 0.0),
 }
-PLACES = {"charger_a": "charger_a", "charger_b": "dock_b"}
+BIG_GRAPH = {
+    "station_1": ("L1", 10.0, 2.0),
+    "station_2": ("L1", 10.0, 6.0),
+    "bay_1": ("L1", 0.0, 10.0),
+    "ward": ("L1", 50.0, 0.0),
+}
+"""The other brand's, in which the same places have other names."""
+PLACES = {
+    "charger_a": {"tiny": "charger_a", "big": "station_1"},
+    "charger_b": {"tiny": "dock_b", "big": "station_2"},
+}
 NO_ERROR: tuple[FaultSide, str] = ("", "")
 RECEIVERS = {f"RX-{i}": Robot("tiny", f"AMR0{i}") for i in (1, 2, 3)}
+BIG = {"RX-9": Robot("big", "B01")}
 
 
 def settings(**changes: Any) -> Settings:
@@ -61,6 +72,23 @@ def settings(**changes: Any) -> Settings:
     return Settings(**(known | changes))
 
 
+def two_brands() -> Settings:
+    """The same two stations, and a fleet of another brand beside the first."""
+    tiny = settings().fleets["tiny"]
+    waypoints = {
+        n: Waypoint(level=a, x=x, y=y) for n, (a, x, y) in BIG_GRAPH.items() if n != "ward"
+    }
+    robot = RobotSettings(
+        stations=["charger_a", "charger_b"], waits_at="bay_1", receivers=["RX-9"], rcu="rcu_b01"
+    )
+    big = FleetSettings(waypoints=waypoints, robots={"B01": robot})
+    stations = {
+        "charger_a": Station(waypoints={"big": "station_1"}),
+        "charger_b": Station(waypoint="dock_b", waypoints={"big": "station_2"}),
+    }
+    return settings(stations=stations, fleets={"tiny": tiny, "big": big})
+
+
 class Charger:
     """A charger's daemon: its own core, and a station under it.
 
@@ -69,7 +97,7 @@ class Charger:
     """
 
     def __init__(self, name: str, knows: bool = True) -> None:
-        receivers = RECEIVERS if knows else {}
+        receivers = RECEIVERS | BIG if knows else {}
         self.name = name
         self.limits = ChargerLimits(Durations(misses=3, released_s=1.0), receivers)
         self.memory = charger.initial(self.limits, 0.0)
@@ -153,6 +181,8 @@ class Yard:
         self.chargers = {name: Charger(name, self.knows) for name in PLACES}
         homes = {f"AMR0{i}": f"wait_{i}" for i in (1, 2, 3)}
         self.fleet = Fleet("tiny", GRAPH, homes, self.drive_s, self.finishing)
+        self.big = Fleet("big", BIG_GRAPH, {"B01": "bay_1"}, self.drive_s, self.finishing)
+        self.adapters = [self.fleet, self.big][: len(self.settings.fleets)]
         self.states = self.rmf.publisher(topics.CHARGER_STATES)
         self.fleets: Any = self.rmf.publisher(topics.FLEET_STATES)
         self.wishes = self.rmf.publisher(topics.ADAPTER_CHARGER_REQUESTS)
@@ -184,8 +214,9 @@ class Yard:
         told = len(self.story)
         while self.now < until:
             self.now += STEP_S
-            for _, message in self.fleet.tick(self.now):
-                self.fleets.publish(message)
+            for adapter in self.adapters:
+                for _, message in adapter.tick(self.now):
+                    self.fleets.publish(message)
             for charger_ in self.chargers.values():
                 self._scan(charger_)
             self.node.round()
@@ -215,9 +246,10 @@ class Yard:
     def _scan(self, station: Charger) -> None:
         if station.dead:
             return
-        robots = self.fleet.robots.values()
-        here = next((r for r in robots if r.place == PLACES[station.name]), None)
-        receivers = {who.name: receiver for receiver, who in RECEIVERS.items()}
+        robots = [(a.name, robot) for a in self.adapters for robot in a.robots.values()]
+        places = PLACES[station.name]
+        here = next((robot for fleet, robot in robots if robot.place == places[fleet]), None)
+        receivers = {who.name: receiver for receiver, who in (RECEIVERS | BIG).items()}
         station.pad = receivers[here.name] if here else ""
         if here and station.activity is Activity.CHARGING:
             here.battery_percent = min(100.0, here.battery_percent + self.fills * STEP_S)
@@ -266,7 +298,8 @@ class Yard:
             if self.assigned.get(a.robot_name) != word:
                 self.assigned[a.robot_name] = word
                 self.tell(f"{a.robot_name} -> {word}")
-        self.fleet.hear(message, self.now)
+        for adapter in self.adapters:
+            adapter.hear(message, self.now)
 
     def _alert(self, alert: Any) -> None:
         self.tell(f"ALERT {alert.subtitle}: {alert.message}")
