@@ -9,8 +9,8 @@ import pytest
 
 from bridges.charger.signals import Activity
 from bridges.settings.load import SettingsError, load
-from drivers.charger import http
 from drivers.charger.dry_contact import decode
+from drivers.charger.http_fields import Number as HttpNumber
 from drivers.charger.register_map import Number
 from drivers.hal.points import Input
 from drivers.json_fields import Flag
@@ -27,7 +27,7 @@ class _Http(switched.TestAnotherMakeOnHttp):
             settings.fields,
             range_ok=Flag(field="pad.gap", when=["ok"]),
             at_height=Flag(field="pad.raised"),
-            temperatures={"coil": http.Number(field="pad.decidegrees", scale=0.1)},
+            temperatures={"coil": HttpNumber(field="pad.decidegrees", scale=0.1)},
         )
         return msgspec.structs.replace(settings, fields=fields)
 
