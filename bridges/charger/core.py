@@ -30,6 +30,7 @@ from msgspec.structs import replace
 
 from bridges.charger import pad, report, session
 from bridges.charger.memory import ChargerLimits, Memory, Session, rivalled, unreachable
+from bridges.charger.refusals import OCCUPIED
 from bridges.charger.report import ChargerReport
 from bridges.charger.signals import (
     AT_FAULT,
@@ -184,7 +185,7 @@ def _request(
     if on_pad and session.shown_released(holder, now, limits):
         again = session.granted(request, now, limits)
         return replace(_held(memory, None), holder=again), ""
-    return memory, "charger occupied"
+    return memory, OCCUPIED
 
 
 def _granted(
@@ -194,7 +195,7 @@ def _granted(
     if memory.adopted and on_pad:
         return replace(memory, holder=replace(holder, started=True), adopted=False), ""
     if report.state(memory) is not report.IDLE:
-        return memory, "charger occupied"
+        return memory, OCCUPIED
     return replace(memory, holder=holder), ""
 
 

@@ -19,6 +19,8 @@ from bridges.rmf.definitions import ChargerRequest, DiagnosticLevel, DiagnosticS
 from bridges.rmf.topics import CHARGER_REFUSALS
 
 NAME = "ChargerRequest refused"
+OCCUPIED = "charger occupied"
+"""The reason that ends when the charger is let go."""
 LONGEST_REASON = 500
 
 

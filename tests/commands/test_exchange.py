@@ -401,6 +401,13 @@ def test_a_refusal_ends_the_command_at_once_and_says_who_has_the_charger() -> No
     assert (told.outcome, told.at) == (Failed(text), 0.7)
 
 
+def test_a_refusal_that_a_cancel_would_not_help_proposes_none() -> None:
+    unknown = msgspec.structs.replace(REFUSAL, reason="robot has no receiver here")
+    told = tell(CHARGE, [(0.5, CHARGER), (0.7, unknown.message())])
+    text = "a refuses the request: robot has no receiver here: fleet/other has it (request r0)"
+    assert told.outcome == Failed(text)
+
+
 def test_a_refusal_of_a_charger_that_nobody_has_names_its_error() -> None:
     hot = msgspec.structs.replace(
         REFUSAL, reason="charger in error", held_by="", held_request="", error="station: hot"

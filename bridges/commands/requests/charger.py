@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from bridges.charger.refusals import Refusal
+from bridges.charger.refusals import OCCUPIED, Refusal
 from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
@@ -60,7 +60,7 @@ class Charge(_Charger):
         if refusal is None:
             return None
         text = f"{refusal.charger or self.name} refuses the request: {refusal.text}"
-        if not refusal.held_request:
+        if refusal.reason != OCCUPIED or not refusal.held_request:
             return Failed(text)
         cancel = ("send", "charger", refusal.charger, "--cancel", refusal.held_request)
         return Failed(f"{text}; to cancel that: {self.line.other(*cancel)}")
