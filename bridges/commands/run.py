@@ -12,7 +12,7 @@ from bridges.commands.graph import TRANSPORTS, overridden
 from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
-from bridges.serve import places, signals
+from bridges.serve import guard, places, signals
 from bridges.serve.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
@@ -34,13 +34,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--domain-id", type=int, metavar="N", help="overrides the YAML's domain_id")
     parser.add_argument("--transport", choices=TRANSPORTS, help="overrides the YAML's transport")
     parser.add_argument(
+        "--log-level", choices=("debug", "info", "warning", "error"), default="info"
+    )
+    parser.add_argument(
+        "--log-format",
+        choices=("text", "json"),
+        default="text",
+        help="json: a line each, for programs",
+    )
+    parser.add_argument(
         "--runtime-dir", metavar="DIR", help="default: systemd's, else one of the user's"
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Validate, claim, serve. Returns 78 for an invalid configuration."""
-    log.start()
+    log.start(args.log_level.upper(), json=args.log_format == "json")
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: --simulate is refused where RMF_BRIDGE_SERVICE=1")
         return EX_USAGE
@@ -99,13 +108,6 @@ def _held(args: argparse.Namespace) -> runtime.RuntimeDirectory:
     return runtime.RuntimeDirectory(found, file, serves=True)
 
 
-def _outputs_off(args: argparse.Namespace) -> list[str]:
-    """The command that switches off what this daemon may leave on."""
-    given = ["--runtime-dir", os.path.abspath(args.runtime_dir)] if args.runtime_dir else []
-    file = str(args.file.absolute())
-    return [sys.executable, "-m", "bridges.cli", "outputs-off", file, *given]
-
-
 def _serve(
     config: Config, held: runtime.RuntimeDirectory, end: signals.End, args: argparse.Namespace
 ) -> int:
@@ -114,7 +116,7 @@ def _serve(
     if not args.simulate:
         from bridges.serve.daemon import Daemon
 
-        outputs_off = _outputs_off(args)
+        outputs_off = guard.command(args.file, args.runtime_dir)
         places.work_somewhere(held.places)  # lgpio leaves a FIFO in the working directory
         return Daemon(config, held, end, ros_args=args.ros_args, outputs_off=outputs_off).serve()
     from hal_fakes.simulate import Simulation

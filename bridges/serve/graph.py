@@ -16,7 +16,7 @@ from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.stamps import ClockError, stamp
 from bridges.rmf.topics import Topic
-from bridges.rmf.transport import Transport
+from bridges.rmf.transport import Subscription, Transport
 from bridges.serve.clock import Clock
 from bridges.serve.inbox import Inbox
 from bridges.serve.keeper import Keeper, Kept
@@ -31,6 +31,10 @@ MAX_SUBJECTS = 1000
 """More lifts or doors than any site has; more names must be invented ones."""
 MAX_UNSHOWN = 100
 """At most this many names that only requests mention, without a state of such a lift or door."""
+MAX_REQUESTERS = 10_000
+"""At most this many requesters of all lifts or doors that the YAML does not name: more than any site's
+robots at a time. Who holds one is never forgotten, so made-up ones would pile up.
+"""
 DEFECT = "a defect"
 
 
@@ -81,9 +85,11 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
         self._reset = False
+        self._hears: dict[str, Subscription] = {}
         self._unsaid: list[tuple[Topic[Message], Message]] = []
         self._shown: set[str] = set()
         self._reserved = frozenset(kind.reserved(settings))
+        self._requesters = 0
         for name, memory in self._keeper.restore(settings, self._started_at).items():
             self._add(name, memory)
 
@@ -95,7 +101,9 @@ class GraphNode(Generic[S, L, M, E, R]):
         for topic in self._kind.requests:
             others_only = topic in self._kind.publishes
             hear = self._to_inbox(topic)
-            self._transport.subscribe(self._named(topic), hear, others_only=others_only)
+            self._hears[topic.name] = self._transport.subscribe(
+                self._named(topic), hear, others_only=others_only
+            )
 
     def reset(self) -> None:
         """An operator says that latched faults may clear; from any thread."""
@@ -145,12 +153,14 @@ class GraphNode(Generic[S, L, M, E, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """For the status file: whether it is passive, and how many other nodes publish the same."""
+        """For the status file: whether it is passive, who does the same, and who hears whom."""
         return {
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
             "refused": self.refused,
             "faults": [{"code": f.code, "detail": f.detail} for f in self._keeper.faults],
+            "heard_by": self._heard_by(),
+            "hears": {name: end.matched() for name, end in self._hears.items()},
         }
 
     def devices(self) -> Mapping[str, Status]:
@@ -186,9 +196,15 @@ class GraphNode(Generic[S, L, M, E, R]):
         if not any(changed):
             return
         may = self._may_speak()
-        silent = self._kind.publishes if not may.yes else () if may.alone else self._kind.yields
-        self._outlet.open(t for t in self._kind.publishes if t not in silent)
+        topics = dict.fromkeys((*self._kind.publishes, *self._kind.sole)) if may.yes else {}
+        silent = () if may.alone else self._kind.yields
+        self._outlet.open(topic for topic in topics if topic not in silent)
         self._decide_all(may)
+
+    def _heard_by(self) -> dict[str, int]:
+        """By the topic: how many other nodes listen to what is sent."""
+        names = {topic.name for topic in self._kind.publishes}
+        return {name: n for name, n in self._outlet.heard_by().items() if name in names}
 
     def _may_speak(self) -> MaySpeak:
         return MaySpeak(self.presence.may_speak, self.alone is None or self.alone.may_speak)
@@ -199,12 +215,14 @@ class GraphNode(Generic[S, L, M, E, R]):
             if now >= subject.wake_at:
                 self._decide(subject, Woken())
             if self._kind.idle(subject.memory, now):
+                self._requesters -= self._remembered(subject)
                 del self.subjects[subject.name]
                 self._shown.discard(subject.name)
 
     def _receive(self, name: str, topic: Topic[Message], event: E) -> None:
         with self._counting(name):
             subject = self._subject(name, shows_itself=self._kind.shown_by in (None, topic))
+            self._require_room(subject, self._kind.requester(event))
             self._decide(subject, event)
 
     def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
@@ -224,6 +242,18 @@ class GraphNode(Generic[S, L, M, E, R]):
             return len(self._shown) < MAX_SUBJECTS
         return len(self.subjects) - len(self._shown) < MAX_UNSHOWN
 
+    def _require_room(self, subject: Subject[M, GraphEvent[E], None, R], who: str) -> None:
+        """Raises RequestRefused for a new requester where there are too many already."""
+        full = who and self._requesters >= MAX_REQUESTERS and subject.name not in self._reserved
+        if full and who not in self._kind.requesters(subject.memory):
+            raise RequestRefused("too many requesters", f"{who} at {subject.name}")
+
+    def _remembered(self, subject: Subject[M, GraphEvent[E], None, R]) -> int:
+        """How many requesters it remembers; those of the YAML's have a bound of their own."""
+        if subject.name in self._reserved:
+            return 0
+        return len(self._kind.requesters(subject.memory))
+
     def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
         """Without names never shown, if there is a flood of them: it would return at the next start."""
         if len(memories) - len(self._shown) < MAX_UNSHOWN:
@@ -235,11 +265,14 @@ class GraphNode(Generic[S, L, M, E, R]):
         refusals, clock = self._refusals, self._clock
         subject = Subject(name, memory, self._core, self._will_say, refusals, clock)
         self.subjects[name] = subject
+        self._requesters += self._remembered(subject)
         self._decide(subject, self._may_speak())
         return subject
 
     def _decide(self, subject: Subject[M, GraphEvent[E], None, R], event: GraphEvent[E]) -> None:
+        before = self._remembered(subject)
         subject.log(subject.decide(event).report)
+        self._requesters += self._remembered(subject) - before
 
     def _decide_all(self, event: GraphEvent[E]) -> None:
         for subject in self.subjects.values():

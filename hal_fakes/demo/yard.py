@@ -6,14 +6,14 @@ the charger says that it charges. The first fleet's finishing request is `charge
 """
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator.settings import Settings
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import CHARGING_ASSIGNMENTS, DIAGNOSTICS, AnyTopic
 from hal_fakes.demo.world import World
-from hal_fakes.rmf import Said
+from hal_fakes.rmf import Party, Said
 from hal_fakes.rmf.fleet import Finishing, Fleet, FleetRobot
 
 WARD: Final = "ward"
@@ -22,7 +22,7 @@ FILLS_PER_S: Final = 15.0
 FINISHING: Final[dict[str, Finishing]] = {"tiny": "charge", "porter": "nothing"}
 
 
-class Yard:
+class Yard(Party):
     """Both fleets, as one party on RMF's side; and what the coordinator shows on /diagnostics: its
     `queue`, and all of it, `shown`, by its key."""
 
@@ -44,7 +44,7 @@ class Yard:
 
     # ---- a party on RMF's side
 
-    def hear(self, message: Any, now: float) -> list[Said]:
+    def hear(self, message: d.Message, now: float) -> list[Said]:
         """Charging assignments, and what the coordinator shows."""
         if isinstance(message, d.DiagnosticArray):
             self._diagnosed(message)

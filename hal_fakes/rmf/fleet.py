@@ -15,11 +15,11 @@ FleetUpdateHandle.cpp) and seen with Jazzy's:
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import CHARGING_ASSIGNMENTS, FLEET_STATES, AnyTopic
-from hal_fakes.rmf import Said
+from hal_fakes.rmf import Party, Said
 
 EVERY_S: Final = 1.0
 RECHARGE_PERCENT: Final = 100.0
@@ -60,7 +60,7 @@ class FleetRobot:
         return self.doing in ("charge", "idle charge")
 
 
-class Fleet:
+class Fleet(Party):
     """Publishes FleetState at 1 Hz and hears ChargingAssignments."""
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS,)
@@ -103,9 +103,9 @@ class Fleet:
         """It drives there in the task that it has, whatever that wants."""
         self._go(self.robots[who], place, now)
 
-    def hear(self, message: Any, now: float) -> list[Said]:
+    def hear(self, message: d.Message, now: float) -> list[Said]:
         """Charging assignments."""
-        if message.fleet_name == self.name:
+        if isinstance(message, d.ChargingAssignments) and message.fleet_name == self.name:
             for assignment in message.assignments:
                 if assignment.waypoint_name not in self.graph:
                     raise AdapterCrashed(assignment.waypoint_name)
