@@ -49,7 +49,6 @@ KIND: GraphKind[
         CHARGER_CANCELS,
         CHARGING_ASSIGNMENTS,
         ALERT,
-        CHARGER_COORDINATOR,
         CHARGER_REFUSALS,
     ),
     answer=messages.answer,

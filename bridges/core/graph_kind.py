@@ -41,8 +41,8 @@ class GraphKind(Generic[S, L, M, E, R]):
     `devices_key`: the YAML's section of its settings. `settings`: the struct that reads it.
     `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
     RequestRefused; `wall` is our clock (s since the epoch).
-    `publishes`: the topics that it sends on. `sole`: those on which only one node may send; while
-    another node does, ours only listens. `yields`: those on which it alone falls silent then.
+    `publishes`: the topics that it sends on. `sole`: those on which only one node may have a publisher;
+    while another node has one, ours only listens. `yields`: those on which it alone falls silent then.
     `device_name`: which subject a message is about. `shown_by`: the topic on which a subject publishes
     its own states, which proves that it exists (a request may name anything); None if there is only
     one subject. `reserved(settings)`: the subjects that the YAML names.

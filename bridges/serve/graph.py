@@ -166,7 +166,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             "refused": self.refused,
             **self._answers.shown(),
             "faults": [{"code": f.code, "detail": f.detail} for f in self._keeper.faults],
-            "heard_by": self._outlet.heard_by(),
+            "heard_by": self._heard_by(),
             "hears": {name: end.matched() for name, end in self._hears.items()},
         }
 
@@ -205,9 +205,15 @@ class GraphNode(Generic[S, L, M, E, R]):
         if not any(changed):
             return
         may = self._may_speak()
-        silent = self._kind.publishes if not may.yes else () if may.alone else self._kind.yields
-        self._outlet.open(t for t in self._kind.publishes if t not in silent)
+        topics = dict.fromkeys((*self._kind.publishes, *self._kind.sole)) if may.yes else {}
+        silent = () if may.alone else self._kind.yields
+        self._outlet.open(topic for topic in topics if topic not in silent)
         self._decide_all(may)
+
+    def _heard_by(self) -> dict[str, int]:
+        """By the topic: how many other nodes listen to what is sent."""
+        names = {topic.name for topic in self._kind.publishes}
+        return {name: n for name, n in self._outlet.heard_by().items() if name in names}
 
     def _may_speak(self) -> MaySpeak:
         return MaySpeak(self.presence.may_speak, self.alone is None or self.alone.may_speak)

@@ -126,7 +126,7 @@ class _Comparing:
         elif request in (None, "nothing"):
             text = (
                 "finishing_request: nothing leaves a charged robot on its pad until it gets a task, and"
-                " the next robot waits: write park, or charge"
+                " the next robot waits: write charge"
             )
             self._theirs("warnings", path if request else ("rmf_fleet",), text)
 

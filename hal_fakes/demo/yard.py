@@ -7,7 +7,7 @@ the charger says that it charges. The first fleet's finishing request is `charge
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator.settings import Settings
@@ -48,7 +48,7 @@ class Yard(Party):
 
     # ---- a party on RMF's side
 
-    def hear(self, message: Any, now: float) -> list[Said]:
+    def hear(self, message: d.Message, now: float) -> list[Said]:
         """Charging assignments, and what the coordinator shows."""
         if isinstance(message, d.DiagnosticArray):
             self._diagnosed(message)

@@ -110,7 +110,8 @@ def test_a_schedule_that_cannot_be_kept_is_refused(
     tmp_path: Path, lines: str, problem: str
 ) -> None:
     file = tmp_path / "site.yaml"
-    file.write_text(CONFIG.read_text().replace("  near_m", f"  {lines}\n  near_m"))
+    start, _, rest = CONFIG.read_text().partition("  schedule:\n")
+    file.write_text(f"{start}  {lines}\n" + rest.partition("\n")[2])
     with pytest.raises(SettingsError) as refused:
         load(file)
     assert problem in "\n".join(map(str, refused.value.problems))

@@ -181,13 +181,13 @@ def test_a_station_that_lets_go_before_rmf_is_content_is_a_mismatch(site: Site) 
             "  finishing_request: park",
             "  finishing_request: nothing",
             "config.yaml:5:3: warning: finishing_request: nothing leaves a charged robot on its pad"
-            " until it gets a task, and the next robot waits: write park, or charge",
+            " until it gets a task, and the next robot waits: write charge",
         ),
         (
             "  finishing_request: park\n",
             "",
             "config.yaml:1:1: warning: finishing_request: nothing leaves a charged robot on its pad"
-            " until it gets a task, and the next robot waits: write park, or charge",
+            " until it gets a task, and the next robot waits: write charge",
         ),
         (
             "    AMR02: {charger: dock_b}\n",
