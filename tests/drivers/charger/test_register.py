@@ -147,4 +147,5 @@ def test_each_value_is_told_by_what_its_registers_hold() -> None:
         ("amps", "unit 3 input register 4", "0x050A", "12.9 A"),
         ("in_range", "unit 3 discrete input 0", "0", "0"),
         ("in_range", "unit 3 discrete input 0", "1", "1"),
+        ("coil", "unit 3 input register 5", "0x0001", "1"),
     )
