@@ -6,7 +6,7 @@ BIN := .venv/bin
 # compiles every file again.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo demo-charging test deep test-ros lint format bench flood soak torture mutate clean
+.PHONY: help demo demo-charging test deep test-ros lint man format bench flood soak torture mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
@@ -19,6 +19,7 @@ help:
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
+	@echo "make man     the manual page, build/rmf-bridge.1"
 	@echo "make format  rewrite the sources as the linter wants them"
 	@echo "make clean   remove the virtual environment and everything generated"
 
@@ -61,6 +62,12 @@ lint: .venv/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+man: .venv/ready
+	@mkdir -p build
+	$(BIN)/argparse-manpage --module bridges.cli --function whole_parser --prog rmf-bridge \
+	  --project-name rmf-bridges --description "connect Open-RMF to lifts, doors and chargers" \
+	  --manual-section 1 --output build/rmf-bridge.1
 
 format: .venv/ready
 	$(BIN)/ruff check --fix .

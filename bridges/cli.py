@@ -4,10 +4,15 @@ import argparse
 import importlib
 import os
 import sys
+from collections.abc import Container
 
 from bridges import __version__
 
 COMMANDS = {
+    "init": (
+        "write a first YAML for the device in front of you",
+        "init my_lift.yaml --kind lift --wiring gpio --floors L1,L2,L3 --yes",
+    ),
     "run": (
         "serve a device, from its YAML, until SIGTERM or SIGINT",
         "run my_lift.yaml --simulate",
@@ -18,12 +23,29 @@ COMMANDS = {
     ),
     "schema": ("print the JSON Schema of a device YAML", "schema > rmf-bridge.json"),
     "watch": ("show lifts, doors and chargers live, as RMF sees them", "watch --localhost"),
+    "status": (
+        "show every daemon on this machine: state, faults and what to do",
+        "status --json",
+    ),
     "send": (
         "send a request as RMF does, and wait for its effect",
         "send lift Lift1 L3 --session me --direct --localhost",
     ),
     "release": ("end the session of whoever holds a lift", "release Lift1"),
     "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
+    "press": (
+        "in a simulation: a person or the building acts",
+        "press my_lift.yaml fire_alarm on",
+    ),
+    "fail": (
+        "in a simulation: a wire or a part fails; ok mends it",
+        "fail my_lift.yaml door_opened stuck",
+    ),
+    "log": ("show the log of a device's service", "log my_lift.yaml --follow --event fault"),
+    "completion": (
+        "print the completion script for bash, zsh or fish",
+        "completion bash > /etc/bash_completion.d/rmf",
+    ),
     "outputs-off": (
         "switch off every output of a device whose daemon is dead",
         "outputs-off my_lift.yaml",
@@ -34,12 +56,27 @@ COMMANDS = {
 
 def main(argv: list[str] | None = None) -> int:
     """Run one subcommand and return its exit code."""
-    parser = argparse.ArgumentParser(
+    if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion; ends the process
+        import argcomplete
+
+        argcomplete.autocomplete(parser(COMMANDS))
+    arguments, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
+    typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
+    parsed = parser(arguments).parse_args(arguments, typed)
+    try:
+        return int(_module(parsed.command).run(parsed))
+    except BrokenPipeError:  # the reader of a pipe has closed it, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def parser(whole: Container[str]) -> argparse.ArgumentParser:
+    """The command line's parser. `whole`: the subcommands with options; only they are imported."""
+    top = argparse.ArgumentParser(
         prog="rmf-bridge", description="Connect Open-RMF to lifts, doors and chargers."
     )
-    parser.add_argument("--version", action="version", version=f"rmf-bridge {__version__}")
-    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    arguments, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
+    top.add_argument("--version", action="version", version=f"rmf-bridge {__version__}")
+    subparsers = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, (text, example) in COMMANDS.items():
         subparser = subparsers.add_parser(
             name,
@@ -47,14 +84,14 @@ def main(argv: list[str] | None = None) -> int:
             description=text[0].upper() + text[1:] + ".",
             epilog=f"example: rmf-bridge {example}",
         )
-        if name in arguments:  # only the command that runs is imported
+        if name in whole:
             _module(name).add_arguments(subparser)
-    parsed = parser.parse_args(arguments, argparse.Namespace(ros_args=ros_args, typed=arguments))
-    try:
-        return int(_module(parsed.command).run(parsed))
-    except BrokenPipeError:  # the reader of a pipe has closed it, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+    return top
+
+
+def whole_parser() -> argparse.ArgumentParser:
+    """The parser with every subcommand's options, for the manual page (`make man`)."""
+    return parser(COMMANDS)
 
 
 def split_ros_args(argv: list[str]) -> tuple[list[str], list[str]]:

@@ -6,6 +6,7 @@ import logging
 import os
 import sys
 from collections.abc import Iterator, Mapping, Set
+from datetime import UTC, datetime
 from enum import Enum
 
 import msgspec
@@ -15,9 +16,20 @@ codecs.lookup(ESCAPED)  # at once: without a free descriptor it could not be loa
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
-def pairs(event: str, **values: object) -> str:
+class Line(str):
+    """A log line `event key=value …`, and what it was made of, for `--log-format json`."""
+
+    __slots__ = ("event", "values")
+    event: str
+    values: Mapping[str, object]
+
+
+def pairs(event: str, **values: object) -> Line:
     """One log line. Values with spaces, quotes or line breaks are quoted and escaped."""
-    return " ".join([event, *(f"{key}={_quoted(plain(value))}" for key, value in values.items())])
+    shown = (f"{key}={_quoted(plain(value))}" for key, value in values.items())
+    line = Line(" ".join([event, *shown]))
+    line.event, line.values = event, values
+    return line
 
 
 def plain(value: object) -> str:
@@ -80,6 +92,31 @@ class _Formatter(logging.Formatter):
         return "\n".join(prefix + line for line in text.splitlines())
 
 
+class _Json(logging.Formatter):
+    """A line of JSON for each event: at (ISO 8601), priority, event and its values, and the text."""
+
+    def __init__(self, journal: bool) -> None:
+        super().__init__()
+        self._journal = journal
+
+    def format(self, record: logging.LogRecord) -> str:
+        at = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
+        told: dict[str, object] = {"at": at, "priority": record.levelname.lower()}
+        if isinstance(record.msg, Line):
+            told["event"] = record.msg.event
+            told["values"] = {key: _as_json(value) for key, value in record.msg.values.items()}
+        told["text"] = record.getMessage()
+        if record.exc_info:
+            told["traceback"] = self.formatException(record.exc_info)
+        line = msgspec.json.encode(told).decode()
+        return f"<{_PRIORITY.get(record.levelname, 6)}>{line}" if self._journal else line
+
+
+def _as_json(value: object) -> object:
+    """Numbers and truth as they are; all else as the text log says it."""
+    return value if isinstance(value, int | float | str) else plain(value)
+
+
 class _OthersOnce(logging.Filter):
     """Lets each log call in a library through once: with bad frames or datagrams anybody could
     trigger it endlessly. Our own code already logs each event once."""
@@ -100,9 +137,10 @@ class _OthersOnce(logging.Filter):
         return first
 
 
-def start(level: str = "INFO") -> None:
-    """Send every log line to stderr."""
+def start(level: str = "INFO", *, json: bool = False) -> None:
+    """Send every log line to stderr, as text or as JSON."""
     to_stderr = logging.StreamHandler(sys.stderr)
-    to_stderr.setFormatter(_Formatter(journal="JOURNAL_STREAM" in os.environ))
+    journal = "JOURNAL_STREAM" in os.environ
+    to_stderr.setFormatter(_Json(journal) if json else _Formatter(journal))
     to_stderr.addFilter(_OthersOnce())
     logging.basicConfig(level=level, handlers=[to_stderr], force=True)

@@ -1,14 +1,16 @@
 """What log lines say: words of the field, and no Python."""
 
+import json
 import logging
 from dataclasses import dataclass
+from datetime import datetime
 
 import pytest
 
 from bridges.core.decision import OperatorReset
 from bridges.door.signals import DoorOutputs
 from bridges.lift.signals import LiftOutputs, Side
-from bridges.log import _Formatter, pairs, plain
+from bridges.log import _Formatter, _Json, pairs, plain
 from bridges.rmf.definitions import LiftMode
 
 
@@ -66,3 +68,25 @@ def test_a_log_line_stays_one_line_whatever_is_in_it() -> None:
 def test_under_systemd_every_line_carries_its_priority(level: int, prefix: str) -> None:
     record = logging.LogRecord("x", level, "", 0, "one\ntwo", (), None)
     assert _Formatter(journal=True).format(record) == f"{prefix}one\n{prefix}two"
+
+
+def test_as_json_a_line_keeps_its_event_and_its_values() -> None:
+    line = pairs("state", device="Lift1", level=3, agv=True, floors=("L1", "L2"))
+    record = logging.LogRecord("x", logging.INFO, "", 0, line, (), None)
+    told = json.loads(_Json(journal=False).format(record))
+    assert datetime.fromisoformat(told.pop("at")).timestamp() == pytest.approx(
+        record.created, abs=0.01
+    )
+    assert told == {
+        "priority": "info",
+        "event": "state",
+        "values": {"device": "Lift1", "level": 3, "agv": True, "floors": "L1, L2"},
+        "text": line,
+    }
+
+
+def test_as_json_under_systemd_a_text_without_an_event_is_one_line_with_its_priority() -> None:
+    record = logging.LogRecord("x", logging.ERROR, "", 0, "one\ntwo", (), None)
+    line = _Json(journal=True).format(record)
+    assert line.startswith("<3>{")
+    assert json.loads(line.removeprefix("<3>"))["text"] == "one\ntwo"

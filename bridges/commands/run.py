@@ -34,13 +34,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--domain-id", type=int, metavar="N", help="overrides the YAML's domain_id")
     parser.add_argument("--transport", choices=TRANSPORTS, help="overrides the YAML's transport")
     parser.add_argument(
+        "--log-level", choices=("debug", "info", "warning", "error"), default="info"
+    )
+    parser.add_argument(
+        "--log-format",
+        choices=("text", "json"),
+        default="text",
+        help="json: a line each, for programs",
+    )
+    parser.add_argument(
         "--runtime-dir", metavar="DIR", help="default: systemd's, else one of the user's"
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Validate, claim, serve. Returns 78 for an invalid configuration."""
-    log.start()
+    log.start(args.log_level.upper(), json=args.log_format == "json")
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: --simulate is refused where RMF_BRIDGE_SERVICE=1")
         return EX_USAGE

@@ -68,6 +68,8 @@ class DdsTransport:
     retains goes out again. Raises TransportError when the domain cannot be joined.
     """
 
+    speaks = "dds"
+
     def __init__(self, node_name: str, domain_id: int, *, loopback: bool) -> None:
         self.name = node_name
         self.dropped: dict[str, int] = {}

@@ -30,6 +30,8 @@ class MemoryNetwork:
 class MemoryTransport:
     """One node on a MemoryNetwork. Callbacks run on the thread that publishes."""
 
+    speaks = "memory"
+
     def __init__(self, network: MemoryNetwork, node_name: str) -> None:
         self.name = node_name
         self.dropped: dict[str, int] = {}

@@ -68,6 +68,8 @@ class Ros2Transport:
     Raises TransportError when the graph cannot be joined.
     """
 
+    speaks = "ros2"
+
     def __init__(
         self,
         node_name: str,

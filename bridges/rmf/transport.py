@@ -38,13 +38,15 @@ class Subscription(Protocol):
 
 
 class Transport(Protocol):
-    """One node on the RMF graph. `received` is called on the transport's own thread.
+    """One node on the RMF graph. `speaks`: the transport's name in a YAML.
 
-    A callback must only append to an inbox and must not raise. Samples that do not decode, or whose
-    callback raises, are dropped, counted in `dropped` by topic name, and logged once for each topic.
+    `received` is called on the transport's own thread. A callback must only append to an inbox and
+    must not raise. Samples that do not decode, or whose callback raises, are dropped, counted in
+    `dropped` by topic name, and logged once for each topic.
     """
 
     name: str
+    speaks: str
     dropped: dict[str, int]
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:

@@ -52,6 +52,8 @@ class ZenohTransport:
     when no session can be opened; that nobody answers yet is no error.
     """
 
+    speaks = "zenoh"
+
     def __init__(
         self, node_name: str, domain_id: int, *, loopback: bool, settings: Zenoh | None = None
     ) -> None:

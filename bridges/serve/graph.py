@@ -16,7 +16,7 @@ from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.stamps import ClockError, stamp
 from bridges.rmf.topics import Topic
-from bridges.rmf.transport import Transport
+from bridges.rmf.transport import Subscription, Transport
 from bridges.serve.clock import Clock
 from bridges.serve.inbox import Inbox
 from bridges.serve.keeper import Keeper, Kept
@@ -79,6 +79,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
         self._reset = False
+        self._hears: dict[str, Subscription] = {}
         self._unsaid: list[tuple[Topic[Message], Message]] = []
         self._shown: set[str] = set()
         self._reserved = frozenset(kind.reserved(settings))
@@ -91,7 +92,9 @@ class GraphNode(Generic[S, L, M, E, R]):
         for topic in self._kind.requests:
             others_only = topic in self._kind.publishes
             hear = self._to_inbox(topic)
-            self._transport.subscribe(self._named(topic), hear, others_only=others_only)
+            self._hears[topic.name] = self._transport.subscribe(
+                self._named(topic), hear, others_only=others_only
+            )
 
     def reset(self) -> None:
         """An operator says that latched faults may clear; from any thread."""
@@ -140,12 +143,14 @@ class GraphNode(Generic[S, L, M, E, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """For the status file: whether it is passive, and how many other nodes publish the same."""
+        """For the status file: whether it is passive, who does the same, and who hears whom."""
         return {
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
             "refused": self.refused,
             "faults": [{"code": f.code, "detail": f.detail} for f in self._keeper.faults],
+            "heard_by": self._outlet.heard_by(),
+            "hears": {name: end.matched() for name, end in self._hears.items()},
         }
 
     def devices(self) -> Mapping[str, Status]:

@@ -34,6 +34,10 @@ class Outlet:
         except TransportError as error:
             log.error(pairs("not_published", topic=topic.name, reason=error))
 
+    def heard_by(self) -> dict[str, int]:
+        """The number of subscriptions that receive each topic, by the topic's name."""
+        return {name: end.matched() for name, end in self._ends.copy().items()}
+
     def close(self) -> None:
         """Withdraw every publisher."""
         for end in self._ends.values():

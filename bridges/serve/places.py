@@ -12,6 +12,7 @@ import os
 import pwd
 import stat
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,6 +91,18 @@ def _of_user(uid: int, file: Path) -> Iterator[Places]:
             continue
         if his:
             yield Places(runtime, home / ".local/state/rmf-bridge" / file.stem)
+
+
+def runtimes() -> Iterator[Path]:
+    """Every runtime directory on this machine that this user may look for: the services', one's own;
+    for root those of all users.
+    """
+    bases = [SERVICE_RUN, by_hand(Path("any")).runtime.parent]
+    if os.geteuid() == 0:
+        bases += [*USERS_RUN.glob("*/rmf-bridge"), *TMP.glob("rmf-bridge-*/rmf-bridge")]
+    for base in dict.fromkeys(bases):
+        with suppress(OSError):
+            yield from sorted(base.iterdir())
 
 
 def distrusted(folder: Path) -> str:

@@ -15,7 +15,7 @@ from bridges.core.kind import AnyDeviceKind
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import M_co, Topic
-from bridges.rmf.transport import Transport
+from bridges.rmf.transport import Subscription, Transport
 from bridges.serve.clock import Clock, machine_s
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
@@ -112,6 +112,7 @@ class Devices:
         self._strangers: Counter[str] = Counter()
         self._outlet = Outlet(transport, named)
         self._outlet.open(self._topics())
+        self._hears: dict[str, Subscription] = {}
         self._loops = [self._loop(name, open_bus) for name in config.buses]
         self.loops = [Serving(loop, clock) for loop in self._loops]
         self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
@@ -119,7 +120,8 @@ class Devices:
     def subscribe(self) -> None:
         """Subscribe to requests, and to states of our devices that other nodes publish."""
         for topic in self._kind.requests:
-            self._transport.subscribe(self._named(topic), self._to_inbox(topic))
+            hear = self._to_inbox(topic)
+            self._hears[topic.name] = self._transport.subscribe(self._named(topic), hear)
         states = self._kind.states
         self._transport.subscribe(self._named(states), self._to_inbox(states), others_only=True)
 
@@ -133,6 +135,8 @@ class Devices:
         return {
             "requests_for_others": self._strangers["requests"],
             "events_dropped": sum(loop.inbox.dropped for loop in self._loops),
+            "heard_by": self._outlet.heard_by(),
+            "hears": {name: end.matched() for name, end in self._hears.items()},
         }
 
     def devices(self) -> Mapping[str, Status]:

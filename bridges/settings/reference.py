@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 from msgspec import inspect as mi
 
+from bridges import __version__
 from bridges.core.fields import Rmf
 from bridges.core.graph_kind import AnyGraphKind, GraphKind
 from bridges.settings import names as named
@@ -59,6 +60,7 @@ def schema() -> dict[str, Any]:
         _allow_type(components, by_type[bus])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:rmf-bridges:device:{__version__}",
         "title": "rmf-bridges device",
         "oneOf": [
             *(_file(shape, buses, by_type) for shape in shapes()),

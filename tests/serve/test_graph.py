@@ -228,6 +228,8 @@ def test_the_status_says_who_holds_each_lift_who_waits_and_what_is_wrong() -> No
         "other_publishers": 0,
         "refused": {},
         "faults": [],
+        "heard_by": {"lift_requests": 1},
+        "hears": {"adapter_lift_requests": 1, "lift_states": 1},
     }
     assert site.node.devices() == {
         "Lift1": {

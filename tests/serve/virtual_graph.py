@@ -135,6 +135,8 @@ class World:
 class WorldTransport:
     """A node's place in the world (`bridges.rmf.transport.Transport`)."""
 
+    speaks = "memory"
+
     def __init__(self, world: World, name: str) -> None:
         self.name = name
         self.dropped: dict[str, int] = {}

@@ -65,6 +65,8 @@ class RealTime(Timeline):
 class DdsPlace:
     """One node on DDS, whose messages come at the timeline's own time."""
 
+    speaks = "dds"
+
     def __init__(self, timeline: RealTime, domain: int, name: str) -> None:
         self.name = name
         self.dropped: dict[str, int] = {}

@@ -1,0 +1,21 @@
+"""`rmf-bridge fail FILE PART MODE`: in a simulation, a wire or a part of the device fails."""
+
+import argparse
+
+from bridges.commands.plants import add_simulation, obey
+
+MODES = ("off", "stuck", "slow", "garbage", "wrong", "ok")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `fail`."""
+    add_simulation(parser)
+    parser.add_argument(
+        "part", metavar="PART", help="a signal of the file, or a part such as car, unit or server"
+    )
+    parser.add_argument("mode", choices=MODES, help="how it fails; ok mends it")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0; 1 if it cannot fail like this; 69 if no simulation of the file runs."""
+    return obey(args, "fail", args.part, args.mode)

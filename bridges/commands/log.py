@@ -1,0 +1,59 @@
+"""`rmf-bridge log FILE`: the log of a device's service, from systemd's journal."""
+
+import argparse
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from bridges.log import pairs
+
+EX_UNAVAILABLE = 69
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `log`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML, or its name")
+    parser.add_argument("-f", "--follow", action="store_true", help="go on with what comes")
+    parser.add_argument("-n", "--lines", type=int, default=100, metavar="N", help="default: 100")
+    parser.add_argument("--since", metavar="TIME", help="such as today, '1 hour ago', '09:30'")
+    parser.add_argument("--device", metavar="NAME", help="only what is about this device")
+    parser.add_argument("--event", metavar="WORD", help="only this event: state, fault, refused …")
+    parser.add_argument("--json", action="store_true", help="the journal's JSON, a line each")
+
+
+def run(args: argparse.Namespace) -> int:
+    """journalctl's exit code; 69 where there is no journal."""
+    if shutil.which("journalctl") is None:
+        print(
+            "no journalctl here: a daemon without systemd logs to its own terminal", file=sys.stderr
+        )
+        return EX_UNAVAILABLE
+    try:
+        return subprocess.run(command(args)).returncode
+    except KeyboardInterrupt:  # the normal end of --follow
+        return 0
+
+
+def command(args: argparse.Namespace) -> list[str]:
+    """The journalctl command line."""
+    words = ["journalctl", f"--unit=rmf-bridge@{args.file.stem}", f"--lines={args.lines}"]
+    words += ["--output=json"] if args.json else ["--output=short-iso", "--no-hostname"]
+    words += ["--follow"] if args.follow else []
+    words += [f"--since={args.since}"] if args.since else []
+    if pattern := _pattern(args.event, args.device):
+        words += [f"--grep={pattern}", "--case-sensitive=yes"]
+    return words
+
+
+def _pattern(event: str | None, device: str | None) -> str:
+    """A regular expression for a line of ours: `event key=value …`."""
+    parts = [f"^{_literal(event)}\\b"] if event else []
+    if device:
+        _, written = pairs("", device=device).split(" ", 1)
+        parts += [f" {_literal(written)}( |$)"]
+    return ".*".join(parts)
+
+
+def _literal(text: str) -> str:
+    return "".join(c if c.isalnum() or c in '_="' else f"\\{c}" for c in text)

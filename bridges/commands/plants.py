@@ -1,0 +1,64 @@
+"""Speaks to the plants of a running simulation by their control sockets (`hal_fakes/control.py`)."""
+
+import argparse
+import shlex
+import socket
+import sys
+from pathlib import Path
+
+from bridges.serve.places import as_told, by_hand
+
+EX_UNAVAILABLE = 69
+ANSWER_S = 5.0
+
+
+def add_simulation(parser: argparse.ArgumentParser) -> None:
+    """The options that name a simulation and one of its devices."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the YAML that is simulated")
+    parser.add_argument("--device", metavar="NAME", help="which device, if the file has several")
+    parser.add_argument("--runtime-dir", metavar="DIR", help="the simulation's runtime directory")
+
+
+def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
+    """Send one command. 0; 1 if the simulation refuses it; 69 if there is none."""
+    folder = (as_told(args.runtime_dir) or by_hand(args.file.absolute())).runtime
+    sockets = sorted(folder.glob("plant*.sock"))
+    try:
+        answers = [_ask(path, [verb, *_device(args), *words]) for path in sockets]
+    except OSError as error:
+        print(f"the simulation of {args.file} does not answer: {error}", file=sys.stderr)
+        return EX_UNAVAILABLE
+    if "ok" in answers:
+        return 0
+    if not answers:
+        print(
+            f"no simulation of {args.file} runs: there is no plant.sock in {folder}."
+            f" Start one with rmf-bridge run {args.file} --simulate",
+            file=sys.stderr,
+        )
+        return EX_UNAVAILABLE
+    known = [one for one in answers if "no device" not in one] or answers
+    print("\n".join(one.removeprefix("error ") for one in known), file=sys.stderr)
+    return 1
+
+
+def _device(args: argparse.Namespace) -> list[str]:
+    """The device's name; the file's only one if none is given."""
+    if args.device:
+        return [args.device]
+    from bridges.settings.load import load
+
+    devices = list(load(args.file).devices)
+    if len(devices) > 1:
+        raise SystemExit(f"--device is needed: {args.file} has {', '.join(devices)}")
+    return devices
+
+
+def _ask(path: Path, words: list[str]) -> str:
+    """The answer to one line: `ok` or `error TEXT`. Raises OSError."""
+    with socket.socket(socket.AF_UNIX) as caller:
+        caller.settimeout(ANSWER_S)
+        caller.connect(str(path))
+        caller.sendall(shlex.join(words).encode() + b"\n")
+        with caller.makefile(encoding="utf-8") as lines:
+            return lines.readline().strip()

@@ -1,0 +1,19 @@
+"""`rmf-bridge press FILE SIGNAL`: in a simulation, a person or the building acts."""
+
+import argparse
+
+from bridges.commands.plants import add_simulation, obey
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `press`."""
+    add_simulation(parser)
+    parser.add_argument(
+        "signal", metavar="SIGNAL", help="a wrong one is answered with what there is"
+    )
+    parser.add_argument("how", nargs="?", choices=("on", "off"), default="on", help="default: on")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0; 1 if there is no such signal; 69 if no simulation of the file runs."""
+    return obey(args, "press", args.signal, args.how)

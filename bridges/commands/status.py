@@ -1,0 +1,265 @@
+"""`rmf-bridge status`: every daemon on this machine, what it tells RMF, its faults and what to do.
+
+It reads the daemons' status files and asks systemd; it opens no bus and joins no graph.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, TextIO, cast
+
+import msgspec
+
+from bridges.commands.faults import Remedy, remedies
+from bridges.commands.paint import bold, red
+from bridges.rmf.words import printable
+from bridges.serve import directory
+from bridges.serve.places import SERVICE_RUN, Places, owner_of, runtimes
+from bridges.serve.subject import Status
+
+OLD_AFTER_S: Final = 5.0
+"""The status file is written each second."""
+UNIT: Final = "rmf-bridge@"
+ASK_SYSTEMD_S: Final = 3.0
+WELL, FAULTY, DOWN, NONE = 0, 1, 2, 3
+"""Exit codes, as monitoring plugins have them: OK, WARNING, CRITICAL, UNKNOWN."""
+NOT_TOLD: Final = ("faults", "input_age_s", "outputs", "refused")
+LEVEL_OF: Final = {
+    "serving": WELL,
+    "old": DOWN,
+    "died": DOWN,
+    "failed": DOWN,
+    "unknown": NONE,
+    "stopped": WELL,
+}
+
+
+class FaultTold(msgspec.Struct):
+    """A fault in a status file."""
+
+    code: str
+    detail: str
+
+
+class DeviceTold(msgspec.Struct):
+    """What every device's status has; its other keys are the kind's own."""
+
+    faults: list[FaultTold] = []
+    input_age_s: float | None = None
+
+
+class Told(msgspec.Struct):
+    """What `status` relies on in a status file."""
+
+    devices: dict[str, DeviceTold] = {}
+    faults: list[FaultTold] = []
+    heard_by: dict[str, int] = {}
+    hears: dict[str, int] = {}
+
+
+class Daemon(msgspec.Struct, kw_only=True):
+    """One daemon, or a unit without one.
+
+    `state`: `serving`; `old`: it writes no status any more; `died` without tidying up; `failed`:
+    systemd has given up; `stopped`; `unknown`: this user may not see it. `unit`: what systemd says.
+    """
+
+    name: str
+    state: str
+    by: str
+    unit: str = ""
+    why: str = ""
+    age_s: float | None = None
+    status: dict[str, Any] = {}
+
+    @property
+    def devices(self) -> Mapping[str, Status]:
+        """Its devices' part of the status file."""
+        return cast(Mapping[str, Status], self.status.get("devices", {}))
+
+    @property
+    def level(self) -> int:
+        """Its exit code."""
+        level = LEVEL_OF[self.state]
+        parts = (self.status, *self.devices.values())
+        return max(level, FAULTY) if any(part.get("faults") for part in parts) else level
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `status`."""
+    parser.add_argument(
+        "name", nargs="?", metavar="NAME", help="only this one: a device YAML, or its name"
+    )
+    parser.add_argument("--json", action="store_true", help="for programs")
+    parser.add_argument("--runtime-dir", metavar="DIR", help="only the daemon of this directory")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0: all serve; 1: there are faults; 2: one has died or is silent; 3: none is here, or visible."""
+    folders = [Path(args.runtime_dir)] if args.runtime_dir else list(runtimes())
+    found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
+    if args.name:
+        found = [one for one in found if one.name == Path(args.name).stem]
+    else:  # what was started by hand once is no news
+        found = [one for one in found if one.state != "stopped" or one.unit]
+    if args.json:
+        print(json.dumps([{**msgspec.to_builtins(one), "level": one.level} for one in found]))
+    else:
+        show(found, sys.stdout)
+    return max((one.level for one in found), default=NONE)
+
+
+def daemons(
+    folders: Iterable[Path], found_units: Mapping[str, str], wall: float
+) -> Iterator[Daemon]:
+    """The daemon of each runtime directory, and each of systemd's units without one. `wall`: now."""
+    rest = dict(found_units)
+    for folder in folders:
+        service = folder.parent == SERVICE_RUN
+        unit = rest.pop(folder.name, "") if service else ""
+        by = "service" if service else f"by hand, {owner_of(folder)}"
+        with suppress(NotADirectoryError, FileNotFoundError):
+            yield _daemon(folder, by, unit, wall)
+    for name, unit in rest.items():
+        yield Daemon(name=name, state=_without_directory(unit), by="service", unit=unit)
+
+
+def _daemon(folder: Path, by: str, unit: str, wall: float) -> Daemon:
+    one = Daemon(name=folder.name, state="stopped", by=by, unit=unit)
+    try:
+        holder = directory.holder(Places(folder, folder))
+        status, one.age_s = _read(folder / directory.STATUS, wall)
+    except (directory.Unknown, PermissionError) as error:
+        one.state, one.why = "unknown", str(error)
+        return one
+    one.status = status
+    if holder is not None and holder.serves:
+        fresh = one.age_s is not None and one.age_s <= OLD_AFTER_S
+        one.state = "serving" if fresh else "old"
+    elif status:
+        one.state = "died"
+    elif unit.startswith("failed"):
+        one.state = "failed"
+    return one
+
+
+def _without_directory(unit: str) -> str:
+    return "failed" if unit.startswith("failed") else "stopped"
+
+
+def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
+    """The status and its age (s); nothing if there is none, or it cannot be understood."""
+    try:
+        written_at = path.stat().st_mtime
+        text = path.read_bytes()
+        msgspec.json.decode(text, type=Told)
+        found = msgspec.json.decode(text, type=dict[str, Any])
+    except (FileNotFoundError, msgspec.MsgspecError):
+        return {}, None
+    return found, max(0.0, wall - written_at)
+
+
+def units() -> dict[str, str]:
+    """State of each of our units by instance, such as `active (running)`; empty without systemd."""
+    if shutil.which("systemctl") is None:
+        return {}
+    ask = ("systemctl", "list-units", "--all", "--plain", "--output=json", f"{UNIT}*")
+    try:
+        told = subprocess.run(ask, capture_output=True, timeout=ASK_SYSTEMD_S, check=True).stdout
+        found = json.loads(told)
+    except (OSError, subprocess.SubprocessError, ValueError):
+        return {}
+    return {
+        one["unit"].removeprefix(UNIT).removesuffix(".service"): f"{one['active']} ({one['sub']})"
+        for one in found
+    }
+
+
+def show(found: Iterable[Daemon], out: TextIO) -> None:
+    """A block of lines for each daemon."""
+    blocks = list(found)
+    if not blocks:
+        why = "" if os.geteuid() == 0 else " that this user may see (try sudo)"
+        print(f"no daemon of rmf-bridges is on this machine{why}", file=out)
+        return
+    known = remedies() if any(_faults(one) for one in blocks) else {}
+    for one in blocks:
+        print("\n".join(_lines(one, known, out)), file=out)
+
+
+def _lines(one: Daemon, known: Mapping[str, Remedy], out: TextIO) -> Iterator[str]:
+    paint = red if one.level else bold
+    simulated = " SIMULATED" if one.status.get("simulated") else ""
+    by = f"{one.by}, {one.unit}" if one.unit else one.by
+    yield paint(f"{one.name}: {_state(one)}{simulated}", out) + f" ({by})"
+    if one.why:
+        yield f"  {printable(one.why)}"
+    if one.state in ("serving", "old"):
+        yield from _serving(one, known, out)
+
+
+def _serving(one: Daemon, known: Mapping[str, Remedy], out: TextIO) -> Iterator[str]:
+    about = {"transport": "?", "domain_id": "?", "kind": "?", "version": "?", **one.status}
+    yield "  {file}: {kind}, version {version}, {transport} domain {domain_id}".format(**about)
+    for topic, nodes in one.status.get("heard_by", {}).items():
+        yield f"  {topic}: " + ("nobody listens" if not nodes else f"heard by {_nodes(nodes)}")
+    for topic, nodes in one.status.get("hears", {}).items():
+        yield f"  {topic}: " + ("nobody sends" if not nodes else f"from {_nodes(nodes)}")
+    yield from _fault_lines(one.status, known, out)
+    for name, device in one.devices.items():
+        yield f"  {printable(name)}: {_told(device)}; {_age(device)}"
+        yield from _fault_lines(device, known, out)
+
+
+def _state(one: Daemon) -> str:
+    match one.state:
+        case "old":
+            age = (
+                "has written no status yet"
+                if one.age_s is None
+                else f"silent for {one.age_s:.0f} s"
+            )
+            return f"runs, but {age}"
+        case "died":
+            return "has died; its next start tidies up, or `rmf-bridge outputs-off FILE`"
+        case "unknown":
+            return "cannot be seen"
+        case "serving" if one.status.get("passive"):
+            return "passive: another node does the same"
+        case other:
+            return other
+
+
+def _told(device: Status) -> str:
+    told = ((key, value) for key, value in device.items() if key not in NOT_TOLD)
+    shown = ", ".join(f"{key} {value}" for key, value in told if value not in ("-", ""))
+    return printable(shown) or "nothing to tell"
+
+
+def _age(device: Status) -> str:
+    age_s = device.get("input_age_s")
+    return "never read" if age_s is None else f"read {age_s:.1f} s ago"
+
+
+def _nodes(count: int) -> str:
+    return f"{count} node{'s' if count > 1 else ''}"
+
+
+def _faults(one: Daemon) -> bool:
+    return any(part.get("faults") for part in (one.status, *one.devices.values()))
+
+
+def _fault_lines(part: Status, known: Mapping[str, Remedy], out: TextIO) -> Iterator[str]:
+    for fault in part.get("faults", ()):
+        detail = printable(": ".join(filter(None, (fault["code"], fault["detail"]))))
+        yield "    " + red(detail, out)
+        if remedy := known.get(fault["code"]):
+            yield f"      cause: {remedy.cause}"
+            yield f"      do: {remedy.do}"

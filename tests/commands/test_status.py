@@ -1,0 +1,163 @@
+"""`rmf-bridge status`: what it finds in runtime directories, its words and its exit codes."""
+
+import fcntl
+import io
+import json
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridges import cli
+from bridges.commands import faults
+from bridges.commands.status import DOWN, FAULTY, NONE, WELL, Daemon, daemons, show
+
+ROOT = Path(__file__).parents[2]
+STUCK = {"code": "DOOR_OPENING_FAULT", "detail": "held, but not open after 8 s"}
+
+
+def lift(*found: dict[str, str]) -> dict[str, Any]:
+    return {
+        "file": "/etc/rmf-bridges/lift_a.yaml",
+        "kind": "lift",
+        "version": "1.2",
+        "transport": "dds",
+        "domain_id": 3,
+        "heard_by": {"lift_states": 2},
+        "hears": {"lift_requests": 0},
+        "devices": {
+            "Lift1": {
+                "mode": "AGV",
+                "floor": "L1",
+                "session": "-",
+                "faults": list(found),
+                "input_age_s": 0.04,
+                "refused": {},
+            }
+        },
+    }
+
+
+@contextmanager
+def served(folder: Path, told: object) -> Iterator[Path]:
+    """A runtime directory whose lock a daemon holds."""
+    folder.mkdir()
+    (folder / "status.json").write_text(json.dumps(told))
+    lock = os.open(folder / "lock", os.O_RDWR | os.O_CREAT)
+    os.write(lock, json.dumps({"pid": 4711, "file": "x", "serves": True}).encode())
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    try:
+        yield folder
+    finally:
+        os.close(lock)
+
+
+def seen(folder: Path, age_s: float = 0.0, units: dict[str, str] | None = None) -> list[Daemon]:
+    path = folder / "status.json"
+    written_at = path.stat().st_mtime if path.exists() else 0.0
+    return list(daemons([folder], units or {}, written_at + age_s))
+
+
+def shown(found: list[Daemon]) -> list[str]:
+    out = io.StringIO()
+    show(found, out)
+    return out.getvalue().splitlines()
+
+
+def test_a_daemon_that_serves_is_shown_with_its_devices_and_who_hears_it(tmp_path: Path) -> None:
+    with served(tmp_path / "lift_a", lift()) as folder:
+        found = seen(folder)
+        lines = shown(found)
+    assert [one.level for one in found] == [WELL]
+    assert re.sub(r"by hand, \w+", "by hand, USER", "\n".join(lines)).splitlines() == [
+        "lift_a: serving (by hand, USER)",
+        "  /etc/rmf-bridges/lift_a.yaml: lift, version 1.2, dds domain 3",
+        "  lift_states: heard by 2 nodes",
+        "  lift_requests: nobody sends",
+        "  Lift1: mode AGV, floor L1; read 0.0 s ago",
+    ]
+
+
+def test_a_fault_is_shown_with_its_cause_and_what_to_do(tmp_path: Path) -> None:
+    with served(tmp_path / "lift_a", lift(STUCK)) as folder:
+        found = seen(folder)
+        lines = shown(found)
+    remedy = faults.remedies()["DOOR_OPENING_FAULT"]
+    assert [one.level for one in found] == [FAULTY]
+    assert lines[-3:] == [
+        "    DOOR_OPENING_FAULT: held, but not open after 8 s",
+        f"      cause: {remedy.cause}",
+        f"      do: {remedy.do}",
+    ]
+
+
+def test_a_daemon_whose_status_is_old_hangs(tmp_path: Path) -> None:
+    with served(tmp_path / "lift_a", lift()) as folder:
+        found = seen(folder, age_s=6.0)
+        assert (found[0].state, found[0].level) == ("old", DOWN)
+        assert shown(found)[0].startswith("lift_a: runs, but silent for 6 s")
+
+
+def test_a_daemon_that_left_its_status_has_died(tmp_path: Path) -> None:
+    with served(tmp_path / "lift_a", lift()) as folder:
+        pass
+    found = seen(folder)
+    assert [(one.state, one.level) for one in found] == [("died", DOWN)]
+    assert len(shown(found)) == 1
+
+
+def test_a_daemon_that_ended_well_has_left_only_its_lock(tmp_path: Path) -> None:
+    with served(tmp_path / "lift_a", lift()) as folder:
+        (folder / "status.json").unlink()
+    assert [(one.state, one.level) for one in seen(folder)] == [("stopped", WELL)]
+
+
+def test_a_unit_that_failed_is_shown_though_it_has_no_directory() -> None:
+    found = list(daemons([], {"lift_b": "failed (failed)"}, 0.0))
+    assert [(one.name, one.state, one.level) for one in found] == [("lift_b", "failed", DOWN)]
+    assert shown(found) == ["lift_b: failed (service, failed (failed))"]
+
+
+@pytest.mark.parametrize("broken", ["", "{", "[1]", '{"devices": 1}'])
+def test_a_status_that_cannot_be_understood_is_none(tmp_path: Path, broken: str) -> None:
+    with served(tmp_path / "lift_a", {}) as folder:
+        (folder / "status.json").write_text(broken)
+        assert [one.state for one in seen(folder)] == ["old"]
+
+
+def test_a_name_from_the_graph_moves_no_cursor(tmp_path: Path) -> None:
+    told = lift()
+    told["devices"] = {"\x1b[2J": told["devices"]["Lift1"]}
+    with served(tmp_path / "lift_a", told) as folder:
+        assert "\x1b" not in "".join(shown(seen(folder)))
+
+
+def test_for_programs_it_prints_json_and_nothing_found_is_unknown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with served(tmp_path / "lift_a", lift(STUCK)) as folder:
+        assert cli.main(["status", "--json", "--runtime-dir", str(folder)]) == FAULTY
+    (told,) = json.loads(capsys.readouterr().out)
+    assert (told["name"], told["state"], told["level"]) == ("lift_a", "serving", FAULTY)
+    assert told["status"]["devices"]["Lift1"]["faults"] == [STUCK]
+    assert cli.main(["status", "--runtime-dir", str(tmp_path / "nowhere")]) == NONE
+
+
+def test_each_fault_of_the_source_has_a_remedy_and_each_remedy_a_fault() -> None:
+    sources = "".join(path.read_text() for path in (ROOT / "bridges").rglob("*.py"))
+    named = set(re.findall(r'Fault\(\s*"([A-Z_]+)"', sources))
+    constants = set(re.findall(r'^[A-Z_]+(?:: Final)? = "([A-Z]+(?:_[A-Z]+)+)"$', sources, re.M))
+    hazards = {"CODE_BLUE", "EARTHQUAKE", "EMERGENCY", "FIRE", "MANUAL", "OUT_OF_SERVICE"}
+    known = set(faults.remedies())
+    assert len(named) > 30
+    assert named - known == set()
+    assert known - named - constants - hazards == set()
+
+
+def test_the_page_of_faults_is_the_table_itself() -> None:
+    """`python -m bridges.commands.faults > docs/faults.md` brings it up to date."""
+    assert (ROOT / "docs" / "faults.md").read_text() == faults.page()
