@@ -86,12 +86,12 @@ def ride(broken: str, mode: FailureMode, broken_at: float) -> WiredStory:
     return story
 
 
-@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 2))
+@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 3))
 def test_a_part_broken_before_the_ride(broken: str, mode: FailureMode) -> None:
     ride(broken, mode, broken_at=1.0)
 
 
-@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 2, 1))
+@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 3, 1))
 def test_a_part_that_breaks_on_the_way(broken: str, mode: FailureMode) -> None:
     ride(broken, mode, broken_at=3.0)
 

@@ -18,8 +18,9 @@ from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import TransportError
 from tests.rmf import peer
-from tests.rmf.conftest import ROS2, Join, joining
+from tests.rmf.conftest import ROS2
 from tests.rmf.domains import domain_of_this_run
+from tests.rmf.joining import Join, joining
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.ros

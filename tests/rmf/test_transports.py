@@ -9,7 +9,7 @@ from hypothesis import given
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import RETAINED, VOLATILE, Topic
 from bridges.rmf.transport import Publisher, Subscription, TransportError
-from tests.rmf.conftest import Join
+from tests.rmf.joining import Join
 from tests.rmf.values import MESSAGE_TYPES, repeatable, values
 from tests.waiting import wait_until
 

@@ -10,7 +10,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf import peer
-from tests.rmf.conftest import ZENOH
+from tests.rmf.joining import ZENOH
 from tests.rmf.values import repeatable, values
 from tests.waiting import wait_until
 
@@ -41,6 +41,7 @@ def echoed(request: pytest.FixtureRequest, module_domain: int) -> Iterator[Zenoh
     made.node.close()
 
 
+@pytest.mark.xdist_group("echo on zenoh")
 @ALL_TOPICS
 def test_every_message_survives_the_wire_to_another_process_and_back(
     echoed: ZenohTransport, topic: Topic[Any]
