@@ -230,7 +230,7 @@ def test_every_key_that_is_taken_out_leaves_a_right_file_or_is_missed(
 
 def may_be_right(node: ScalarNode, trap: str) -> bool:
     """A value left out, or a number for a number: what is wrong may be another key, that needs it."""
-    return trap == "~" or trap in ("17", "1.0") and node.tag.endswith((":float", ":int"))
+    return trap == "~" or (trap in ("17", "1.0") and node.tag.endswith((":float", ":int")))
 
 
 def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file: Path) -> None:
