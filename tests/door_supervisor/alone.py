@@ -55,7 +55,7 @@ class Alone:
         self.hears(OpenRequested(who, self.stamp(aged)))
 
     def closes(self, who: str = "a", *, aged: float = 0.0) -> None:
-        """Its CLOSE."""
+        """A requester's CLOSE."""
         self.hears(CloseRequested(who, self.stamp(aged)))
 
     def stamp(self, aged: float) -> int:

@@ -257,7 +257,7 @@ class Story:
         self.request(LiftRequest("Lift1", session_id=session, request_type=int(END)))
 
     def request(self, *requests: LiftRequest) -> None:
-        """These arrive in one scan."""
+        """These requests arrive in one scan."""
         self._scan(*(self.node.event(LIFT_REQUESTS, request) for request in requests))
 
     def rival(self) -> None:

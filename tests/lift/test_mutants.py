@@ -129,7 +129,7 @@ def test_an_event_that_is_not_a_request_is_not_refused(event: Any) -> None:
     assert Told()(0.0, AT_L1, event).decision.refused == ""
 
 
-def test_a_reading_says_nothing_at_the_exact_end_of_its_age() -> None:
+def test_a_reading_no_longer_counts_in_the_instant_in_which_it_is_too_old() -> None:
     burning = replace(AT_L1, door=Door.BOTH, hazards=frozenset({Hazard.EMERGENCY}))
     told = Told(stale_after_s=2.0)(0.0, burning)(2.0, IoFailed("timeout"))
     assert told.faults == (Fault("INPUTS_NOT_FRESH", "timeout"),)
@@ -197,7 +197,7 @@ def test_an_event_that_is_only_noted_is_not_refused() -> None:
     assert (told.decision.refused, told.decision.report.session) == ("", "A")
 
 
-def test_even_a_short_grace_is_kept() -> None:
+def test_even_a_short_grace_lasts_its_time() -> None:
     told = Told(release_grace_s=0.5)(0.0, AT_L1)(0.1, ASKED)(1.0, AT_L1, Ended("A"))
     assert told.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
     assert told(1.5, AT_L1).decision.outputs == LiftOutputs()

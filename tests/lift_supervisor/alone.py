@@ -58,7 +58,7 @@ class Alone:
         self.hears(Requested(session, Target(kind, floor, door), stamp, self.now - stamp))
 
     def ends(self, session: str, *, aged: float = 0.0) -> None:
-        """Its END."""
+        """An adapter's END."""
         stamp = self.now + self.skew - aged
         self.hears(Ended(session, stamp, self.now - stamp))
 

@@ -47,7 +47,7 @@ def test_malformed_datagrams_write_no_line_each(domain: int, tmp_path: Path) -> 
     assert log.read_text().splitlines() == []
 
 
-def test_a_library_says_each_of_its_lines_once_and_we_say_all_of_ours(tmp_path: Path) -> None:
+def test_each_line_of_a_library_is_logged_once_and_every_line_of_ours(tmp_path: Path) -> None:
     text = (
         "import logging; from bridges import log; log.start()\n"
         "for n in range(3):\n"

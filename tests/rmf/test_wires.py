@@ -206,7 +206,7 @@ def test_each_end_has_the_type_the_type_hash_and_the_qos_of_the_golden_table(
 
 
 def as_ros_shows(qos: Any) -> golden_qos.Qos:
-    """Of an end's QoS on DDS, what the golden table has."""
+    """An end's QoS on DDS, in the golden table's terms."""
     names = {
         "Reliable": "RELIABLE",
         "Volatile": "VOLATILE",

@@ -101,7 +101,7 @@ def test_a_process_that_leaves_is_gone_at_once_for_the_others(here: Here) -> Non
     wait_until(lambda: not publisher.matched() and not subscription.matched(), "it is gone", 5.0)
 
 
-def test_those_who_stay_find_who_comes_after_the_first_of_them_has_gone(here: Here) -> None:
+def test_nodes_that_stay_find_a_newcomer_after_the_first_of_them_has_gone(here: Here) -> None:
     states = LIFT_STATES
     stays = ZenohTransport("stays", here.domain, loopback=True, settings=ZENOH[here.way])
     try:

@@ -94,7 +94,7 @@ def _alive(pid: int) -> bool:
         return False
 
 
-def test_the_rule_leaves_out_crashes_and_what_ends_nothing_by_default() -> None:
+def test_the_rule_leaves_out_crashes_and_signals_that_end_nothing_by_default() -> None:
     left_alone = {signal.Signals(n).name for n in signal.valid_signals() - ENDING}
     assert left_alone == {
         *("SIGKILL", "SIGSTOP"),

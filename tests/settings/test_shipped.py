@@ -251,7 +251,9 @@ def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file:
     assert accepted < 40 + 3 * coordinates, accepted
 
 
-def test_every_shipped_file_is_judged_when_cut_anywhere(config: Path, file: Path) -> None:
+def test_every_shipped_file_cut_anywhere_is_right_or_refused_at_its_place(
+    config: Path, file: Path
+) -> None:
     text = config.read_bytes()
     for end in range(0, len(text), depth(97, 23)):
         problems_of(file, text[:end])

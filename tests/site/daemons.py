@@ -175,7 +175,7 @@ class RmfsSupervisor:
             self._place.subscribe(topic, self._hear)
 
     def kill(self) -> None:
-        """It is stopped."""
+        """It is stopped and leaves the graph."""
         self._place.close()
 
     def _hear(self, message: Any) -> None:
