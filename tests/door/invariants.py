@@ -53,7 +53,7 @@ def the_relay_follows_the_hold(step: Step) -> None:
 
 
 def open_is_the_truth(step: Step) -> None:
-    """OPEN only by a fresh reading of the contact at the open end, or by time where that is permitted."""
+    """OPEN only by a fresh reading of the contact at the open end, or by time where permitted."""
     shown, sample = step.decision.report, step.world.sample
     if not _sighted(step):
         assert shown.mode is DoorModeValue.MODE_OFFLINE
