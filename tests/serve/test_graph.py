@@ -305,7 +305,7 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
 def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
     join: Callable[[str], Transport],
 ) -> None:
-    """A node that is passive because of a rival publishes once that has gone; others see one of them."""
+    """A node that is passive because of a rival publishes when it has gone; others see one of them."""
     others, ours, rival = join("others"), join("supervisor"), join("rival")
     rival.publisher(LIFT_REQUESTS)
     heard: list[LiftRequest] = []
