@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.waiting import PATIENCE_S
+
 NODE = """
 import sys
 from bridges import log
@@ -43,7 +45,7 @@ def test_malformed_datagrams_write_no_line_each(domain: int, tmp_path: Path) -> 
                     sender.sendto(packet, ("127.0.0.1", 7400 + 250 * domain + port))
         assert node.stdin
         node.stdin.close()
-        assert node.wait(20) == 0
+        assert node.wait(PATIENCE_S) == 0
     assert log.read_text().splitlines() == []
 
 

@@ -12,7 +12,7 @@ from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf import peer
 from tests.rmf.joining import ZENOH
 from tests.rmf.values import repeatable, values
-from tests.waiting import wait_until
+from tests.waiting import LEASE_S, wait_until
 
 ALL_TOPICS = pytest.mark.parametrize("topic", peer.TOPICS.values(), ids=peer.TOPICS.keys())
 
@@ -98,7 +98,9 @@ def test_a_process_that_leaves_is_gone_at_once_for_the_others(here: Here) -> Non
     subscription = here.node.subscribe(LIFT_STATES.named("pong_lift_states"), print)
     with peer.running("echo", here.domain, here.way):
         wait_until(lambda: publisher.matched() and subscription.matched(), "it is found")
-    wait_until(lambda: not publisher.matched() and not subscription.matched(), "it is gone", 5.0)
+    wait_until(
+        lambda: not publisher.matched() and not subscription.matched(), "it is gone", LEASE_S
+    )
 
 
 def test_nodes_that_stay_find_a_newcomer_after_the_first_of_them_has_gone(here: Here) -> None:

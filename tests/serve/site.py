@@ -147,7 +147,7 @@ def daemon(file: Path, runtime_dir: Path, *options: str, **env: str) -> Iterator
     finally:
         started.process.terminate()
         try:
-            started.process.wait(20)
+            started.process.wait(PATIENCE_S)
         finally:
             started.process.kill()
             started.process.wait()
