@@ -4,7 +4,7 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
-from bridges.charger_coordinator import core, keep
+from bridges.charger_coordinator import core, keep, report
 from bridges.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
@@ -27,11 +27,6 @@ from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf import definitions as d
 from tests.charger_coordinator.test_core import ONE, SETTINGS, THREE, TWO, A, Alone, B, busy
-
-
-def waiting(site_: Alone) -> list[str]:
-    """The robots that wait, as the report has them."""
-    return [str(who) for who in core.report.report(site_.memory, site_.now, SITE).queue]
 
 
 SITE = Site.of(SETTINGS)
@@ -350,11 +345,11 @@ def test_the_report_names_each_station_with_its_state_and_robot() -> None:
     site_.run(1)
     site_.does(A, CHARGING)
     site_.run(1)
-    shown = core.report.report(site_.memory, site_.now, SITE)
+    shown = report.report(site_.memory, site_.now, SITE)
     assert shown.read_at == 2.0
     assert shown.stations == ((A, "CHARGING tiny/AMR01"), (B, "?"))
     site_.hears(Unwanted(site_.memory.grants[A].request_id))
-    assert core.report.report(site_.memory, site_.now, SITE).stations[0] == (A, "CHARGING")
+    assert report.report(site_.memory, site_.now, SITE).stations[0] == (A, "CHARGING")
 
 
 @pytest.mark.parametrize(
