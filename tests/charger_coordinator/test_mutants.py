@@ -28,7 +28,6 @@ from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf import definitions as d
 from tests.charger_coordinator.test_core import ONE, SETTINGS, THREE, TWO, A, Alone, B, busy
 
-
 SITE = Site.of(SETTINGS)
 SERVED = [CHARGING, RELEASED]
 
