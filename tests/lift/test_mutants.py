@@ -5,7 +5,15 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.core.decision import (
+    Fault,
+    IoFailed,
+    OperatorReset,
+    RivalSeen,
+    Sampled,
+    Suspended,
+    WriteFailed,
+)
 from bridges.lift.core import decide
 from bridges.lift.memory import LiftLimits, Memory
 from bridges.lift.sensing import MOTION_MEMORY_S
@@ -73,6 +81,10 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     "a rear door that is both": (
         [(0.0, replace(AT_L1, rear_door=Door.BOTH))],
         Fault("DOOR_CONTACTS_CONTRADICT", "rear door reads open and closed"),
+    ),
+    "a door whose number means nothing": (
+        [(0.0, replace(AT_L1, door=Door.UNKNOWN))],
+        Fault("DOOR_CODE_ILLEGAL", "the door's number means nothing"),
     ),
     "up and down at once": (
         [(0.0, replace(AT_L1, motion=Motion.CONTRADICTORY))],
@@ -277,3 +289,17 @@ def test_a_reading_in_the_instant_in_which_the_last_one_expires_starts_afresh() 
     assert (shown.mode, shown.floor, told.faults) == (LiftMode.MODE_OFFLINE, "", ())
     told(1.6, AT_L1)
     assert told.decision.report.floor == "L1"
+
+
+def test_after_a_sleep_everything_is_forgotten_but_the_last_landing() -> None:
+    told = Told()(0.0, AT_L1)(1.0, AT_L1)(2.0, Suspended("the machine slept"))
+    assert told.decision.refused == ""
+    assert told.faults == (Fault("INPUTS_NOT_FRESH", "the machine slept"),)
+    position = told.memory.senses.position
+    assert (position.trusted, position.moved_at) == ("L1", 2.0)
+    assert told.memory.senses == type(told.memory.senses)(position=position)
+
+
+def test_an_illegal_door_number_names_the_rear_door() -> None:
+    told = Told()(0.0, replace(AT_L1, rear_door=Door.UNKNOWN))
+    assert told.faults == (Fault("DOOR_CODE_ILLEGAL", "the rear door's number means nothing"),)
