@@ -2,7 +2,11 @@
 
 import math
 
-from bridges.core.freshness import Requester, Rules
+import pytest
+
+from bridges.core.decision import RequestRefused
+from bridges.core.freshness import Requester, Rules, in_ns
+from bridges.rmf.definitions import Time
 
 STAMP = 1_800_000_000.0
 STARTED = Rules(most_s=5.0)
@@ -139,3 +143,16 @@ def test_a_requester_without_stamps_counts_when_it_repeats_itself() -> None:
 
 def test_a_requester_never_heard_has_no_stamps() -> None:
     assert Requester() == Requester(*[-math.inf] * 6)
+
+
+def test_a_requester_that_counts_by_its_repeats_is_remembered_from_then_on() -> None:
+    requester = Clocked(skew=-3600.0)
+    assert [requester.at(100.0), requester.at(101.0)] == [False, True]
+    assert requester.requester.heard_at == 101.0
+
+
+def test_a_stamp_of_no_clock_is_refused_and_a_request_without_stamp_is_not() -> None:
+    assert [in_ns(Time(0, 0)), in_ns(Time(1, 999_999_999))] == [0, 1_999_999_999]
+    for stamp, text in ((Time(-1, 0), "-1 s 0 ns"), (Time(0, 10**9), "0 s 1000000000 ns")):
+        with pytest.raises(RequestRefused, match=f"^impossible request_time: {text}$"):
+            in_ns(stamp)
