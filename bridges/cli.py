@@ -33,6 +33,10 @@ COMMANDS = {
     ),
     "release": ("end the session of whoever holds a lift", "release Lift1"),
     "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
+    "walk": (
+        "try every wire of a device with the electrician, and sign what was seen",
+        "walk my_lift.yaml --device Lift1",
+    ),
     "press": (
         "in a simulation: a person or the building acts",
         "press my_lift.yaml fire_alarm on",

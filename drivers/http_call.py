@@ -1,7 +1,7 @@
 """Commands over HTTP: their settings in the YAML, and how a driver sends them."""
 
 from collections.abc import Iterable
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Protocol
 
 import msgspec
 
@@ -31,7 +31,7 @@ class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 class Calls(Protocol):
     """What a driver needs from an HTTP bus."""
 
-    def get_json(self, path: str) -> dict[str, Any]:
+    def get_json(self, path: str) -> dict[str, object]:
         """One JSON object. Raises HalError."""
 
     def send(

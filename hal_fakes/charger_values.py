@@ -1,6 +1,6 @@
-"""What a charger's places hold while it does something, so that its rules and errors say so.
+"""Values for a charger's places, so that the driver's rules and errors read the wanted activity.
 
-The rules are those that the driver reads by: values are tried until they judge as is wanted.
+It tries values until the driver's own rules judge them as wanted.
 """
 
 import itertools
@@ -17,7 +17,7 @@ NEAREST: Final = {
     Activity.STOPPING: Activity.CHARGING,
     Activity.RELEASED: Activity.IDLE,
 }
-"""What is shown where an activity has no way of its own."""
+"""What is shown for an activity that no code or rule can express."""
 
 
 def values(

@@ -87,6 +87,7 @@ def accept_state(state: d.ChargerState, settings: Settings, wall: float) -> Stat
 
 def accept_wish(request: d.ChargerRequest, settings: Settings, wall: float) -> Wanted:
     """An operator's request as an event. An empty charger_name means any suitable station."""
+    check_length(charger_name=request.charger_name)
     asked = accept_charger_request(request, ChargerSettings())
     if asked.who not in settings.robots():
         raise RequestRefused("robot not ours", f"{asked.who} is in no fleet of the YAML")
@@ -97,6 +98,7 @@ def accept_withdrawal(cancel: d.ChargerCancel, settings: Settings, wall: float) 
     """An operator's cancel as an event. Raises RequestRefused."""
     if not cancel.request_id:
         raise RequestRefused("empty request_id", "which wish is withdrawn?")
+    check_length(request_id=cancel.request_id)
     return Unwanted(cancel.request_id)
 
 

@@ -8,12 +8,14 @@ since. A directory that is full, missing or read-only does not delay switching o
 import argparse
 import logging
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from bridges import log
 from bridges.log import pairs
 from bridges.serve import directory as runtime
 from bridges.serve import signals
+from bridges.serve.last_shown import ages
 from bridges.serve.places import Places, act_as_owner, by_hand, work_somewhere
 from bridges.serve.record import Record, Records
 from bridges.serve.switch_off import outputs_off
@@ -42,16 +44,19 @@ def run(args: argparse.Namespace) -> int:
         return EX_UNAVAILABLE
     work_somewhere(places or by_hand(file))
     if places is None:
-        return _off_by_yaml(file)
+        return _off_by_yaml(file, {})
+    answered = ages(places)
     if args.record and _asked_by_our_daemon(places):
-        return _off_by_records(Records(places, file), args.record)
+        return _off_by_records(Records(places, file), answered, args.record)
     try:
         held = runtime.RuntimeDirectory(places, file, serves=False)
     except runtime.AlreadyRunning as error:
         logging.error("%s: stop it instead, it switches its outputs off", error)
         return EX_UNAVAILABLE
     try:
-        return _off_by_records(held.records) if held.records.unreleased() else _off_by_yaml(file)
+        if held.records.unreleased():
+            return _off_by_records(held.records, answered)
+        return _off_by_yaml(file, answered)
     finally:
         held.close()
 
@@ -79,7 +84,7 @@ def _asked_by_our_daemon(places: Places) -> bool:
     return found is None or found.pid in (0, os.getppid())
 
 
-def _off_by_yaml(file: Path) -> int:
+def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
     try:
         config = load(file)
     except SettingsError as error:
@@ -88,22 +93,24 @@ def _off_by_yaml(file: Path) -> int:
     if not config.buses:
         logging.info(pairs("nothing_to_switch_off", file=file, kind=config.kind))
         return 0
-    return _told(_unsafe(config, ()) == set())
+    return _told(_unsafe(config, (), answered) == set())
 
 
-def _off_by_records(records: Records, names: list[str] | None = None) -> int:
+def _off_by_records(
+    records: Records, answered: Mapping[str, float], names: list[str] | None = None
+) -> int:
     """Switch off what these records name; all records by default."""
     found = [r for r in records.unreleased() if names is None or r.name in names]
-    return _told(not [r for r in found if not _off_by_record(records, r)])
+    return _told(not [r for r in found if not _off_by_record(records, r, answered)])
 
 
-def _off_by_record(records: Records, record: Record) -> bool:
+def _off_by_record(records: Records, record: Record, answered: Mapping[str, float]) -> bool:
     try:
         config = record.config()
     except SettingsError as error:
         _say(error)
         return False
-    unsafe = _unsafe(config, record.safe)
+    unsafe = _unsafe(config, record.safe, answered)
     try:
         if unsafe:
             records.still_unsafe(record, unsafe, config)
@@ -114,8 +121,8 @@ def _off_by_record(records: Records, record: Record) -> bool:
     return not unsafe
 
 
-def _unsafe(config: Config, safe: tuple[str, ...]) -> set[str]:
-    return set(config.devices) - set(safe) - outputs_off(config, TIMEOUT_S, safe)
+def _unsafe(config: Config, safe: tuple[str, ...], answered: Mapping[str, float]) -> set[str]:
+    return set(config.devices) - set(safe) - outputs_off(config, TIMEOUT_S, safe, answered)
 
 
 def _told(all_off: bool) -> int:

@@ -12,7 +12,7 @@ from bridges.commands.graph import TRANSPORTS, overridden
 from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
-from bridges.serve import places, signals
+from bridges.serve import guard, places, signals
 from bridges.serve.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
@@ -108,13 +108,6 @@ def _held(args: argparse.Namespace) -> runtime.RuntimeDirectory:
     return runtime.RuntimeDirectory(found, file, serves=True)
 
 
-def _outputs_off(args: argparse.Namespace) -> list[str]:
-    """The command that switches off what this daemon may leave on."""
-    given = ["--runtime-dir", os.path.abspath(args.runtime_dir)] if args.runtime_dir else []
-    file = str(args.file.absolute())
-    return [sys.executable, "-m", "bridges.cli", "outputs-off", file, *given]
-
-
 def _serve(
     config: Config, held: runtime.RuntimeDirectory, end: signals.End, args: argparse.Namespace
 ) -> int:
@@ -123,7 +116,7 @@ def _serve(
     if not args.simulate:
         from bridges.serve.daemon import Daemon
 
-        outputs_off = _outputs_off(args)
+        outputs_off = guard.command(args.file, args.runtime_dir)
         places.work_somewhere(held.places)  # lgpio leaves a FIFO in the working directory
         return Daemon(config, held, end, ros_args=args.ros_args, outputs_off=outputs_off).serve()
     from hal_fakes.simulate import Simulation

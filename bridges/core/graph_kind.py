@@ -44,6 +44,8 @@ class GraphKind(Generic[S, L, M, E, R]):
     `device_name`: which subject a message is about. `shown_by`: the topic on which a subject publishes
     its own states, which proves that it exists (a request may name anything); None if there is only
     one subject. `reserved(settings)`: the subjects that the YAML names.
+    `requester(event)`: who sends this request; "" for a state. `requesters(memory)`: whom the subject
+    remembers. Anybody can make them up, so all subjects together have a bound.
     `quiet_s(settings)`: how long it only listens after its start.
     `limits(settings)`: what the core needs of the settings.
     `initial(subject, started_at)`: a subject's memory; `started_at` is the daemon's start.
@@ -85,6 +87,8 @@ class GraphKind(Generic[S, L, M, E, R]):
     speaks_of: Callable[[S], Iterable[Place]] = lambda settings: ()
     shown_by: Topic[Message] | None = None
     reserved: Callable[[S], Collection[str]] = lambda settings: ()
+    requester: Callable[[E], str] = lambda event: ""
+    requesters: Callable[[M], Collection[str]] = lambda memory: ()
 
 
 AnyGraphKind = GraphKind[Any, Any, Any, Any, Any]

@@ -40,6 +40,8 @@ KIND: GraphKind[
     idle=core.idle,
     shown_by=DOOR_STATES,
     reserved=lambda settings: settings.doors or (),
+    requester=messages.requester,
+    requesters=lambda memory: memory.requesters,
     together=report.heartbeat,
     persist=keep.persist,
     restore=keep.restore,

@@ -62,6 +62,11 @@ def device_name(message: DoorRequest | DoorState) -> str:
     return message.door_name
 
 
+def requester(event: OpenRequested | CloseRequested | StateHeard) -> str:
+    """Who sends this request; "" for a state."""
+    return "" if isinstance(event, StateHeard) else event.requester
+
+
 def stamped(
     message: DoorRequest | SupervisorHeartbeat, time: Time
 ) -> DoorRequest | SupervisorHeartbeat:

@@ -36,4 +36,6 @@ KIND: GraphKind[
     speaks_of=speaks_of,
     shown_by=LIFT_STATES,
     reserved=lambda settings: settings.lifts or (),
+    requester=messages.requester,
+    requesters=lambda memory: memory.requesters,
 )

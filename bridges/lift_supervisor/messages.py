@@ -79,6 +79,11 @@ def device_name(message: LiftRequest | LiftState) -> str:
     return message.lift_name
 
 
+def requester(event: Requested | Ended | StateHeard) -> str:
+    """The session of this request; "" for a state."""
+    return "" if isinstance(event, StateHeard) else event.session
+
+
 def stamped(message: LiftRequest, time: Time) -> LiftRequest:
     """The message with its time of sending."""
     return replace(message, request_time=time)

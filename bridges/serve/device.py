@@ -79,6 +79,11 @@ class Node(Generic[S, L, M, X, E, O, R]):
         """Whether each input was read or timed out once, and the first state is published."""
         return self._pace.told_at > AGES_AGO
 
+    @property
+    def answers(self) -> bool:
+        """Could the last scan read and write all of it?"""
+        return self._has_read and not self._io_fault
+
     def event(self, topic: Topic[Message], message: Message) -> E | RivalSeen | None:
         """The core's event for a message; None if it is refused. Called from any thread."""
         if topic == self._kind.states:

@@ -31,6 +31,10 @@ MAX_SUBJECTS = 1000
 """More lifts or doors than any site has; more names must be invented ones."""
 MAX_UNSHOWN = 100
 """At most this many names that only requests mention, without a state of such a lift or door."""
+MAX_REQUESTERS = 10_000
+"""At most this many requesters of all lifts or doors that the YAML does not name: more than any site's
+robots at a time. Who holds one is never forgotten, so made-up ones would pile up.
+"""
 DEFECT = "a defect"
 
 
@@ -83,6 +87,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._unsaid: list[tuple[Topic[Message], Message]] = []
         self._shown: set[str] = set()
         self._reserved = frozenset(kind.reserved(settings))
+        self._requesters = 0
         for name, memory in self._keeper.restore(settings, self._started_at).items():
             self._add(name, memory)
 
@@ -195,12 +200,14 @@ class GraphNode(Generic[S, L, M, E, R]):
             if now >= subject.wake_at:
                 self._decide(subject, Woken())
             if self._kind.idle(subject.memory, now):
+                self._requesters -= self._remembered(subject)
                 del self.subjects[subject.name]
                 self._shown.discard(subject.name)
 
     def _receive(self, name: str, topic: Topic[Message], event: E) -> None:
         with self._counting(name):
             subject = self._subject(name, shows_itself=self._kind.shown_by in (None, topic))
+            self._require_room(subject, self._kind.requester(event))
             self._decide(subject, event)
 
     def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
@@ -220,6 +227,18 @@ class GraphNode(Generic[S, L, M, E, R]):
             return len(self._shown) < MAX_SUBJECTS
         return len(self.subjects) - len(self._shown) < MAX_UNSHOWN
 
+    def _require_room(self, subject: Subject[M, GraphEvent[E], None, R], who: str) -> None:
+        """Raises RequestRefused for a new requester where there are too many already."""
+        full = who and self._requesters >= MAX_REQUESTERS and subject.name not in self._reserved
+        if full and who not in self._kind.requesters(subject.memory):
+            raise RequestRefused("too many requesters", f"{who} at {subject.name}")
+
+    def _remembered(self, subject: Subject[M, GraphEvent[E], None, R]) -> int:
+        """How many requesters it remembers; those of the YAML's have a bound of their own."""
+        if subject.name in self._reserved:
+            return 0
+        return len(self._kind.requesters(subject.memory))
+
     def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
         """Without names never shown, if there is a flood of them: it would return at the next start."""
         if len(memories) - len(self._shown) < MAX_UNSHOWN:
@@ -231,11 +250,14 @@ class GraphNode(Generic[S, L, M, E, R]):
         refusals, clock = self._refusals, self._clock
         subject = Subject(name, memory, self._core, self._will_say, refusals, clock)
         self.subjects[name] = subject
+        self._requesters += self._remembered(subject)
         self._decide(subject, MaySpeak(self.presence.may_speak))
         return subject
 
     def _decide(self, subject: Subject[M, GraphEvent[E], None, R], event: GraphEvent[E]) -> None:
+        before = self._remembered(subject)
         subject.log(subject.decide(event).report)
+        self._requesters += self._remembered(subject) - before
 
     def _decide_all(self, event: GraphEvent[E]) -> None:
         for subject in self.subjects.values():

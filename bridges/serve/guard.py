@@ -8,8 +8,10 @@ off; the end of the pipe without a word, that the daemon is dead. Under systemd,
 import logging
 import os
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
 
 from bridges.log import pairs
 
@@ -23,6 +25,12 @@ read -r word
 [ $? = 69 ] && sleep 1 && "$@"
 """
 """Exit code 69: the dead daemon's lock was not free yet; one more try."""
+
+
+def command(file: Path, runtime_dir: str | None) -> list[str]:
+    """The command that switches off what this process may leave on."""
+    given = ["--runtime-dir", os.path.abspath(runtime_dir)] if runtime_dir else []
+    return [sys.executable, "-m", "bridges.cli", "outputs-off", str(file.absolute()), *given]
 
 
 class Guard:

@@ -63,6 +63,16 @@ class Inbox(Generic[T]):
         self._rung = False
         return True
 
+    def waiting(self) -> set[str]:
+        """The devices that have events waiting."""
+        with self._lock:
+            return set(self._items)
+
+    def take_for(self, name: str) -> list[T]:
+        """Take the events waiting for one device, in order."""
+        with self._lock:
+            return list(self._items.pop(name, {}).values())
+
     def take(self) -> dict[str, list[T]]:
         """Take all waiting events: by device, in order."""
         with self._lock:

@@ -1,12 +1,15 @@
 """The loop: one bus and the devices on it.
 
 RMF callbacks and GPIO edges only put something into the inbox. A round scans each device that is due,
-has something in the inbox, or may have changed. At the end, whatever its cause, every output is made
-safe.
+has something in the inbox, or may have changed: first those that answered the last time, then the
+others, the longest overdue first. It ends after one that has kept the bus waiting in vain, so that
+silent devices are asked singly between live ones: a live one's reading is never older than its period
+and one silent device's timeout, even in the first rounds. A device that falls silent costs its retries
+too, once. At the end, whatever its cause, every output is made safe, those that answer first.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from bridges.core.durations import AGES_AGO, NEVER
 from bridges.log import pairs
@@ -60,20 +63,17 @@ class Loop:
     def round(self) -> None:
         """Scan whatever is due."""
         self._notice_suspension()
-        events = self.inbox.take()
-        everything = self._take_edge()
-        for node in self.nodes:
-            if self.inbox.closed:
-                return
-            if everything or node.name in events or self._is_due(node):
-                self._scan(node, events.get(node.name, ()))
+        self._take_edge()
+        self._scan_in_turn(self.inbox.waiting())
+        if self.inbox.closed:
+            return
         self._bus.scanned()
         self._ran_at = self._clock.monotonic()
 
     def end(self) -> bool:
         """Every output off, and the bus released."""
         self._bus.insist()
-        safe = [node.make_safe() for node in self.nodes]
+        safe = [node.make_safe() for node in self._in_turn()]
         for node in self.nodes:
             node.close()
         self._bus.close()
@@ -88,9 +88,26 @@ class Loop:
             for node in self.nodes:
                 node.was_suspended(late_s)
 
-    def _scan(self, node: AnyNode, events: Sequence[object]) -> None:
+    def _scan_in_turn(self, asked: Collection[str]) -> None:
+        """Scan what is due or asked for, until a silent device has had its turn."""
+        for node in self._in_turn():
+            if self.inbox.closed:
+                return
+            if node.name in asked or self._is_due(node):
+                calls = self._bus.calls
+                self._scan(node)
+                if not node.answers and self._bus.calls > calls:
+                    return
+
+    def _in_turn(self) -> list[AnyNode]:
+        """Those that answer, as the YAML has them; then the others, the longest overdue first."""
+        others = [node for node in self.nodes if not node.answers]
+        others.sort(key=lambda node: self._due[node.name])
+        return [node for node in self.nodes if node.answers] + others
+
+    def _scan(self, node: AnyNode) -> None:
         started = self._clock.monotonic()
-        node.scan(events)
+        node.scan(self.inbox.take_for(node.name))
         self._scans += 1
         next_at = min(node.wake_at, started + self._scan_s)
         self._due[node.name] = max(next_at, started + LEAST_GAP_S)
@@ -102,9 +119,8 @@ class Loop:
         self._edge = True
         self.inbox.wake()
 
-    def _take_edge(self) -> bool:
-        """Whether there was an edge. One that comes meanwhile counts now or wakes the next round."""
-        if not self._edge:
-            return False
-        self._edge = False
-        return True
+    def _take_edge(self) -> None:
+        """After an edge every device is due. One that comes meanwhile wakes the next round."""
+        if self._edge:
+            self._edge = False
+            self._due = dict.fromkeys(self._due, AGES_AGO)

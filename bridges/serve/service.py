@@ -12,6 +12,7 @@ from typing import Protocol
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import GraphKind
 from bridges.core.kind import AnyDeviceKind
+from bridges.core.names import LONGEST_NAME
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import M_co, Topic
@@ -181,5 +182,5 @@ class Devices:
 
     def _count_stranger(self, device: str) -> None:
         if not self._strangers:
-            log.info(pairs("not_ours", kind=self._kind.name, name=device))
+            log.info(pairs("not_ours", kind=self._kind.name, name=device[:LONGEST_NAME]))
         self._strangers["requests"] += 1

@@ -1,26 +1,37 @@
-"""Switches off every output of a YAML or record, from a new process. Imports no more than it needs."""
+"""Switches off every output of a YAML or record, from a new process. Imports no more than it needs.
+
+On each bus those devices come first that answered the dead daemon last: silent ones would use up the
+time. Each has a short try, then those that have failed are tried again.
+"""
 
 import logging
+import math
 import threading
 import time
-from collections.abc import Collection, Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
 
 from bridges.log import pairs
 from bridges.settings.load import Config
-from drivers import Driver, DriverError
-from drivers.hal import HalError
+from drivers import DriverError
+from drivers.hal import Bus, HalError
 
 log = logging.getLogger(__name__)
 
 
-def outputs_off(config: Config, timeout_s: float, but: Collection[str] = ()) -> set[str]:
+def outputs_off(
+    config: Config,
+    timeout_s: float,
+    but: Collection[str] = (),
+    ages: Mapping[str, float] | None = None,
+) -> set[str]:
     """Switch off every output of a file, except those of the devices in `but`.
 
+    `ages`: how long ago (s) a device had answered the dead daemon; none for one that never had.
     Returns the devices that are verified off. Gives up after `timeout_s` in total.
     """
     results: dict[str, bool] = {}
     left = [name for name in config.devices if name not in but]
+    left.sort(key=lambda name: (ages or {}).get(name, math.inf))
     threads = [_started(config, bus, left, results) for bus in config.buses]
     deadline = time.monotonic() + timeout_s
     for thread in threads:
@@ -32,10 +43,11 @@ def outputs_off(config: Config, timeout_s: float, but: Collection[str] = ()) -> 
 
 
 def _started(
-    config: Config, bus_name: str, left: Collection[str], results: dict[str, bool]
+    config: Config, bus_name: str, left: Sequence[str], results: dict[str, bool]
 ) -> threading.Thread:
     """Start a thread for one bus, so that a dead bus does not delay the others."""
-    devices = [name for name in config.devices_on(bus_name) if name in left]
+    here = set(config.devices_on(bus_name))
+    devices = [name for name in left if name in here]
     arguments = (config, bus_name, devices, results)
     thread = threading.Thread(target=_bus_off, args=arguments, daemon=True)
     thread.start()
@@ -53,23 +65,36 @@ def _bus_off(
         log.error(pairs("outputs_not_off", bus=bus_name, reason=error))
         results.update(dict.fromkeys(devices, False))
         return
-    for name in devices:
-        driver = config.driver_type(name).create(name, config.devices[name], bus)
-        results[name] = _device_off(name, driver)
+    failed = [name for name in devices if not _device_off(config, name, bus, results)]
+    for name in failed:
+        bus.insist()
+        _device_off(config, name, bus, results, last=True)
     bus.close()
 
 
-def _device_off(name: str, driver: Driver[Any, Any]) -> bool:
+def _device_off(
+    config: Config, name: str, bus: Bus, results: dict[str, bool], last: bool = False
+) -> bool:
+    """Try one device; a failure counts, and is logged, only if it is the `last` try."""
+    driver = config.driver_type(name).create(name, config.devices[name], bus)
     try:
         driver.open()
         driver.make_safe()
-    except DriverError as error:
-        log.error(pairs("outputs_not_off", device=name, reason=error))
-        return False
-    except Exception as error:  # a defect of ours must not stop the other devices
-        log.error(pairs("outputs_not_off", device=name, reason=repr(error)), exc_info=True)
+    except Exception as error:  # noqa: BLE001 - logged by _failed
+        if last:
+            _failed(name, error)
+            results[name] = False
         return False
     finally:
         driver.close()
     log.info(pairs("outputs_off", device=name))
+    results[name] = True
     return True
+
+
+def _failed(name: str, error: Exception) -> None:
+    """Say why; a defect of ours must not stop the other devices."""
+    if isinstance(error, DriverError):
+        log.error(pairs("outputs_not_off", device=name, reason=error))
+    else:
+        log.error(pairs("outputs_not_off", device=name, reason=repr(error)), exc_info=error)

@@ -75,7 +75,7 @@ def _shown() -> Found:
     return found
 
 
-def _profiles() -> Iterator[Profile]:
+def _profiles() -> Iterator[Profile[msgspec.Struct]]:
     """Every sort of profile that a driver reads."""
     for kind in named.kind_names():
         for driver in named.driver_names(kind):

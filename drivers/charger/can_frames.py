@@ -62,8 +62,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 def frame_map(settings: Settings) -> FrameMap:
     """The map: the one in the YAML, or the profile's."""
-    found: FrameMap = settings.map or PROFILE.load(settings.profile or "")
-    return found
+    return settings.map or PROFILE.load(settings.profile or "")
 
 
 def _setpoint_problems(settings: Settings) -> Problems:

@@ -8,11 +8,14 @@ import functools
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
 from bridges import regular_file
 from drivers import DriverError
 from drivers.profiles import texts
+
+if TYPE_CHECKING:
+    from cantools.database import Message
 
 EXTENDED: Final = 1 << 31
 SIZE_MAX: Final = 4 << 20
@@ -26,10 +29,13 @@ class Dbc:
         from cantools.database.errors import Error
 
         try:
-            database: Any = cantools.database.load_string(text, "dbc")
+            database = cantools.database.load_string(text, "dbc")
         except Error as error:
             raise ValueError(f"is not a DBC file: {' '.join(str(error).split())[:200]}") from None
-        self._messages: dict[str, Any] = {message.name: message for message in database.messages}
+        assert isinstance(database, cantools.database.Database)
+        self._messages: dict[str, Message] = {
+            message.name: message for message in database.messages
+        }
 
     def frames(self) -> list[str]:
         """The names of its frames."""
@@ -56,6 +62,7 @@ class Dbc:
             found = self._messages[frame].decode(payload, decode_choices=False)
         except (Error, ValueError, KeyError) as error:
             raise DriverError(f"{frame} {payload.hex(' ')} cannot be decoded: {error}") from None
+        assert isinstance(found, dict)  # a list is for frames within frames, which DBC has not
         return {
             name: value
             for name, value in found.items()

@@ -12,8 +12,8 @@ import msgspec
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide
 from drivers.driver_type import DriverType
-from drivers.hal.points import Input, Output, Points, PointsBus, Wire
-from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
+from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
+from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
 
 CUT_MUST_READ: Final = {
     "fault": (True, "a fault of the station is not seen"),
@@ -68,30 +68,12 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 def wires(settings: Settings) -> list[Wire]:
     """The wiring table, inputs first."""
-    inputs = [
-        Wire(
-            signal=signal,
-            direction="in",
-            point=contact.point,
-            active=contact.active,
-            pull=contact.pull,
-            debounce_s=contact.debounce_s,
-            path=("inputs", signal),
-        )
-        for signal in settings.inputs.__struct_fields__
-        if (contact := getattr(settings.inputs, signal)) is not None
-    ]
-    relay = settings.outputs.enable
-    path = ("outputs", ENABLE)
-    return [*inputs, Wire(ENABLE, "out", relay.point, relay.active, path=path)]
+    relay = settings.outputs.enable.wire(ENABLE, ("outputs", ENABLE))
+    return [*input_wires(settings.inputs), relay]
 
 
 def _unsafe(settings: Settings) -> Iterator[Unsafe]:
-    table = wires(settings)
-    for wire in table:
-        if wire.signal in CUT_MUST_READ:
-            yield from cut_must_read(wire, *CUT_MUST_READ[wire.signal])
-    yield from energised_at_boot(table)
+    return unsafe_wires(wires(settings), CUT_MUST_READ)
 
 
 def warnings(settings: Settings) -> Problems:
@@ -104,8 +86,7 @@ def warnings(settings: Settings) -> Problems:
             yield wire.path, "a cut wire reads as no charge: look at it where a charge never begins"
     if settings.inputs.fault is None:
         yield ("inputs",), "without a fault contact a station that is out of order reads idle"
-    for signal in settings.accept_unsafe.keys() - {signal for signal, _, _ in _unsafe(settings)}:
-        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
+    yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     yield (), "contacts tell nobody's receiver: the robot on the pad is not verified"
 
 

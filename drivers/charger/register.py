@@ -55,8 +55,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 def charger_map(settings: Settings) -> ChargerMap:
     """The map: the one in the YAML, or the profile's."""
-    found: ChargerMap = settings.map or PROFILE.load(settings.profile or "")
-    return found
+    return settings.map or PROFILE.load(settings.profile or "")
 
 
 def cells(settings: Settings) -> dict[str, list[Point]]:

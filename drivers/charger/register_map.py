@@ -15,8 +15,6 @@ from drivers.profiles import Profile
 Problems = Iterator[tuple[tuple[str, ...], str]]
 Bit = Annotated[int, msgspec.Meta(ge=0, le=31)]
 MEASURED: Final = ("volts", "amps", "battery_percent", "time_to_full_s")
-KNOWN: Final = ("state", "receiver", "in_range", *MEASURED)
-"""The values whose names have a meaning of their own."""
 
 
 class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -6,7 +6,7 @@ fails, only the relay's own timer can release the door. So `hold` sets that time
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 
@@ -19,7 +19,7 @@ from drivers.driver_type import DriverType
 from drivers.hal import http
 from drivers.http_call import Call, InsistentCalls, send, told
 from drivers.json_fields import Flag
-from drivers.unsafe import Unsafe, unaccepted
+from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted
 
 HOLD: Final = "hold_open"
 Problems = Iterator[tuple[tuple[str, ...], str]]
@@ -120,8 +120,7 @@ def warnings(settings: Settings) -> Problems:
             "pull the network plug while the door is held, and see that it is released in this time"
         )
         yield ("switches_off_after_s",), text
-        if HOLD in settings.accept_unsafe:
-            yield ("accept_unsafe", HOLD), f"nothing is unsafe about {HOLD}: delete this"
+    yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if settings.held is None:
         yield (), "held is not read: that the door was released is not verified"
     if settings.feedback == "estimated":
@@ -188,12 +187,12 @@ class HttpDoor:
         send(self._bus, self._settings.hold if on else self._settings.release, safe=not on)
         self._told = on
 
-    def _held(self, answer: Mapping[str, Any]) -> bool | None:
+    def _held(self, answer: Mapping[str, object]) -> bool | None:
         place = self._settings.held
         return None if place is None else json_fields.flag(answer, place)
 
 
-def decode(settings: Settings, answer: Mapping[str, Any]) -> DoorSample:
+def decode(settings: Settings, answer: Mapping[str, object]) -> DoorSample:
     """Decode the answer. Raises DriverError that names the field it cannot decode."""
 
     def said(place: Flag | None) -> bool | None:

@@ -2,8 +2,8 @@
 
 The file or folder is named after the bus `type:` of the YAML and holds a `BUS`. A Bus belongs to one
 thread. Every failure is a HalError, raised within the bus's I/O timeout. After a failure the bus backs
-off for 0.5 to 30 s, during which calls fail at once: so a dead device costs the other devices on its
-bus at most one timeout per backoff.
+off for 0.5 to 30 s, during which calls fail at once. So a dead device costs the others on its bus at
+most one timeout per backoff.
 """
 
 from collections.abc import Callable, Iterable
@@ -23,10 +23,10 @@ Remark = tuple[tuple[str, ...], str]
 
 
 class Where(NamedTuple):
-    """What a bus is in the building, by which two files are seen to mean the same.
+    """Where a bus is in the building: two files with the same `Where` use the same hardware.
 
-    `text`: as a person says it. `local`: it is this machine's own, as a serial port is. `clients`: how
-    many daemons it takes at once; None where that depends on its make.
+    `text`: its name for a person. `local`: it belongs to this machine, as a serial port does.
+    `clients`: how many daemons it takes at once; None if that depends on the make.
     """
 
     text: str
@@ -60,7 +60,7 @@ class BusType(Generic[Settings]):
     """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, which needs no vendor library.
 
     `settings`: the struct below the bus's name in the YAML, with `scan_s` (how often it is read).
-    `open_bus(settings)`: raises HalError.
+    `open_bus(settings)`: makes the bus, which sends nothing yet. Raises HalError.
     `where(settings)`: what it is in the building; None where files never share it.
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
     far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it

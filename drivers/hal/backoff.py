@@ -22,6 +22,8 @@ class Backoff:
         self._retry_at = -math.inf
         self._failure = ""
         self._insisted = False
+        self.proven = False
+        """Has an attempt ever succeeded?"""
 
     @property
     def insisting(self) -> bool:
@@ -53,6 +55,7 @@ class Backoff:
     def mended(self) -> None:
         """An attempt succeeded: end the pause, and begin with the shortest one next time."""
         self._pause_s, self._retry_at, self._insisted = 0.0, -math.inf, False
+        self.proven = True
 
     def insist(self) -> None:
         """End the pause for one attempt; without effect again until an attempt succeeds."""

@@ -4,7 +4,6 @@ The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 """
 
 from collections.abc import Iterable, Mapping
-from typing import cast
 
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from drivers.driver_type import DriverType
@@ -59,9 +58,9 @@ def debounce(settings: Settings) -> Mapping[str, float]:
     return lift_table.debounce(settings)
 
 
-def create(name: str, settings: Settings, bus: object) -> "LiftDryContact":
+def create(name: str, settings: Settings, bus: PointsBus) -> "LiftDryContact":
     """The lift's driver on its GPIO or Modbus bus; it touches nothing before `open`."""
-    return LiftDryContact(settings, cast(PointsBus, bus))
+    return LiftDryContact(settings, bus)
 
 
 class LiftDryContact:

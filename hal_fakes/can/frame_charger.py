@@ -1,9 +1,8 @@
-"""A charger that speaks frames of its maker's, by the same map as the driver's, with a plant behind.
+"""A charger with its maker's own CAN frames, by the driver's map, with a plant behind it.
 
-It charges while it is fed: while every frame that its map wants comes, at the pace of the map, and says
-what `on` means. It stops when one says what `off` means, and when one stays away for three periods.
-A machine that holds this station up for a while holds the daemon up as well, so such a gap counts as
-one look only.
+It charges while every frame of its map comes on time with the values of `on`. It stops when a frame has
+the values of `off`, or when one stays away for three periods. A machine that holds this station
+up holds the daemon up as well, so such a gap counts as one look only.
 
 Failing part `node`, beside those of the plant and the bus: `off` is silent, `stuck` says what it said
 before, `slow` says it every two seconds, `garbage` sends frames of six bytes, `wrong` a state of no
@@ -12,7 +11,7 @@ list.
 
 import time
 from collections.abc import Mapping
-from typing import Final, cast
+from typing import Final
 
 import can
 
@@ -106,7 +105,8 @@ class FrameCharger:
 
     def _message(self, frame: str, wrong: bool) -> can.Message:
         self.plant.advance(time.monotonic())
-        reading = cast(PadReading, self.plant.sense("reading"))
+        reading = self.plant.reading()
+        assert isinstance(reading, PadReading)
         values = dict.fromkeys(self._dbc.signals(frame), 0.0) | {
             signal.split(".")[1]: value
             for signal, value in self._values(reading, wrong).items()
@@ -166,5 +166,5 @@ def _short(message: can.Message) -> can.Message:
 
 FAKE = Fake[Settings](
     plant=lambda name, settings, wires: PadPlant(name),
-    station=lambda plant, settings, bus: FrameCharger(plant, settings),
+    station=lambda plant, settings: FrameCharger(plant, settings),
 )

@@ -68,9 +68,8 @@ class LiftPlant(Machine):
         self._sides = {level: _sides(settings, level) for level in self._levels}
         self.doors = {side: CarDoor() for sides in self._sides.values() for side in sides}
         parts = [p for p in FAILS if p != "rear_door_operator" or Side.REAR in self.doors]
-        super().__init__(name, wires(settings), parts)
+        super().__init__(name, wires(settings), parts, _buttons(settings, self.doors))
         self._only_in_agv = {s for s, _, line in input_rows(settings) if line.valid_when}
-        self._pressed = dict.fromkeys(_buttons(settings, self.doors), False)
         self._on: set[str] = set()
         self._people: list[int] = []
         self._let_out = False
@@ -95,11 +94,7 @@ class LiftPlant(Machine):
             self._seen, self._seen_at = self._called(), self.now + CALL_SETTLES_S
 
     def act(self, signal: str, asserted: bool) -> None:
-        """A person or the building."""
-        if signal not in self._pressed:
-            known = ", ".join(self._pressed)
-            raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
-        self._pressed[signal] = asserted
+        """A person calls the car to a landing; in AGV mode nobody can."""
         if signal.startswith("hall_") and asserted and not self.agv:
             self._people.append(self._levels.index(signal.removeprefix("hall_")))
 
@@ -134,7 +129,7 @@ class LiftPlant(Machine):
     # ---- the controller
 
     def _hazard(self, *hazards: Hazard) -> bool:
-        return any(self._pressed.get(h, False) for h in hazards)
+        return any(self.pressed.get(h, False) for h in hazards)
 
     def _called(self) -> int | None:
         """The landing whose call is on; None for none, or for a code that means none."""
@@ -217,7 +212,7 @@ class LiftPlant(Machine):
         here = self.car.standing and side in self._sides[self._levels[self.car.floor]]
         if not here:
             return False
-        if not door.closed and self._pressed[f"{PREFIX[side]}obstruction"]:
+        if not door.closed and self.pressed[f"{PREFIX[side]}obstruction"]:
             return True
         if self._hazard(Hazard.FIRE):
             return self.car.floor == 0

@@ -1,10 +1,6 @@
 """`rmf-bridge init`: every draft passes `check`, and nothing is overwritten."""
 
 import json
-import os
-import pty
-import select
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,7 +11,7 @@ from yaml import safe_load
 from bridges import cli
 from bridges.commands.drafts import WIRINGS
 from bridges.settings.load import load
-from tests.waiting import PATIENCE_S
+from tests.commands.terminal import Terminal
 
 MAP = """
 levels:
@@ -134,37 +130,6 @@ def test_a_map_that_is_none_is_said(tmp_path: Path, capsys: pytest.CaptureFixtur
     site.write_text("a: 1\n")
     assert cli.main(["init", str(tmp_path / "x.yaml"), "--from", str(site), "--yes"]) == 66
     assert "has no 'levels:'" in capsys.readouterr().err
-
-
-class Terminal:
-    """A terminal with somebody who types at it."""
-
-    def __init__(self, *words: str) -> None:
-        self.screen = b""
-        self.pid, self._end = pty.fork()
-        if self.pid == 0:
-            import sys
-
-            os.environ["TERM"] = "xterm"
-            os.execv(sys.executable, [sys.executable, "-m", "bridges.cli", *words])
-
-    def wait_for(self, text: str) -> None:
-        deadline = time.monotonic() + PATIENCE_S
-        while text.encode() not in self.screen:
-            ready, _, _ = select.select([self._end], [], [], deadline - time.monotonic())
-            assert ready, (text, self.screen)
-            chunk = os.read(self._end, 65536)
-            self.screen += chunk
-            if b"\x1b[6n" in chunk:  # it asks where the cursor is
-                os.write(self._end, b"\x1b[1;1R")
-
-    def type(self, keys: str) -> None:
-        os.write(self._end, keys.encode())
-
-    def end(self) -> int:
-        _, status = os.waitpid(self.pid, 0)
-        os.close(self._end)
-        return os.waitstatus_to_exitcode(status)
 
 
 def test_on_a_terminal_it_asks_one_thing_after_the_other(tmp_path: Path) -> None:

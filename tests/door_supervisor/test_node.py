@@ -10,10 +10,12 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import stamp
+from bridges.serve import graph as graph_node
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from tests.serve.virtual_graph import Disk
 
+OPEN, CLOSE = d.DoorModeValue.MODE_OPEN, d.DoorModeValue.MODE_CLOSED
 HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT
 
 
@@ -154,3 +156,25 @@ def test_nothing_is_published_before_it_is_on_disk() -> None:
     assert graph.heard[-1] == (4.0, "OPEN lab")
     graph.until(4.2)
     assert graph.heard[-1] == (4.1, "beat lab:b")
+
+
+def test_holders_of_made_up_doors_never_age_out_and_so_have_one_bound(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(graph_node, "MAX_REQUESTERS", 3)
+    graph = Graph()
+    graph.until(3.0)
+    for door in range(3):
+        for who in ("a", "b"):
+            graph.asks(who, OPEN, f"made up {door}")
+    assert graph.node.refused == {"too many requesters": 3}
+    graph.until(1000.0)
+    graph.asks("r1", OPEN)
+    assert graph.node.refused == {"too many requesters": 4}
+    graph.asks("a", CLOSE, "made up 0")
+    graph.until(1100.0)
+    graph.asks("b", CLOSE, "made up 0")
+    graph.until(1200.0)
+    graph.asks("r1", OPEN)
+    assert graph.node.refused == {"too many requesters": 4}
+    assert sorted(graph.node.subjects) == ["made up 1", "ward"]

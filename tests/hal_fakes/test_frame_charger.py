@@ -33,14 +33,17 @@ class Bench:
         until = self.far.now + seconds
         while self.far.now < until:
             self.far.now += STATUS_S / 2
-            self.station.tick(self.far.now, self.far.coming.append)
+            self.station.tick(self.far.now, self._send)
             if fed:
                 self.driver.read()
                 self.driver.write(ChargerOutputs(True))
 
     def _hear(self, message: can.Message) -> list[can.Message]:
-        self.station.hear(message, self.far.now, self.far.coming.append)
+        self.station.hear(message, self.far.now, self._send)
         return []
+
+    def _send(self, message: can.Message, late: bool = False) -> None:
+        self.far.coming.append(message)
 
     def enabled(self) -> list[object]:
         return [edge.value for edge in self.plant.edges if edge.signal == "enable"]
@@ -59,5 +62,5 @@ def test_a_machine_that_holds_it_up_for_a_while_does_not_make_it_stop() -> None:
     bench = Bench()
     bench.passes(5.0, fed=True)
     bench.far.now += 10.0
-    bench.station.tick(bench.far.now, bench.far.coming.append)
+    bench.passes(STATUS_S / 2, fed=False)
     assert bench.enabled() == [True]

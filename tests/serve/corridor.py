@@ -1,6 +1,6 @@
-"""Two doors on one bus, in rounds and in virtual time."""
+"""Doors on one bus, in rounds and in virtual time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from bridges.door import KIND
 from bridges.door.memory import DoorLimits
@@ -67,13 +67,15 @@ class Wires(Bus):
 
 
 class Corridor:
-    """Two doors on one bus. `story`: (s, what)."""
+    """Two doors on one bus, or these. `story`: (s, what)."""
 
-    def __init__(self, debounce: dict[str, float] | None = None) -> None:
+    def __init__(
+        self, debounce: dict[str, float] | None = None, doors: Sequence[str] = ("ward", "lab")
+    ) -> None:
         self.now = 0.0
         self.story: list[tuple[float, str]] = []
         self.bus = Wires(self.tell)
-        self.doors = {name: Door(name, self.tell) for name in ("ward", "lab")}
+        self.doors = {name: Door(name, self.tell) for name in doors}
         clock = Clock(lambda: self.now, lambda: 1e6 + self.now)
         settings = DoorSettings()
         limits = DoorLimits.of(settings, debounce or {})
@@ -97,6 +99,16 @@ class Corridor:
         before = len(self.story)
         self.loop.round()
         return [what for _, what in self.story[before:]]
+
+    def falls_silent(self, door: str, timeout_s: float) -> None:
+        """From now on its readings end in a timeout."""
+
+        def waits() -> None:
+            self.now += timeout_s
+            self.bus.calls += 1
+            raise DriverError("no answer")
+
+        self.doors[door].during = waits
 
     def asks(self, door: str) -> None:
         """RMF wants it open."""

@@ -7,7 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -75,6 +75,13 @@ class Module:
         self.edges += [json.loads(line) for line in lines if line.startswith(b"{")]
         return [edge["value"] for edge in self.edges if edge["signal"] == "hold_open"]
 
+    def tell(self, *words: str) -> None:
+        """Have the plant do something, as `fail ward_door opened off`."""
+        with socket.socket(socket.AF_UNIX) as control:
+            control.connect(str(self.directory / "plant.sock"))
+            control.sendall(" ".join(words).encode() + b"\n")
+            assert control.recv(100) == b"ok\n"
+
     def hang(self) -> None:
         """The module answers nobody, and its relay stays as it is."""
         self._far_side.send_signal(signal.SIGSTOP)
@@ -103,9 +110,12 @@ def shipped(name: str, directory: Path, transport: str) -> Path:
     return file
 
 
-def command(*arguments: str | Path) -> list[str]:
-    """`rmf-bridge …` in this environment."""
-    return [sys.executable, "-m", "bridges.cli", *map(str, arguments)]
+BRIDGE = ("bridges.cli",)
+
+
+def command(*arguments: str | Path, program: Sequence[str] = BRIDGE) -> list[str]:
+    """`rmf-bridge …` in this environment; `program`: the module with what comes before."""
+    return [sys.executable, "-m", *program, *map(str, arguments)]
 
 
 def environment(**more: str) -> dict[str, str]:
@@ -118,11 +128,18 @@ def environment(**more: str) -> dict[str, str]:
 class Daemon:
     """`rmf-bridge run`, with its log."""
 
-    def __init__(self, file: Path, runtime_dir: Path, *options: str, **env: str) -> None:
+    def __init__(
+        self,
+        file: Path,
+        runtime_dir: Path,
+        *options: str,
+        program: Sequence[str] = BRIDGE,
+        **env: str,
+    ) -> None:
         self.log = runtime_dir.parent / f"{runtime_dir.name}.log"
         with self.log.open("wb") as out:
             self.process = subprocess.Popen(
-                command("run", file, "--runtime-dir", runtime_dir, *options),
+                command("run", file, "--runtime-dir", runtime_dir, *options, program=program),
                 stdout=out,
                 stderr=out,
                 env=environment(**env),
@@ -139,9 +156,11 @@ class Daemon:
 
 
 @contextmanager
-def daemon(file: Path, runtime_dir: Path, *options: str, **env: str) -> Iterator[Daemon]:
+def daemon(
+    file: Path, runtime_dir: Path, *options: str, program: Sequence[str] = BRIDGE, **env: str
+) -> Iterator[Daemon]:
     """A daemon that does not outlive its test."""
-    started = Daemon(file, runtime_dir, *options, **env)
+    started = Daemon(file, runtime_dir, *options, program=program, **env)
     try:
         yield started
     finally:

@@ -371,6 +371,23 @@ def test_no_descriptor_left_ends_no_daemon(module: Module, graph: Graph, tmp_pat
     assert module.relay() == [True, False]
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root has others' directories to be careful of")
+def test_by_hand_nothing_is_switched_where_it_cannot_be_known_who_lives_and_as_execstoppost_it_is(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    with daemon(module.file, tmp_path / "run", **SERVICE) as running:
+        hold_open(module, graph, running)
+        running.end(signal.SIGKILL)
+    (tmp_path / "run").chmod(0o777)
+    off = ("outputs-off", module.file, "--runtime-dir", tmp_path / "run")
+    by_hand = _told(*off)
+    assert (by_hand.returncode, "can be written by others" in by_hand.stderr) == (69, True)
+    assert module.relay() == [True]
+    stopped = _told(*off, SERVICE_RESULT="signal")
+    assert (stopped.returncode, "Traceback" in stopped.stderr) == (0, False), stopped.stderr
+    _off(module)
+
+
 def _runs_for_others() -> bool:
     """Whether another user may run the Python that runs these tests (not below root's home)."""
     try:
@@ -403,6 +420,28 @@ def test_a_user_without_permission_is_told_what_to_do_and_switches_nothing(
                     assert (stranger.returncode, "sudo" in stranger.stderr) == (69, True)
                 assert "Traceback" not in stranger.stderr
             assert module.relay() == [True]
+
+
+@pytest.mark.skipif(
+    os.geteuid() == 0 and not _runs_for_others(), reason="no other user can run this Python"
+)
+@pytest.mark.parametrize("name", ["door_rs485.yaml", "charger_wiferion.yaml"])
+def test_a_user_who_may_not_open_the_adapter_is_told_what_to_do(name: str) -> None:
+    with tempfile.TemporaryDirectory(dir="/tmp") as base:
+        os.chmod(base, 0o755)
+        adapter, file = Path(base) / "adapter", Path(base) / name
+        adapter.touch(mode=0o000)
+        text = (Path(__file__).parents[2] / "config" / name).read_text()
+        file.write_text(re.sub(r"/dev/serial/by-id/[^ ,}\n]*", str(adapter), text))
+        done = subprocess.run(
+            command("outputs-off", file, "--runtime-dir", Path(base) / "none"),
+            env=environment(),
+            capture_output=True,
+            text=True,
+            user=65534 if os.geteuid() == 0 else None,
+        )
+    assert (done.returncode, "Traceback" in done.stderr) == (1, False), done.stderr
+    assert "add the daemon's user to the group dialout" in done.stderr
 
 
 def test_missing_lgpio_or_permission_is_told_in_one_line(tmp_path: Path) -> None:

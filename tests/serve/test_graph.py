@@ -57,6 +57,11 @@ class Site:
         self.node.round()
         return request
 
+    def ends(self, session: str = "fleet/a", lift: str = "Lift1") -> None:
+        """An adapter ends a session."""
+        self.adapter.publish(LiftRequest(lift, stamp(WALL + self.now), session, 0, "L3", 2))
+        self.node.round()
+
 
 def test_after_its_quiet_start_what_an_adapter_asks_is_passed_on_with_our_stamp() -> None:
     site = Site()
@@ -178,6 +183,46 @@ def test_the_lifts_of_the_yaml_are_never_turned_away(monkeypatch: pytest.MonkeyP
         site.asks(lift=lift)
     assert [request.lift_name for request in site.sent] == ["Lift1", "Lift2"]
     assert site.node.refused == {"not ours": 1}
+
+
+def test_made_up_sessions_at_made_up_lifts_have_one_bound_and_known_ones_are_still_heard(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(graph_node, "MAX_REQUESTERS", 6)
+    site = Site()
+    site.until(3.0)
+    site.asks()
+    for lift in range(4):
+        for session in range(2):
+            site.asks(session=f"made up {session}", lift=f"made up {lift}")
+    assert site.node.refused == {"too many requesters": 3}
+    known = {name: set(node.memory.requesters) for name, node in site.node.subjects.items()}
+    assert sum(map(len, known.values())) == 6
+    site.until(8.0)
+    site.asks()
+    assert site.node.refused == {"too many requesters": 3}
+
+
+def test_requesters_that_are_forgotten_leave_their_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(graph_node, "MAX_REQUESTERS", 2)
+    site = Site()
+    site.until(3.0)
+    for lift in ("made up", "made up, too"):
+        site.ends(lift=lift)
+    site.asks()
+    assert site.node.refused == {"too many requesters": 1}
+    site.until(64.0)
+    site.asks()
+    assert site.node.refused == {"too many requesters": 1}
+    assert list(site.node.subjects) == ["Lift1"]
+
+
+def test_the_lifts_of_the_yaml_keep_room_for_sessions(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(graph_node, "MAX_REQUESTERS", 0)
+    site = Site(Settings(lifts=["Lift1"]))
+    site.until(3.0)
+    site.asks()
+    assert (len(site.sent), site.node.refused) == (1, {})
 
 
 def test_a_robot_that_waits_for_a_lift_that_is_long_gone_is_forgotten_and_one_that_has_it_never() -> (

@@ -56,7 +56,7 @@ REFUSED = {
     ),
     "a unit that is everybody": (
         door(LINE).replace("unit 1 coil", "unit 0 coil"),
-        "12:26: unit 0 is everybody at once, and nobody answers: units on a serial line are 1 to 247",
+        "12:26: unit 0 addresses all units, and none answers: units on a serial line are 1 to 247",
     ),
     "a unit that only TCP has": (
         door(LINE).replace("unit 1 coil", "unit 255 coil"),

@@ -150,7 +150,7 @@ doors:
     outputs: {hold_open: {point: unit 1 coil 0, active: high}}
 """
     assert problems_of(file, text) == [
-        "4:3: 'module' says not where the units are: write tcp: {host: …} or serial: {port: …}",
+        "4:3: 'module' needs a connection: write tcp: {host: …} or serial: {port: …}",
         "7:19: 'on_s' must be shorter than every_s; leave pulse out for a steady hold",
         "8:5: 'inputs' needs 'closed'; without that contact say feedback: estimated",
     ]

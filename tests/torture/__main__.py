@@ -6,6 +6,7 @@ Exit code 1, and what happened, when a relay stayed on or a daemon died of what 
 import argparse
 import random
 import secrets
+import signal
 import sys
 import tempfile
 import threading
@@ -27,6 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--times", type=int, default=10, help="of each shortage")
     parser.add_argument("--forged-s", type=float, default=20.0, help="on each wire")
     options = parser.parse_args(argv)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the daemons heed a nohup that they inherit
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     began, table, failed = time.monotonic(), Table(), list[str]()
     with tempfile.TemporaryDirectory(prefix="rmf-bridges-") as base:

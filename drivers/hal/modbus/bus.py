@@ -6,17 +6,21 @@
   the reply to another request.
 - If the connection or port cannot be opened, the whole bus backs off; if a unit fails, only that unit
   does: for 0.5 to 30 s, while calls fail at once with the same text. After that a request gets
-  one try until the unit answers again: a dead unit costs the others one `timeout_s` per backoff.
-- Writes that switch off have their own backoff at each unit: a failed reading never delays them.
+  one try until the unit answers again, and so does the first reading of a unit that has never answered:
+  a dead unit costs the others one `timeout_s` per backoff. Between two such tries in vain the live
+  units have their turn.
+- Writes that switch off have their own backoff at each unit: a failed reading never delays the first.
 
 If a gateway waits for its serial units longer than `timeout_s`, the other units wait too: set the
 gateway's timeout below `timeout_s`.
 """
 
 import functools
+import math
 import random
 import time
 from collections.abc import Callable, Iterable, Mapping
+from typing import Final
 
 from drivers.hal import Bus, HalError
 from drivers.hal.backoff import Backoff
@@ -37,6 +41,11 @@ from drivers.hal.modbus.wire import (
     Wire,
 )
 from drivers.hal.points import Pull
+
+TURN_S: Final = 0.05
+"""After a try in vain no other unit that has failed is tried for so long: longer than what is left of a
+scan, and shorter than a scan's period.
+"""
 
 
 class ModbusBus(Bus):
@@ -59,6 +68,7 @@ class ModbusBus(Bus):
         self._backoff = functools.partial(Backoff, clock, jitter)
         self._link = self._backoff()
         self._units: dict[tuple[int, bool], Backoff] = {}
+        self._turn_at = -math.inf
         self._watchdogs = Watchdogs(self, settings.module_watchdog, clock)
 
     def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> Lines:
@@ -117,13 +127,17 @@ class ModbusBus(Bus):
         unit = question.unit
         backoff = self._units.setdefault((unit, safe), self._backoff())
         self._link.check()
-        backoff.check(not_yet=backoff.probing and self._wire.owes(unit))
+        not_yet = self._wire.owes(unit) or self.now() < self._turn_at
+        backoff.check(not_yet=backoff.probing and not_yet)
         text = f"modbus unit {unit} at {self._where}, {what}: "
-        tries = 1 if once or backoff.probing else self._settings.retries + 1
+        first = question.function in READS.values() and not (backoff.proven or safe)
+        probe = backoff.probing or (first and not backoff.insisting)
+        tries = 1 if once or probe else self._settings.retries + 1
         if not backoff.insisting:
             self._wire.begin(unit)
         answer, reason = self._tried(question, tries)
         if answer is None:
+            self._turn_at = self.now() + TURN_S
             raise backoff.failed(f"{text}{reason}, tried {tries}x")
         if answer.exception:
             raise self._refused(backoff, unit, text, answer.exception)

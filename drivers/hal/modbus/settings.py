@@ -26,7 +26,7 @@ class Settings(
     `tcp`: where the module or gateway listens.
     `serial`: the serial line (Modbus RTU).
     `timeout_s`: for one try of one request.
-    `retries`: how many more tries a request gets.
+    `retries`: how many more tries a request gets after the first.
     `scan_s`: how often every input is read.
     `module_watchdog`: the modules' own watchdog for their outputs.
     """
@@ -41,9 +41,9 @@ class Settings(
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """Problems that involve more than one field."""
         if self.tcp is None and self.serial is None:
-            yield (), "says not where the units are: write tcp: {host: …} or serial: {port: …}"
+            yield (), "needs a connection: write tcp: {host: …} or serial: {port: …}"
         elif self.tcp and self.serial:
-            yield ("serial",), "a bus has tcp or serial: write a second bus for the other"
+            yield ("serial",), "a bus has either tcp or serial: define a second bus for the other"
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
@@ -55,16 +55,16 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
 
 
 def unreachable(settings: Settings, point: str) -> str | None:
-    """On a serial line units are 1 to 247 (Modbus over Serial Line V1.02, 2.2)."""
+    """Why this bus cannot reach the point: a line has units 1 to 247 (Modbus over Serial Line 2.2)."""
     unit = int(point.split()[1])
     if settings.serial is None or 1 <= unit <= 247:
         return None
-    why = "is everybody at once, and nobody answers" if unit == 0 else "is for Modbus TCP"
+    why = "addresses all units, and none answers" if unit == 0 else "is for Modbus TCP"
     return f"unit {unit} {why}: units on a serial line are 1 to 247"
 
 
 def where(settings: Settings) -> Where:
-    """The gateway or module, or the port of the line, which has one owner."""
+    """The gateway or module, or the line's port, which only one daemon can open."""
     if settings.serial:
         return Where(settings.serial.port, local=True, clients="one")
     assert settings.tcp  # or `problems` has said so

@@ -19,7 +19,7 @@ from drivers.hal.modbus.points import Point
 from drivers.profiles.texts import FOLDER
 from tests.depth import examples
 from tests.door.virtual import CLOSED, CoreAlone
-from tests.settings.reading import problems_of as settings_problems
+from tests.settings.reading import changed, problems_of
 
 CONFIG = Path(__file__).parents[3] / "config"
 GENERIC: DoorMap = PROFILE.load("generic-register-door")
@@ -41,16 +41,6 @@ WORDS = st.integers(0, 65535)
 
 def seen(**words: int) -> DoorSample:
     return decode(GENERIC, {**QUIET, **words})
-
-
-def problems_of(path: Path, old: str, new: str) -> list[str]:
-    assert YAML.count(old) == 1
-    path.write_text(YAML.replace(old, new))
-    try:
-        load(path)
-    except SettingsError as error:
-        return [str(problem).removeprefix(f"{path}:") for problem in error.problems]
-    return []
 
 
 def test_each_listed_status_is_what_the_map_says() -> None:
@@ -187,13 +177,13 @@ PROFILED = YAML[: YAML.index("    map:")] + "    profile: generic-register-door\
 def test_what_a_device_changes_is_judged_where_it_stands(
     tmp_path: Path, changes: str, wanted: list[str]
 ) -> None:
-    found = settings_problems(tmp_path / "door.yaml", f"{PROFILED}    changes: {changes}\n")
+    found = problems_of(tmp_path / "door.yaml", f"{PROFILED}    changes: {changes}\n")
     assert [re.split(": a |known here", problem)[0].strip() for problem in found] == wanted
 
 
 def test_a_map_that_is_written_out_has_no_changes_beside_it(tmp_path: Path) -> None:
     text = "    changes: {command: {at: coil 4, hold: 1, release: 0}}\n"
-    assert settings_problems(tmp_path / "door.yaml", YAML + text) == [
+    assert problems_of(tmp_path / "door.yaml", YAML + text) == [
         "11:5: 'changes' is for a profile: change the map that is written here"
     ]
 
@@ -263,7 +253,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
 def test_an_impossible_map_is_named_at_its_line(
     tmp_path: Path, old: str, new: str, wanted: list[str]
 ) -> None:
-    assert sorted(problems_of(tmp_path / "door.yaml", old, new)) == sorted(wanted)
+    assert sorted(problems_of(tmp_path / "door.yaml", changed(old, new, YAML))) == sorted(wanted)
 
 
 def test_a_door_without_map_or_profile_is_told_which_profiles_there_are(tmp_path: Path) -> None:

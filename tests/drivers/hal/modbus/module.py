@@ -16,6 +16,7 @@ import pytest
 from drivers.hal.modbus import ModbusBus, Serial, Settings, Tcp
 from drivers.hal.modbus.watchdog import Watchdog
 from drivers.hal.points import HalError
+from tests.waiting import at_last
 
 Reply = Callable[[bytes], bytes | None]
 """A request's bytes to what is sent; None hangs up."""
@@ -151,6 +152,18 @@ def fails(bus: ModbusBus, point: str) -> str:
 def serial(port: str, ignore_echo: bool = False) -> Serial:
     """A quick line."""
     return Serial(port=port, baudrate=115200, parity="none", stopbits=1, ignore_echo=ignore_echo)
+
+
+def proven(
+    module: Module, clock: Time | None = None, *, timeout_s: float = 2.0, retries: int = 1
+) -> ModbusBus:
+    """A bus whose unit 1 has answered once, so that it gets its retries. `asked` begins anew."""
+    door(module)
+    bus = bus_to(module.port, clock, timeout_s=timeout_s, retries=retries)
+    read = bus.lines({"unit 1 discrete input 0": None}, {}).read
+    at_last(read, "the first reading", bus.insist)
+    module.asked.clear()
+    return bus
 
 
 opened: list[ModbusBus] = []

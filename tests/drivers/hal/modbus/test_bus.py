@@ -5,7 +5,17 @@ import socket
 import pytest
 
 from drivers.hal.modbus.tcp import Connection
-from tests.drivers.hal.modbus.module import Module, Time, bits_reply, bus_to, door, fails, frame
+from drivers.hal.points import HalError
+from tests.drivers.hal.modbus.module import (
+    Module,
+    Time,
+    bits_reply,
+    bus_to,
+    door,
+    fails,
+    frame,
+    proven,
+)
 
 IN0 = "unit 1 discrete input 0"
 
@@ -44,9 +54,9 @@ def test_a_bus_that_was_refused_works_when_its_pause_is_over(module: Module) -> 
 def test_a_silent_unit_gets_two_tries_and_then_one_after_each_of_ever_longer_pauses(
     module: Module,
 ) -> None:
-    module.reply = lambda request: b""
     clock = Time()
-    bus = bus_to(module.port, clock, timeout_s=0.3)
+    bus = proven(module, clock, timeout_s=0.3)
+    module.reply = lambda request: b""
     assert fails(bus, IN0).endswith("read discrete input 0: no reply within 0.3 s, tried 2x")
     begun = [0.0]
     assert len(module.asked) == 2
@@ -58,6 +68,39 @@ def test_a_silent_unit_gets_two_tries_and_then_one_after_each_of_ever_longer_pau
             begun.append(clock.now)
             assert len(module.asked) == before + 1
     assert begun == [0.0, 0.5, 1.5, 3.5, 7.5, 15.5, 31.5, 61.5, 91.5, 121.5]
+
+
+def test_a_unit_that_has_never_answered_gets_one_try(module: Module) -> None:
+    module.reply = lambda request: b""
+    bus = bus_to(module.port, timeout_s=0.3)
+    assert fails(bus, IN0).endswith("no reply within 0.3 s, tried 1x")
+    assert len(module.asked) == 1
+
+
+def test_switching_off_gets_its_tries_though_the_unit_has_never_answered(module: Module) -> None:
+    module.reply = lambda request: b""
+    bus = bus_to(module.port, timeout_s=0.3)
+    with pytest.raises(HalError, match="tried 2x"):
+        bus.lines({}, {"unit 1 coil 0": False}).make_safe()
+
+
+def test_of_two_silent_units_one_is_tried_and_the_live_ones_have_their_turn(
+    module: Module,
+) -> None:
+    door(module)
+    clock = Time()
+    bus = bus_to(module.port, clock, timeout_s=0.3)
+    silent = ["unit 2 discrete input 0", "unit 3 discrete input 0"]
+    for point in silent:
+        fails(bus, point)
+    clock.now += 0.7
+    module.asked.clear()
+    for _ in range(2):
+        for point in silent:
+            fails(bus, point)
+        assert bus.lines({IN0: None}, {}).read() == {IN0: False}
+        clock.now += 0.1
+    assert module.units_asked() == [2, 1, 3, 1]
 
 
 def test_a_connection_that_ends_between_two_readings_is_made_again(module: Module) -> None:
@@ -75,18 +118,19 @@ def test_a_server_that_hangs_up_on_each_request_is_a_failure(module: Module) -> 
     assert "read discrete input 0: the connection broke" in text
 
 
-def test_a_half_open_connection_costs_its_tries_and_no_more() -> None:
+def test_a_half_open_connection_costs_one_try_and_no_more() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         text = fails(bus_to(listener.getsockname()[1], timeout_s=0.3), IN0)
-    assert text.endswith("no reply within 0.3 s, tried 2x")
+    assert text.endswith("no reply within 0.3 s, tried 1x")
 
 
 def test_a_reply_that_drips_ends_with_the_time_of_its_try(module: Module) -> None:
     def drip(request: bytes) -> bytes:
         return request[:4] + b"\x00\xff" + request[6:7] + b"\x02"
 
+    bus = proven(module, timeout_s=0.3)
     module.reply = drip
-    assert fails(bus_to(module.port, timeout_s=0.3), IN0).endswith("0.3 s, tried 2x")
+    assert fails(bus, IN0).endswith("0.3 s, tried 2x")
 
 
 def test_the_late_reply_of_an_earlier_request_answers_no_other(module: Module) -> None:
@@ -127,8 +171,8 @@ def test_what_does_not_answer_the_question_is_no_answer(
     module: Module, what: str, reply: object
 ) -> None:
     assert callable(reply)
+    bus = proven(module, timeout_s=0.3)
     module.reply = reply
-    bus = bus_to(module.port, timeout_s=0.3)
     assert fails(bus, IN0).endswith("tried 2x"), what
 
 

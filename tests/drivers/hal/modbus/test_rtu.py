@@ -10,7 +10,7 @@ from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.points import parse, ranges
 from drivers.hal.points import HalError
 from tests.drivers.hal.modbus.line import SerialModule, crc, rtu
-from tests.drivers.hal.modbus.module import Module, Time, bits_reply, bus_to, door, fails
+from tests.drivers.hal.modbus.module import Module, Time, bits_reply, bus_to, door, fails, proven
 from tests.waiting import at_last
 
 IN0, COIL = "unit 1 discrete input 0", "unit 1 coil 0"
@@ -84,9 +84,11 @@ def _later(clock: Time) -> None:
 
 def test_one_broken_frame_is_asked_again_at_once(line: SerialModule) -> None:
     replies = iter([IS_1[:-1] + b"\x00", IS_0])
+    bus = proven(line)
     line.on_wire = lambda frame: next(replies)
-    assert bus_to(line.port).lines({IN0: None}, {}).read() == {IN0: False}
-    assert line.frames == [READ_IN0, READ_IN0]
+    assert bus.lines({IN0: None}, {}).read() == {IN0: False}
+    assert line.frames[-2:] == [READ_IN0, READ_IN0]
+    assert len(line.asked) == 2
 
 
 def test_noise_after_a_reply_does_not_reach_the_next(line: SerialModule) -> None:
@@ -139,17 +141,17 @@ def test_the_late_reply_to_one_question_never_answers_another(line: SerialModule
 
     def one_behind(frame: bytes) -> bytes:
         owed.append(IS_1 if frame[3] == 5 else IS_0)
-        if len(line.frames) == 2:
+        if len(line.asked) == 2:
             later.start()
         return owed.pop(0) if len(owed) > 1 else b""
 
+    bus = proven(line, Time(), timeout_s=0.05, retries=1)
     line.on_wire = one_behind
-    bus = bus_to(line.port, Time(), timeout_s=0.05, retries=1)
     asked = "unit 1 discrete input 5"
     assert bus.lines({asked: None}, {}).read() == {asked: True}  # by its second try
     assert bus._wire.owes(1)
     assert bus.lines({IN0: None}, {}).read() == {IN0: False}
-    assert [frame[3] for frame in line.frames] == [5, 5, 0, 0]
+    assert [request[9] for request in line.asked] == [5, 5, 0, 0]
     later.join()
 
 
@@ -252,8 +254,9 @@ def test_a_line_that_is_never_silent_is_a_failure(line: SerialModule) -> None:
             line.say(b"\x55")
         return b""
 
+    bus = proven(line, timeout_s=0.05)
     line.on_wire = chatter
-    text = fails(bus_to(line.port, timeout_s=0.05), IN0)
+    text = fails(bus, IN0)
     enough.set()
     assert text.endswith("tried 2x")
 

@@ -61,8 +61,8 @@ def test_a_connection_that_is_reset_is_no_reply() -> None:
         ("module.ward-3", []),
         ("fe80::1", []),
         ("192.168.1.50:502", ["write the host alone; its port goes into port"]),
-        ("tcp://a", ["'tcp://a' is no host: write its address, 192.168.1.50 say"]),
-        ("a b", ["'a b' is no host: write its address, 192.168.1.50 say"]),
+        ("tcp://a", ["'tcp://a' is no host: write its address, such as 192.168.1.50"]),
+        ("a b", ["'a b' is no host: write its address, such as 192.168.1.50"]),
     ],
 )
 def test_a_host_is_an_address_or_a_name(host: str, problems: list[str]) -> None:
@@ -77,10 +77,10 @@ LINE = {"port": "/dev/serial/by-id/a", "baudrate": 19200, "parity": "none", "sto
     [
         ({"tcp": {"host": "a"}}, []),
         ({"serial": LINE}, []),
-        ({}, ["says not where the units are: write tcp: {host: …} or serial: {port: …}"]),
+        ({}, ["needs a connection: write tcp: {host: …} or serial: {port: …}"]),
         (
             {"tcp": {"host": "a"}, "serial": LINE},
-            ["a bus has tcp or serial: write a second bus for the other"],
+            ["a bus has either tcp or serial: define a second bus for the other"],
         ),
     ],
 )
@@ -170,9 +170,9 @@ def test_loading_the_vendors_library_costs_the_first_request_none_of_its_time(
 def test_the_vendors_libraries_are_loaded_with_the_first_bus_and_their_server_never() -> None:
     before = "import drivers.hal.modbus as m, drivers.door.dry_contact, drivers.door.register"
     assert loaded(before) == set()
-    tcp = loaded(f"{before}; m.open_bus(m.Settings(tcp=m.Tcp(host='a')))")
+    tcp = loaded(f"{before}; m.ModbusBus(m.Settings(tcp=m.Tcp(host='a')))")
     line = "m.Serial(port='/dev/a', baudrate=9600, parity='none', stopbits=1)"
-    rtu = loaded(f"{before}; m.open_bus(m.Settings(serial={line}))")
+    rtu = loaded(f"{before}; m.ModbusBus(m.Settings(serial={line}))")
     assert "pymodbus.framer.socket" in tcp
     assert {m for m in tcp if m.startswith(("pymodbus.server", "aiohttp", "serial"))} == set()
     assert {m for m in rtu if m.startswith(("pymodbus.server", "aiohttp"))} == set()

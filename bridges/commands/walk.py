@@ -1,0 +1,193 @@
+"""`rmf-bridge walk FILE`: try every wire of a device with the electrician, and sign what was seen.
+
+Every input is shown live; each output is switched on alone, after a key, for a few seconds. Nothing
+else may serve the device meanwhile. However it ends, every output is off: a guard switches them off
+even after a kill -9.
+"""
+
+import argparse
+import getpass
+import importlib.util
+import logging
+import sys
+import time
+from contextlib import ExitStack
+from datetime import datetime
+from pathlib import Path
+
+from bridges import log
+from bridges.serve import directory as runtime
+from bridges.serve import guard, places, record, signals
+from bridges.settings.load import Config, SettingsError, load
+from drivers.hal import Bus, HalError
+
+EX_USAGE, EX_UNAVAILABLE, EX_CONFIG = 64, 69, 78
+DRAW_S = 0.05
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `walk`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
+    parser.add_argument("--device", metavar="NAME", help="which device, if the file has several")
+    parser.add_argument(
+        "--by", metavar="NAME", help="who does it, for the record (default: the user)"
+    )
+    parser.add_argument(
+        "--record",
+        type=Path,
+        metavar="PATH",
+        help="where PATH.md and PATH.json are written (default: walk-DEVICE-DATE here)",
+    )
+    parser.add_argument("--simulate", action="store_true", help="practise on fake hardware")
+    parser.add_argument("--runtime-dir", metavar="DIR", help=argparse.SUPPRESS)
+
+
+def run(args: argparse.Namespace) -> int:
+    """0: done, all off; 1: not verified off; 64: no terminal; 69: the device is in use; 78: YAML."""
+    log.start("WARNING")
+    if why := _no_screen():
+        print(why, file=sys.stderr)
+        return EX_USAGE
+    try:
+        config = load(args.file)
+        device = _device(config, args.device)
+    except SettingsError as error:
+        print("\n".join(map(str, error.problems)), file=sys.stderr)
+        return EX_CONFIG
+    end = signals.End()
+    signals.ignore_reset()
+    file = args.file.absolute()
+    try:
+        held = runtime.RuntimeDirectory(_places(args), file, serves=False)
+    except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
+        print(f"{error}: stop it first, a device has one master", file=sys.stderr)
+        return EX_UNAVAILABLE
+    try:
+        return _walk(args, config, device, held, end)
+    except HalError as error:
+        print(error, file=sys.stderr)
+        return EX_UNAVAILABLE
+    finally:
+        held.close()
+
+
+def _no_screen() -> str:
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return "walk needs a terminal: it switches outputs by keys"
+    if importlib.util.find_spec("rich") is None:
+        return "walk needs rich to draw: pip install 'rmf-bridges[laptop]'"
+    return ""
+
+
+def _device(config: Config, name: str | None) -> str:
+    """The device to walk. Raises SystemExit with what to write instead."""
+    names = list(config.devices)
+    if not names:
+        raise SystemExit(f"a {config.kind} has no wires to walk")
+    if name is None and len(names) > 1:
+        raise SystemExit(f"--device is needed: the file has {', '.join(names)}")
+    if name is not None and name not in names:
+        raise SystemExit(f"the file has no device '{name}'; it has {', '.join(names)}")
+    return name or names[0]
+
+
+def _places(args: argparse.Namespace) -> places.Places:
+    """The directories of this file's daemon, so that neither starts beside the other."""
+    file = args.file.absolute()
+    if args.simulate:
+        return places.as_told(args.runtime_dir) or places.by_hand(file)
+    found = runtime.find(file, args.runtime_dir)
+    places.own(found)
+    return found
+
+
+def _walk(
+    args: argparse.Namespace,
+    config: Config,
+    device: str,
+    held: runtime.RuntimeDirectory,
+    end: signals.End,
+) -> int:
+    if held.records.unreleased():
+        print(f"a dead daemon may have left outputs on: rmf-bridge outputs-off {args.file}")
+        return EX_UNAVAILABLE
+    with ExitStack() as stack:
+        bus_name = next(name for name in config.buses if device in config.devices_on(name))
+        if args.simulate:
+            from hal_fakes.simulate import Simulation
+
+            simulation = Simulation(config, held.path)
+            stack.callback(simulation.close)
+            bus = simulation.open_bus(bus_name)
+            return _on(args, config, device, bus, end)
+        ours = record.of(config)
+        held.claim(ours)
+        watching = guard.Guard(guard.command(args.file, args.runtime_dir))
+        path = _record_path(args, device).absolute()
+        args.record = path
+        places.work_somewhere(held.places)
+        code = _on(args, config, device, config.open_bus(bus_name), end)
+        if code == 0:
+            held.released()
+            watching.dismiss()
+        return code
+
+
+def _record_path(args: argparse.Namespace, device: str) -> Path:
+    day = datetime.now().strftime("%Y-%m-%d-%H%M")
+    return args.record or Path(f"walk-{device.replace('/', '_')}-{day}")
+
+
+def _on(args: argparse.Namespace, config: Config, device: str, bus: Bus, end: signals.End) -> int:
+    from bridges.commands.walking import signed
+    from bridges.commands.walking.bench import Bench, Input
+    from bridges.commands.walking.screen import Screen, keyboard, keys
+    from bridges.commands.walking.steps import OFF, steps
+    from bridges.commands.walking.tap import Tap
+
+    settings, driver_type = config.devices[device], config.driver_type(device)
+    tap = Tap(bus)
+    wires = list(driver_type.wires(settings))
+    inputs = [Input(w, tap.canonical(w.point)) for w in wires if w.direction == "in"]
+    wired = {w.signal for w in wires if w.direction == "out"} if wires else None
+    tried = steps(config.kind, settings, wired)
+    bench = Bench(driver_type.create(device, settings, tap), tap, inputs, tried, OFF[config.kind])
+    path, file, begun = _record_path(args, device).absolute(), args.file.absolute(), datetime.now()
+    by = args.by or getpass.getuser()
+
+    def note(how: str) -> None:
+        signed.write(
+            path,
+            signed.told(
+                file,
+                device,
+                by,
+                begun,
+                inputs=inputs,
+                steps=tried,
+                memory=bench.memory,
+                end=how,
+            ),
+        )
+
+    how, noted = "interrupted", None
+    try:
+        with bench, keyboard() as terminal, Screen(device, bench) as screen:
+            while not end.wait(0):
+                if not all(map(screen.obey, keys(terminal, DRAW_S))):
+                    how = "ended by key"
+                    break
+                screen.draw(time.monotonic())
+                if bench.memory.results != noted:
+                    noted = bench.memory.results
+                    note("not ended")
+    except OSError as error:
+        how = f"interrupted: {error.strerror}"  # the terminal has gone
+    finally:
+        off = "every output verified off" if bench.verified_off else "outputs NOT verified off"
+        note(f"{how}; {off}")
+        bus.close()
+    print(f"{off}. Record: {path}.md and .json")
+    if not bench.verified_off:
+        logging.error("cut the relays' supply before working on the device")
+    return 0 if bench.verified_off else 1

@@ -1,0 +1,154 @@
+"""When an output of a walk is on, and what counts as seen. Pure: time is an argument.
+
+One output at a time, for ON_S at most; off at once where a reading fails, grows old, or shows that the
+output must not be on. Feedback may come later than the output: a car needs its time.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+ON_S: Final = 5.0
+FEEDBACK_S: Final = 120.0
+STALE_S: Final = 1.0
+"""No output is switched on, or stays on, with a reading older than this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One output to try. `outputs`: the driver's, with this one on. `expects`: what should be seen.
+
+    `seen(sample)`: whether it is; None where no input shows it. `hindrance(sample)`: why the output
+    must not be on now, "" if it may.
+    """
+
+    name: str
+    does: str
+    outputs: Any
+    expects: str
+    seen: Callable[[Any], bool] | None
+    hindrance: Callable[[Any], str]
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What a walk knows. `on`: the step whose output is on. `off_at`: when it goes off (s).
+
+    `waits`: the step whose feedback may still come, until `waits_until`. `results`: step -> what was
+    seen of it. `says`: why the last key did nothing, or an output went off.
+    """
+
+    sample: Any = None
+    read_at: float | None = None
+    why_lost: str = "not read yet"
+    on: int | None = None
+    off_at: float = 0.0
+    waits: int | None = None
+    waits_until: float = 0.0
+    results: Mapping[int, str] = field(default_factory=dict)
+    says: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """The inputs were read."""
+
+    sample: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Reading or writing failed."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Switch:
+    """The person wants this step's output on, or off if it is on."""
+
+    step: int
+
+
+@dataclass(frozen=True, slots=True)
+class ByEye:
+    """The person has seen this step's effect, or has seen that there is none."""
+
+    step: int
+    seen: bool
+
+
+class Tick:
+    """Time has passed."""
+
+
+Event = Read | Lost | Switch | ByEye | Tick
+
+
+def decide(memory: Memory, event: Event, now: float, steps: Sequence[Step]) -> Memory:
+    """The memory after this event."""
+    match event:
+        case Read(sample):
+            memory = replace(memory, sample=sample, read_at=now, why_lost="")
+        case Lost(why):
+            memory = replace(memory, why_lost=why)
+        case Switch(step):
+            memory = _switch(memory, step, now, steps)
+        case ByEye(step, seen):
+            told = "seen" if seen else "not seen"
+            memory = replace(memory, results={**memory.results, step: f"{told}, by eye"})
+    return _feedback(_limited(memory, now, steps), now, steps)
+
+
+def output_of(memory: Memory, steps: Sequence[Step]) -> Any:
+    """The outputs to write; None for all off."""
+    return None if memory.on is None else steps[memory.on].outputs
+
+
+def _switch(memory: Memory, step: int, now: float, steps: Sequence[Step]) -> Memory:
+    if memory.on is not None:
+        return _off(memory, "switched off")
+    if why := _hindrance(memory, now, steps[step]):
+        return replace(memory, says=f"{steps[step].name} stays off: {why}")
+    results = {**memory.results, step: "switched on, and nothing was seen"}
+    return replace(
+        memory,
+        on=step,
+        off_at=now + ON_S,
+        waits=step,
+        waits_until=now + FEEDBACK_S,
+        results=results,
+        says="",
+    )
+
+
+def _limited(memory: Memory, now: float, steps: Sequence[Step]) -> Memory:
+    if memory.on is None:
+        return memory
+    if now >= memory.off_at:
+        return _off(memory, f"{steps[memory.on].name} was on for {ON_S:g} s")
+    why = _hindrance(memory, now, steps[memory.on])
+    return _off(memory, f"{steps[memory.on].name} went off: {why}") if why else memory
+
+
+def _off(memory: Memory, says: str) -> Memory:
+    return replace(memory, on=None, says=says)
+
+
+def _hindrance(memory: Memory, now: float, step: Step) -> str:
+    if memory.why_lost:
+        return memory.why_lost
+    if memory.read_at is None or now - memory.read_at > STALE_S:
+        return f"the inputs were not read for {STALE_S:g} s"
+    return step.hindrance(memory.sample)
+
+
+def _feedback(memory: Memory, now: float, steps: Sequence[Step]) -> Memory:
+    """What the inputs show of the step that waits for them."""
+    if memory.waits is None:
+        return memory
+    step = steps[memory.waits]
+    if step.seen is not None and memory.read_at == now and step.seen(memory.sample):
+        results = {**memory.results, memory.waits: f"seen: {step.expects}"}
+        return replace(memory, results=results, waits=None)
+    return replace(memory, waits=None) if now >= memory.waits_until else memory

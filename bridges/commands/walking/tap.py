@@ -1,0 +1,46 @@
+"""A bus with a tap: the driver works on it as ever, and the levels that it reads can be seen."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from drivers.hal.points import Lines, Pull
+
+
+class TappedLines:
+    """Lines that remember what was read."""
+
+    def __init__(self, lines: Lines, levels: dict[str, int]) -> None:
+        self.claim = lines.claim
+        self.write = lines.write
+        self.outputs = lines.outputs
+        self.close = lines.close
+        if hasattr(lines, "flash"):
+            self.flash = lines.flash
+        self._lines = lines
+        self._levels = levels
+
+    def read(self) -> Mapping[str, int]:
+        """Every input's level, read now. Raises HalError."""
+        found = self._lines.read()
+        self._levels.update(found)
+        return found
+
+
+class Tap:
+    """Wraps an open bus. `levels`: the last level of each input, by its canonical point."""
+
+    def __init__(self, bus: Any) -> None:
+        self.levels: dict[str, int] = {}
+        self._bus = bus
+
+        self.scanned = bus.scanned
+        self.insist = bus.insist
+        self.close = bus.close
+
+    def __getattr__(self, name: str) -> Any:
+        """What else the driver needs of its bus."""
+        return getattr(self._bus, name)
+
+    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> TappedLines:
+        """A set of points for one device, whose readings are seen here."""
+        return TappedLines(self._bus.lines(inputs, outputs), self.levels)

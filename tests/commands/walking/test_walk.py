@@ -1,0 +1,89 @@
+"""`rmf-bridge walk` as a person meets it: a real terminal, a real Modbus module, a real death."""
+
+import json
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bridges import cli
+from tests.commands.terminal import Terminal
+from tests.serve.site import Module, daemon, environment
+from tests.waiting import wait_until
+
+
+@pytest.fixture
+def module(domain: int, tmp_path: Path) -> Iterator[Module]:
+    standing = Module(tmp_path, domain)
+    yield standing
+    standing.close()
+
+
+def walk(module: Module, tmp_path: Path) -> Terminal:
+    words = ("--runtime-dir", tmp_path / "run", "--record", tmp_path / "record", "--by", "me")
+    return Terminal("walk", module.file, *words, environ=environment())
+
+
+def test_an_output_is_tried_seen_and_signed(module: Module, tmp_path: Path) -> None:
+    terminal = walk(module, tmp_path)
+    terminal.wait_for("closed yes")
+    terminal.type("\r")
+    terminal.wait_until(lambda: module.relay() == [True], "the relay is on")
+    row = "| hold_open | the door is open | seen: the door is open |"
+    terminal.wait_until(
+        lambda: row in (tmp_path / "record.md").read_text(), "the feedback is noted"
+    )
+    terminal.type("\rq")
+    terminal.wait_for("every output verified off")
+    assert terminal.end() == 0
+    assert module.relay() == [True, False]
+    record = json.loads((tmp_path / "record.json").read_text())
+    assert (record["device"], record["by"], record["end"]) == (
+        "ward_door",
+        "me",
+        "ended by key; every output verified off",
+    )
+    assert record["outputs"] == [
+        {"output": "hold_open", "expected": "the door is open", "seen": "seen: the door is open"}
+    ]
+    assert record["inputs"][1] == {
+        "signal": "closed",
+        "point": "unit 1 discrete input 1",
+        "seen": "on and off",
+    }
+    assert row in (tmp_path / "record.md").read_text()
+
+
+@pytest.mark.parametrize("how", ["closed terminal", "kill -9", "SIGTERM"])
+def test_however_it_ends_the_output_goes_off(module: Module, tmp_path: Path, how: str) -> None:
+    terminal = walk(module, tmp_path)
+    terminal.wait_for("closed yes")
+    terminal.type("\r")
+    terminal.wait_until(lambda: module.relay() == [True], "the relay is on")
+    terminal.wait_until(
+        lambda: "nothing was seen" in (tmp_path / "record.md").read_text(), "it is noted"
+    )
+    if how == "closed terminal":
+        terminal.close()
+    else:
+        os.kill(terminal.pid, signal.SIGKILL if how == "kill -9" else signal.SIGTERM)
+    terminal.wait()
+    wait_until(lambda: module.relay() == [True, False], "the relay is off")
+    assert "| the door is open | not tried |" not in (tmp_path / "record.md").read_text()
+
+
+def test_it_refuses_a_device_that_is_served(module: Module, tmp_path: Path) -> None:
+    with daemon(module.file, tmp_path / "run") as running:
+        running.wait_for("ready file")
+        terminal = walk(module, tmp_path)
+        terminal.wait_for("stop it first")
+        assert terminal.end() == 69
+
+
+def test_without_a_terminal_it_switches_nothing(
+    module: Module, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["walk", str(module.file)]) == 64
+    assert "walk needs a terminal" in capsys.readouterr().err

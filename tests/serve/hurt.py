@@ -1,0 +1,58 @@
+"""`rmf-bridge`, with a part inside that fails as soon as a file exists.
+
+`python -m tests.serve.hurt reader|bus FILE run …`: `reader` is the transport's, which raises again and
+again; `bus` is Modbus, whose next reading never ends.
+"""
+
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from bridges import cli
+from drivers.hal.modbus import ModbusBus
+from hal_fakes.wire import wire
+
+
+def _reader() -> type:
+    if wire() == "dds":
+        from bridges.rmf.dds import DdsTransport
+
+        return DdsTransport
+    from bridges.rmf.zenoh import ZenohTransport
+
+    return ZenohTransport
+
+
+def _raises() -> None:
+    raise MemoryError("none left")
+
+
+def _hangs() -> None:
+    threading.Event().wait()
+
+
+HURTS: dict[str, tuple[Callable[[], type], str, Callable[[], None]]] = {
+    "reader": (_reader, "_follow_network", _raises),
+    "bus": (lambda: ModbusBus, "read", _hangs),
+}
+
+
+def main(argv: Sequence[str]) -> int:
+    """Serve until the file exists."""
+    what, file, *command = argv
+    owner, name, fail = HURTS[what]
+    whole = getattr(owner(), name)
+
+    def hurt(*arguments: Any) -> object:
+        if Path(file).exists():
+            fail()
+        return whole(*arguments)
+
+    setattr(owner(), name, hurt)
+    return cli.main(command)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,102 @@
+"""Every string of every message that a kind hears: ten megabytes of it are not kept."""
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridges.core.decision import RequestRefused
+from bridges.core.graph_kind import GraphKind
+from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from bridges.rmf.definitions import Message
+from bridges.rmf.topics import Topic
+from bridges.settings.load import load
+from bridges.settings.names import kind_called
+
+CONFIG = Path(__file__).parents[2] / "config"
+HUGE = "x" * 10_000_000
+KEPT_MOST = 20_000
+"""Characters of all that is kept of one message."""
+
+ROBOT = d.RobotState(
+    name="AMR01", task_id="t", mode=d.RobotMode(int(d.RobotModeValue.MODE_CHARGING))
+)
+LIFT = d.LiftRequest(
+    "Lift1", session_id="fleet/r", request_type=1, destination_floor="L3", door_state=2
+)
+DOOR = d.DoorRequest(requester_id="r", door_name="ward_door", requested_mode=d.DoorMode(2))
+WISH = d.ChargerRequest("", "tiny", "AMR01", d.Duration(60), "id")
+HEARD: dict[str, dict[Topic[Any], Message]] = {
+    "lift_dry_contact": {topics.LIFT_REQUESTS: LIFT},
+    "door_modbus": {topics.DOOR_REQUESTS: DOOR},
+    "charger_http": {
+        topics.CHARGER_REQUESTS: WISH,
+        topics.CHARGER_CANCELS: d.ChargerCancel(request_id="id"),
+    },
+    "lift_supervisor": {
+        topics.ADAPTER_LIFT_REQUESTS: LIFT,
+        topics.LIFT_STATES: d.LiftState(
+            lift_name="Lift1", current_floor="L1", available_floors=("L1", "L3")
+        ),
+    },
+    "door_supervisor": {
+        topics.ADAPTER_DOOR_REQUESTS: DOOR,
+        topics.DOOR_STATES: d.DoorState(door_name="ward_door"),
+    },
+    "charger_coordinator": {
+        topics.CHARGER_STATES: d.ChargerState(state=1, charger_name="charger_a", error_message="e"),
+        topics.FLEET_STATES: d.FleetState("tiny", (ROBOT,)),
+        topics.ADAPTER_CHARGER_REQUESTS: WISH,
+        topics.ADAPTER_CHARGER_CANCELS: d.ChargerCancel(request_id="id"),
+        topics.CHARGING_ASSIGNMENTS: d.ChargingAssignments(
+            "tiny", (d.ChargingAssignment("AMR01", "charger_a", int(d.ChargingMode.MODE_CHARGE)),)
+        ),
+    },
+}
+
+
+def taker(name: str, topic: Topic[Any]) -> Callable[[Message], object]:
+    """What makes an event of such a message, with this shipped YAML."""
+    config = load(CONFIG / f"{name}.yaml")
+    kind = kind_called(config.kind)
+    if isinstance(kind, GraphKind):
+        accept = kind.requests[topic]
+        return lambda message: accept(message, config.section, 1.8e9)
+    settings = next(iter(config.devices.values()))
+    return lambda message: kind.requests[topic](message, settings)
+
+
+def with_huge(value: Any) -> Iterator[Any]:
+    """The value once for each string in it, with that one huge."""
+    if isinstance(value, str):
+        yield HUGE
+    elif isinstance(value, tuple):
+        for i, item in enumerate(value):
+            yield from ((*value[:i], huge, *value[i + 1 :]) for huge in with_huge(item))
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        for field in dataclasses.fields(value):
+            for huge in with_huge(getattr(value, field.name)):
+                yield replace(value, **{field.name: huge})
+
+
+@pytest.mark.parametrize(
+    ("name", "topic"), [(name, topic) for name, heard in HEARD.items() for topic in heard]
+)
+def test_no_string_of_a_message_is_kept_however_long_it_is(name: str, topic: Topic[Any]) -> None:
+    take, message = taker(name, topic), HEARD[name][topic]
+    take(message)
+    for sent in with_huge(message):
+        try:
+            kept = repr(take(sent))
+        except RequestRefused as refusal:
+            kept = f"{refusal.kind} {refusal.detail}"
+        assert len(kept) < KEPT_MOST
+
+
+def test_every_topic_that_a_kind_hears_is_looked_at() -> None:
+    for name, heard in HEARD.items():
+        assert set(heard) == set(kind_called(load(CONFIG / f"{name}.yaml").kind).requests)
