@@ -145,7 +145,7 @@ def test_make_safe_and_close_leave_every_relay_off(site: Site) -> None:
     assert relays == {"front": [True, False], "ward": [True, False]}
 
 
-def test_an_address_that_nobody_has_is_refused_and_a_unit_by_a_gateway_alone(site: Site) -> None:
+def test_an_unknown_address_is_refused_and_an_unknown_unit_by_a_gateway_only(site: Site) -> None:
     def refusal(point: str) -> str:
         with pytest.raises(HalError) as caught:
             site.bus.lines({point: None}, {}).read()
