@@ -12,9 +12,8 @@ from msgspec import Meta
 
 from bridges.charger.settings import ReceiverId, Robot, StartTimeout
 from bridges.core.fields import GraphSettings, Name
-from bridges.core.kind import Place
+from bridges.core.kind import CHARGER, WAYPOINT, Place
 from bridges.core.table import Table
-from bridges.settings.building_map import CHARGER, WAYPOINT
 
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
 Near = Annotated[float, Meta(ge=0.1, le=5, extra={"unit": "m"})]

@@ -1,11 +1,11 @@
-"""A table that a person holds against a controller: `check` prints it, its sheet has boxes for it."""
+"""A table that a person compares with a controller: `check` prints it, with boxes on its sheet."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of cells, as many as headings."""
+    """Each row has as many cells as there are headings."""
 
     title: str
     headings: tuple[str, ...]

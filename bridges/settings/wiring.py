@@ -72,13 +72,13 @@ class Wiring:
         return reason is None
 
     def warnings(self, wires: Iterable[Wire], spot: Spot) -> Iterable[tuple[Node, str]]:
-        """What is legal about these wires but worth a look, and where it stands."""
+        """What is legal about these wires but may be a mistake, and the node to point to."""
         for wire in wires:
             for text in self._hal.wire_warnings(wire) if self._hal else ():
                 yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
 
     def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
-        """Record what a device without wires claims for itself: (place, path in its YAML)."""
+        """Record what a device without wires needs for itself: (place, path in its YAML)."""
         for text, path in places:
             user = f"{self._device} {'.'.join(path)}"
             self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from bridges import regular_file
+from bridges import user_files
 from drivers import DriverError
 from drivers.profiles import texts
 
@@ -115,7 +115,7 @@ def _understood(file: Path, text: bytes) -> Dbc:
 
 def _read(file: Path) -> bytes:
     try:
-        text = regular_file.read(file, SIZE_MAX).content
+        text = user_files.read(file, SIZE_MAX).content
     except OSError as error:
         raise ValueError(f"{file} cannot be read: {error.strerror}") from None
     if len(text) > SIZE_MAX:

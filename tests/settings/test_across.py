@@ -37,8 +37,8 @@ GPIO = (
     .replace("unit 1 coil 0", "BCM18")
 )
 GATEWAY = (
-    "b.yaml:5:3: warning: 192.168.1.50:502 is asked in a.yaml too for unit 1: many take one client;"
-    " best have one file for one gateway"
+    "b.yaml:5:3: warning: 192.168.1.50:502 is asked in a.yaml too for unit 1: many gateways take"
+    " only one client: use one file for each gateway"
 )
 
 
@@ -101,13 +101,16 @@ def test_domains_that_differ_are_an_error(capsys: pytest.CaptureFixture[str]) ->
     assert said(capsys, DOOR, second.replace("domain_id: 3", "domain_id: 4")) == (
         78,
         [
-            "b.yaml:3:18: DDS domain 4, and a.yaml is in domain 3: neither hears the other",
+            "b.yaml:3:18: DDS domain 4, but a.yaml is in domain 3: they cannot hear each other",
             "1 error",
         ],
     )
     assert said(capsys, DOOR, second.replace("{domain_id: 3}", "{}")) == (
         78,
-        ["b.yaml:3:1: DDS domain 0, and a.yaml is in domain 3: neither hears the other", "1 error"],
+        [
+            "b.yaml:3:1: DDS domain 0, but a.yaml is in domain 3: they cannot hear each other",
+            "1 error",
+        ],
     )
 
 

@@ -29,7 +29,7 @@ from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
 from bridges.commands.sheets.text import lines
 from bridges.commands.sheets.told import told
-from bridges.core.fields import Rmf
+from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.load import load
 from tests.depth import depth, part

@@ -1,6 +1,6 @@
-"""The commissioning sheet: an HTML file to print, a page for each controller, to tick and to sign.
+"""The commissioning sheet: an HTML file to print, tick and sign, with a page for each controller.
 
-It needs nothing beside itself. What a YAML says is text here, never markup.
+It needs no other file. Texts from a YAML are escaped, never markup.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -67,14 +67,14 @@ def _bus(bus: BusTold) -> Iterator[str]:
 
 
 def _warnings(warnings: Iterable[Problem]) -> Iterator[str]:
-    """All of the file's: each controller's page is signed by itself."""
+    """All warnings of the file, on each page: each controller's page is signed by itself."""
     for warning in warnings:
         text = f"line {warning.line}: {warning.text.removeprefix('warning: ')}"
         yield f'<p class="warning">&#9744; {escape(text)}</p>'
 
 
 def _table(table: Table) -> Iterator[str]:
-    """Each row with a box, and with room for what was seen."""
+    """A table with a box to tick in each row, and room for what was seen."""
     headings = "".join(f"<th>{escape(heading)}</th>" for heading in table.headings)
     yield f"<h2>{escape(table.title)}</h2>"
     yield f'<table>\n<tr>{headings}<th class="seen">seen</th><th class="box">right</th></tr>'
@@ -85,7 +85,7 @@ def _table(table: Table) -> Iterator[str]:
 
 
 def _trials(part: Part) -> Iterator[str]:
-    """What no file can say of a controller."""
+    """Trials on the controller itself."""
     if part.bus:
         yield from _table(Table("to be tried", ("trial",), tuple((trial,) for trial in TO_TRY)))
 

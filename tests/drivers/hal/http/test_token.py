@@ -45,7 +45,7 @@ def test_a_pipe_in_place_of_a_token_file_keeps_nobody_waiting(tmp_path: Path) ->
     with pytest.raises(HalError) as caught:
         bus.get_json("/state")
     assert str(caught.value) == (
-        f"token_file {file} cannot be read: it is no file but a pipe, a socket or a device"
+        f"token_file {file} cannot be read: it is a pipe, a socket or a device, not a file"
     )
 
 
