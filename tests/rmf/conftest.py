@@ -6,7 +6,6 @@ import pytest
 
 from bridges.rmf.choose import missing_of_dds
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.settings import Zenoh
 from bridges.rmf.transport import Transport
 from tests.rmf.domains import domain_of_this_run
 from tests.rmf.joining import Join, joining

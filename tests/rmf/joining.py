@@ -3,7 +3,7 @@
 import importlib
 from collections.abc import Callable
 
-from bridges.core.fields import Zenoh
+from bridges.rmf.settings import Zenoh
 from bridges.rmf.transport import Transport
 from bridges.rmf.zenoh import ZenohTransport
 
