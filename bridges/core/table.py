@@ -10,3 +10,9 @@ class Table:
     title: str
     headings: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+
+    def filled(self) -> "Table":
+        """The same without the columns that are empty in every row."""
+        kept = [i for i in range(len(self.headings)) if any(row[i] for row in self.rows)]
+        headings, *rows = (tuple(row[i] for i in kept) for row in (self.headings, *self.rows))
+        return Table(self.title, headings, tuple(rows))

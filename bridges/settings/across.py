@@ -120,6 +120,8 @@ def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]
     canonical = config.bus_type(bus).canonical
     for wire in config.wires(device):
         yield canonical(wire.point), (*wire.path, "point")
+        if wire.flash is not None:
+            yield canonical(wire.flash.point), (*wire.path, "flash")
     yield from config.driver_type(device).claims(config.devices[device])
 
 

@@ -154,6 +154,8 @@ def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
 def _check_text(node: ScalarNode, extra: Extra) -> None:
     text: str = node.value
     reading = reads_as(text) if is_plain(node) and "check" not in extra else None
+    if reading is not None and "number" in extra:
+        raise Wrong(f"is the number {text}: write {extra['number']}")
     if reading is not None:
         taken = f"is written {short(text)}, which YAML may read as {reading}"
         if looks(node) == f"the number {text}":

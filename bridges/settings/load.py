@@ -77,6 +77,7 @@ class _Reading:
         self._buses: dict[str, BusRead] = {}
         self._devices: dict[str, DeviceSettings] = {}
         self._uses: list[Use] = []
+        self._written: dict[str, list[str]] = {}
         self._warnings: list[Problem] = []
         self._notes: list[Problem] = []
 
@@ -116,6 +117,7 @@ class _Reading:
         elif self._kind and self._kind.devices_key in sections:
             self._read_devices(sections[self._kind.devices_key].spot())
         note_conflicts(self._page, self._uses)
+        self._collect_kept()
 
     def _read_kind(self, entry: Entry | None) -> None:
         name = word(self._values, entry, named.kind_names())
@@ -243,7 +245,8 @@ class _Reading:
             wires = list(driver.wires(settings))
             self._check_signals(settings, wires, spot, wiring, driver)
             self._check_pace(settings, spot, bus)
-            self._check_reach(wiring, bus)
+            wiring.reach(self._buses[bus].settings if bus else BROKEN)
+            self._written.setdefault(bus or "", []).extend(wiring.written)
             if len(self._page.problems) == before:
                 self._collect_warnings(settings, spot, driver)
                 for node, text in wiring.warnings(wires, spot):
@@ -272,15 +275,6 @@ class _Reading:
         for path, text in () if read is BROKEN else out_of_step(settings, read):
             self._page.note(locate(spot, path).where(), text)
 
-    def _check_reach(self, wiring: Wiring, bus: str | None) -> None:
-        """Note points that no bus with these settings can have."""
-        read = self._buses[bus] if bus else None
-        for use in wiring.uses if read and read.hal and read.settings is not BROKEN else ():
-            assert read
-            assert read.hal
-            if reason := read.hal.unreachable(read.settings, use.point):
-                self._page.note(use.node, reason)
-
     def _collect_warnings(self, settings: DeviceSettings, spot: Spot, driver: AnyDriver) -> None:
         """Collect the warnings about a valid device."""
         for signal, reason in settings.accept_unsafe.items():
@@ -291,6 +285,17 @@ class _Reading:
         for path, text in driver.notes(settings):
             node = locate(spot, path).where()
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
+
+    def _collect_kept(self) -> None:
+        """Collect what is to be said of outputs that outlive this machine, once for each bus."""
+        for name, bus in () if self._page.problems else self._buses.items():
+            assert bus.hal
+            kept = bus.hal.kept(bus.settings, self._written.get(name, ()))
+            for path, text in kept.warnings:
+                self._warn(locate(bus.entry.spot(), path).where(), f"bus '{name}': {text}")
+            for path, text in kept.notes:
+                node = locate(bus.entry.spot(), path).where()
+                self._notes.append(self._page.problem(node, f"note: bus '{name}': {text}"))
 
     def _warn(self, node: Node, text: str) -> None:
         self._warnings.append(self._page.problem(node, f"warning: {text}"))

@@ -283,10 +283,7 @@ class Values:
         problems = getattr(made, "problems", None)
         for path, text in problems() if problems else ():
             entry = locate(spot, path)
-            if text.partition(" ")[0] in VERBS:
-                subject = f"'{short(entry.name)}'" if entry.name else spot.label
-                text = f"{subject} {text}"
-            self._page.note(entry.where(), text)
+            self._page.note(entry.where(), _of_subject(path, entry.name, spot.label, text))
 
     def _miscounted(self, wanted: ListType | VarTupleType | DictType, spot: Spot, n: int) -> bool:
         least, most = wanted.min_length or 0, wanted.max_length
@@ -343,3 +340,15 @@ def _misplaced(entry: Entry, before: Entry | None, elsewhere: Mapping[str, str])
 
 def _is_empty(node: Node) -> bool:
     return isinstance(node, ScalarNode) and is_plain(node) and not node.value
+
+
+def _of_subject(path: tuple[str, ...], name: str, label: str, text: str) -> str:
+    """The text with its subject: the key that it is about, where it does not name that itself."""
+    if text.partition(" ")[0] in VERBS:
+        return f"'{short(name)}' {text}" if name else f"{label} {text}"
+    key = name
+    if name.isdecimal():  # an item of a list, or a number of codes
+        key = next((part for part in reversed(path) if not part.isdecimal()), "")
+    if (key or label) in text:
+        return text
+    return f"'{short(key)}': {text}" if key else f"{label}: {text}"

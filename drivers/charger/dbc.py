@@ -82,6 +82,12 @@ class Dbc:
         """A signal's unit, or ""."""
         return str(self._messages[frame].get_signal_by_name(signal).unit or "")
 
+    def bounds(self, frame: str, signal: str) -> tuple[float, float]:
+        """The least and the greatest value that the file allows for a signal."""
+        found = self._messages[frame].get_signal_by_name(signal)
+        low, high = found.minimum, found.maximum
+        return -math.inf if low is None else low, math.inf if high is None else high
+
     def sample(self, frame: str, signal: str, value: float) -> bytes | None:
         """A frame whose one signal says this and all others 0; None where it has no such frame."""
         from cantools.database.errors import Error

@@ -193,12 +193,12 @@ def test_the_yamls_zenoh_section_reaches_the_transport(tmp_path: Path) -> None:
         ("{connect: []}", ["'connect' has 0 entries: at least 1 are needed"]),
         ("{connect: [10.0.0.5]}", ["item 1 of 'connect' is '10.0.0.5': write protocol/host:port"]),
         ("{password: x}", ["unknown key 'password'"]),
-        ("{user: lift}", ["user and password_file go together: give both, or none"]),
+        ("{user: lift}", ["'zenoh': user and password_file go together: give both, or none"]),
         ("{tls: {}}", ["no endpoint is encrypted: write connect: [tls/host:port]"]),
         ("{listen: [tls/0.0.0.0:7447]}", ["who listens with TLS needs tls: {certificate: "]),
         (
             "{connect: [tls/rmf:7447], tls: {certificate: /c.pem}}",
-            ["certificate and private_key go together: give both, or none"],
+            ["'tls': certificate and private_key go together: give both, or none"],
         ),
     ],
 )

@@ -50,8 +50,8 @@ def _tables(parts: Sequence[Part]) -> Iterator[str]:
 
 def _table(table: Table) -> list[str]:
     """The lines of a table, without columns that are empty in every row."""
-    kept = [i for i in range(len(table.headings)) if any(row[i] for row in table.rows)]
-    return _indented([[row[i] for i in kept] for row in (table.headings, *table.rows)])
+    filled = table.filled()
+    return _indented([filled.headings, *filled.rows])
 
 
 def _indented(rows: Sequence[Sequence[str]]) -> list[str]:

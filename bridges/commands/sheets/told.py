@@ -134,4 +134,6 @@ def _row(wire: Wire, point: str) -> tuple[str, ...]:
 
 
 def _debounce(wire: Wire) -> str:
-    return "default" if wire.debounce_s is None else f"{wire.debounce_s:g} s"
+    if wire.debounce_s is None:
+        return "default"
+    return f"{wire.debounce_s:g} s" if wire.debounce_s else "none"
