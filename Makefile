@@ -37,8 +37,9 @@ demo-charging: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo charging
 
 # Many tests wait for a process or a wire: more of them than there are cores run side by side.
-# What was waited for on a wire and never came is tried again, and said; every other failure counts at once.
-SIDE_BY_SIDE := -n 8 --dist load --maxschedchunk 2 --reruns 2 --only-rerun 'never happened'
+# Each test goes to the next free worker, in the order of conftest.py: long ones first. Tests that share a
+# process stay together (mark xdist_group).
+SIDE_BY_SIDE := -n 8 --dist loadgroup --no-loadscope-reorder
 test: .venv/ready lint
 	$(BIN)/pytest $(SIDE_BY_SIDE)
 

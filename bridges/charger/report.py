@@ -172,7 +172,8 @@ def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) 
     stopping = memory.sample and memory.sample.activity is Activity.STOPPING
     if shown is CHARGING and not stopping and holder.over and holder.ended != "full":
         what = holder.ended or "the charger was at fault"
-        return [Fault("STILL_CHARGING", f"{holder.request.request_id}: {what}")]
+        whose = holder.request.request_id or holder.request.who
+        return [Fault("STILL_CHARGING", f"{whose}: {what}")]
     if shown is RELEASED and holder.ended == "start timeout":
         late = f"{holder.request.who} did not start to charge in time"
         why = pad.not_ready(memory.sample) if memory.sample else ""

@@ -1,7 +1,8 @@
 """A charger with its maker's own CAN frames, by the driver's map, with a plant behind it.
 
 It charges while every frame of its map comes on time with the values of `on`. It stops when a frame has
-the values of `off`, or when one stays away for three periods.
+the values of `off`, or when one stays away for three periods. A machine that holds this station
+up holds the daemon up as well, so such a gap counts as one look only.
 
 Failing part `node`, beside those of the plant and the bus: `off` is silent, `stuck` says what it said
 before, `slow` says it every two seconds, `garbage` sends frames of six bytes, `wrong` a state of no
@@ -57,25 +58,29 @@ class FrameCharger:
         self._receiver = next(known, RECEIVER)
         self._wanted = {self._dbc.id(sent.frame): sent for sent in self._map.send}
         self._fed_at: dict[str, float] = {}
+        self._looked_at = float("-inf")
+        self._watched_s = 0.0
         self._status_at = float("-inf")
         self._status: list[can.Message] = []
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
         """A frame that feeds it, or that takes its power away."""
+        self._look(now)
         extended = dbc.EXTENDED if message.is_extended_id else 0
         sent = self._wanted.get(message.arbitration_id | extended)
         if sent is None or self.plant.failures.get("node") == "off":
             return
         if self._says(sent, bytes(message.data), on=True):
-            self._fed_at[sent.frame] = now
+            self._fed_at[sent.frame] = self._watched_s
         elif self._says(sent, bytes(message.data), on=False):
             self._fed_at.clear()
-        self.plant.drive("enable", self._fed(now), now)
+        self.plant.drive("enable", self._fed(), now)
 
     def tick(self, now: float, send: Send) -> None:
         """Stop when the frames that keep it charging stay away, and send the status."""
+        self._look(now)
         mode = self.plant.failures.get("node")
-        self.plant.drive("enable", self._fed(now) and mode != "off", now)
+        self.plant.drive("enable", self._fed() and mode != "off", now)
         period_s = SLOW_S if mode == "slow" else STATUS_S
         if mode == "off" or now < self._status_at + period_s:
             return
@@ -85,10 +90,15 @@ class FrameCharger:
         for message in self._status:
             send(_short(message) if mode == "garbage" else message)
 
-    def _fed(self, now: float) -> bool:
+    def _look(self, now: float) -> None:
+        """Add to the time that this station has watched the bus."""
+        self._watched_s += min(now - self._looked_at, STATUS_S)
+        self._looked_at = now
+
+    def _fed(self) -> bool:
         needed = (sent for sent in self._map.send if sent.on is not None)
         return all(
-            now - self._fed_at.get(sent.frame, float("-inf")) < PERIODS * sent.every_s
+            self._watched_s - self._fed_at.get(sent.frame, float("-inf")) < PERIODS * sent.every_s
             for sent in needed
         )
 

@@ -494,7 +494,7 @@ def test_a_restart_while_a_stranger_charges_does_not_leave_it_alone() -> None:
     assert (it.powered, it.told) == ([False], [(0.0, "ERROR", "unknown receiver 4711")])
 
 
-def test_charging_that_begins_under_our_eyes_and_nobody_asked_for_is_stopped() -> None:
+def test_charging_that_begins_while_we_watch_and_that_nobody_asked_for_is_stopped() -> None:
     it = story().sees((A.CHARGING, ONE, 1))
     assert it.powered == [False, False]
     unseen = Story(ChargerLimits(DURATIONS)).polls("idle 1, charging 1")

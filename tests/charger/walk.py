@@ -96,7 +96,7 @@ Move = Callable[[World], tuple[World, list[Event]]]
 
 
 def reading(world: World) -> list[Event]:
-    """What a scan brings."""
+    """The event that a scan brings."""
     if not world.readable:
         return [IoFailed("timeout")]
     return [Sampled(world.sample), *([] if world.writable else [WriteFailed("status 500")])]
@@ -157,7 +157,7 @@ WAITS = (1.0, 5.0, 32.0)
 
 
 def moved(world: World, move: Move, limits: ChargerLimits, seen: Seen) -> World:
-    """After this move."""
+    """The world after this move."""
     world, events = move(world)
     for event in events:
         world = decided(world, event, 0.0, limits, seen)

@@ -232,7 +232,7 @@ def test_a_simulation_that_is_not_heard_is_looked_for_on_loopback() -> None:
     ]
 
 
-def test_a_name_that_nobody_has_is_compared_with_those_heard() -> None:
+def test_an_unknown_name_is_compared_with_those_that_are_heard() -> None:
     there = every_second(replace(LIFT, lift_name="lift1")) + every_second(
         replace(LIFT, lift_name="Goods")
     )

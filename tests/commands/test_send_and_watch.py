@@ -276,7 +276,7 @@ def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
 
 @pytest.fixture(params=sorted({wire(), "zenoh"}))
 def speaks(request: pytest.FixtureRequest) -> Wire:
-    """The transport of both."""
+    """The transport of the daemon and of the command."""
     speaks: Wire = request.param
     return speaks
 
@@ -384,7 +384,9 @@ def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
         router.leave()
 
 
-def test_a_file_that_is_none_is_said_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_is_no_yaml_of_ours_is_refused_at_its_place(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "bad.yaml").write_text("kind: nothing\n")
     assert main(["watch", "--config", str(tmp_path / "bad.yaml")]) == 1
     assert "bad.yaml:1:7: " in capsys.readouterr().err

@@ -117,7 +117,7 @@ def test_rmfs_own_supervisor_would_have_closed_on_it() -> None:
     assert [round(at) for at, _ in site.relay] == [10, 23]
 
 
-def test_with_its_memory_lost_it_closes_nothing_before_the_quiet_start_is_over() -> None:
+def test_a_supervisor_that_lost_its_memory_closes_nothing_before_its_quiet_start_is_over() -> None:
     site = Site([(10.0, 60.0)])
     site.world.run(20.0)
     site.disk.kept = None
@@ -149,7 +149,7 @@ def test_the_session_of_a_restarted_fleet_adapter_is_cleaned_by_the_next_heartbe
     assert site.disk.kept == keep.persist({})
 
 
-def test_beside_rmfs_own_such_a_session_stays_for_ever() -> None:
+def test_with_rmfs_own_supervisor_such_a_session_stays_for_ever() -> None:
     site = Site([(10.0, 60.0)], theirs=True)
     (a,) = site.walkers
     site.world.run(20.5)

@@ -119,7 +119,7 @@ def test_presses_and_failures_are_made_on_command(world: World) -> None:
         ),
     ],
 )
-def test_an_impossible_order_is_answered_with_the_reason(
+def test_an_impossible_command_is_answered_with_the_reason(
     world: World, line: str, answer: str
 ) -> None:
     assert world.call().say(line) == answer

@@ -18,7 +18,7 @@ OFF = LiftOutputs()
 
 
 def check(step: Step) -> None:
-    """Everything at once; AssertionError says what is broken."""
+    """Check every rule; AssertionError says which is broken."""
     outputs_make_sense(step)
     nothing_is_driven_when_forbidden(step)
     sessions_end_by_end_alone(step)

@@ -259,7 +259,7 @@ class Story:
         self.request(LiftRequest("Lift1", session_id=session, request_type=int(END)))
 
     def request(self, *requests: LiftRequest) -> None:
-        """These arrive from the supervisor in one scan."""
+        """These requests arrive from the supervisor in one scan."""
         self.receive(*((LIFT_REQUESTS, request) for request in requests))
 
     def receive(self, *said: tuple[Topic[Any], LiftRequest]) -> None:

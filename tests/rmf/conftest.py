@@ -1,18 +1,14 @@
 import gc
-import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from bridges.rmf.choose import missing_of_dds, missing_of_ros
+from bridges.rmf.choose import missing_of_dds
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.releases import NEWEST, Release
-from bridges.rmf.ros_types import installed
-from bridges.rmf.settings import Zenoh
 from bridges.rmf.transport import Transport
-from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf.domains import domain_of_this_run
+from tests.rmf.joining import Join, joining
 
 if missing_of_dds():
     collect_ignore = [
@@ -23,14 +19,6 @@ if missing_of_dds():
         "test_wires.py",
     ]
 
-RELEASE = NEWEST if missing_of_ros() else installed()
-"""What the tests speak: where ROS is installed, its release on every wire."""
-
-Join = Callable[[str], Transport]
-"""Open a node of this name on the graph of this test."""
-
-
-ZENOH = {"zenoh": Zenoh(), "zenoh_ros2dds": Zenoh(keys="ros2dds")}
 DDS = pytest.param("dds", marks=pytest.mark.dds)
 ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
 
@@ -88,23 +76,6 @@ def observer(join_dds: Join) -> Iterator[Any]:
     yield participant
     del participant
     gc.collect()
-
-
-def joining(transport: str, domain: int, release: Release | None = RELEASE) -> Join:
-    """What opens nodes of this transport in this domain, on loopback."""
-
-    def join(name: str) -> Transport:
-        if transport.startswith("zenoh"):
-            ways = ZENOH[transport]
-            return ZenohTransport(name, domain, loopback=True, settings=ways, release=release)
-        # Imported here: there may be no ROS.
-        module = importlib.import_module(f"bridges.rmf.{transport}")
-        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
-        wanted = {} if transport == "ros2" else {"release": release}  # that takes what is installed
-        node: Transport = getattr(module, kind)(name, domain, loopback=True, **wanted)
-        return node
-
-    return join
 
 
 def _graph(opening: Join) -> Iterator[Join]:

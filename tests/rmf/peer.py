@@ -17,7 +17,7 @@ from bridges.rmf import topics
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher
 from tests.rmf import zenoh_hostile
-from tests.rmf.conftest import RELEASE, joining
+from tests.rmf.joining import RELEASE, joining
 from tests.waiting import wait_until
 
 TOPICS: dict[str, Topic[Any]] = {

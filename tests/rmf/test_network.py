@@ -49,7 +49,7 @@ def test_ross_variables_become_cyclones_configuration(environ: dict[str, str], w
 
 
 class Machine:
-    """Its addresses, as the test wants them."""
+    """The machine's addresses, as the test sets them."""
 
     def __init__(self) -> None:
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})

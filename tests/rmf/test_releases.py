@@ -15,8 +15,9 @@ from bridges.rmf.releases import JAZZY, KILTED, Release
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.transport import Transport
 from bridges.serve.outlet import Outlet
-from tests.rmf.conftest import DDS, joining
+from tests.rmf.conftest import DDS
 from tests.rmf.domains import domain_of_this_run
+from tests.rmf.joining import joining
 from tests.waiting import wait_until
 
 CLEANING = d.RobotMode(9, 7, "sweeping")

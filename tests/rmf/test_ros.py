@@ -19,8 +19,9 @@ from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import TransportError
 from tests.rmf import peer
-from tests.rmf.conftest import RELEASE, ROS2, Join, joining
+from tests.rmf.conftest import ROS2
 from tests.rmf.domains import domain_of_this_run
+from tests.rmf.joining import RELEASE, Join, joining
 from tests.rmf.test_definitions import NOT_IN_JAZZY
 from tests.waiting import wait_until
 

@@ -15,8 +15,8 @@ from bridges.rmf.definitions import LiftState
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf import rmw_zenoh_reader
-from tests.rmf.conftest import ZENOH
 from tests.rmf.domains import domain_of_this_run
+from tests.rmf.joining import ZENOH
 from tests.rmf.zenoh_programs import meeting, reading
 from tests.waiting import wait_until
 

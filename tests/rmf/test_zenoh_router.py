@@ -151,7 +151,7 @@ def test_with_two_routers_each_message_comes_once_and_one_of_them_is_enough(site
 
 
 class Machine:
-    """Its addresses, as the test wants them."""
+    """The machine's addresses, as the test sets them."""
 
     def __init__(self) -> None:
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
@@ -216,7 +216,7 @@ class Papers:
         self.directory = directory
 
     def file(self, name: str) -> str:
-        """The path of one of them."""
+        """The path of one of the files."""
         return str(self.directory / name)
 
     @staticmethod

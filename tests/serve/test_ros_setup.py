@@ -28,7 +28,7 @@ def test_the_file_is_sourced_once_and_the_command_goes_on_as_it_was(tmp_path: Pa
     assert sourcing(rmf, {SOURCED: "/opt/ros/another/setup.bash"}, ARGV) == command
 
 
-def test_dds_needs_no_setup_file_and_no_file_named_is_none_sourced(tmp_path: Path) -> None:
+def test_dds_needs_no_setup_file_and_none_is_sourced_where_none_is_named(tmp_path: Path) -> None:
     setup = tmp_path / "setup.bash"
     setup.touch()
     assert sourcing(Rmf(transport="dds", ros_setup=str(setup)), {}, ARGV) == []

@@ -114,7 +114,9 @@ def test_domains_that_differ_are_an_error(capsys: pytest.CaptureFixture[str]) ->
     )
 
 
-def test_a_supervisor_of_a_door_that_no_file_has(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_supervisor_of_a_door_that_no_file_has_is_an_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     supervisor = "kind: door_supervisor\nrmf: {domain_id: 3}\nsupervisor: {doors: [wart]}\n"
     assert said(capsys, DOOR, supervisor) == (
         78,
@@ -134,7 +136,9 @@ def test_a_second_supervisor_is_an_error(capsys: pytest.CaptureFixture[str]) -> 
     )
 
 
-def test_a_coordinators_station_that_no_charger_has(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_coordinators_station_that_no_charger_has_is_an_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     coordinator = (CONFIG / "charger_coordinator.yaml").read_text()
     code, lines = said(capsys, (CONFIG / "charger_http.yaml").read_text(), coordinator, "-q")
     assert code == 78

@@ -151,7 +151,7 @@ def test_a_pin_that_the_firmware_uses_is_warned_of_by_name(file: Path, pin: str)
     ]
 
 
-def test_a_pin_that_is_nobodys_is_not(file: Path) -> None:
+def test_a_pin_that_the_firmware_does_not_use_is_not_warned_of(file: Path) -> None:
     assert warnings_of(file, HEADER.replace("PIN", "BCM5")) == []
 
 

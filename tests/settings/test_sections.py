@@ -238,7 +238,7 @@ def test_the_same_point_of_two_buses_is_two_points(file: Path) -> None:
 
 
 @pytest.mark.parametrize("other", ["", "    limits: {tires: 1}\n"])
-def test_a_wire_that_cannot_be_is_told_by_the_bus(file: Path, other: str) -> None:
+def test_the_bus_says_what_is_wrong_with_an_impossible_wire(file: Path, other: str) -> None:
     text = changed("    limits: {open_s: 3, tries: 2}\n", other)
     text = changed(
         "{point: A0, active: high, pull: up}", "{point: A9, active: high, pull: up}", text

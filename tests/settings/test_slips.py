@@ -123,7 +123,7 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("what", SLIPS)
-def test_a_slip_is_named(file: Path, what: str) -> None:
+def test_a_slip_of_the_keyboard_is_named(file: Path, what: str) -> None:
     text, told = SLIPS[what]
     assert problems_of(file, text) == told
 

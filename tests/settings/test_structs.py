@@ -92,7 +92,7 @@ def test_a_list_or_a_mapping_is_neither_text_nor_number(file: Path, text: str) -
     ]
 
 
-def test_a_list_or_a_mapping_is_taken_by_what_it_is(file: Path) -> None:
+def test_where_a_list_or_a_mapping_may_stand_each_is_read_as_what_it_is(file: Path) -> None:
     as_mapping = changed("[in, out]", "{in: {heights: [2, 3.5]}, out: {side: right}}")
     lanes = config_of(file, as_mapping).devices["north"].lanes
     assert {n: (lane.side.value, lane.heights) for n, lane in lanes.items()} == {

@@ -186,7 +186,7 @@ class RmfsSupervisor:
             self._place.subscribe(topic, self._hear)
 
     def kill(self) -> None:
-        """It is stopped."""
+        """It is stopped and leaves the graph."""
         self.alive = False
         self._place.close()
 

@@ -135,7 +135,7 @@ class Place(MemoryTransport):
         return super().subscribe(topic, carried, others_only=others_only)
 
     def arrive(self, received: Callable[[Any], None], message: Any) -> None:
-        """It is here, if the node still is."""
+        """Hand the message over, unless the node has left."""
         if not self._closed:
             self._air.counts["arrived"] += 1
             received(message)

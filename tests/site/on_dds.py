@@ -163,7 +163,7 @@ class RealSite:
             assert not robot.waits_for or waited_s < PATIENCE_S, f"{robot.name}: {robot.waits_for}"
 
     def until(self, done: Callable[[], bool]) -> None:
-        """Let them live until it is done."""
+        """Let everybody go on until this is so."""
         self.timeline.until(done, self.check)
 
     def done(self, what: str) -> int:
@@ -231,10 +231,10 @@ class RealSite:
         self._across[robot.name] = door
 
     def on_pad(self, robot: Resident, charger: str) -> None:
-        """There is no charger."""
+        """Does not happen: this site has no charger."""
 
     def off_pad(self, robot: Resident, charger: str) -> None:
-        """There is no charger."""
+        """Does not happen: this site has no charger."""
 
     def charged(self, charger: str) -> bool:
         return True

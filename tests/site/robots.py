@@ -199,7 +199,7 @@ class Resident:
         self._look()
 
     def _look(self) -> None:
-        """Is what the day waits for there?"""
+        """Go on with the day if what it waits for has come."""
         if self._awaits is not None and self._awaits.done:
             self._go_on(True)
         elif self._timeline.now >= self._until:
@@ -208,7 +208,7 @@ class Resident:
             self._set_alarm()
 
     def _go_on(self, done: bool, first: bool = False) -> None:
-        """The next thing of the day."""
+        """Begin the next item of the day."""
         if self._awaits is not None and not done:
             self.robot.phase = None
             self.done["cancelled"] += 1

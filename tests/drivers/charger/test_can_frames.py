@@ -265,11 +265,11 @@ def test_a_change_is_sent_at_once(charger: Charger) -> None:
     assert [charger.scan(level) for level in levels] == [FED, [], KEPT_OFF, [], FED]
 
 
-def test_no_level_sends_nothing_before_there_was_one(charger: Charger) -> None:
+def test_without_a_wanted_level_nothing_is_sent_until_there_was_one(charger: Charger) -> None:
     assert [charger.scan(LEFT) for _ in range(20)] == [[]] * 20
 
 
-def test_no_level_goes_on_with_the_last_one(charger: Charger) -> None:
+def test_without_a_wanted_level_the_last_one_is_still_sent(charger: Charger) -> None:
     assert [charger.scan(OFF, 0.5), charger.scan(LEFT, 0.5), charger.scan(LEFT)] == [KEPT_OFF] * 3
 
 
@@ -391,7 +391,7 @@ def test_volts_above_their_own_maximum_are_a_problem() -> None:
     ]
 
 
-def test_what_is_fed_cannot_be_kept() -> None:
+def test_a_charge_that_must_be_fed_cannot_be_kept_after_the_daemons_end() -> None:
     [(path, _)] = problems(on_death="keep")
     assert path == ("on_death",)
 

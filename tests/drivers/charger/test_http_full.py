@@ -226,7 +226,7 @@ def test_a_start_is_repeated_while_the_station_stays_idle_and_a_stop_while_it_go
     ]
 
 
-def test_no_level_sends_nothing_whatever_the_station_does() -> None:
+def test_without_a_wanted_level_nothing_is_sent_whatever_the_station_does() -> None:
     _, scan = driver()
     assert [scan(AS_IT_IS, state) for state in FULL.state_words] == [[]] * 7
 

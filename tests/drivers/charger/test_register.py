@@ -67,11 +67,13 @@ def read(**values: float) -> tuple[Activity, int | str, str, str]:
         ({"fault": 99, "state": 4}, (Activity.ERROR, 4, "error 99", "")),
     ],
 )
-def test_rules_codes_and_errors_say_what_it_does(values: dict[str, float], wanted: object) -> None:
+def test_rules_codes_and_errors_say_what_the_station_does(
+    values: dict[str, float], wanted: object
+) -> None:
     assert read(**values) == wanted
 
 
-def test_what_it_measures_is_told() -> None:
+def test_receiver_range_voltage_and_current_are_read_by_the_map() -> None:
     assert SETTINGS.map
     values = {**WELL, "receiver": 4711.0}
     assert decode(SETTINGS.map, values) == ChargerSample(

@@ -93,7 +93,7 @@ def test_a_test_holds_for_what_it_says_and_nothing_else() -> None:
     ]
 
 
-def test_numbers_that_are_none_are_errors_with_what_there_is() -> None:
+def test_an_error_value_that_is_no_number_is_an_error_that_shows_it() -> None:
     assert ErrorNumber(at="a").errors("E7") == [("", "error E7")]
     assert ErrorNumber(at="a").errors(0) == []
     assert ErrorBits(at="a").errors(None) == [("", "error flags None")]

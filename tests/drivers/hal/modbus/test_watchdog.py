@@ -107,7 +107,7 @@ def site() -> Iterator[Site]:
     built.close()
 
 
-def test_it_is_armed_before_anything_is_driven_and_read_back(site: Site) -> None:
+def test_the_watchdog_is_armed_and_read_back_before_anything_is_driven(site: Site) -> None:
     assert site.register(STATE) == STOPPED
     site.bench.driver.open()
     assert (site.register(STATE), site.register(TIME)) == (RUNNING, SLOW)
@@ -300,7 +300,9 @@ SHORT = (
         ),
     ],
 )
-def test_what_cannot_be_right_about_it_is_said(tmp_path: Path, dog: str, wanted: list[str]) -> None:
+def test_a_watchdog_that_cannot_be_right_is_refused_where_it_stands(
+    tmp_path: Path, dog: str, wanted: list[str]
+) -> None:
     assert problems_of(tmp_path / "door.yaml", dog) == wanted
 
 
