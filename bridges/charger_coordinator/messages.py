@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
-from typing import Any
 from zoneinfo import ZoneInfo
 
 from bridges.charger.messages import accept_request as accept_charger_request
@@ -139,7 +138,7 @@ def accept_assignments(
     )
 
 
-def subject(message: Any) -> str:
+def subject(message: object) -> str:
     """Every message is about the site: the queue spans its stations."""
     return SITE
 

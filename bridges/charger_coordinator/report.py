@@ -10,7 +10,7 @@
 """
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 from msgspec.structs import replace
@@ -73,7 +73,7 @@ class SiteReport(msgspec.Struct, frozen=True):
     absent: tuple[Robot, ...] = ()
     faults: tuple[Fault, ...] = ()
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """What is worth a line in the log: not the time that passes."""
         return self.stations, self.waiting, self.assigns, self.schedule, self.absent
 

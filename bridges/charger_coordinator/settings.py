@@ -15,9 +15,8 @@ from bridges.charger.settings import ReceiverId, Robot, StartTimeout
 from bridges.charger_coordinator import schedule as times
 from bridges.charger_coordinator.schedule import Charging
 from bridges.core.fields import GraphSettings, Name, Timeout
-from bridges.core.kind import Place
+from bridges.core.kind import CHARGER, WAYPOINT, Place
 from bridges.core.table import Table
-from bridges.settings.building_map import CHARGER, WAYPOINT
 
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
 Near = Annotated[float, Meta(ge=0.1, le=5, extra={"unit": "m"})]
@@ -132,7 +131,9 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
     def _of_station(self, name: str, station: Station) -> Iterator[tuple[tuple[str, ...], str]]:
         places = self.places()[name]
         if not self._graphs_with(name):
-            text = f"stands at '{station.waypoint or name}', which is in no fleet's waypoints"
+            text = (
+                f"'{name}' stands at '{station.waypoint or name}', which is in no fleet's waypoints"
+            )
             yield ("waypoint",), text
         for fleet in station.waypoints:
             if fleet not in self.fleets:
@@ -171,7 +172,10 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
             for fleet, place in places.items():
                 owner = taken.setdefault((fleet, place), station)
                 if owner != station:
-                    yield ("stations", station), f"stands at '{place}', as '{owner}' does"
+                    yield (
+                        ("stations", station),
+                        f"'{station}' stands at '{place}', as '{owner}' does",
+                    )
                     break
         taken |= {("rcu", station): f"the station '{station}'" for station in self.stations}
         for who, robot in self.robots().items():

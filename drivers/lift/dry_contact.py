@@ -133,7 +133,7 @@ def decode(
 def _service(inputs: Inputs, shown: Mapping[str, bool]) -> str | None:
     if inputs.service is None:
         return None
-    return inputs.service.means(_number("service", len(inputs.service.bits), shown))
+    return inputs.service.means(codes.shown_number("service", shown, len(inputs.service.bits)))
 
 
 def _agv(inputs: Inputs, shown: Mapping[str, bool], service: str | None) -> bool | None:
@@ -163,16 +163,10 @@ def _motion(inputs: Inputs, shown: Mapping[str, bool]) -> Motion | None:
     if inputs.up:
         return UP_DOWN[shown["up"], shown["down"]]
     if inputs.motion:
-        number = _number("motion", len(inputs.motion.bits), shown)
+        number = codes.shown_number("motion", shown, len(inputs.motion.bits))
         known = inputs.motion.codes.get(number)
         return Motion(known) if known else Motion.CONTRADICTORY
     return None
-
-
-def _number(prefix: str, width: int, shown: Mapping[str, bool]) -> int:
-    number = codes.decode("binary", [shown[f"{prefix}_bit{i}"] for i in range(width)])
-    assert number is not None  # binary shows any number
-    return number
 
 
 DRIVER = DriverType(

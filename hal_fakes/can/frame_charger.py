@@ -14,11 +14,13 @@ from typing import Final
 
 import can
 
-from bridges.charger.signals import Activity
+from bridges.charger.signals import Activity, FaultSide
 from drivers.charger import dbc
 from drivers.charger.can_frames import Settings, frame_map
-from drivers.charger.can_map import FrameMap, Sent
+from drivers.charger.can_map import FrameMap, Sent, State
+from drivers.charger.rules import UNKNOWN, Errors
 from hal_fakes.can.side import Send
+from hal_fakes.charger_values import NEAREST, values
 from hal_fakes.fake import Fake
 from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
@@ -40,6 +42,7 @@ FLAGS: Final = {
     "too_near": "BadCoilPosition",
 }
 """Which error signal shows what is wrong with the plant; none is published for foreign objects."""
+ROBOTS_FAULTS: Final = frozenset(FLAGS) - {"transmitter_fault", "foreign_object"}
 
 
 class FrameCharger:
@@ -111,38 +114,50 @@ class FrameCharger:
 
     def _values(self, reading: PadReading, wrong: bool) -> dict[str, float]:
         known = self._map
-        values = {known.state.at: float(self._unknown() if wrong else self._code(reading))}
+        shown = {FLAGS[fault] for fault in reading.faults}
+        said: dict[str, float] = {}
+        if known.state:
+            state = self._unknown(known.state) if wrong else self._code(known.state, reading)
+            said[known.state.at] = float(state)
         for signal, value in (
             (known.volts, reading.volts),
             (known.amps, reading.amps),
             (known.receiver, float(self._seen(reading))),
         ):
             if signal:
-                values[signal] = round(value, 1)
-        shown = {FLAGS[fault] for fault in reading.faults}
+                said[signal] = round(value, 1)
         for signal in (*known.errors.station, *known.errors.robot):
-            values[signal] = float(signal.split(".")[1] in shown)
+            said[signal] = float(signal.split(".")[1] in shown)
         if known.out_of_range:
-            values[known.out_of_range] = float(reading.robot and not reading.in_range)
-        return values
+            said[known.out_of_range] = float(reading.robot and not reading.in_range)
+        return said | self._by_rules(reading, said, wrong)
+
+    def _by_rules(
+        self, reading: PadReading, natural: Mapping[str, float], wrong: bool
+    ) -> dict[str, float]:
+        """What the signals of rules, error numbers and error flags hold."""
+        known = self._map
+        flags = (*known.errors.station, *known.errors.robot)
+        numbers = Errors(codes=known.errors.codes, bits=known.errors.bits)
+        in_error = reading.activity is Activity.ERROR
+        side: FaultSide = "robot" if in_error and reading.faults & ROBOTS_FAULTS else ""
+        wanted = UNKNOWN if wrong else (reading.activity, side)
+        found = values(known.rules, numbers, wanted, natural)
+        found = values(known.rules, numbers, UNKNOWN, natural) if found is None else found
+        return {at: float(value) for at, value in (found or {}).items() if at not in flags}
 
     def _seen(self, reading: PadReading) -> int:
         """The id of the receiver on the pad; 0 if there is none."""
         return STRANGER if reading.stranger else self._receiver if reading.robot else 0
 
-    def _code(self, reading: PadReading) -> int:
+    def _code(self, state: State, reading: PadReading) -> int:
         """The first code of the plant's activity, or of the nearest one that the map has."""
-        lists = self._map.state.codes.lists()
-        nearest = {
-            Activity.HANDSHAKE: Activity.IDLE,
-            Activity.STOPPING: Activity.CHARGING,
-            Activity.RELEASED: Activity.IDLE,
-        }
-        codes = lists[reading.activity] or lists[nearest.get(reading.activity, Activity.ERROR)]
+        lists = state.codes.lists()
+        codes = lists[reading.activity] or lists[NEAREST.get(reading.activity, Activity.ERROR)]
         return codes[0]
 
-    def _unknown(self) -> int:
-        known = self._map.state.codes.meanings()
+    def _unknown(self, state: State) -> int:
+        known = state.codes.meanings()
         return next(code for code in range(15, -1, -1) if code not in known)
 
 

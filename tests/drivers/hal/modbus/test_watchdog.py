@@ -280,14 +280,16 @@ SHORT = (
         ("{units: [1], profile: wago-750}", []),
         ("{units: [1], habits: " + SHORT % ("0.5", "coil 2") + "}", []),
         ("{units: [1]}", ["7:5: 'module_watchdog' needs 'habits', or a profile: wago-750"]),
-        ("{units: [1, 1], profile: wago-750}", ["7:23: names a unit twice"]),
+        ("{units: [1, 1], profile: wago-750}", ["7:23: 'units': names a unit twice"]),
         (
             "{units: [1], profile: wago}",
             ["7:44: unknown profile 'wago': did you mean 'wago-750'? known here: wago-750"],
         ),
         (
             "{units: [1], habits: " + SHORT % ("0.6", "coil 2") + "}",
-            ["7:66: one late scan would drop the outputs: at most 0.5, half of time_s"],
+            [
+                "7:66: 'refresh_s': one late scan would drop the outputs: at most 0.5, half of time_s"
+            ],
         ),
         (
             "{units: [1], habits: " + SHORT % ("0.5", "input register 2") + "}",
