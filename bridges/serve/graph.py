@@ -85,6 +85,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
         self._reset = False
+        self._may = MaySpeak(False)
         self._hears: dict[str, Subscription] = {}
         self._unsaid: list[tuple[Topic[Message], Message]] = []
         self._shown: set[str] = set()
@@ -191,14 +192,19 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _look_around(self) -> None:
         """Declare our publishers when we may speak, and withdraw them when not."""
-        now = self._clock.monotonic()
-        changed = [look.look(now) for look in (self.presence, self.alone) if look]
-        if not any(changed):
-            return
+        for look in filter(None, (self.presence, self.alone)):
+            look.look(self._clock.monotonic())
         may = self._may_speak()
-        topics = dict.fromkeys((*self._kind.publishes, *self._kind.sole)) if may.yes else {}
-        silent = () if may.alone else self._kind.yields
-        self._outlet.open(topic for topic in topics if topic not in silent)
+        if may == self._may:
+            return
+        self._may = may
+        if may.yes or may.at_once:
+            silent = () if may.alone else self._kind.yields
+            topics = dict.fromkeys((*self._kind.publishes, *self._kind.sole))
+            self._outlet.close(silent)
+            self._outlet.open(topic for topic in topics if topic not in silent)
+        else:
+            self._outlet.close()
         self._decide_all(may)
 
     def _heard_by(self) -> dict[str, int]:
@@ -207,7 +213,14 @@ class GraphNode(Generic[S, L, M, E, R]):
         return {name: n for name, n in self._outlet.heard_by().items() if name in names}
 
     def _may_speak(self) -> MaySpeak:
-        return MaySpeak(self.presence.may_speak, self.alone is None or self.alone.may_speak)
+        alone = self.alone is None or self.alone.may_speak
+        return MaySpeak(self.presence.may_speak, self._must_at_once(), alone)
+
+    def _must_at_once(self) -> bool:
+        """Is there something that cannot wait for the end of the quiet start, and no rival?"""
+        if self.presence.may_speak or self.presence.rivals:
+            return False
+        return any(self._kind.urgent(subject.memory) for subject in self.subjects.values())
 
     def _wake(self) -> None:
         now = self._clock.monotonic()
@@ -266,7 +279,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         subject = Subject(name, memory, self._core, self._will_say, refusals, clock)
         self.subjects[name] = subject
         self._requesters += self._remembered(subject)
-        self._decide(subject, self._may_speak())
+        self._decide(subject, self._may)
         return subject
 
     def _decide(self, subject: Subject[M, GraphEvent[E], None, R], event: GraphEvent[E]) -> None:
