@@ -7,6 +7,7 @@ from datetime import datetime
 from zoneinfo import ZoneInfo
 
 from bridges.charger.messages import accept_request as accept_charger_request
+from bridges.charger.refusals import refused
 from bridges.charger.settings import ChargerSettings, Robot
 from bridges.charger_coordinator.keep import SITE
 from bridges.charger_coordinator.report import SiteReport
@@ -22,10 +23,12 @@ from bridges.charger_coordinator.signals import (
     Wanted,
 )
 from bridges.core.decision import RequestRefused
+from bridges.core.kind import Answer
 from bridges.core.names import LONGEST_TEXT, check_length
 from bridges.rmf import definitions as d
 from bridges.rmf.definitions import Time
 from bridges.rmf.stamps import in_seconds
+from bridges.rmf.topics import CHARGER_REFUSALS
 
 CHARGE = d.ChargingMode.MODE_CHARGE
 CHARGES = (d.RobotModeValue.MODE_CHARGING, d.RobotModeValue.MODE_DOCKING)
@@ -159,3 +162,20 @@ def summary(report: SiteReport, now: float) -> Mapping[str, str]:
         "queue": "; ".join(report.queue) or "-",
         **({"did not come": ", ".join(map(str, report.absent))} if report.absent else {}),
     }
+
+
+def answer(asked: object, reason: str) -> Answer | None:
+    """What is said when a request for any charger is refused; None for what is none."""
+    match asked:
+        case d.ChargerRequest():
+            who, station, request_id = (
+                Robot(asked.fleet_name, asked.robot_name),
+                asked.charger_name,
+                asked.request_id,
+            )
+        case Wanted():
+            who, station, request_id = asked.robot, asked.station, asked.request_id
+        case _:
+            return None
+    refusal = refused(request_id, station or "any", who, reason)
+    return Answer(CHARGER_REFUSALS, refusal.message(), refusal.told())

@@ -172,10 +172,8 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
             for fleet, place in places.items():
                 owner = taken.setdefault((fleet, place), station)
                 if owner != station:
-                    yield (
-                        ("stations", station),
-                        f"'{station}' stands at '{place}', as '{owner}' does",
-                    )
+                    text = f"'{station}' stands at '{place}', as '{owner}' does"
+                    yield ("stations", station), text
                     break
         taken |= {("rcu", station): f"the station '{station}'" for station in self.stations}
         for who, robot in self.robots().items():

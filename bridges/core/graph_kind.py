@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Union
 
 from bridges.core.decision import Decision, M, OperatorReset, R
-from bridges.core.kind import AnyDeviceKind, E, L, Place, S
+from bridges.core.kind import Answer, AnyDeviceKind, E, L, Place, S
 from bridges.core.table import Table
 from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
@@ -58,6 +58,8 @@ class GraphKind(Generic[S, L, M, E, R]):
     `decide`: the core. Its messages have no stamps: `stamped(message, time)` adds them when they are
     sent. `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`:
     may this subject be forgotten?
+    `answer(asked, reason)`: what is said when a request is refused; None for nothing. `asked`: the
+    message if it was refused at once, else the event.
     `on_map(settings)`: which settings name a place on RMF's map (`bridges/core/kind.py`).
 
     For a kind with one message about all its subjects: `together(memories)`, sent each second and
@@ -96,6 +98,7 @@ class GraphKind(Generic[S, L, M, E, R]):
     yields: tuple[Topic[Message], ...] = ()
     shown_by: Topic[Message] | None = None
     reserved: Callable[[S], Collection[str]] = lambda settings: ()
+    answer: Callable[[object, str], Answer | None] = lambda asked, reason: None
     requester: Callable[[E], str] = lambda event: ""
     requesters: Callable[[M], Collection[str]] = lambda memory: ()
 

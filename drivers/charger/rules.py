@@ -229,20 +229,16 @@ def judged(station: "Station", read: Read, code: int | str | None, told: FaultSi
     An entry of `errors` makes it an error, whatever the state is. Raises DriverError.
     """
     meant = meaning(station.rules, station.codes, read, code)
-    return with_errors(meant, station.errors.found(read), told)
+    return with_errors(meant, station.errors.found(read), station.codes, told)
 
 
 class Meant(NamedTuple):
-    """What rules and codes say, its code for texts, and the text of the rule that holds.
-
-    `unnamed`: whose an error is, if nothing names a side.
-    """
+    """What rules and codes say, its code for texts, and the text of the rule that holds."""
 
     activity: Activity
     side: FaultSide
     code: int | str
     text: str = ""
-    unnamed: FaultSide = ""
 
 
 def meaning(rules: list[Rule], codes: Codes | None, read: Read, code: int | str | None) -> Meant:
@@ -251,16 +247,19 @@ def meaning(rules: list[Rule], codes: Codes | None, read: Read, code: int | str 
     if rule is not None:
         return Meant(*MEANINGS[rule.means], f"rule {rules.index(rule) + 1}", rule.text or "")
     if codes is not None and code is not None:
-        unnamed = codes.unnamed_side(code)
-        return Meant(*codes.meanings().get(code, UNKNOWN), code, unnamed=unnamed)
+        return Meant(*codes.meanings().get(code, UNKNOWN), code)
     return Meant(*UNKNOWN, "of no rule")
 
 
-def with_errors(meant: Meant, errors: Found, told: FaultSide = "") -> Judged:
-    """The state with what is wrong. `told`: whose fault it is by the station's own text."""
+def with_errors(
+    meant: Meant, errors: Found, codes: Codes | None = None, told: FaultSide = ""
+) -> Judged:
+    """The state with what is wrong. `told`: the side of an error that is told in words."""
     wrong: Found = [(meant.side, meant.text), *errors] if meant.text else errors
     shown = Activity.ERROR if wrong else meant.activity
-    side = first_side([meant.side, told, *(whose for whose, _ in wrong)]) or meant.unnamed
+    side = first_side([meant.side, told, *(whose for whose, _ in wrong)])
+    if codes is not None:
+        side = side or codes.unnamed_side(meant.code)
     return Judged(shown, side, meant.code, said(wrong), meant.activity)
 
 

@@ -6,6 +6,7 @@ the charger says that it charges. The first fleet's finishing request is `charge
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 from bridges.charger.settings import Robot
@@ -15,11 +16,14 @@ from bridges.rmf.topics import CHARGING_ASSIGNMENTS, DIAGNOSTICS, AnyTopic
 from hal_fakes.demo.world import World
 from hal_fakes.rmf import Party, Said
 from hal_fakes.rmf.fleet import Finishing, Fleet, FleetRobot
+from hal_fakes.rmf.tutorial import tutorial_fleet
 
 WARD: Final = "ward"
 DRIVE_S: Final = 1.0
 FILLS_PER_S: Final = 15.0
-FINISHING: Final[dict[str, Finishing]] = {"tiny": "charge", "porter": "nothing"}
+CONFIGURED: Final = {"tiny": Path(__file__).parents[2] / "config" / "fleet_tiny.yaml"}
+"""Fleets that are started from their adapter's configuration; the others have only this."""
+FINISHING: Final[dict[str, Finishing]] = {"porter": "nothing"}
 
 
 class Yard(Party):
@@ -131,4 +135,6 @@ def _fleet(name: str, site: Settings) -> Fleet:
     graph = {place: (at.level, at.x, at.y) for place, at in settings.waypoints.items()}
     graph[WARD] = ("L1", -20.0, 0.0)
     homes = {who: robot.waits_at for who, robot in settings.robots.items()}
+    if name in CONFIGURED:
+        return tutorial_fleet(CONFIGURED[name], graph, DRIVE_S, only=homes)
     return Fleet(name, graph, homes, DRIVE_S, FINISHING[name])

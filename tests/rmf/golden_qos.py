@@ -42,6 +42,8 @@ GOLDEN: Final[Mapping[str, tuple[str, Qos, Qos]]] = {
     "charger_states": ("rmf_charger_msgs/ChargerState", PLAIN, PLAIN),
     "charger_requests": ("rmf_charger_msgs/ChargerRequest", PLAIN, PLAIN),
     "charger_cancels": ("rmf_charger_msgs/ChargerCancel", PLAIN, PLAIN),
+    # Ours: who asked hears why not; nothing is retained, as an old refusal tells nobody anything.
+    "charger_refusals": ("diagnostic_msgs/DiagnosticStatus", PLAIN, PLAIN),
     "adapter_charger_requests": ("rmf_charger_msgs/ChargerRequest", PLAIN, PLAIN),
     "adapter_charger_cancels": ("rmf_charger_msgs/ChargerCancel", PLAIN, PLAIN),
     # Fleet adapter publishes SystemDefaults 100.
