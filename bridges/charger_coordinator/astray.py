@@ -21,7 +21,7 @@ from bridges.charger.pad import misplaced_in
 from bridges.charger.report import Diagnosis
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator.memory import CHARGING, Memory, Nudge, Site
-from bridges.charger_coordinator.queue import REMEMBERED_S, suiting
+from bridges.charger_coordinator.queue import Here, standing, suiting
 from bridges.charger_coordinator.wishes import SETTLES_S
 from bridges.core.durations import AGES_AGO, NEVER
 
@@ -111,20 +111,26 @@ def _stands(memory: Memory, who: Robot, site: Site) -> tuple[str | None, float, 
 
 def _blocking(memory: Memory, now: float, site: Site) -> Iterator[Astray]:
     """Those that have no station, and stand on a pad that another robot waits for."""
-    for wish in memory.wishes:
+    here = standing(memory, AGES_AGO if now == NEVER else now, site)
+    idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
+    for wish in memory.wishes if idle else ():
         if memory.station_of(wish.robot) is not None:
             continue
         for name in suiting(memory, wish, site):
-            grant, seen = memory.grants.get(name), memory.stations.get(name)
-            if seen is None or seen.state is CHARGING or (grant is not None and not grant.over):
+            who, seen = idle.get(name), memory.stations.get(name)
+            if who is None or who == wish.robot or seen is None:
                 continue
-            for who, standing in memory.robots.items():
-                free = who != wish.robot and memory.station_of(who) is None
-                here = memory.stands_at(who, site) == name
-                since = max(standing.here_since, seen.since) + site.leaves_s
-                fresh = now == NEVER or now < standing.at + REMEMBERED_S
-                if free and here and fresh and since <= now:
-                    yield Astray(who, name, since, name, 1, waiter=wish.robot)
+            since = max(memory.robots[who].here_since, seen.since) + site.leaves_s
+            if since <= now:
+                yield Astray(who, name, since, name, 1, waiter=wish.robot)
+
+
+def _idle_at(memory: Memory, station: str, here: Here) -> Robot | None:
+    """A robot without a station that stands at this one, which nobody has."""
+    grant, seen = memory.grants.get(station), memory.stations.get(station)
+    if seen is None or seen.state is CHARGING or (grant is not None and not grant.over):
+        return None
+    return next((who for who in here[station] if memory.station_of(who) is None), None)
 
 
 def _matters(memory: Memory, who: Robot, nudge: Nudge, astray: Mapping[Robot, Astray]) -> bool:

@@ -1,7 +1,7 @@
 """What the coordinator remembers, and what it needs of its settings."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Literal, TypeVar
 
 import msgspec
@@ -48,10 +48,19 @@ class Site:
     again_percent: float
     leaves_s: float
     schedule: tuple[Charging, ...] = ()
+    _stations: Mapping[tuple[str, str], str] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        found = {
+            (fleet, place): name
+            for name, places in self.places.items()
+            for fleet, place in places.items()
+        }
+        object.__setattr__(self, "_stations", found)
 
     def station_at(self, fleet: str, place: str | None) -> str | None:
         """Which station is at this waypoint of the fleet's graph; None for none."""
-        return next((name for name, at in self.places.items() if at[fleet] == place), None)
+        return self._stations.get((fleet, place or ""))
 
     @classmethod
     def of(cls, settings: Settings) -> "Site":

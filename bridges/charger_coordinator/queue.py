@@ -11,7 +11,7 @@ Beside another node's charging schedule, a robot gets the station that the sched
 RMF drives it to no other. A robot that the schedule does not name may have the one where it stands.
 """
 
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from msgspec.structs import replace
@@ -23,13 +23,17 @@ from bridges.charger_coordinator.memory import ERROR, IDLE, NODE, Grant, Memory,
 
 REMEMBERED_S: Final = 30.0
 """How long a robot's last place counts, after its fleet has shown it."""
+Here = Mapping[str, Sequence[Robot]]
+"""Station -> the robots that stand there."""
 
 
 def allot(memory: Memory, now: float, site: Site) -> Memory:
     """Give the free stations to the robots that wait, in the order of the queue."""
+    here = standing(memory, now, site)
     for wish in memory.wishes:
         if memory.station_of(wish.robot) is None:
-            station = next(_free_for(memory, wish, now, site), None)
+            stations = suiting(memory, wish, site)
+            station = next((s for s in stations if _free(memory, s, wish.robot, now, here)), None)
             if station is not None:
                 memory = _granted(memory, wish, station, now, site)
     return memory
@@ -41,10 +45,6 @@ def _granted(memory: Memory, wish: Wish, station: str, now: float, site: Site) -
     timeout_s = wish.start_timeout_s or site.start_timeout_s
     grant = Grant(wish.robot, request_id, now, timeout_s)
     return replace(memory, count=count).with_grant(station, grant)
-
-
-def _free_for(memory: Memory, wish: Wish, now: float, site: Site) -> Iterator[str]:
-    return (s for s in suiting(memory, wish, site) if _free(memory, s, wish.robot, now, site))
 
 
 def suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
@@ -61,10 +61,10 @@ def suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
     return sorted(untried, key=lambda s: first.index(s) if s in first else len(first))
 
 
-def _free(memory: Memory, station: str, robot: Robot, now: float, site: Site) -> bool:
+def _free(memory: Memory, station: str, robot: Robot, now: float, here: Here) -> bool:
     if not memory.speaks(station, now) or now < memory.shunned.get(station, now):
         return False
-    if station in memory.grants or in_the_way(memory, station, robot, now, site):
+    if station in memory.grants or in_the_way(here, station, robot):
         return False
     seen = memory.stations[station]
     if seen.state is not ERROR:
@@ -74,17 +74,16 @@ def _free(memory: Memory, station: str, robot: Robot, now: float, site: Site) ->
     return is_refused and seen.request_id.startswith(UNREQUESTED)
 
 
-def in_the_way(
-    memory: Memory, station: str, robot: Robot | None, now: float, site: Site
-) -> Robot | None:
-    """Another robot that stands at the station, by its fleet's state; None if there is none."""
-    return next(
-        (
-            who
-            for who, standing in memory.robots.items()
-            if who != robot
-            and now < standing.at + REMEMBERED_S
-            and memory.stands_at(who, site) == station
-        ),
-        None,
-    )
+def standing(memory: Memory, now: float, site: Site) -> Here:
+    """The robots that stand at each station, by their fleets' states of the last REMEMBERED_S."""
+    here: dict[str, list[Robot]] = {}
+    for who, seen in memory.robots.items():
+        station = memory.stands_at(who, site)
+        if station is not None and now < seen.at + REMEMBERED_S:
+            here.setdefault(station, []).append(who)
+    return here
+
+
+def in_the_way(here: Here, station: str, robot: Robot) -> Robot | None:
+    """Another robot that stands at the station; None if there is none."""
+    return next((who for who in here.get(station, ()) if who != robot), None)

@@ -5,6 +5,7 @@ probably get: of those that suit it, the one that is free first and that no robo
 """
 
 from collections.abc import Iterator
+from typing import Final
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator.memory import (
@@ -15,8 +16,11 @@ from bridges.charger_coordinator.memory import (
     Site,
     Wish,
 )
-from bridges.charger_coordinator.queue import in_the_way, suiting
+from bridges.charger_coordinator.queue import Here, in_the_way, standing, suiting
 from bridges.core.durations import NEVER
+
+MOST: Final = 4
+"""Of so many stations a robot is shown why it does not have them."""
 
 
 def queued(memory: Memory) -> list[Wish]:
@@ -27,11 +31,14 @@ def queued(memory: Memory) -> list[Wish]:
 def reasons(memory: Memory, now: float, site: Site) -> Iterator[str]:
     """`tiny/AMR03 by the robot: charger_b charges tiny/AMR01, free in 12 min` for each that waits."""
     taken: set[str] = set()
+    here = standing(memory, now, site)
     for wish in queued(memory):
         stations = suiting(memory, wish, site)
         left = [name for name in stations if name not in taken]
         first = min(left, key=lambda name: free_in_s(memory, name, now), default=None)
-        texts = [_obstacle(memory, name, wish.robot, now, site) for name in stations]
+        texts = [_obstacle(memory, name, wish.robot, now, here) for name in stations[:MOST]]
+        if len(stations) > MOST:
+            texts.append(f"and {len(stations) - MOST} more")
         if first is not None and (wait_s := free_in_s(memory, first, now)) < NEVER:
             taken.add(first)
             texts.append(f"{first} is free in {_lasts(wait_s)}")
@@ -47,7 +54,7 @@ def free_in_s(memory: Memory, station: str, now: float) -> float:
     return max(0.0, seen.at + seen.full_in_s - now)
 
 
-def _obstacle(memory: Memory, station: str, robot: Robot, now: float, site: Site) -> str:
+def _obstacle(memory: Memory, station: str, robot: Robot, now: float, here: Here) -> str:
     """Why the robot does not have this station."""
     seen, grant = memory.stations.get(station), memory.grants.get(station)
     if seen is None or not memory.speaks(station, now):
@@ -57,9 +64,9 @@ def _obstacle(memory: Memory, station: str, robot: Robot, now: float, site: Site
     if grant is not None and not grant.over:
         does = "charges" if grant.started else "is kept for"
         return f"{station} {does} {grant.robot}"
-    here = in_the_way(memory, station, robot, now, site)
-    if here is not None:
-        return f"{here} stands at {station}"
+    other = in_the_way(here, station, robot)
+    if other is not None:
+        return f"{other} stands at {station}"
     if seen.state is ERROR:
         return f"{station} is out of service"
     return f"{station} is not free yet"

@@ -201,17 +201,19 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _look_around(self) -> None:
         """Declare our publishers when we may speak, and withdraw them when not."""
-        for look in (self.presence, self.alone):
-            if look:
-                look.look(self._clock.monotonic())
+        for look in filter(None, (self.presence, self.alone)):
+            look.look(self._clock.monotonic())
         may = self._may_speak()
         if may == self._may:
             return
         self._may = may
-        speaks = may.yes or may.at_once
-        topics = dict.fromkeys((*self._kind.publishes, *self._kind.sole)) if speaks else {}
-        silent = () if may.alone else self._kind.yields
-        self._outlet.open(topic for topic in topics if topic not in silent)
+        if may.yes or may.at_once:
+            silent = () if may.alone else self._kind.yields
+            topics = dict.fromkeys((*self._kind.publishes, *self._kind.sole))
+            self._outlet.close(silent)
+            self._outlet.open(topic for topic in topics if topic not in silent)
+        else:
+            self._outlet.close()
         self._decide_all(may)
 
     def _may_speak(self) -> MaySpeak:

@@ -31,12 +31,10 @@ class Outlet:
         self._lock = threading.Lock()
 
     def open(self, topics: Iterable[Topic[Message]]) -> None:
-        """Declare these that RMF's release has, and withdraw all others. Raises TransportError."""
-        wanted = {t.name: t for t in topics if self._transport.release.has(t.type)}
-        for name in self._ends.keys() - wanted.keys():
-            self._ends.pop(name).close()
-        for topic in wanted.values():
-            self._end(topic)
+        """Declare those that are not declared yet and that RMF's release has. Raises TransportError."""
+        for topic in topics:
+            if self._transport.release.has(topic.type):
+                self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> None:
         """Publish. A failure is logged: the next message may get through."""
@@ -67,3 +65,10 @@ class Outlet:
     def heard_by(self) -> dict[str, int]:
         """The number of subscriptions that receive each topic, by the topic's name."""
         return {name: end.matched() for name, end in self._ends.copy().items()}
+
+    def close(self, topics: Iterable[Topic[Message]] | None = None) -> None:
+        """Withdraw these publishers; every one if none is named."""
+        names = list(self._ends) if topics is None else [topic.name for topic in topics]
+        for end in [self._ends.pop(name, None) for name in names]:
+            if end is not None:
+                end.close()

@@ -141,7 +141,7 @@ class World:
         try:
             yield
         except Wrong as wrong:
-            raise Wrong(f"{name}: {wrong}") from wrong
+            raise Wrong(f"{name}: {wrong}" if text else str(wrong)) from wrong
         self.journal.legs[name] = time.monotonic() - began_at
 
     def until(
