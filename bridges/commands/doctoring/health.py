@@ -64,9 +64,9 @@ def watchdog(machine: Machine) -> Iterator[Finding]:
 
 def directories(machine: Machine, places: Places, who: User) -> Iterator[Finding]:
     """The subject `disk`: can the daemon keep its files?"""
-    for what, folder in (("runtime", places.runtime), ("state", places.state)):
+    for folder in places.folders:
         found = existing(machine.at(folder))
-        yield disk(f"the {what} directory {folder}", os.statvfs(found))
+        yield disk(str(folder), os.statvfs(found))
         if not who.service and not _may_write(found, machine, who):
             yield wrong(
                 "disk",
@@ -96,7 +96,14 @@ def disk(what: str, found: os.statvfs_result) -> Finding:
 
 def existing(folder: Path) -> Path:
     """The directory itself, or the nearest one above it that exists."""
-    return next(place for place in (folder, *folder.parents) if place.is_dir())
+    return next(place for place in (folder, *folder.parents) if _is_there(place))
+
+
+def _is_there(folder: Path) -> bool:
+    try:
+        return folder.is_dir()
+    except PermissionError:  # it is below one that this user may not search
+        return False
 
 
 def _may_write(folder: Path, machine: Machine, who: User) -> bool:

@@ -46,7 +46,7 @@ def kill_test(
             why = said or "the test's process says nothing"
             yield wrong(KILL_TEST, f"{name} was not switched on: {why}", "nothing is shown", why)
             return
-        if early := _line(victim, SEEN_S):
+        if early := _line(victim, SEEN_S) or _ended_early(victim):
             yield wrong(
                 KILL_TEST, f"{name} went off before the kill: {early}", "nothing is shown", early
             )
@@ -97,6 +97,10 @@ def _line(victim: "subprocess.Popen[bytes]", within_s: float) -> str:
     if not select.select([victim.stdout], [], [], within_s)[0]:
         return ""
     return os.read(victim.stdout.fileno(), 4096).decode(errors="replace").strip()
+
+
+def _ended_early(victim: "subprocess.Popen[bytes]") -> str:
+    return "" if victim.poll() is None else "the test's process has ended by itself"
 
 
 def _ended(victim: "subprocess.Popen[bytes]") -> None:

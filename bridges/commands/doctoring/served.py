@@ -67,6 +67,7 @@ def _told(one: Daemon) -> Iterator[Finding]:
     else:
         version = one.status.get("version", "?")
         yield ok(DAEMON, f"it serves this file, version {version}; {NOT_ASKED}")
+    yield from _listeners(one.status)
     yield from _faults("", one.status)
     for name, device in one.devices.items():
         age_s = device.get("input_age_s")
@@ -75,6 +76,16 @@ def _told(one: Daemon) -> Iterator[Finding]:
         else:
             yield ok(DAEMON, f"{name} was read {age_s:.1f} s before its status")
         yield from _faults(f"{name}: ", device)
+
+
+def _listeners(status: Status) -> Iterator[Finding]:
+    """Who hears the states; topics without a listener are common beside them."""
+    for topic, nodes in status.get("heard_by", {}).items():
+        if nodes:
+            yield ok(DAEMON, f"{topic}: heard by {nodes} node{'s' if nodes > 1 else ''}")
+        elif topic.endswith("_states"):
+            do = "docs/ros.md: domain, multicast, interfaces"
+            yield warning(DAEMON, f"{topic}: nobody listens", "RMF does not see the device", do)
 
 
 def _faults(of: str, part: Status) -> Iterator[Finding]:

@@ -124,7 +124,7 @@ def test_a_directory_that_the_user_may_not_write_is_wrong(tmp_path: Path) -> Non
     found = list(health.directories(made.machine, places, made.user))
     assert [one.found for one in found if one.level == "wrong"] == [
         "pi may not write in /run, where /run/rmf-bridge/lift is to be"
-    ] * 2
+    ]
 
 
 def test_a_port_that_is_there_and_permitted(made: MadeUp) -> None:
