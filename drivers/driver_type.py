@@ -1,6 +1,6 @@
 """The record that describes a driver: the `DRIVER` at the end of its file.
 
-`drivers/<kind>/<driver>.py` is named after the YAML's `kind:` and `driver:`; there is no table of
+The YAML's `kind:` and `driver:` name the file `drivers/<kind>/<driver>.py`, so there is no table of
 drivers to edit. Only `bridges/settings/names.py` imports a driver by its name.
 """
 
@@ -26,19 +26,19 @@ class DriverType(Generic[Settings, Sample, Outputs]):
 
     `settings`: a struct that derives from the kind's (`bridges.lift.settings.LiftSettings`…) and adds
     the wiring. `buses`: the bus types that it works on, as the names of files in `drivers/hal/`.
-    `create(name, settings, bus)`: one device on its bus; sends nothing before `open`.
+    `create(name, settings, bus)`: makes the driver of one device; it sends nothing before `open`.
 
     The rest is optional:
-    `wires(settings)`: the table that an electrician checks (`drivers/hal/points.py`).
-    `debounce(settings)`: how long a change of each signal or group must last (s).
-    `describe(settings, bus's settings)`: where there are no wires, rows for `check` (what, meaning).
+    `wires(settings)`: the wiring table that an electrician checks (`drivers/hal/points.py`).
+    `debounce(settings)`: signal or group -> how long a change must last (s).
+    `describe(settings, bus's settings)`: rows for `check` (what, meaning) if there are no wires.
     `tables(settings)`: codes, pulses and frames, for `check` (`bridges/core/table.py`).
-    `claims(settings)`: (place, path) of what no other device of its bus may use, beside the wires'.
-    `warnings(settings)`: (path, text) of what is legal but worth a look.
-    `notes(settings)`: (path, text) of what a site may well want so, and should know.
-    `unwired(settings)`: signals without a wire of which `accept_unsafe` may speak as well.
-    `fake`: the module that stands in for the hardware in `run --simulate`, by its name, as nothing real
-    imports a fake (`hal_fakes/fake.py`); the plant of its kind, on its wires, where it names none.
+    `claims(settings)`: (place, path) of each place, besides the wires', that no other device may use.
+    `warnings(settings)`: (path, text) of valid settings that may be a mistake.
+    `notes(settings)`: (path, text) of settings that a site may want, and should know about.
+    `unwired(settings)`: signals without a wire that `accept_unsafe` may name too.
+    `fake`: the name of the module that stands in for the hardware in `run --simulate`
+    (`hal_fakes/fake.py`). Without a name, the kind's plant stands at the far end of the wires.
     """
 
     settings: type[Settings]

@@ -6,7 +6,7 @@ For any JSON, a value has the type that the caller asks for, or DriverError name
 import math
 import reprlib
 from collections.abc import Mapping
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import msgspec
 
@@ -42,7 +42,7 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     when: list[Value] = []
 
 
-def flag(answer: Mapping[str, Any], place: Flag) -> bool:
+def flag(answer: Mapping[str, object], place: Flag) -> bool:
     """Yes or no; null means no. Raises DriverError for an absent field or a value of the wrong type."""
     value = needed(answer, place.field)
     if value is None:
@@ -70,12 +70,15 @@ def value_of(place: Flag, yes: bool) -> Value:
     return next(no for no in others if not any(same(no, when) for when in place.when))
 
 
-def put(answer: dict[str, Any], field: str, value: Any) -> None:
+def put(answer: dict[str, object], field: str, value: object) -> None:
     """Put a value at its field, for a fake controller; list items are not supported."""
-    *above, last = field.split(".")
-    for part in above:
-        answer = answer.setdefault(part, {})
-    answer[last] = value
+    first, _, below = field.partition(".")
+    if below:
+        inner = answer.setdefault(first, {})
+        assert isinstance(inner, dict)
+        put(inner, below, value)
+    else:
+        answer[first] = value
 
 
 def same(value: object, given: Value) -> bool:
@@ -92,7 +95,7 @@ def is_field(text: str) -> bool:
     return True
 
 
-def found(answer: Any, field: str) -> Any:
+def found(answer: object, field: str) -> object:
     """The field's value, or ABSENT."""
     for part in field.split("."):
         if isinstance(answer, dict):
@@ -104,7 +107,7 @@ def found(answer: Any, field: str) -> Any:
     return answer
 
 
-def needed(answer: Mapping[str, Any], field: str) -> Any:
+def needed(answer: Mapping[str, object], field: str) -> object:
     """The field's value. Raises DriverError that lists the fields that there are."""
     value = found(answer, field)
     if value is ABSENT:
@@ -113,7 +116,7 @@ def needed(answer: Mapping[str, Any], field: str) -> Any:
     return value
 
 
-def text(answer: Mapping[str, Any], field: str) -> str:
+def text(answer: Mapping[str, object], field: str) -> str:
     """A text, made printable and put on one line; "" when absent or null."""
     value = found(answer, field)
     if value is ABSENT or value is None:
@@ -123,7 +126,7 @@ def text(answer: Mapping[str, Any], field: str) -> str:
     return clean(value)
 
 
-def number(answer: Mapping[str, Any], field: str, scale: float) -> float | None:
+def number(answer: Mapping[str, object], field: str, scale: float) -> float | None:
     """A number times `scale`; None when absent or null. Raises DriverError for anything else."""
     value = found(answer, field)
     if value is ABSENT or value is None:
@@ -139,7 +142,7 @@ def number(answer: Mapping[str, Any], field: str, scale: float) -> float | None:
     return scaled
 
 
-def name(answer: Mapping[str, Any], field: str) -> str:
+def name(answer: Mapping[str, object], field: str) -> str:
     """An id as text; "" for null. Raises DriverError when it is absent or no id."""
     value = needed(answer, field)
     if value is None:
@@ -149,7 +152,7 @@ def name(answer: Mapping[str, Any], field: str) -> str:
     return clean(str(value), 64)
 
 
-def wrong(field: str, value: Any, wanted: str) -> DriverError:
+def wrong(field: str, value: object, wanted: str) -> DriverError:
     """The error that names the field, its value and what is expected."""
     return DriverError(f"'{field}' is {clean(reprlib.repr(value), 40)}, and {wanted} is expected")
 

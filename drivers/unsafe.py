@@ -44,12 +44,28 @@ def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
             )
 
 
+def unsafe_wires(wires: list[Wire], must_read: Mapping[str, tuple[bool, str]]) -> Iterator[Unsafe]:
+    """Both of the above. `must_read`: signal -> the two arguments of `cut_must_read`."""
+    for wire in wires:
+        if wire.signal in must_read:
+            yield from cut_must_read(wire, *must_read[wire.signal])
+    yield from energised_at_boot(wires)
+
+
 def slow_alarms(wires: Iterable[Wire]) -> Iterator[tuple[tuple[str, ...], str]]:
     """Alarms with a long debounce, as (path, text)."""
     for wire in wires:
         if wire.debounce_s is not None and wire.debounce_s > ALARM_WITHIN_S:
             text = f"{wire.signal} is believed only after {wire.debounce_s:g} s"
             yield (*wire.path, "debounce_s"), f"{text}: contacts bounce for 0.05 s"
+
+
+def needlessly_accepted(
+    found: Iterable[Unsafe], accepted: Mapping[str, str]
+) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What `accept_unsafe` names though nothing is unsafe about it, as (path, text)."""
+    for signal in accepted.keys() - {signal for signal, _, _ in found}:
+        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
 
 
 def unaccepted(

@@ -1,6 +1,6 @@
-"""What a charger's places hold while it does something, so that its rules and errors say so.
+"""Values for a charger's places, so that the driver's rules and errors read the wanted activity.
 
-The rules are those that the driver reads by: values are tried until they judge as is wanted.
+It tries values until the driver's own rules judge them as wanted.
 """
 
 import itertools
@@ -17,7 +17,7 @@ NEAREST: Final = {
     Activity.STOPPING: Activity.CHARGING,
     Activity.RELEASED: Activity.IDLE,
 }
-"""What is shown where an activity has no way of its own."""
+"""What is shown for an activity that no code or rule can express."""
 
 
 def values(
@@ -80,5 +80,8 @@ def _near(test: Test) -> Iterator[Value]:
     for limit in (test.above, test.below):
         if limit is not None:
             yield from (limit + 1, limit - 1, limit)
+    numbers = [n for n in test.one_of if isinstance(n, int | float) and not isinstance(n, bool)]
+    if numbers:
+        yield max(numbers) + 1
     if any(isinstance(value, bool) for value in test.one_of):
         yield from (True, False)

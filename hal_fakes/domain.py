@@ -14,7 +14,7 @@ CLAIM: Final = "\0rmf-bridges-test-domain-{}"
 
 
 _kept: Final[list[socket.socket]] = []
-"""What this process has claimed until it ends."""
+"""The claims of this process, kept until it ends."""
 
 
 def free_domain() -> int:

@@ -1,7 +1,7 @@
-"""Fakes are found as drivers are: `DRIVER` and `BUS` name a module, and its `FAKE` stands in for them.
+"""Fakes are found like drivers: `DRIVER` and `BUS` name a module, and its `FAKE` stands in for them.
 
-Only this file imports one by its name. A driver that names none has the plant of its kind,
-`hal_fakes/plants/<kind>.py`, at the far end of its own wires.
+Only this file imports fakes by name. A driver that names none gets the plant of its kind,
+`hal_fakes/plants/<kind>.py`, at the far end of its wires.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,22 +25,22 @@ class Fake(Generic[Settings]):
     """One sort of controller.
 
     `plant(name, settings, wires)`: its physics; `wires` is the driver's table.
-    `station(plant, settings, settings of the bus)`: what the bus's fake puts on the bus, with that
-    plant behind it. None: the plant's contacts stand there, as a `Wiring`.
+    `station(plant, settings)`: what the bus's fake puts on the bus, with that plant behind it. Without
+    it, the plant's contacts are put there as a `Wiring`.
     """
 
     plant: Callable[[str, Settings, Sequence[Wire]], Plant]
-    station: Callable[[Plant, Settings, Any], object] | None = None
+    station: Callable[[Plant, Settings], object] | None = None
 
 
 class Server(Protocol):
-    """A far side that a process can stand on.
+    """A running far side.
 
-    `replace`: what must stand in the bus's settings instead
+    `replace`: what to write into the bus's settings instead
     (`{"tcp": {"host": "127.0.0.1", "port": 41234}}`).
     """
 
-    replace: dict[str, Any]
+    replace: dict[str, object]
 
     def close(self) -> None:
         """Stop serving. Does not raise."""
@@ -50,9 +50,8 @@ class Server(Protocol):
 class Outside(Generic[Settings, Station]):
     """The far side of a bus, in a process of its own.
 
-    `serve(settings, stations)`: starts a real server on 127.0.0.1, or on a line of its own, and returns
-    at once. The plants behind the stations may be called from any thread; somebody else keeps their
-    time.
+    `serve(settings, stations)`: starts a real server on 127.0.0.1, or on its own line, and returns at
+    once. It may call the plants from any thread, and does not keep their time.
     """
 
     serve: Callable[[Settings, Sequence[Station]], Server]
@@ -62,7 +61,7 @@ class Outside(Generic[Settings, Station]):
 class Inside(Generic[Settings, Station]):
     """The far side of a bus that cannot leave the daemon's process.
 
-    `open_bus(settings, stations, world)`: the real bus, with these on it.
+    `open_bus(settings, stations, world)`: makes the real bus with these stations on it.
     """
 
     open_bus: Callable[[Settings, Sequence[Station], RealTime], Bus]
@@ -88,7 +87,7 @@ def _station(config: Config, bus: str, name: str, plant: Plant) -> object:
     station = _fake(config, name).station
     if station is None:
         return Wiring(plant, config.wires(name), config.bus_type(bus).canonical)
-    return station(plant, config.devices[name], config.buses[bus])
+    return station(plant, config.devices[name])
 
 
 def far_side(config: Config, bus: str) -> FarSide:

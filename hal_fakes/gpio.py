@@ -9,7 +9,6 @@ resistor is fixed, driving an input, a pull on an output.
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any
 
 from gpiozero import PinInvalidFunction
 from gpiozero.pins.mock import MockFactory, MockPin
@@ -27,7 +26,7 @@ class WiredPin(MockPin):  # type: ignore[misc]
 
     factory: "WiredFactory"
 
-    def __init__(self, factory: "WiredFactory", info: Any) -> None:
+    def __init__(self, factory: "WiredFactory", info: object) -> None:
         super().__init__(factory, info)
         self.point = f"BCM{self._number}"
         self._safe: bool | None = None
@@ -78,7 +77,7 @@ class WiredFactory(MockFactory):  # type: ignore[misc]
         self,
         wirings: Sequence[Wiring],
         clock: Callable[[], float] = time.monotonic,
-        lock: AbstractContextManager[Any] | None = None,
+        lock: AbstractContextManager[object] | None = None,
     ) -> None:
         super().__init__(revision="a02082", pin_class=WiredPin)
         self.clock = clock

@@ -1,6 +1,6 @@
 """The far side of an `http` bus: a real HTTP server on 127.0.0.1 in front of stations.
 
-What a station says is its own file's (`hal_fakes/http_charger.py`). How the wire fails, by part and
+Each station has a file that makes its answers (`hal_fakes/http_charger.py`). The wire fails by part and
 mode (`hal_fakes.plants.plant.FAILURE_MODES`):
 
 |         | off              | stuck           | slow               | garbage        | wrong         |
@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from select import select
 from types import MappingProxyType
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 from drivers.hal import http
 from hal_fakes.fake import Outside
@@ -38,9 +38,9 @@ def serve(settings: http.Settings, stations: Sequence["Station"]) -> "HttpServer
 
 
 class Station(Protocol):
-    """What answers on one path, and on those that command it; its plant is behind it.
+    """A controller with a plant behind it.
 
-    `reads`: the path that is read. `commands`: method and path -> what it does to the plant.
+    `reads`: the path of its state. `commands`: method and path -> signal, and asserted or not.
     """
 
     plant: Plant
@@ -48,32 +48,32 @@ class Station(Protocol):
     commands: Mapping[tuple[str, str], tuple[str, bool]]
 
     def answer(self) -> bytes:
-        """The body that a reading is answered with, now."""
+        """The body for a reading, now."""
 
     def obey(self, signal: str, asserted: bool) -> None:
-        """A command for this signal has come."""
+        """Obey a command for this signal."""
 
     def tick(self) -> None:
         """Called often: let timers run out."""
 
 
 class HttpServer:
-    """The running server. `replace`: what must stand in the bus's settings instead.
+    """A running server. `replace`: what to write into the bus's settings instead.
 
-    `path`: of the API. `timeout_s`: the client's deadline, which the slow failures overrun.
+    `path`: the API's path. `timeout_s`: the client's deadline, which slow failures overrun.
     """
 
     def __init__(self, stations: Sequence[Station], path: str, timeout_s: float) -> None:
         self._server = _Listener(stations, path, timeout_s)
         host, port = self._server.server_address[:2]
-        self.replace = {"api_base": f"{host!s}:{port}{path}", "token_file": None}
+        self.replace: dict[str, object] = {"api_base": f"{host!s}:{port}{path}", "token_file": None}
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(LOOK_S,), name="http", daemon=True
         )
         self._thread.start()
 
     def close(self) -> None:
-        """Hang up on everybody. May be called twice."""
+        """Close every connection. May be called twice."""
         self._server.shutdown()
         self._server.hang_up()
         self._server.server_close()
@@ -101,13 +101,14 @@ class _Listener(ThreadingHTTPServer):
         for station in self._stations:
             station.tick()
 
-    def get_request(self) -> tuple[socket.socket, Any]:
+    def get_request(self) -> tuple[socket.socket, object]:
         caller, address = super().get_request()
         with self._lock:
             self._callers.add(caller)
         return caller, address
 
-    def shutdown_request(self, request: Any) -> None:
+    def shutdown_request(self, request: socket.socket | tuple[bytes, socket.socket]) -> None:
+        assert isinstance(request, socket.socket)  # a datagram's would be a pair
         with self._lock:
             self._callers.discard(request)
         super().shutdown_request(request)
@@ -120,7 +121,9 @@ class _Listener(ThreadingHTTPServer):
             with contextlib.suppress(OSError):
                 caller.shutdown(socket.SHUT_RDWR)
 
-    def handle_error(self, request: Any, client_address: Any) -> None:
+    def handle_error(
+        self, request: socket.socket | tuple[bytes, socket.socket], client_address: object
+    ) -> None:
         """Ignore a caller that has hung up; anything else is a defect of this file."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
@@ -174,7 +177,7 @@ class _Call(BaseHTTPRequestHandler):
         self.close_connection = self._send(head, body, failures)
 
     def _send(self, head: bytes, body: bytes, failures: Failures) -> bool:
-        """Write an answer, as far as the wire lets it; True when the conversation is over.
+        """Write as much of an answer as the failure lets through; True to close the connection.
 
         Head and body in one write: in two, each answer would take 40 ms (delayed ACK).
         """
@@ -193,7 +196,7 @@ class _Call(BaseHTTPRequestHandler):
         return failures.get("headers") == "garbage"
 
     def _trickle(self, rest: bytes) -> None:
-        """A byte now and then, so that the whole takes several times the caller's deadline."""
+        """Send byte by byte, so slowly that the whole overruns the caller's deadline."""
         for n in range(len(rest)):
             self._wait(self.server.timeout_s / 4)
             self.wfile.write(rest[n : n + 1])
@@ -205,7 +208,7 @@ class _Call(BaseHTTPRequestHandler):
             if select([self.connection], [], [], min(left_s, LOOK_S))[0]:
                 raise ConnectionAbortedError("the caller has hung up")
 
-    def log_message(self, format: str, *args: Any) -> None:
+    def log_message(self, format: str, *args: object) -> None:
         """Log nothing: the daemon's log shows its requests."""
 
 

@@ -7,7 +7,6 @@ called.
 import json
 import time
 from collections.abc import Iterator, Mapping
-from typing import Any, cast
 
 from bridges.charger.signals import Activity
 from drivers.charger.http import Settings
@@ -44,7 +43,9 @@ class HttpCharger:
     def reading(self) -> Reading:
         """What the station does now."""
         self.plant.advance(time.monotonic())
-        return cast(Reading, self.plant.sense("reading"))
+        reading = self.plant.reading()
+        assert isinstance(reading, Reading)
+        return reading
 
     def obey(self, signal: str, asserted: bool) -> None:
         """A command for this signal has come."""
@@ -82,9 +83,9 @@ class HttpCharger:
         self._last = json.dumps(answer).encode()
         return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
 
-    def _answer(self, code: int | str, reading: Reading) -> dict[str, Any]:
+    def _answer(self, code: int | str, reading: Reading) -> dict[str, object]:
         """Everything where the YAML says that it is."""
-        fields, answer = self._settings.fields, dict[str, Any]()
+        fields, answer = self._settings.fields, dict[str, object]()
         if self._settings.codes is not None:
             put(answer, fields.state, self._words.get(code, code))
             put(answer, fields.error_text, reading.error_text)
@@ -100,15 +101,13 @@ class HttpCharger:
             put(answer, at, shown)
         return answer
 
-    def _by_rules(self, reading: Reading, answer: dict[str, Any]) -> dict[str, Value]:
+    def _by_rules(self, reading: Reading, answer: dict[str, object]) -> dict[str, Value]:
         """What the places of rules and errors hold."""
         said = self._settings
         robots = reading.error_text in ROBOTS_FAULTS
         wanted = ROBOT_ERROR if robots else (reading.activity, "")
-        looked_at = (at for _, at in places(said.rules))
-        natural = {
-            at: found(answer, at) for at in looked_at if isinstance(found(answer, at), Value)
-        }
+        shown = {at: found(answer, at) for _, at in places(said.rules)}
+        natural = {at: value for at, value in shown.items() if isinstance(value, Value)}
         return values(said.rules, said.errors, wanted, natural) or {}
 
     def _code(self, reading: Reading) -> int:
@@ -144,5 +143,5 @@ def _numbers(reading: Reading) -> list[tuple[str, float | None]]:
 
 FAKE = Fake[Settings](
     plant=lambda name, settings, wires: build(name, settings),
-    station=lambda plant, settings, bus: HttpCharger(plant, settings),
+    station=lambda plant, settings: HttpCharger(plant, settings),
 )

@@ -7,7 +7,7 @@ fail is in `hal_fakes/http.py`.
 import json
 import time
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 from drivers.door.http import HOLD, Settings
 from drivers.hal.points import Wire
@@ -61,7 +61,7 @@ class HttpDoor:
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")
         if server == "stuck" and self._last is not None:
             return self._last
-        said: dict[str, Any] = {}
+        said: dict[str, object] = {}
         for signal in self._settings.inputs.__struct_fields__:
             if place := getattr(self._settings.inputs, signal):
                 put(said, place.field, value_of(place, self.plant.sense(signal)))
@@ -75,5 +75,5 @@ class HttpDoor:
 
 FAKE = Fake[Settings](
     plant=lambda name, settings, wires: door.build(name, settings, contacts(settings), PARTS),
-    station=lambda plant, settings, bus: HttpDoor(plant, settings),
+    station=lambda plant, settings: HttpDoor(plant, settings),
 )

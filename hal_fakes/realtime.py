@@ -1,4 +1,4 @@
-"""Plants in real time: one lock around them, one thread that lets each event happen when it is due.
+"""Plants in real time: one lock around them, and one thread that runs each event when it is due.
 
 The thread sleeps until the next event of any plant, so an idle simulation costs nothing.
 """
@@ -13,8 +13,7 @@ from hal_fakes.plants.plant import Edge, FailureMode, Plant
 class RealTime:
     """A running world. `plants` are views that any thread may call.
 
-    `on_step` callbacks run after each step, with the lock held: whoever must show a contact that
-    moved (GPIO pins) does it there.
+    `on_step` callbacks run after each step with the lock held: GPIO pins take their levels there.
     """
 
     def __init__(self, plants: Mapping[str, Plant]) -> None:
@@ -29,13 +28,13 @@ class RealTime:
         self._thread.start()
 
     def stir(self) -> None:
-        """Something was done to a plant: look again at what is due."""
+        """A plant was driven: look again at what is due."""
         with self.lock:
             self._stirred = True
             self._due.notify()
 
     def show(self) -> None:
-        """Contacts that have just moved are seen at once, in the caller's thread."""
+        """Show moved contacts at once, in the caller's thread."""
         with self.lock:
             self._step()
 
@@ -111,6 +110,13 @@ class _Serialised:
     def sense(self, signal: str) -> bool:
         with self._world.lock:
             return self._plant.sense(signal)
+
+    def reading(self) -> object:
+        with self._world.lock:
+            return self._plant.reading()
+
+    def names(self) -> Mapping[str, list[str]]:
+        return self._plant.names()
 
     def next_at(self) -> float:
         with self._world.lock:

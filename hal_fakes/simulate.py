@@ -1,5 +1,4 @@
-"""What stands in for the hardware in `rmf-bridge run FILE --simulate`: for each bus of the file, a
-plant for each of its devices and the far side of the bus in front of them.
+"""The hardware of `rmf-bridge run FILE --simulate`: a plant for each device behind its bus.
 
 Where it can, a far side stands in a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real
 bus is pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's.
@@ -9,12 +8,10 @@ the file has several buses.
 """
 
 import contextlib
-import json
 import selectors
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, cast
 
 import msgspec
 
@@ -86,21 +83,21 @@ class Simulation:
         self._open.callback(_end, child)
         return child
 
-    def _pointed_at_child(self, name: str) -> Any:
-        settings = self._config.buses[name]
+    def _pointed_at_child(self, name: str) -> msgspec.Struct:
+        settings: msgspec.Struct = self._config.buses[name]
         child = self._children.pop(name) if name in self._children else self._start(name)
         replace = _first_line(child, name)
         return msgspec.convert({**msgspec.to_builtins(settings), **replace}, type(settings))
 
 
-def _first_line(child: "subprocess.Popen[bytes]", bus_name: str) -> dict[str, Any]:
+def _first_line(child: "subprocess.Popen[bytes]", bus_name: str) -> dict[str, object]:
     assert child.stdout is not None
     with selectors.DefaultSelector() as ready:
         ready.register(child.stdout, selectors.EVENT_READ)
         line = child.stdout.readline() if ready.select(READY_S) else b""
     if not line:
         raise HalError(f"the simulated far side of bus {bus_name} did not start; its log says why")
-    return cast(dict[str, Any], json.loads(line))
+    return msgspec.json.decode(line, type=dict[str, object])
 
 
 def _end(child: "subprocess.Popen[bytes]") -> None:

@@ -1,6 +1,6 @@
 """The wires between a plant's signals and a bus's points, which have addresses and levels.
 
-For buses with points (GPIO, Modbus). How wires fail is in `plants/contact.py`, below the plant.
+For buses with points (GPIO, Modbus). `plants/contact.py` says how wires fail.
 """
 
 from collections.abc import Callable, Iterable
@@ -27,6 +27,6 @@ class Wiring:
         return {p: w.level(self.plant.sense(w.signal)) for p, w in self.inputs.items()}
 
     def drive(self, point: str, level: bool, now: float) -> None:
-        """An output's level, as the bus has it at `now`. KeyError for a point not wired here."""
+        """Set an output to the level that the bus has at `now`. KeyError if it is not wired here."""
         wire = self.outputs[point]
         self.plant.drive(wire.signal, wire.asserted(level), now)

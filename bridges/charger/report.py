@@ -6,7 +6,6 @@ RMF's ChargerState has one text for everything that is wrong. From that text the
 """
 
 from enum import StrEnum
-from typing import Any
 
 import msgspec
 from msgspec.structs import replace
@@ -94,7 +93,7 @@ class ChargerReport(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...] = ()
     measured: Measured = Measured()
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """All but the age and the measurements, which change with each reading."""
         measured = Measured(receiver_id=self.measured.receiver_id)
         return replace(self, read_at=None, measured=measured)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from bridges.charger.messages import accept_request as accept_charger_request
 from bridges.charger.settings import ChargerSettings, Robot
@@ -119,7 +118,7 @@ def accept_assignments(
     )
 
 
-def subject(message: Any) -> str:
+def subject(message: object) -> str:
     """Every message is about the site: the queue spans its stations."""
     return SITE
 

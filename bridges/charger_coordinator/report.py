@@ -10,7 +10,7 @@
 """
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 from msgspec.structs import replace
@@ -60,7 +60,7 @@ class SiteReport(msgspec.Struct, frozen=True):
     queue: tuple[str, ...] = ()
     faults: tuple[Fault, ...] = ()
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """What is worth a line in the log."""
         return self.stations, self.queue
 

@@ -12,9 +12,8 @@ from msgspec import Meta
 
 from bridges.charger.settings import ReceiverId, Robot, StartTimeout
 from bridges.core.fields import GraphSettings, Name
-from bridges.core.kind import Place
+from bridges.core.kind import CHARGER, WAYPOINT, Place
 from bridges.core.table import Table
-from bridges.settings.building_map import CHARGER, WAYPOINT
 
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
 Near = Annotated[float, Meta(ge=0.1, le=5, extra={"unit": "m"})]
@@ -105,7 +104,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
             yield ("again_percent",), "is above full_percent: a full robot would come back at once"
         for name, place in self.places().items():
             if not self._graphs_with(place):
-                text = f"stands at '{place}', which is in no fleet's waypoints"
+                text = f"'{name}' stands at '{place}', which is in no fleet's waypoints"
                 yield ("stations", name, "waypoint"), text
         for name, fleet in self.fleets.items():
             for path, text in self._of_fleet(fleet):
@@ -139,7 +138,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         for station, place in self.places().items():
             owner = taken.setdefault(("place", place), station)
             if owner != station:
-                yield ("stations", station), f"stands at '{place}', as '{owner}' does"
+                yield ("stations", station), f"'{station}' stands at '{place}', as '{owner}' does"
         for who, robot in self.robots().items():
             path = ("fleets", who.fleet, "robots", who.name)
             things = [("waits_at", robot.waits_at), *(("receivers", r) for r in robot.receivers)]

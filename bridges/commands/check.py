@@ -1,7 +1,7 @@
 """`rmf-bridge check FILE...`: what is wrong with device YAMLs, or all that an electrician signs.
 
-Each file is read and judged, then all of them together (`bridges/settings/across.py`). What is told of
-a file is gathered once (`sheets/told.py`): as text, as JSON, and as a sheet to print.
+Each file is read and checked, then all of them together (`bridges/settings/across.py`). The findings
+about a file are gathered once (`sheets/told.py`), and printed as text, as JSON or as a sheet.
 """
 
 import argparse
@@ -74,7 +74,7 @@ def _building(file: str | None) -> "BuildingMap | None":
 def _read(
     files: Sequence[str], building: "BuildingMap | None"
 ) -> tuple[dict[str, tuple[Config, Told]], dict[str, Told]]:
-    """Each file, once: those that could be read, and what is told of every one."""
+    """Each file, once: (the readable ones, the findings of all)."""
     right: dict[str, tuple[Config, Told]] = {}
     found: dict[str, Told] = {}
     for file in dict.fromkeys(files):
@@ -89,7 +89,7 @@ def _read(
 
 
 def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Problem], list[str]]:
-    """Its names beside the map's: (problems, what else is to be said)."""
+    """Compare its names with the map's: (problems, notes)."""
     if building is None:
         return [], []
     from bridges.settings.map_names import mismatches, places
@@ -104,7 +104,7 @@ def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Probl
 
 
 def _with(file: Told, together: Found) -> Told:
-    """A file with what was found about it among the others."""
+    """A file's findings, with those from comparing it with the others."""
     return msgspec.structs.replace(
         file,
         errors=[*file.errors, *(p for p in together.errors if p.file == file.file)],
@@ -113,7 +113,7 @@ def _with(file: Told, together: Found) -> Told:
 
 
 def _tell(files: Sequence[Told], args: argparse.Namespace) -> int:
-    """Print it, write the sheet; the exit code."""
+    """Print the findings and write the sheet. Returns the exit code."""
     errors = sum(len(file.errors) for file in files)
     code = os.EX_CONFIG if errors else 0
     if args.json:
@@ -140,7 +140,7 @@ def _print(file: Told, quiet: bool) -> None:
 
 
 def _verdict(files: Sequence[Told], quiet: bool) -> None:
-    """The last line: that all is right, or how many errors there are."""
+    """The last line: `OK`, or the number of errors."""
     errors, warnings = _counts(files)
     also = f", {_many(warnings, 'warning')}" if warnings else ""
     if errors:
@@ -154,13 +154,13 @@ def _many(number: int, what: str) -> str:
 
 
 def _complain(lines: Iterable[str]) -> None:
-    """To stderr, after what was printed: the two often end in one log."""
+    """Write to stderr, after flushing stdout: the two often end in one log."""
     sys.stdout.flush()
     sys.stderr.writelines(f"{line}\n" for line in lines)
 
 
 def _write_sheet(files: Sequence[Told], path: str) -> int:
-    """Write the commissioning sheet; 0, or the exit code when that fails."""
+    """Write the commissioning sheet. Returns 0, or another exit code if that fails."""
     from bridges.commands.sheets.html import page
 
     try:

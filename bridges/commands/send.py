@@ -9,7 +9,7 @@ import sys
 import time
 from contextlib import closing, suppress
 from dataclasses import replace
-from typing import Any, TextIO
+from typing import TextIO
 from uuid import uuid4
 
 from bridges.commands.exchange import step
@@ -198,7 +198,7 @@ class _Exchange:
         self, transport: Transport, request: Request, timeout_s: float, out: TextIO
     ) -> None:
         self.request, self.out = request, out
-        self.publisher: Publisher[Any] = transport.publisher(request.topic)
+        self.publisher: Publisher[d.Message] = transport.publisher(request.topic)
         self.inbox = Inbox(transport, request.states, topics.DOOR_SUPERVISOR_HEARTBEAT)
         self.seen = Seen(began_at=time.monotonic(), timeout_s=timeout_s)
         self.said: set[str] = set()
@@ -220,16 +220,11 @@ class _Exchange:
             self._send(todo.send, now)
         return None
 
-    def _take(self, heard: Heard) -> None:
-        if isinstance(heard.message, d.SupervisorHeartbeat):
-            self.seen = replace(self.seen, heartbeat=heard)
+    def _take(self, heard: Heard[d.Message]) -> None:
+        before, self.seen = self.seen, self.seen.hears(heard, self.request.about)
+        if self.seen.states == before.states:
             return
-        name = words.device(heard.message)
-        self.seen = replace(self.seen, names=self.seen.names | {name})
-        if not self.request.about(heard.message):
-            return
-        self.seen = replace(self.seen, states=(*self.seen.states, heard))
-        text = words.described(heard.message)
+        text = words.described(self.seen.states[-1].message)
         if text != self.described:
             self.described = text
             self._line(heard.at, "state", text)
@@ -239,8 +234,7 @@ class _Exchange:
             message = replace(message, request_time=stamp(time.time()))
         if self.seen.first_sent_at is None:
             self._line(now, "request", f"{words.request(message)} on {self.request.topic.name}")
-        first = now if self.seen.first_sent_at is None else self.seen.first_sent_at
-        self.seen = replace(self.seen, first_sent_at=first, last_sent_at=now)
+        self.seen = self.seen.sends(now)
         self.publisher.publish(message)
 
     def _finish(self, outcome: Done | Failed) -> int:

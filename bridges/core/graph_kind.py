@@ -1,4 +1,4 @@
-"""How the daemon sees a kind without hardware: topics in, topics out, and the core between them.
+"""The record of a kind without hardware: topics in, topics out, and the core between them.
 
 A supervisor or coordinator has no driver and no bus. It learns from messages which subjects (lifts,
 doors) there are, and keeps one core memory for each. `bridges/<kind>/__init__.py` holds the `KIND`;

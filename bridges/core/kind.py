@@ -1,4 +1,4 @@
-"""How the daemon sees a kind of device: its topics, and the pure functions of its folder.
+"""The record of a kind of device: its topics, and the pure functions of its folder.
 
 `bridges/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or doors. Each
 `KIND` states its types, so mypy proves that its functions fit together.
@@ -32,8 +32,11 @@ E = TypeVar("E")
 DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: UP007
 """Every event that the core of a device takes."""
 
+FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
+"""What a name on RMF's map can name."""
+
 Place = tuple[tuple[str, ...], str, str]
-"""A setting that names something on RMF's map: its path, what it is (`building_map`), the name."""
+"""A setting that names something on RMF's map: its path, what it is (`FLOOR`, …), the name."""
 
 
 @dataclass(frozen=True, slots=True)

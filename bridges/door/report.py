@@ -1,7 +1,6 @@
 """What RMF, the log and the status file are told of a door."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import msgspec
 
@@ -30,7 +29,7 @@ class DoorReport(msgspec.Struct, frozen=True):
     hold: bool = False
     estimated: bool = False
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """The report without its age."""
         return self.mode, self.faults, self.hold, self.estimated
 

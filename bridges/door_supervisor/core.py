@@ -20,19 +20,19 @@ requests on `adapter_door_requests`; the supervisor sends its own on `door_reque
 The heartbeat (`report.py`) says who holds the doors, and `keep.py` saves that across a restart.
 """
 
-from typing import Any, Final
+from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.core.decision import Decision
+from bridges.core.decision import Decision, Said
 from bridges.core.durations import FORGOTTEN_S, NEVER, due_at
 from bridges.core.freshness import Rules, hear
 from bridges.core.graph_kind import MaySpeak
 from bridges.door_supervisor.memory import Holder, Limits, Memory
 from bridges.door_supervisor.report import DoorHoldReport, report
 from bridges.door_supervisor.signals import CloseRequested, Event, OpenRequested, StateHeard
-from bridges.rmf.definitions import DoorMode, DoorRequest, Message
-from bridges.rmf.topics import DOOR_REQUESTS, Topic
+from bridges.rmf.definitions import DoorMode, DoorRequest
+from bridges.rmf.topics import DOOR_REQUESTS
 
 REQUESTER_ID: Final = "door_supervisor"
 """The requester_id that RMF's own uses (door_supervisor/Node.hpp)."""
@@ -56,7 +56,7 @@ def idle(memory: Memory, now: float) -> bool:
 def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
     """Take the event in, and send what is due: at most one message. Never raises."""
     memory, refused = _take(memory, event, now)
-    publish: tuple[tuple[Topic[Any], Message], ...] = ()
+    publish: tuple[Said, ...] = ()
     if now >= _due_at(memory):
         publish = ((DOOR_REQUESTS, _request(memory)),)
         memory = replace(memory, sent=memory.wanted, sent_at=now, prompted=False)

@@ -21,8 +21,6 @@ Rules, in the order in which they are applied:
      close by itself while a robot drives through.
 """
 
-from typing import Any
-
 from msgspec.structs import replace
 
 from bridges.core.decision import (
@@ -31,6 +29,7 @@ from bridges.core.decision import (
     IoFailed,
     OperatorReset,
     RivalSeen,
+    Said,
     Sampled,
     Suspended,
     WriteFailed,
@@ -41,8 +40,8 @@ from bridges.lift.memory import Grace, LiftLimits, Memory, Session
 from bridges.lift.report import NOT_FRESH, LiftReport, report
 from bridges.lift.sensing import HAZARDS, View, gap, look, take, trust, unsure
 from bridges.lift.signals import Event, Hazard, LiftOutputs, LiftSample, Requested
-from bridges.rmf.definitions import Bool, EmergencySignal, Message
-from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
+from bridges.rmf.definitions import Bool, EmergencySignal
+from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER
 
 NOT_RMFS = frozenset(
     {
@@ -231,9 +230,7 @@ def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory
     )
 
 
-def _alarms(
-    before: bool, memory: Memory, limits: LiftLimits
-) -> tuple[tuple[Topic[Any], Message], ...]:
+def _alarms(before: bool, memory: Memory, limits: LiftLimits) -> tuple[Said, ...]:
     """`true` once when a fire alarm comes; `false` once when an operator resets."""
     if memory.alarmed == before or limits.alarm == "none":
         return ()

@@ -1,7 +1,5 @@
 """What RMF is told about a lift: the content of LiftState."""
 
-from typing import Any
-
 import msgspec
 
 from bridges.core.decision import Fault
@@ -37,7 +35,7 @@ class LiftReport(msgspec.Struct, frozen=True):
         """The floor at which the door is shown open, "" when it is not."""
         return self.floor if self.door is LiftDoor.DOOR_OPEN else ""
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """All but the age and the faults' details, which may change with each reading."""
         shown = (self.floor, self.destination, self.door, self.motion, self.mode, self.session)
         return *shown, self.estimated, tuple(fault.code for fault in self.faults)

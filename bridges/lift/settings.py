@@ -7,9 +7,8 @@ import msgspec
 from msgspec import Meta
 
 from bridges.core.fields import DeviceSettings, Name, Period, Seconds, Timeout
-from bridges.core.kind import Place
+from bridges.core.kind import FLOOR, Place
 from bridges.lift.signals import Side, Stop
-from bridges.settings.building_map import FLOOR
 
 
 class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -1,11 +1,11 @@
-"""Messages as bytes: plain CDR (XCDR1), the form in which ROS 2 puts them on the wire.
+"""Messages as bytes: plain CDR (XCDR1), the encoding that ROS 2 uses on the wire.
 
 Four bytes of header (`00 01 00 00` little endian, `00 00 00 00` big endian), then the fields in
 their order. A number is aligned to its own size, counted from the end of the header; a string is its
 length with the closing NUL as uint32, the UTF-8 bytes and the NUL; a sequence is its length as uint32
 and its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and what rmw_cyclonedds and rmw_fastrtps send.
 
-The steps for each type are made once, from the annotations in `definitions.py`.
+The encoder and decoder of each type are built once, from the annotations in `definitions.py`.
 """
 
 import struct
@@ -18,7 +18,7 @@ from bridges.rmf.definitions import field_types
 
 T = TypeVar("T")
 Value = Any
-"""A field's value: a number, a text, a truth, a tuple of them, or a struct of `definitions.py`."""
+"""A field's value: a number, text or bool, a tuple of these, or a struct of `definitions.py`."""
 Put = Callable[[bytearray, Value], None]
 Get = Callable[[bytes, int], tuple[Value, int]]
 
@@ -30,14 +30,14 @@ BYTES = ("uint8", "byte")
 
 
 class CdrError(ValueError):
-    """These bytes are not a message of this type, or this message cannot be put into bytes."""
+    """These bytes are not a message of this type, or this message cannot be encoded."""
 
 
 def encode(message_type: type, message: object) -> bytes:
     """The message as little endian CDR with its header.
 
-    What no string on the wire can hold (a NUL, half a surrogate pair) goes out as `?`: an odd text
-    from a device must not silence the state that carries it. Raises CdrError for a number out of
+    Characters that no string on the wire can hold (a NUL, half a surrogate pair) become `?`: a strange
+    text from a device must not stop the state that contains it. Raises CdrError for a number out of
     range, or a value of another type.
     """
     out = bytearray(LITTLE_ENDIAN)
@@ -51,7 +51,7 @@ def encode(message_type: type, message: object) -> bytes:
 def decode(message_type: type[T], sample: bytes) -> T:
     """The message in a sample, of either byte order. Raises CdrError for anything else.
 
-    Up to three bytes may follow the last field: RTPS pads payloads to a multiple of four.
+    Up to three bytes may follow the last field, because RTPS pads payloads to a multiple of four.
     """
     order = _ORDERS.get(sample[:2])
     if order is None:
@@ -72,7 +72,7 @@ _ORDERS = {LITTLE_ENDIAN[:2]: "<", BIG_ENDIAN[:2]: ">"}
 
 @cache
 def _put(kind: type) -> Put:
-    """How a value of this type is appended."""
+    """The function that appends a value of this type."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
         return _put_byte if name in BYTES else _putting_number(CODES[name])
@@ -91,7 +91,7 @@ def _put_byte(out: bytearray, value: int) -> None:
 
 def _put_bool(out: bytearray, value: bool) -> None:
     if value is not True and value is not False:
-        raise CdrError(f"{value!r} is not a truth value")
+        raise CdrError(f"{value!r} is not a bool")
     out.append(value)
 
 
@@ -135,7 +135,7 @@ def _putting_struct(members: list[tuple[str, Put]]) -> Put:
 
 @cache
 def _get(kind: type, order: str) -> Get:
-    """How a value of this type is read at a position: the value, and where the next one begins."""
+    """The function that reads a value of this type at a position: it returns the value and its end."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
         return _get_byte if name in BYTES else _getting_number(order + CODES[name])
@@ -154,7 +154,7 @@ def _get_byte(sample: bytes, at: int) -> tuple[int, int]:
 
 def _get_bool(sample: bytes, at: int) -> tuple[bool, int]:
     if sample[at] > 1:
-        raise CdrError(f"{sample[at]} is not a truth value")
+        raise CdrError(f"{sample[at]} is not a bool")
     return sample[at] == 1, at + 1
 
 
@@ -187,8 +187,8 @@ def _getting_sequence(get_element: Get, order: str) -> Get:
 
     def get(sample: bytes, at: int) -> tuple[tuple[Value, ...], int]:
         length, at = get_length(sample, at)
-        if length > len(sample) - at:  # each element takes a byte at least
-            raise CdrError(f"a sequence of {length} in {len(sample)} bytes")
+        if length > len(sample) - at:  # each element takes at least one byte
+            raise CdrError(f"a sequence of {length} elements in {len(sample)} bytes")
         elements = []
         for _ in range(length):
             element, at = get_element(sample, at)

@@ -1,12 +1,12 @@
-"""The ends of the `dds` transport: what a publisher and a subscription are in DDS.
+"""The ends of the `dds` transport: its publishers and subscriptions.
 
-An end outlives its writer or reader: when the transport joins anew, it is given another one.
+An end outlives its writer or reader: when the transport joins again, the end gets a new one.
 """
 
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Final, Generic, TypeVar
+from typing import Final, Protocol
 
 from cyclonedds.core import DDSException, DDSStatus
 from cyclonedds.domain import DomainParticipant
@@ -18,28 +18,26 @@ from cyclonedds.topic import Topic as DdsTopic
 from bridges.rmf import notices, topics
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
-from bridges.rmf.idl import SampleType, sample_type
+from bridges.rmf.idl import Sample, sample_type
 from bridges.rmf.rihs01 import type_hash
-from bridges.rmf.topics import Topic
-from bridges.rmf.transport import TransportError
-
-M = TypeVar("M", bound=Message)
+from bridges.rmf.topics import AnyTopic
+from bridges.rmf.transport import Receive, TransportError
 
 WRITE_BLOCKS_NS: Final = 20_000_000
-"""A writer that waits for a peer holds Python's lock meanwhile: keep it below one scan."""
+"""A writer that waits for a peer holds Python's lock: keep this shorter than a scan."""
 AT_ONCE: Final = 100
-"""How many samples are taken from one subscription before it is the others' turn."""
+"""The most samples taken from one subscription before the others have their turn."""
 POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation", 24: "type"}
 
 
-class DdsPublisher(Generic[M]):
-    """One topic's sending end. `withdraw`: takes it off the graph."""
+class DdsPublisher:
+    """The publisher of one topic. `withdraw(publisher, writer)`: takes it off the graph."""
 
     def __init__(
         self,
-        topic: Topic[M],
+        topic: AnyTopic,
         reader_thread: threading.Thread,
-        withdraw: Callable[["AnyPublisher", DataWriter], None],
+        withdraw: Callable[["DdsPublisher", DataWriter], None],
     ) -> None:
         self.topic = topic
         self._withdraw = withdraw
@@ -47,23 +45,23 @@ class DdsPublisher(Generic[M]):
         self._reader_thread = reader_thread
         self._sample = sample_type(topic.type)
         depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
-        self._retained: deque[SampleType] = deque(maxlen=depth)
+        self._retained: deque[Sample] = deque(maxlen=depth)
 
     watched = DDSStatus.OfferedIncompatibleQos
 
     def create(self, participant: DomainParticipant, topic: DdsTopic) -> DataWriter:
-        """The writer, in place of any that was."""
+        """Make its writer; it replaces an earlier one."""
         qos = _writer_qos(self.topic.publish, self.topic.type)
         self._writer = DataWriter(participant, topic, qos=qos)
         return self._writer
 
     def send_retained(self) -> None:
-        """Give late joiners what the writer before this one kept for them."""
+        """Send again what the earlier writer retained for late joiners."""
         for sample in list(self._retained):
             self._writer.write(sample)
 
-    def publish(self, message: M) -> None:
-        """Send; blocks for 20 ms at most. Raises TransportError when it was not sent."""
+    def publish(self, message: Message) -> None:
+        """Send; blocks for 20 ms at most. Raises TransportError if it was not sent."""
         if self._writer is None:
             raise TransportError(f"topic {self.topic.name}: not sent: there is no network")
         if not self._reader_thread.is_alive():
@@ -93,13 +91,13 @@ class DdsPublisher(Generic[M]):
             _log_misfit(self.topic, notices.NOT_SERVED, status)
 
 
-class DdsSubscription(Generic[M]):
-    """One topic's receiving end. `dropped`: counts samples that are no messages, by topic."""
+class DdsSubscription:
+    """The subscription of one topic. `dropped`: counts invalid samples, by topic name."""
 
     def __init__(
         self,
-        topic: Topic[M],
-        received: Callable[[M], None],
+        topic: AnyTopic,
+        received: Receive,
         dropped: dict[str, int],
         *,
         others_only: bool,
@@ -113,7 +111,7 @@ class DdsSubscription(Generic[M]):
     watched = DDSStatus.RequestedIncompatibleQos
 
     def create(self, participant: DomainParticipant, topic: DdsTopic) -> DataReader:
-        """The reader, in place of any that was."""
+        """Make its reader; it replaces an earlier one."""
         qos = _reader_qos(self.topic.subscribe, self.topic.type, others_only=self._others_only)
         self._reader = DataReader(participant, topic, qos=qos)
         return self._reader
@@ -126,7 +124,7 @@ class DdsSubscription(Generic[M]):
             return 0
 
     def take(self) -> bool:
-        """Hand on what has arrived; False when nothing had."""
+        """Deliver what has arrived; False if nothing had."""
         for taken in range(AT_ONCE):
             try:
                 samples = self._reader.take(1)
@@ -146,11 +144,13 @@ class DdsSubscription(Generic[M]):
             _log_misfit(self.topic, notices.NOT_HEARD, status)
 
 
-AnyPublisher = DdsPublisher[Any]
-AnySubscription = DdsSubscription[Any]
+class _Misfits(Protocol):
+    """Cyclone's status of an end that has met peers whose QoS does not fit."""
+
+    last_policy_id: int
 
 
-def _log_misfit(topic: Topic[M], text: str, status: SampleType) -> None:
+def _log_misfit(topic: AnyTopic, text: str, status: _Misfits) -> None:
     policy = POLICIES.get(status.last_policy_id, f"QoS policy {status.last_policy_id}")
     notices.misfit(topic, text, policy)
 

@@ -1,9 +1,9 @@
 """The RIHS01 type hash (ROS REP-2016) of each message, computed from `definitions.py`.
 
-A ROS 2 node announces the hash of its message definition beside each endpoint, and warns about a
-peer that has none or another one. The hash is the SHA-256 of the type's description as JSON: its
-fields, and after them the descriptions of all types it is made of, sorted by name. It covers names
-and types of fields, not constants and not comments.
+A ROS 2 node announces the hash of its message definition with each endpoint, and warns about a peer
+without a hash or with another one. The hash is the SHA-256 of the type's description as JSON: its
+fields, then the descriptions of all nested types, sorted by name. It covers the names and types of
+fields, but neither constants nor comments.
 Source: ros2/rosidl, rosidl_generator_type_description, and type_description_interfaces/FieldType.
 """
 
@@ -64,7 +64,7 @@ def _field_type(kind: type) -> dict[str, object]:
 
 
 def _element(kind: type) -> type:
-    """What a sequence holds, or the type itself; a number by its ROS name."""
+    """The type of a sequence's elements, or the type itself; a number type as its ROS name."""
     if typing.get_origin(kind) is tuple:
         kind = typing.get_args(kind)[0]
     return typing.get_args(kind)[1] if typing.get_origin(kind) is typing.Annotated else kind

@@ -1,4 +1,4 @@
-"""The names on RMF's map of a building that our files must match: levels, lifts, doors, waypoints.
+"""The names on RMF's map of a building: levels, lifts, doors, waypoints. Our files must use the same.
 
 Two kinds of file hold it, and either is accepted:
 
@@ -18,13 +18,11 @@ from dataclasses import dataclass
 
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
+from bridges.core.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
 from bridges.settings.nodes import Page, Sort, compose, read
 
 MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)
-"""Some seconds' worth of reading: what is longer is refused at once."""
-
-FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
-"""What a name on the map can name."""
+"""A file of this size takes some seconds to read; longer ones are refused at once."""
 
 Lines = dict[str, int]
 """Name -> the line of its first occurrence."""

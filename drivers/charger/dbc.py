@@ -8,11 +8,14 @@ import functools
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
-from bridges import regular_file
+from bridges import user_files
 from drivers import DriverError
 from drivers.profiles import texts
+
+if TYPE_CHECKING:
+    from cantools.database import Message
 
 EXTENDED: Final = 1 << 31
 SIZE_MAX: Final = 4 << 20
@@ -26,10 +29,13 @@ class Dbc:
         from cantools.database.errors import Error
 
         try:
-            database: Any = cantools.database.load_string(text, "dbc")
+            database = cantools.database.load_string(text, "dbc")
         except Error as error:
             raise ValueError(f"is not a DBC file: {' '.join(str(error).split())[:200]}") from None
-        self._messages: dict[str, Any] = {message.name: message for message in database.messages}
+        assert isinstance(database, cantools.database.Database)
+        self._messages: dict[str, Message] = {
+            message.name: message for message in database.messages
+        }
 
     def frames(self) -> list[str]:
         """The names of its frames."""
@@ -56,6 +62,7 @@ class Dbc:
             found = self._messages[frame].decode(payload, decode_choices=False)
         except (Error, ValueError, KeyError) as error:
             raise DriverError(f"{frame} {payload.hex(' ')} cannot be decoded: {error}") from None
+        assert isinstance(found, dict)  # a list is for frames within frames, which DBC has not
         return {
             name: value
             for name, value in found.items()
@@ -74,6 +81,12 @@ class Dbc:
     def unit(self, frame: str, signal: str) -> str:
         """A signal's unit, or ""."""
         return str(self._messages[frame].get_signal_by_name(signal).unit or "")
+
+    def bounds(self, frame: str, signal: str) -> tuple[float, float]:
+        """The least and the greatest value that the file allows for a signal."""
+        found = self._messages[frame].get_signal_by_name(signal)
+        low, high = found.minimum, found.maximum
+        return -math.inf if low is None else low, math.inf if high is None else high
 
     def sample(self, frame: str, signal: str, value: float) -> bytes | None:
         """A frame whose one signal says this and all others 0; None where it has no such frame."""
@@ -108,7 +121,7 @@ def _understood(file: Path, text: bytes) -> Dbc:
 
 def _read(file: Path) -> bytes:
     try:
-        text = regular_file.read(file, SIZE_MAX).content
+        text = user_files.read(file, SIZE_MAX).content
     except OSError as error:
         raise ValueError(f"{file} cannot be read: {error.strerror}") from None
     if len(text) > SIZE_MAX:

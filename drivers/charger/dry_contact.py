@@ -4,6 +4,7 @@ They are on the GPIO header or on a Modbus I/O module (coils and discrete inputs
 whenever the daemon does not run, so a charge ends with the daemon.
 """
 
+import itertools
 from collections.abc import Iterator, Mapping
 from typing import Final
 
@@ -11,9 +12,11 @@ import msgspec
 
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide
+from bridges.core.table import Table
 from drivers.driver_type import DriverType
-from drivers.hal.points import Input, Output, Points, PointsBus, Wire
-from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, unaccepted
+from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
+from drivers.tables import lines_on, one_cut, told_of_cuts
+from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
 
 CUT_MUST_READ: Final = {
     "fault": (True, "a fault of the station is not seen"),
@@ -68,44 +71,46 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 def wires(settings: Settings) -> list[Wire]:
     """The wiring table, inputs first."""
-    inputs = [
-        Wire(
-            signal=signal,
-            direction="in",
-            point=contact.point,
-            active=contact.active,
-            pull=contact.pull,
-            debounce_s=contact.debounce_s,
-            path=("inputs", signal),
-        )
-        for signal in settings.inputs.__struct_fields__
-        if (contact := getattr(settings.inputs, signal)) is not None
-    ]
-    relay = settings.outputs.enable
-    path = ("outputs", ENABLE)
-    return [*inputs, Wire(ENABLE, "out", relay.point, relay.active, path=path)]
+    relay = settings.outputs.enable.wire(ENABLE, ("outputs", ENABLE))
+    return [*input_wires(settings.inputs, debounce_s=0.0), relay]
 
 
 def _unsafe(settings: Settings) -> Iterator[Unsafe]:
-    table = wires(settings)
-    for wire in table:
-        if wire.signal in CUT_MUST_READ:
-            yield from cut_must_read(wire, *CUT_MUST_READ[wire.signal])
-    yield from energised_at_boot(table)
+    return unsafe_wires(wires(settings), CUT_MUST_READ)
+
+
+def tables(settings: Settings) -> Iterator[Table]:
+    """What the contacts mean together, what a cut wire makes of it, and how the relay is driven."""
+    table = {wire.signal: wire for wire in wires(settings) if wire.direction == "in"}
+    rows = []
+    for on in itertools.product((False, True), repeat=len(table)):
+        shown = dict(zip(table, on, strict=True))
+        means = _means(shown)
+        cuts = [(signal, _means(cut)) for signal, cut in one_cut(shown, table)]
+        told = told_of_cuts([(signal, reads) for signal, reads in cuts if reads != means])
+        rows.append((lines_on(shown), means, told))
+    yield Table("contacts", ("asserted", "reads as", "reads with one wire cut"), tuple(rows))
+    driven = "on while a robot may charge"
+    yield Table("outputs", ("output", "how long"), ((ENABLE, driven),))
+
+
+def _means(shown: Mapping[str, bool]) -> str:
+    """What the contacts mean: while the relay is off, and while it is on if that differs."""
+    off, on = (str(decode(shown, enabled).activity) for enabled in (False, True))
+    return off if off == on else f"{off} ({on} while enabled)"
 
 
 def warnings(settings: Settings) -> Problems:
     """Valid settings to review before the station goes into service: (path, text)."""
     for wire in wires(settings):
-        if wire.debounce_s is not None:
+        if wire.debounce_s:
             text = "contacts of a charger are not debounced: the next scan corrects a bounce"
             yield (*wire.path, "debounce_s"), f"{text}; leave this out"
         if wire.signal == "charging" and wire.broken_reads() is not True:
             yield wire.path, "a cut wire reads as no charge: look at it where a charge never begins"
     if settings.inputs.fault is None:
         yield ("inputs",), "without a fault contact a station that is out of order reads idle"
-    for signal in settings.accept_unsafe.keys() - {signal for signal, _, _ in _unsafe(settings)}:
-        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
+    yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     yield (), "contacts tell nobody's receiver: the robot on the pad is not verified"
 
 
@@ -167,6 +172,7 @@ DRIVER = DriverType(
     buses=("gpio", "modbus"),
     create=create,
     wires=wires,
+    tables=tables,
     warnings=warnings,
     fake="hal_fakes.plants.contact_charger",
 )

@@ -10,8 +10,8 @@ which robot it charges. For other makes the YAML gives paths and fields. `codes`
 states mean; an unlisted state is an error. A maker's state is never passed on as an RMF state.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, Final, Literal
+from collections.abc import Iterable, Iterator
+from typing import Final
 
 import msgspec
 
@@ -21,65 +21,19 @@ from bridges.charger.signals import (
     Activity,
     ChargerOutputs,
     ChargerSample,
-    FaultSide,
-    Measured,
 )
 from bridges.core.fields import Timeout
 from drivers import json_fields
 from drivers.charger import rules
+from drivers.charger.http_fields import Fields, Word
 from drivers.charger.rules import Errors, Rule, judged
-from drivers.charger.state_codes import CODE_MAX, Code, Codes, first_side
+from drivers.charger.state_codes import Code, Codes, first_side
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, Calls, send, told
-from drivers.json_fields import Field, Flag
+from drivers.http_call import Call, Calls, claim, send, timer_unseen, told
 from drivers.unsafe import unaccepted
 
 POWER: Final = "power"
-WORD_MAX: Final = 64
-Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
-TextMeans = Literal["none", "station", "robot"]
-
-
-class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A measurement.
-
-    `field`: the field of the answer that holds it.
-    `scale`: the factor from the maker's unit to ours (0.001 for mV).
-    """
-
-    field: Field
-    scale: float = 1.0
-
-
-InRange = Flag
-"""Whether the robot's coil is in charging range."""
-
-
-class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The fields of the answer to `state_path`: names with dots between them.
-
-    `state`: the station's state; `codes` says what it means.
-    `error_text`: the station's own text for an error: any text means an error, whatever `state` is.
-    `error_texts`: text -> the side of the error, `station` or `robot`; or `none` for a text that means
-    no error (`OK`). For other texts `codes` gives the side, if it can.
-    `receiver_id`: the id of the receiver that it sees; null or "" when it sees none.
-    `in_range`: whether the robot stands where it can be charged.
-    `volts`: the voltage at the battery.
-    `amps`: the current into the battery.
-    `battery_percent`: the battery's charge, 0 to 100.
-    `time_to_full_s`: the time until the battery is full (s).
-    """
-
-    state: Field = "state"
-    error_text: Field = "error_msg"
-    error_texts: dict[Word, TextMeans] = msgspec.field(default_factory=dict)
-    receiver_id: Field | None = None
-    in_range: InRange | None = None
-    volts: Number | None = None
-    amps: Number | None = None
-    battery_percent: Number | None = None
-    time_to_full_s: Number | None = None
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -166,13 +120,16 @@ def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
 
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """The station's own state, which no other charger can have."""
+    """The station's own state and commands, which no other charger can have."""
     yield f"{settings.fields.state} of {settings.state_path}", ("state_path",)
+    for name in ("start", "stop"):
+        if call := getattr(settings, name):
+            yield claim(call), (name, "path")
 
 
 def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str, str]]:
     """Rows that `check` prints instead of a wiring table: (what, meaning)."""
-    api, fields = http.base(bus_settings.api_base), settings.fields
+    api = http.base(bus_settings.api_base)
     rows = [("state", f"GET {api.url(settings.state_path)} every {bus_settings.scan_s:g} s")]
     for what in ("start", "stop", "range_check"):
         if call := getattr(settings, what):
@@ -183,14 +140,7 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
     if settings.clear_error_path:
         clear = f"POST {api.url(settings.clear_error_path)}, {_how_often(settings)}"
         rows.append(("clear error", clear))
-    for name in fields.__struct_fields__ if fields != Fields() else ():
-        place = getattr(fields, name)
-        if place is fields.error_texts or (name == "state" and settings.codes is None):
-            continue
-        if place:
-            rows.append((f"field {name}", _place(place)))
-    for text, means in fields.error_texts.items():
-        rows.append((f"text {text}", "no error" if means == "none" else f"{means}'s error"))
+    rows += settings.fields.rows(has_codes=settings.codes is not None)
     rows += [(f"word {word}", str(code)) for word, code in settings.state_words.items()]
     rows += rules.rows(settings.rules, settings.errors)
     if settings.codes:
@@ -199,14 +149,6 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
     if settings.stop:
         rows.append(("on death", settings.on_death))
     return rows
-
-
-def _place(place: str | Number | InRange) -> str:
-    if isinstance(place, Number):
-        return place.field if place.scale == 1.0 else f"{place.field} x {place.scale:g}"
-    if isinstance(place, InRange):
-        return json_fields.place_text(place)
-    return place
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
@@ -223,6 +165,10 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield (), f"{sort}without {' and '.join(missing)}, {what}"
     if not _lacks(settings, "receiver_id") and not settings.receivers:
         yield ("fields",), "receiver_id is read, but without receivers nobody is verified"
+    off_s = settings.switches_off_after_s
+    if settings.start and off_s is not None and timer_unseen(settings.start, off_s):
+        text = f"start sets no timer of {off_s:g} s that can be seen in it: compare the two"
+        yield ("start", "path"), text
     if settings.codes and not settings.codes.error:
         yield ("codes",), "no code means error: each of them will be shown as an unknown state"
 
@@ -264,18 +210,17 @@ class HttpCharger:
         """Read and decode the station's state. Raises DriverError for an answer that makes no sense."""
         answer = self._bus.get_json(self._settings.state_path)
         fields = self._settings.fields
-        words, code = self._settings.state_words, None
-        if self._settings.codes is not None:
-            code = _code(answer, fields.state, words)
+        has_codes = self._settings.codes is not None
+        code = fields.code(answer, self._settings.state_words) if has_codes else None
         found = judged(self._settings, lambda at: json_fields.needed(answer, at), code)
-        said, text_side = _error(answer, fields)
+        said, text_side = fields.error(answer)
         shown = Activity.ERROR if said else found.activity
         self._activity, self._at_fault = found.does, shown in AT_FAULT
         return ChargerSample(
             shown,
             found.code,
             "; ".join(filter(None, (found.text, said))),
-            _measured(answer, fields),
+            fields.measured(answer),
             first_side((found.side, text_side)),
             charges=shown is Activity.ERROR and found.does is Activity.CHARGING,
         )
@@ -319,51 +264,6 @@ class HttpCharger:
         renewed = self._settings.switches_off_after_s and self._activity not in AT_FAULT
         if waits or renewed or (not given and self._activity is Activity.HANDSHAKE):
             send(self._bus, self._settings.start)
-
-
-def _code(answer: Mapping[str, Any], field: str, words: Mapping[str, int]) -> int | str:
-    """The maker's number for its state, or its word if `state_words` does not list it."""
-    code = json_fields.needed(answer, field)
-    if words and isinstance(code, str):
-        word = json_fields.clean(code, WORD_MAX)
-        return words.get(word, word)
-    if words or not isinstance(code, int) or isinstance(code, bool):
-        raise json_fields.wrong(field, code, "a text" if words else "a whole number")
-    if not 0 <= code <= CODE_MAX:
-        raise json_fields.wrong(field, code, f"0 to {CODE_MAX}")
-    return code
-
-
-def _error(answer: Mapping[str, Any], fields: Fields) -> tuple[str, FaultSide]:
-    """The station's words for its error, and whose they say that it is."""
-    said = json_fields.text(answer, fields.error_text)
-    means = fields.error_texts.get(said)
-    if means == "none":
-        return "", ""
-    return said, means or ""
-
-
-def _measured(answer: Mapping[str, Any], fields: Fields) -> Measured:
-    numbers = ("volts", "amps", "battery_percent", "time_to_full_s")
-    found = {name: _number(answer, getattr(fields, name)) for name in numbers}
-    percent, left_s = found["battery_percent"], found["time_to_full_s"]
-    if percent is not None and not 0 <= percent <= 100:
-        assert fields.battery_percent
-        raise json_fields.wrong(fields.battery_percent.field, percent, "0 to 100")
-    if left_s is not None and not 0 <= left_s <= 7 * 86400:
-        assert fields.time_to_full_s
-        raise json_fields.wrong(fields.time_to_full_s.field, left_s, "0 s to a week")
-    receiver = fields.receiver_id and json_fields.name(answer, fields.receiver_id)
-    return Measured(receiver_id=receiver, in_range=_in_range(answer, fields.in_range), **found)
-
-
-def _number(answer: Mapping[str, Any], number: Number | None) -> float | None:
-    return json_fields.number(answer, number.field, number.scale) if number else None
-
-
-def _in_range(answer: Mapping[str, Any], place: InRange | None) -> bool | None:
-    """Null means not in range."""
-    return None if place is None else json_fields.flag(answer, place)
 
 
 DRIVER = DriverType(

@@ -10,9 +10,11 @@ from typing import Final
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import ChargerOutputs, ChargerSample, Measured
 from bridges.core.fields import Name
+from bridges.core.table import Table
 from drivers import DriverError
 from drivers.charger import rules
 from drivers.charger.register_map import MEASURED, PROFILE, ChargerMap, Number, Problems
+from drivers.charger.register_tables import samples
 from drivers.charger.rules import judged
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
@@ -55,8 +57,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 def charger_map(settings: Settings) -> ChargerMap:
     """The map: the one in the YAML, or the profile's."""
-    found: ChargerMap = settings.map or PROFILE.load(settings.profile or "")
-    return found
+    return settings.map or PROFILE.load(settings.profile or "")
 
 
 def cells(settings: Settings) -> dict[str, list[Point]]:
@@ -100,6 +101,11 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
             yield name.replace("_", " "), f"{written[name]}: write {order.write}"
     yield from rules.rows(found.rules, found.errors)
     yield from found.codes.rows() if found.codes else ()
+
+
+def tables(settings: Settings) -> Iterator[Table]:
+    """Each value by a sample, to hold against the station's registers."""
+    yield samples(charger_map(settings), cells(settings))
 
 
 def warnings(settings: Settings) -> Problems:
@@ -223,6 +229,7 @@ DRIVER = DriverType(
     buses=("modbus",),
     create=create,
     describe=describe,
+    tables=tables,
     claims=claims,
     warnings=warnings,
     fake="hal_fakes.modbus.register_charger",

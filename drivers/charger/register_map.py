@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from bridges.core.fields import Name
+from bridges.settings.nodes import unknown
 from drivers.charger import rules as by_rules
 from drivers.charger.rules import Errors, Rule
 from drivers.charger.state_codes import Codes
@@ -49,7 +50,8 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         ):
             yield ("at",), "is one bit: leave words, signed and bit out"
         if self.bit is not None and self.bit >= 16 * self.words:
-            yield ("bit",), f"{self.words} registers have bits 0 to {16 * self.words - 1}"
+            have = "two registers have" if self.words == 2 else "a register has"
+            yield ("bit",), f"{have} bits 0 to {16 * self.words - 1}"
         if self.low_first and self.words == 1:
             yield ("low_first",), "is for two registers: words: 2"
 
@@ -142,7 +144,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     range_check: Order | None = None
 
     def problems(self) -> Problems:
-        """Names that are not in `values`; a map without a state."""
+        """Names that are not in `values`, or that nothing uses; a map without a state."""
         yield from by_rules.problems(self.rules, self.codes is not None)
         if self.codes and "state" not in self.values:
             yield ("values",), "needs 'state', of which codes speaks"
@@ -150,7 +152,12 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         looked_at += [(("errors", *path), at) for path, at in self.errors.places()]
         for path, name in looked_at:
             if name not in self.values:
-                yield path, f"'{name}' is no value of this map: {', '.join(self.values)}"
+                yield path, unknown("value", name, list(self.values))
+        used = {name for _, name in looked_at}
+        for name in self.values:
+            if name not in KNOWN and name not in used:
+                text = unknown("value", name, KNOWN)
+                yield ("values", name), f"{text}; rules and errors do not use it either"
         if self.range_check and "in_range" not in self.values:
             yield ("range_check",), "needs the value in_range: where is its result?"
 

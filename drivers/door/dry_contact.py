@@ -18,8 +18,8 @@ from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
-from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire
-from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, slow_alarms, unaccepted
+from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire, input_wires
+from drivers.unsafe import Unsafe, needlessly_accepted, slow_alarms, unaccepted, unsafe_wires
 
 DEBOUNCE_S: Final = 0.05
 
@@ -111,25 +111,12 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 def wires(settings: Settings) -> list[Wire]:
     """The wiring table, inputs first."""
-    inputs = [
-        Wire(
-            signal=signal,
-            direction="in",
-            point=contact.point,
-            active=contact.active,
-            pull=contact.pull,
-            debounce_s=DEBOUNCE_S if contact.debounce_s is None else contact.debounce_s,
-            path=("inputs", signal),
-        )
-        for signal in settings.inputs.__struct_fields__
-        if (contact := getattr(settings.inputs, signal)) is not None
-    ]
     relay = settings.outputs.hold_open
     flash = None
     if relay.flash is not None and settings.pulse is not None:
         flash = Flash(relay.flash, settings.pulse.on_s)
     path = ("outputs", "hold_open")
-    return [*inputs, Wire("hold_open", "out", relay.point, relay.active, path=path, flash=flash)]
+    return [*input_wires(settings.inputs, DEBOUNCE_S), relay.wire("hold_open", path, flash)]
 
 
 def debounce(settings: Settings) -> Mapping[str, float]:
@@ -157,8 +144,7 @@ def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
                 "a cut wire may read as a closed door; wire a contact that shuts with it",
             )
     yield from slow_alarms(w for w in wires(settings) if w.signal in ("fire", "obstruction"))
-    for signal in settings.accept_unsafe.keys() - {signal for signal, _, _ in _unsafe(settings)}:
-        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
+    yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if settings.feedback == "estimated":
         yield ("feedback",), "RMF is told OPEN or CLOSED by the clock, whatever the door does"
 
@@ -206,11 +192,7 @@ class DryContactDoor:
 
 
 def _unsafe(settings: Settings) -> Iterator[Unsafe]:
-    table = wires(settings)
-    for wire in table:
-        if wire.signal in CUT_MUST_READ:
-            yield from cut_must_read(wire, *CUT_MUST_READ[wire.signal])
-    yield from energised_at_boot(table)
+    return unsafe_wires(wires(settings), CUT_MUST_READ)
 
 
 DRIVER = DriverType(

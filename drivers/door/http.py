@@ -6,7 +6,7 @@ fails, only the relay's own timer can release the door. So `hold` sets that time
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 
@@ -17,9 +17,9 @@ from drivers import DriverError, json_fields
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, InsistentCalls, send, told
+from drivers.http_call import Call, InsistentCalls, claim, send, timer_unseen, told
 from drivers.json_fields import Flag
-from drivers.unsafe import Unsafe, unaccepted
+from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted
 
 HOLD: Final = "hold_open"
 Problems = Iterator[tuple[tuple[str, ...], str]]
@@ -92,6 +92,13 @@ def _unsafe(settings: Settings) -> Iterator[Unsafe]:
         yield HOLD, ("hold",), text
 
 
+def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """(command, path): a second door with these commands would release this one."""
+    yield claim(settings.hold), ("hold", "path")
+    if settings.release != settings.hold:
+        yield claim(settings.release), ("release", "path")
+
+
 def describe(settings: Settings, bus: http.Settings) -> Iterator[tuple[str, str]]:
     """Rows for `check`: what is read and what is sent."""
     api = http.base(bus.api_base)
@@ -120,8 +127,12 @@ def warnings(settings: Settings) -> Problems:
             "pull the network plug while the door is held, and see that it is released in this time"
         )
         yield ("switches_off_after_s",), text
-        if HOLD in settings.accept_unsafe:
-            yield ("accept_unsafe", HOLD), f"nothing is unsafe about {HOLD}: delete this"
+        if timer_unseen(settings.hold, settings.switches_off_after_s):
+            text = (
+                f"hold sets no timer of {settings.switches_off_after_s:g} s that can be seen in it"
+            )
+            yield ("hold", "path"), f"{text}: compare the two"
+    yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if settings.held is None:
         yield (), "held is not read: that the door was released is not verified"
     if settings.feedback == "estimated":
@@ -188,12 +199,12 @@ class HttpDoor:
         send(self._bus, self._settings.hold if on else self._settings.release, safe=not on)
         self._told = on
 
-    def _held(self, answer: Mapping[str, Any]) -> bool | None:
+    def _held(self, answer: Mapping[str, object]) -> bool | None:
         place = self._settings.held
         return None if place is None else json_fields.flag(answer, place)
 
 
-def decode(settings: Settings, answer: Mapping[str, Any]) -> DoorSample:
+def decode(settings: Settings, answer: Mapping[str, object]) -> DoorSample:
     """Decode the answer. Raises DriverError that names the field it cannot decode."""
 
     def said(place: Flag | None) -> bool | None:
@@ -210,6 +221,7 @@ DRIVER = DriverType(
     buses=("http",),
     create=create,
     describe=describe,
+    claims=claims,
     warnings=warnings,
     unwired=lambda settings: (HOLD,),
     fake="hal_fakes.http_door",

@@ -2,11 +2,11 @@
 
 The file or folder is named after the bus `type:` of the YAML and holds a `BUS`. A Bus belongs to one
 thread. Every failure is a HalError, raised within the bus's I/O timeout. After a failure the bus backs
-off for 0.5 to 30 s, during which calls fail at once: so a dead device costs the other devices on its
-bus at most one timeout per backoff.
+off for 0.5 to 30 s, during which calls fail at once. So a dead device costs the others on its bus at
+most one timeout per backoff.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
@@ -14,7 +14,7 @@ import msgspec
 
 from drivers.hal.points import HalError, Wire
 
-__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Remark", "Where"]
+__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Kept", "Remark", "Where"]
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
@@ -23,15 +23,22 @@ Remark = tuple[tuple[str, ...], str]
 
 
 class Where(NamedTuple):
-    """What a bus is in the building, by which two files are seen to mean the same.
+    """Where a bus is in the building: two files with the same `Where` use the same hardware.
 
-    `text`: as a person says it. `local`: it is this machine's own, as a serial port is. `clients`: how
-    many daemons it takes at once; None where that depends on its make.
+    `text`: its name for a person. `local`: it belongs to this machine, as a serial port does.
+    `clients`: how many daemons it takes at once; None if that depends on the make.
     """
 
     text: str
     local: bool
     clients: Literal["one", "many"] | None = "many"
+
+
+class Kept(NamedTuple):
+    """Remarks on outputs that keep their value when the daemon's machine or the network dies."""
+
+    warnings: Sequence[Remark] = ()
+    notes: Sequence[Remark] = ()
 
 
 class Bus:
@@ -60,11 +67,13 @@ class BusType(Generic[Settings]):
     """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, which needs no vendor library.
 
     `settings`: the struct below the bus's name in the YAML, with `scan_s` (how often it is read).
-    `open_bus(settings)`: raises HalError.
+    `open_bus(settings)`: makes the bus, which sends nothing yet. Raises HalError.
     `where(settings)`: what it is in the building; None where files never share it.
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
     far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it
     cannot leave the daemon's process, as pins cannot.
+    `kept(settings, places)`: which of these places, which the daemon writes, keep their value when its
+    machine or the network dies.
 
     A bus with points also has
     `canonical(point)`: the one spelling of a point; ValueError says what to write instead;
@@ -78,6 +87,7 @@ class BusType(Generic[Settings]):
     open_bus: Callable[[Settings], Bus]
     where: Callable[[Settings], Where | None] = lambda settings: None
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
+    kept: Callable[[Settings, Iterable[str]], Kept] = lambda settings, places: Kept()
     fake: str = ""
     fake_inside: bool = False
     canonical: Callable[[str], str] = str

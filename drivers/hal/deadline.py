@@ -11,13 +11,24 @@ import queue
 import socket
 import threading
 import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
     import ssl
 
-Resolve = Callable[..., list[Any]]
+    from _typeshed import ReadableBuffer, WriteableBuffer
+
+SocketAddress = tuple[str, int] | tuple[str, int, int, int] | tuple[int, bytes]
+Address = tuple[socket.AddressFamily, socket.SocketKind, int, str, SocketAddress]
+"""Family, kind, protocol, canonical name and address, as socket.getaddrinfo returns them."""
+
+
+class Resolve(Protocol):
+    """socket.getaddrinfo, or a test's."""
+
+    def __call__(self, host: str, port: int, *, type: int) -> Sequence[Address]:
+        """The addresses of this name. Raises OSError."""
 
 
 class Deadline:
@@ -47,15 +58,15 @@ class DeadlineSocket(socket.socket):
 
     deadline: Deadline
 
-    def recv_into(self, *args: Any, **kwargs: Any) -> int:
+    def recv_into(self, buffer: "WriteableBuffer", nbytes: int = 0, flags: int = 0) -> int:
         """As socket.recv_into. All of http.client's reading comes through here."""
         self.settimeout(self.deadline.left())
-        return super().recv_into(*args, **kwargs)
+        return super().recv_into(buffer, nbytes, flags)
 
-    def sendall(self, *args: Any, **kwargs: Any) -> None:
+    def sendall(self, data: "ReadableBuffer", flags: int = 0) -> None:
         """As socket.sendall, whose timeout already covers the whole send."""
         self.settimeout(self.deadline.left())
-        super().sendall(*args, **kwargs)
+        super().sendall(data, flags)
 
 
 def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
@@ -66,13 +77,15 @@ def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
     import ssl
 
     class DeadlineTls(ssl.SSLSocket):
-        def recv_into(self, *args: Any, **kwargs: Any) -> int:
+        def recv_into(
+            self, buffer: "WriteableBuffer", nbytes: int | None = None, flags: int = 0
+        ) -> int:
             self.settimeout(deadline.left())
-            return super().recv_into(*args, **kwargs)
+            return super().recv_into(buffer, nbytes, flags)
 
-        def send(self, *args: Any, **kwargs: Any) -> int:
+        def send(self, data: "ReadableBuffer", flags: int = 0) -> int:
             self.settimeout(deadline.left())
-            return super().send(*args, **kwargs)
+            return super().send(data, flags)
 
     return DeadlineTls
 
@@ -110,7 +123,7 @@ class Dialler:
         if descriptor != -1:
             os.close(descriptor)
 
-    def _first_of(self, addresses: list[Any]) -> socket.socket:
+    def _first_of(self, addresses: Sequence[Address]) -> socket.socket:
         failure = OSError("the name has no address")
         for n, address in enumerate(addresses):
             try:
@@ -119,7 +132,7 @@ class Dialler:
                 failure = error
         raise failure
 
-    def _connected(self, address: Any, timeout_s: float) -> socket.socket:
+    def _connected(self, address: Address, timeout_s: float) -> socket.socket:
         family, kind, protocol, _, where = address
         sock = DeadlineSocket(family, kind, protocol)
         sock.deadline = self.deadline
@@ -133,13 +146,13 @@ class Dialler:
             raise
         return sock
 
-    def _addresses(self) -> list[Any]:
+    def _addresses(self) -> Sequence[Address]:
         """The host's addresses. getaddrinfo has no timeout, so it runs in a thread."""
         if _is_numeric(self._host):
             return socket.getaddrinfo(self._host, self._port, type=socket.SOCK_STREAM)
         if self._lookup is not None and self._lookup.is_alive():
             raise TimeoutError("the name's last lookup has not ended yet")
-        answer: queue.SimpleQueue[list[Any] | OSError] = queue.SimpleQueue()
+        answer: queue.SimpleQueue[Sequence[Address] | OSError] = queue.SimpleQueue()
         self._lookup = threading.Thread(target=self._look_up, args=(answer,), daemon=True)
         self._lookup.start()
         try:
@@ -151,7 +164,7 @@ class Dialler:
             raise found
         return found
 
-    def _look_up(self, answer: "queue.SimpleQueue[list[Any] | OSError]") -> None:
+    def _look_up(self, answer: "queue.SimpleQueue[Sequence[Address] | OSError]") -> None:
         try:
             answer.put(self._resolve(self._host, self._port, type=socket.SOCK_STREAM))
         except OSError as error:

@@ -2,8 +2,8 @@
 
 Every call has one deadline from the lookup of the name to the last byte of the body
 (`drivers/hal/deadline.py`). The body is capped; proxies, redirects and compression are off. Each call
-has a connection of its own: replies have no numbers in HTTP/1.1, so on a kept one a second reply to the
-last request, or a late one, would be taken for the next one's. A call is sent once, whatever happens.
+has a connection of its own, because replies in HTTP/1.1 have no numbers: on a kept connection a late or
+second reply would be taken for the reply to the next request. A call is sent only once.
 """
 
 import os
@@ -11,11 +11,11 @@ import socket
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
-from bridges import secret_file
+from bridges import user_files
 from bridges.core.fields import AbsolutePath, Name, Period
 from drivers.hal import Bus, BusType, HalError, Where
 from drivers.hal.backoff import Backoff
@@ -27,6 +27,7 @@ __all__ = ["Base", "HttpBus", "Method", "Path", "Settings", "base"]
 
 if TYPE_CHECKING:
     from requests.adapters import HTTPAdapter
+    from urllib3 import BaseHTTPResponse
 
 BODY_MAX = 64 * 1024
 HEADERS = {
@@ -38,7 +39,7 @@ HEADERS = {
 JSON = {"Content-Type": "application/json"}
 
 Method = Literal["POST", "PUT", "GET"]
-"""How a command is sent. Some makes take them as a GET, with a query."""
+"""How a command is sent. Some makes take commands as a GET with a query."""
 Header = Annotated[
     str,
     msgspec.Meta(
@@ -110,11 +111,6 @@ def where(settings: Settings) -> Where:
     return Where(base(settings.api_base).url(""), local=False)
 
 
-def open_bus(settings: Settings) -> "HttpBus":
-    """The bus for this controller; it sends nothing yet."""
-    return HttpBus(settings)
-
-
 class HttpBus(Bus):
     """Calls to one controller. Every failure is a HalError that says what to check.
 
@@ -133,7 +129,7 @@ class HttpBus(Bus):
         self._adapter = _adapter(self._dialler, self._base.scheme)
         self._backoff, self._safe_backoff = (Backoff(clock, lambda: 0.0) for _ in range(2))
 
-    def get_json(self, path: str) -> dict[str, Any]:
+    def get_json(self, path: str) -> dict[str, object]:
         """GET `api_base` + `path`, which must answer 200 with one JSON object."""
         url = self._base.url(path)
         with self._attempt(self._backoff):
@@ -150,9 +146,6 @@ class HttpBus(Bus):
         url = self._base.url(path)
         with self._attempt(self._safe_backoff if safe else self._backoff):
             self._call(method, url, body)
-
-    def on_edge(self, wake: Callable[[], None]) -> None:
-        """A polled bus has no edges."""
 
     def insist(self) -> None:
         """Make the next call at once, without waiting for the backoff."""
@@ -210,8 +203,8 @@ class HttpBus(Bus):
         if file is None:
             return {}
         try:
-            token = secret_file.one_line("token_file", file, "token")
-        except secret_file.SecretError as error:
+            token = user_files.secret_line("token_file", file, "token")
+        except user_files.SecretError as error:
             raise HalError(str(error)) from None
         header = self._settings.token_header
         return {header: token} if header else {"Authorization": f"Bearer {token}"}
@@ -293,7 +286,7 @@ def _check_status(url: str, reads: bool, status: int) -> None:
     raise HalError(f"{url} answered status {status}: {hint}")
 
 
-def _capped(raw: Any) -> bytes:
+def _capped(raw: "BaseHTTPResponse") -> bytes:
     """The whole body, or one byte more than is allowed. Reading on to its end detects a cut body."""
     body = b""
     while len(body) <= BODY_MAX and (
@@ -312,7 +305,7 @@ def _cause(error: BaseException) -> str:
 
 BUS = BusType(
     settings=Settings,
-    open_bus=open_bus,
+    open_bus=HttpBus,
     fake="hal_fakes.http",
     where=where,
     warnings=warnings,

@@ -1,7 +1,7 @@
 """Decoding an answer's body, which must be one JSON object."""
 
 import json
-from typing import Any
+from typing import NoReturn
 
 from drivers.hal import HalError
 
@@ -11,7 +11,7 @@ def shown(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text[:80])
 
 
-def json_object(url: str, content_type: str, body: bytes) -> dict[str, Any]:
+def json_object(url: str, content_type: str, body: bytes) -> dict[str, object]:
     """The answer's JSON object. Raises HalError if it is anything else."""
     sort = content_type.partition(";")[0].strip().lower()
     if sort != "application/json" and not sort.endswith("+json"):
@@ -28,11 +28,11 @@ def json_object(url: str, content_type: str, body: bytes) -> dict[str, Any]:
     return found
 
 
-def _no_number(word: str) -> Any:
+def _no_number(word: str) -> NoReturn:
     raise ValueError(f"{word} is not JSON")
 
 
-def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _without_doubles(pairs: list[tuple[str, object]]) -> dict[str, object]:
     """Refuse an object with a duplicate key: which value counts is undefined."""
     found = dict(pairs)
     if len(found) < len(pairs):

@@ -34,6 +34,11 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     pull: Pull | None = None
     debounce_s: DebounceSeconds | None = None
 
+    def wire(self, signal: str, path: tuple[str, ...], debounce_s: float | None) -> "Wire":
+        """Its row of the wiring table; `debounce_s` is the default."""
+        own_s = debounce_s if self.debounce_s is None else self.debounce_s
+        return Wire(signal, "in", self.point, self.active, self.pull, own_s, path)
+
 
 class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One relay or line that is driven. Its safe level is always not asserted.
@@ -44,6 +49,16 @@ class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     point: Point
     active: Active
+
+    def wire(self, signal: str, path: tuple[str, ...], flash: "Flash | None" = None) -> "Wire":
+        """Its row of the wiring table."""
+        return Wire(signal, "out", self.point, self.active, path=path, flash=flash)
+
+
+def input_wires(inputs: msgspec.Struct, debounce_s: float | None = None) -> list["Wire"]:
+    """The rows of a YAML's `inputs`: each field that is an Input; `debounce_s` is the default."""
+    fields = ((signal, getattr(inputs, signal)) for signal in inputs.__struct_fields__)
+    return [line.wire(s, ("inputs", s), debounce_s) for s, line in fields if line is not None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,14 @@ from drivers.lift import codes
 from drivers.lift.broken_lines import floor_warnings, unsafe_codes
 from drivers.lift.table import MOTION, input_rows, wires
 from drivers.lift.wiring import FloorCode, LiftWiring
-from drivers.unsafe import Unsafe, cut_must_read, energised_at_boot, slow_alarms, unaccepted
+from drivers.unsafe import (
+    Unsafe,
+    cut_must_read,
+    energised_at_boot,
+    needlessly_accepted,
+    slow_alarms,
+    unaccepted,
+)
 
 Problem = tuple[tuple[str, ...], str]
 """Where it is (path below the device), and what is wrong and how to fix it."""
@@ -47,9 +54,7 @@ def warnings(wiring: LiftWiring) -> Iterator[Problem]:
     confused = floor_warnings(wiring.floor_code, table)
     if confused:
         yield ("floor_code",), f"{confused}: ask for a parity line, or for codes two lines apart"
-    needed = {signal for signal, _, _ in unsafe(wiring)}
-    for signal in wiring.accept_unsafe.keys() - needed:
-        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
+    yield from needlessly_accepted(unsafe(wiring), wiring.accept_unsafe)
 
 
 def missing(

@@ -4,7 +4,6 @@ The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 """
 
 from collections.abc import Iterable, Mapping
-from typing import cast
 
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from drivers.driver_type import DriverType
@@ -59,9 +58,9 @@ def debounce(settings: Settings) -> Mapping[str, float]:
     return lift_table.debounce(settings)
 
 
-def create(name: str, settings: Settings, bus: object) -> "LiftDryContact":
+def create(name: str, settings: Settings, bus: PointsBus) -> "LiftDryContact":
     """The lift's driver on its GPIO or Modbus bus; it touches nothing before `open`."""
-    return LiftDryContact(settings, cast(PointsBus, bus))
+    return LiftDryContact(settings, bus)
 
 
 class LiftDryContact:
@@ -134,7 +133,7 @@ def decode(
 def _service(inputs: Inputs, shown: Mapping[str, bool]) -> str | None:
     if inputs.service is None:
         return None
-    return inputs.service.means(_number("service", len(inputs.service.bits), shown))
+    return inputs.service.means(codes.shown_number("service", shown, len(inputs.service.bits)))
 
 
 def _agv(inputs: Inputs, shown: Mapping[str, bool], service: str | None) -> bool | None:
@@ -164,16 +163,10 @@ def _motion(inputs: Inputs, shown: Mapping[str, bool]) -> Motion | None:
     if inputs.up:
         return UP_DOWN[shown["up"], shown["down"]]
     if inputs.motion:
-        number = _number("motion", len(inputs.motion.bits), shown)
+        number = codes.shown_number("motion", shown, len(inputs.motion.bits))
         known = inputs.motion.codes.get(number)
         return Motion(known) if known else Motion.CONTRADICTORY
     return None
-
-
-def _number(prefix: str, width: int, shown: Mapping[str, bool]) -> int:
-    number = codes.decode("binary", [shown[f"{prefix}_bit{i}"] for i in range(width)])
-    assert number is not None  # binary shows any number
-    return number
 
 
 DRIVER = DriverType(

@@ -7,14 +7,15 @@ number that the map does not list is a fault; it never means a floor, an open do
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
+from bridges.core.table import Table
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import Lines
 from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
-from drivers.lift import checks
-from drivers.lift.register_map import Flag, FloorField, LiftMap, Number, Problems
+from drivers.lift import checks, register_tables
+from drivers.lift.register_map import Flag, LiftMap, Number, Problems
 from drivers.lift.table import DEBOUNCE_S, HAZARD_DEBOUNCE_S
 
 DOOR: Final = {"open": Door.OPEN, "closed": Door.CLOSED, "moving": Door.BETWEEN}
@@ -96,18 +97,21 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
-    """Rows for `check`: each part of the map, its place, and what its numbers mean."""
+    """Rows for `check`: the place of each part of the map, and of each command."""
     for name, part in settings.map.parts().items():
         yield name, f"{at(settings.unit, part.at)}{_meaning(part)}"
     commands = settings.map.commands
     for signal, _, command in commands.singles():
-        yield (
-            signal,
-            f"{at(settings.unit, command.at)}: {command.ask} asks, {command.release} releases",
-        )
+        yield signal, f"{at(settings.unit, command.at)} is written"
     if commands.call:
-        codes = ", ".join(f"{number} {level}" for number, level in commands.call.codes.items())
-        yield "call", f"{at(settings.unit, commands.call.at)}: {codes}, {commands.call.none} none"
+        yield "call", f"{at(settings.unit, commands.call.at)} is written"
+    if not commands.read_back:
+        yield "commands", "written in every scan, and never read back"
+
+
+def tables(settings: Settings) -> Iterator[Table]:
+    """The floors, what each number means, and what is written."""
+    return register_tables.tables(settings, settings.map)
 
 
 def _meaning(part: Number | Flag) -> str:
@@ -115,11 +119,7 @@ def _meaning(part: Number | Flag) -> str:
     if isinstance(part, Flag):
         bit = "" if part.bit is None else f" bit {part.bit}"
         return f"{bit}: asserted at {int(part.active == 'high')}{text}"
-    bits = f" bits {', '.join(map(str, part.bits))}" if part.bits else ""
-    codes = [f"{number} {meaning}" for number, meaning in sorted(part.codes.items())]
-    if isinstance(part, FloorField):
-        codes += [f"{number} between floors" for number in part.between_floors]
-    return f"{bits}: {', '.join(codes)}{text}"
+    return (f" bits {', '.join(map(str, part.bits))}" if part.bits else "") + text
 
 
 def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterLift":
@@ -233,6 +233,7 @@ DRIVER = DriverType(
     create=create,
     debounce=debounce,
     describe=describe,
+    tables=tables,
     claims=claims,
     warnings=warnings,
     notes=notes,

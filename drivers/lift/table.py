@@ -47,14 +47,8 @@ def output_rows(wiring: LiftWiring) -> Iterator[tuple[str, tuple[str, ...], Outp
 def wires(wiring: LiftWiring) -> list[Wire]:
     """The wiring table, inputs first, with default debounces filled in."""
     return [
-        *(
-            Wire(signal, "in", line.point, line.active, line.pull, _debounce_s(signal, line), path)
-            for signal, path, line in input_rows(wiring)
-        ),
-        *(
-            Wire(signal, "out", line.point, line.active, path=path)
-            for signal, path, line in output_rows(wiring)
-        ),
+        *(line.wire(s, path, _debounce_s(s, line)) for s, path, line in input_rows(wiring)),
+        *(line.wire(signal, path) for signal, path, line in output_rows(wiring)),
     ]
 
 

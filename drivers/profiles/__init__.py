@@ -11,7 +11,7 @@ It is parsed like a device YAML, so each problem has its file, line and column.
 import functools
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Generic, TypeVar
 
 import msgspec
 from msgspec.inspect import LiteralType
@@ -22,11 +22,13 @@ from bridges.settings.values import BROKEN, Spot, Values
 from drivers.profiles import texts
 from drivers.profiles.texts import FOLDER
 
+Content = TypeVar("Content", bound=msgspec.Struct, covariant=True)
 
-class Profile:
+
+class Profile(Generic[Content]):
     """One type of profile. `reader`: its `for:`; `key`: where its content is; `content`: its struct."""
 
-    def __init__(self, reader: str, key: str, content: type[msgspec.Struct]) -> None:
+    def __init__(self, reader: str, key: str, content: type[Content]) -> None:
         self.reader = reader
         self.key = key
         self._content = content
@@ -37,15 +39,17 @@ class Profile:
         files = sorted({*folder.glob("*.yaml"), *texts.known_in(folder)})
         return [f.stem for f in files if f.suffix == ".yaml" and first in _lines(f)]
 
-    def load(self, name: str, folder: Path = FOLDER) -> Any:
+    def load(self, name: str, folder: Path = FOLDER) -> Content:
         """A profile's content, as its struct. Raises SettingsError with every problem of the file."""
-        return self._read(folder / f"{name}.yaml")[self.key]
+        found = self._read(folder / f"{name}.yaml")[self.key]
+        assert isinstance(found, self._content)
+        return found
 
     def untried(self, name: str) -> bool:
         """Is it for a real make, and not yet tried on its hardware?"""
-        return bool(self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried")
+        return self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried"
 
-    def _read(self, file: Path) -> dict[str, Any]:
+    def _read(self, file: Path) -> dict[str, object]:
         text = texts.text(file, lambda: read(str(file)))
         return _understood(str(file), text, self.reader, self.key, self._content)
 
@@ -57,11 +61,11 @@ def _lines(file: Path) -> list[str]:
 @functools.cache
 def _understood(
     file: str, text: bytes, reader: str, key: str, content: type[msgspec.Struct]
-) -> dict[str, Any]:
+) -> dict[str, object]:
     page = Page(file)
     root = compose(page, text)
     spot, values = Spot(root, root, "the file"), Values(page)
-    types: dict[str, Any] = {
+    types: dict[str, object] = {
         "for": LiteralType((reader,)),
         "hardware": LiteralType(("tried", "untried", "none")),
         "source": Name,
@@ -75,7 +79,7 @@ def _understood(
 
 
 def profile_problems(
-    sort: Profile, name: str | None, inline: object
+    sort: Profile[msgspec.Struct], name: str | None, inline: object
 ) -> Iterator[tuple[tuple[str, ...], str]]:
     """Problems of `profile:` and of the key that may replace it (`map`)."""
     if name is None and inline is None:
@@ -87,7 +91,7 @@ def profile_problems(
         yield from _named(sort, name)
 
 
-def _named(sort: Profile, name: str) -> Iterator[tuple[tuple[str, ...], str]]:
+def _named(sort: Profile[msgspec.Struct], name: str) -> Iterator[tuple[tuple[str, ...], str]]:
     if name not in sort.names():
         yield ("profile",), unknown("profile", name, sort.names())
         return

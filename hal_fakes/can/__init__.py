@@ -14,9 +14,7 @@ from hal_fakes.fake import Outside
 
 def serve(settings: Settings, stations: Sequence[Station]) -> CanSide:
     """Serve the chargers of this bus on a pseudo-terminal."""
-    place = settings.slcan
-    known = {name: getattr(place, name) for name in place.__struct_fields__} if place else {}
-    return CanSide(SlcanPort(known), stations, slow_s(settings))
+    return CanSide(SlcanPort(settings.slcan), stations, slow_s(settings))
 
 
 FAKE = Outside(serve)

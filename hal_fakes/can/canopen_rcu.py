@@ -10,14 +10,14 @@ A node that is switched off loses `enable`, and says that it starts when it is b
 """
 
 import time
-from typing import Any, Final, cast
+from typing import Final
 
 import can
 import canopen
 from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 
 from drivers.charger.canopen import HEARTBEAT_S, OBJECTS, Settings
-from hal_fakes.can.side import Send, slow_s
+from hal_fakes.can.side import Send
 from hal_fakes.fake import Fake
 from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
@@ -30,12 +30,11 @@ NAMES: Final = {(found.index, found.subindex): name for name, found in OBJECTS.i
 
 
 class CanOpenRcu:
-    """A station (`hal_fakes.can.side.Station`). `slow_s`: how late a slow answer comes."""
+    """A station (`hal_fakes.can.side.Station`)."""
 
-    def __init__(self, plant: Plant, node: int, slow_s: float) -> None:
+    def __init__(self, plant: Plant, node: int) -> None:
         self.plant = plant
         self._id = node
-        self._slow_s = slow_s
         self._latched = 0
         self._beat_at = float("-inf")
         self._was_off = False
@@ -44,7 +43,7 @@ class CanOpenRcu:
         self._node.associate_network(self._network)
         self._node.add_read_callback(self._read)  # type: ignore[no-untyped-call]
         self._node.add_write_callback(self._write)  # type: ignore[no-untyped-call]
-        self._send: Send = lambda message: None
+        self._send: Send | None = None
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
         """A request, if it is for this node."""
@@ -77,16 +76,16 @@ class CanOpenRcu:
             answer = answer[:5]
         elif mode == "wrong":
             answer = answer[:3] + bytes((answer[3] ^ 0x40,)) + answer[4:]
-        message = frame(can_id, answer)
-        if mode == "slow":
-            message.timestamp = time.monotonic() + self._slow_s
-        self._send(message)
+        assert self._send  # it answers nobody but who asks
+        self._send(frame(can_id, answer), late=mode == "slow")
 
     def _reading(self) -> PadReading:
         self.plant.advance(time.monotonic())
-        return cast(PadReading, self.plant.sense("reading"))
+        reading = self.plant.reading()
+        assert isinstance(reading, PadReading)
+        return reading
 
-    def _read(self, index: int, subindex: int, od: Any) -> int | None:
+    def _read(self, index: int, subindex: int, od: object) -> int | None:
         at = (index, subindex)
         name = NAMES.get(at)
         if name is None or name in SIGNALS:
@@ -95,7 +94,7 @@ class CanOpenRcu:
         self._latched = found["latched_high"] << 16 | found["latched_low"]
         return found[name]
 
-    def _write(self, index: int, subindex: int, od: Any, data: bytes) -> None:
+    def _write(self, index: int, subindex: int, od: object, data: bytes) -> None:
         if (name := NAMES.get((index, subindex))) in SIGNALS:
             self.plant.drive(name, bool(data[0]), time.monotonic())
 
@@ -107,7 +106,7 @@ class _Network(canopen.Network):
         super().__init__()
         self._rcu = rcu
 
-    def send_message(self, can_id: int, data: Any, remote: bool = False) -> None:
+    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         """An answer of the node's."""
         self._rcu.reply(can_id, bytes(data))
 
@@ -117,7 +116,7 @@ def frame(can_id: int, payload: bytes) -> can.Message:
     return can.Message(arbitration_id=can_id, is_extended_id=False, data=payload)
 
 
-def dictionary() -> Any:
+def dictionary() -> canopen.ObjectDictionary:
     """The RCU's published objects."""
     made = canopen.ObjectDictionary()  # type: ignore[no-untyped-call]
     for found in OBJECTS.values():
@@ -125,12 +124,13 @@ def dictionary() -> Any:
             made.add_object(ODRecord(f"objects {found.index:04X}", found.index))
         variable = ODVariable(str(found), found.index, found.subindex)
         variable.data_type = TYPES[found.octets]
-        record: Any = made[found.index]
+        record = made[found.index]
+        assert isinstance(record, ODRecord)
         record.add_member(variable)
     return made
 
 
 FAKE = Fake[Settings](
     plant=lambda name, settings, wires: PadPlant(name),
-    station=lambda plant, settings, bus: CanOpenRcu(plant, settings.node, slow_s(bus)),
+    station=lambda plant, settings: CanOpenRcu(plant, settings.node),
 )

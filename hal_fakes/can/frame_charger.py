@@ -1,7 +1,7 @@
-"""A charger that speaks frames of its maker's, by the same map as the driver's, with a plant behind.
+"""A charger with its maker's own CAN frames, by the driver's map, with a plant behind it.
 
-It charges while it is fed: while every frame that its map wants comes, at the pace of the map, and says
-what `on` means. It stops when one says what `off` means, and when one stays away for three periods.
+It charges while every frame of its map comes on time with the values of `on`. It stops when a frame has
+the values of `off`, or when one stays away for three periods.
 
 Failing part `node`, beside those of the plant and the bus: `off` is silent, `stuck` says what it said
 before, `slow` says it every two seconds, `garbage` sends frames of six bytes, `wrong` a state of no
@@ -10,15 +10,17 @@ list.
 
 import time
 from collections.abc import Mapping
-from typing import Final, cast
+from typing import Final
 
 import can
 
-from bridges.charger.signals import Activity
+from bridges.charger.signals import Activity, FaultSide
 from drivers.charger import dbc
 from drivers.charger.can_frames import Settings, frame_map
-from drivers.charger.can_map import FrameMap, Sent
+from drivers.charger.can_map import FrameMap, Sent, State
+from drivers.charger.rules import UNKNOWN, Errors
 from hal_fakes.can.side import Send
+from hal_fakes.charger_values import NEAREST, values
 from hal_fakes.fake import Fake
 from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
@@ -40,6 +42,7 @@ FLAGS: Final = {
     "too_near": "BadCoilPosition",
 }
 """Which error signal shows what is wrong with the plant; none is published for foreign objects."""
+ROBOTS_FAULTS: Final = frozenset(FLAGS) - {"transmitter_fault", "foreign_object"}
 
 
 class FrameCharger:
@@ -95,7 +98,8 @@ class FrameCharger:
 
     def _message(self, frame: str, wrong: bool) -> can.Message:
         self.plant.advance(time.monotonic())
-        reading = cast(PadReading, self.plant.sense("reading"))
+        reading = self.plant.reading()
+        assert isinstance(reading, PadReading)
         values = dict.fromkeys(self._dbc.signals(frame), 0.0) | {
             signal.split(".")[1]: value
             for signal, value in self._values(reading, wrong).items()
@@ -110,38 +114,50 @@ class FrameCharger:
 
     def _values(self, reading: PadReading, wrong: bool) -> dict[str, float]:
         known = self._map
-        values = {known.state.at: float(self._unknown() if wrong else self._code(reading))}
+        shown = {FLAGS[fault] for fault in reading.faults}
+        said: dict[str, float] = {}
+        if known.state:
+            state = self._unknown(known.state) if wrong else self._code(known.state, reading)
+            said[known.state.at] = float(state)
         for signal, value in (
             (known.volts, reading.volts),
             (known.amps, reading.amps),
             (known.receiver, float(self._seen(reading))),
         ):
             if signal:
-                values[signal] = round(value, 1)
-        shown = {FLAGS[fault] for fault in reading.faults}
+                said[signal] = round(value, 1)
         for signal in (*known.errors.station, *known.errors.robot):
-            values[signal] = float(signal.split(".")[1] in shown)
+            said[signal] = float(signal.split(".")[1] in shown)
         if known.out_of_range:
-            values[known.out_of_range] = float(reading.robot and not reading.in_range)
-        return values
+            said[known.out_of_range] = float(reading.robot and not reading.in_range)
+        return said | self._by_rules(reading, said, wrong)
+
+    def _by_rules(
+        self, reading: PadReading, natural: Mapping[str, float], wrong: bool
+    ) -> dict[str, float]:
+        """What the signals of rules, error numbers and error flags hold."""
+        known = self._map
+        flags = (*known.errors.station, *known.errors.robot)
+        numbers = Errors(codes=known.errors.codes, bits=known.errors.bits)
+        in_error = reading.activity is Activity.ERROR
+        side: FaultSide = "robot" if in_error and reading.faults & ROBOTS_FAULTS else ""
+        wanted = UNKNOWN if wrong else (reading.activity, side)
+        found = values(known.rules, numbers, wanted, natural)
+        found = values(known.rules, numbers, UNKNOWN, natural) if found is None else found
+        return {at: float(value) for at, value in (found or {}).items() if at not in flags}
 
     def _seen(self, reading: PadReading) -> int:
         """The id of the receiver on the pad; 0 if there is none."""
         return STRANGER if reading.stranger else self._receiver if reading.robot else 0
 
-    def _code(self, reading: PadReading) -> int:
+    def _code(self, state: State, reading: PadReading) -> int:
         """The first code of the plant's activity, or of the nearest one that the map has."""
-        lists = self._map.state.codes.lists()
-        nearest = {
-            Activity.HANDSHAKE: Activity.IDLE,
-            Activity.STOPPING: Activity.CHARGING,
-            Activity.RELEASED: Activity.IDLE,
-        }
-        codes = lists[reading.activity] or lists[nearest.get(reading.activity, Activity.ERROR)]
+        lists = state.codes.lists()
+        codes = lists[reading.activity] or lists[NEAREST.get(reading.activity, Activity.ERROR)]
         return codes[0]
 
-    def _unknown(self) -> int:
-        known = self._map.state.codes.meanings()
+    def _unknown(self, state: State) -> int:
+        known = state.codes.meanings()
         return next(code for code in range(15, -1, -1) if code not in known)
 
 
@@ -155,5 +171,5 @@ def _short(message: can.Message) -> can.Message:
 
 FAKE = Fake[Settings](
     plant=lambda name, settings, wires: PadPlant(name),
-    station=lambda plant, settings, bus: FrameCharger(plant, settings),
+    station=lambda plant, settings: FrameCharger(plant, settings),
 )

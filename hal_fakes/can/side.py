@@ -15,8 +15,8 @@ import itertools
 import random
 import threading
 import time
-from collections.abc import Callable, Sequence
-from typing import Any, Final, Protocol
+from collections.abc import Sequence
+from typing import Final, Protocol
 
 import can
 
@@ -24,10 +24,10 @@ from drivers.hal.can import Settings
 from hal_fakes.plants.plant import FailureMode, Plant
 
 LOOK_S: Final = 0.02
-"""The longest delay of an ordered failure, of heartbeats and of status frames."""
+"""How late an ordered failure, a heartbeat or a status frame may be (s)."""
 BUS_OFF: Final = 0x40
 SLOWNESS: Final = 1.5
-"""How many of the client's time limits a slow answer takes."""
+"""How many of the client's timeouts a slow answer takes."""
 
 
 def slow_s(settings: Settings) -> float:
@@ -36,24 +36,28 @@ def slow_s(settings: Settings) -> float:
 
 
 class Medium(Protocol):
-    """How frames come and go. `replace`: what must stand in the bus's settings instead."""
+    """The wire. `replace`: what to write into the bus's settings instead."""
 
-    replace: dict[str, Any]
+    replace: dict[str, object]
 
     def receive(self, wait_s: float) -> can.Message | None:
-        """The next frame from the daemon, if one comes in time."""
+        """The next frame from the daemon; None if none comes within `wait_s`."""
 
     def send(self, message: can.Message) -> None:
-        """To the daemon; lost when nobody has it open."""
+        """Send to the daemon. The frame is lost if no program has the bus open."""
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Work (None), or be `off`, `garbage` or `wrong`, from now on. Called often."""
+        """From now on work (None) or fail in this way. Called often."""
 
     def close(self) -> None:
         """End. May be called twice."""
 
 
-Send = Callable[[can.Message], None]
+class Send(Protocol):
+    """How a station sends."""
+
+    def __call__(self, message: can.Message, late: bool = False) -> None:
+        """Send now; `late`: after the daemon has stopped waiting for it."""
 
 
 class Station(Protocol):
@@ -62,7 +66,7 @@ class Station(Protocol):
     plant: Plant
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """A frame from the daemon. What is sent goes out at its `timestamp` (monotonic s), if later."""
+        """A frame from the daemon."""
 
     def tick(self, now: float, send: Send) -> None:
         """Send what is due; called often."""
@@ -72,7 +76,7 @@ class VirtualBus:
     """python-can's `virtual` bus: `channel` names it for whoever opens it as well."""
 
     def __init__(self, channel: str) -> None:
-        self.replace: dict[str, Any] = {}
+        self.replace: dict[str, object] = {}
         self._bus: can.BusABC | None = can.Bus(channel, interface="virtual")
         self._noise = random.Random("can")
         self._off_told = False
@@ -113,9 +117,9 @@ def any_frame(noise: random.Random) -> can.Message:
 
 
 class CanSide:
-    """The running far side. `replace`: what must stand in the bus's settings instead.
+    """A running far side. `replace`: what to write into the bus's settings instead.
 
-    `slow_s`: how late a slow bus's frames come.
+    `slow_s`: how late a frame comes that is sent late, or on a slow bus.
     """
 
     def __init__(self, medium: Medium, stations: Sequence[Station], slow_s: float) -> None:
@@ -158,12 +162,11 @@ class CanSide:
         return min(LOOK_S, max(0.0, next_at - time.monotonic()))
 
     def _post(self, mode: FailureMode | None, now: float) -> Send:
-        at = now + (self._slow_s if mode == "slow" else 0.0)
-        return lambda message: self.put(message, max(at, message.timestamp))
+        def post(message: can.Message, late: bool = False) -> None:
+            at = now + (self._slow_s if late or mode == "slow" else 0.0)
+            heapq.heappush(self._due, (at, next(self._order), message))
 
-    def put(self, message: can.Message, at: float) -> None:
-        """Have it sent at this time (monotonic s)."""
-        heapq.heappush(self._due, (at, next(self._order), message))
+        return post
 
     def _say(self, passes: bool) -> None:
         while self._due and self._due[0][0] <= time.monotonic():

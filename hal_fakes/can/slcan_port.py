@@ -3,20 +3,21 @@
     t123 2 0102 CR     frame 0x123 with two bytes; T and eight digits: with 29 bits
     Sn CR, O CR, C CR  bitrate, open, close
 
-It answers a frame that it takes with `z` or `Z`, and passes frames only while it is open.
+It acknowledges a frame with `z` or `Z`, and passes frames only while it is open.
 """
 
 import os
 import random
 import select
 import tempfile
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import can
+import msgspec
 
+from drivers.hal.can import Slcan
 from hal_fakes.can.side import any_frame
 from hal_fakes.modbus.rtu import Adapter
 from hal_fakes.plants.plant import FailureMode
@@ -27,12 +28,13 @@ DIGITS: Final = {"t": 3, "T": 8}
 class SlcanPort:
     """A medium (`hal_fakes.can.side.Medium`). `settings`: the bus's own `slcan`, if it has one."""
 
-    def __init__(self, settings: Mapping[str, Any]) -> None:
+    def __init__(self, settings: Slcan | None = None) -> None:
         self._directory = tempfile.TemporaryDirectory(prefix="rmf-slcan-")
         self.adapter = Adapter(Path(self._directory.name) / "adapter")
         self.adapter.plug()
-        place = {"bitrate": 250_000, **settings, "port": str(self.adapter.path)}
-        self.replace = {"socketcan": None, "slcan": place}
+        found = settings or Slcan(port="", bitrate=250_000)
+        place = msgspec.structs.replace(found, port=str(self.adapter.path))
+        self.replace = {"socketcan": None, "slcan": msgspec.to_builtins(place)}
         self._noise = random.Random("slcan")
         self._others = False
         self._heard = b""
@@ -58,7 +60,7 @@ class SlcanPort:
             self._write(encoded(message))
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Pulled out, noisy, or among strangers."""
+        """`off` pulls the adapter out, `garbage` sends noise, `wrong` passes only others' frames."""
         if (mode == "off") != (self.adapter.wire is None):
             self._heard, self._open = b"", False
             (self.adapter.pull if mode == "off" else self.adapter.plug)()
@@ -93,14 +95,14 @@ class SlcanPort:
 
 
 def encoded(message: can.Message) -> bytes:
-    """A frame as an adapter says it."""
+    """The line for a frame."""
     letter = "T" if message.is_extended_id else "t"
     digits = f"{message.arbitration_id:0{DIGITS[letter]}X}"
     return f"{letter}{digits}{message.dlc}{bytes(message.data).hex().upper()}\r".encode()
 
 
 def decoded(line: str) -> can.Message:
-    """A line as a frame. Raises ValueError, IndexError."""
+    """The frame in a line. Raises ValueError, IndexError."""
     size = DIGITS[line[0]]
     count = int(line[1 + size])
     data = bytes.fromhex(line[2 + size : 2 + size + 2 * count])

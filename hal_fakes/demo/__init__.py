@@ -1,11 +1,11 @@
-"""`make demo` and `make demo-charging`: daemons on fake hardware, each a process, and RMF, on real DDS.
+"""`make demo` and `make demo-charging`: daemons on fake hardware and RMF, on a real wire.
 
 `python -m hal_fakes.demo` starts the daemons of one demo and plays RMF to them: a robot goes through a
 door, rides a lift and charges (`ride`), or three robots share two chargers (`charging`).
 
     daemons.py   the daemons' processes, and the control sockets of their plants
     journal.py   what happened, and how it is printed
-    stage.py     what a demo is, and the one way out of it, however it ends
+    stage.py     starts the daemons, plays the day, and stops everything however it ends
     world.py     RMF on the graph: what is heard, said and awaited
     ride.py      the robot's day, and whether it went right
     charging.py  the chargers' day, and whether it went right

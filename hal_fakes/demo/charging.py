@@ -8,7 +8,7 @@ request, two robots too many, a robot at the wrong charger, and a charger that o
 from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from bridges.charger_coordinator.settings import Settings
 from bridges.rmf import definitions as d
@@ -18,7 +18,7 @@ from bridges.settings.load import load
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.stage import Demo
 from hal_fakes.demo.world import World
-from hal_fakes.rmf import Said
+from hal_fakes.rmf import Party, Said
 from hal_fakes.rmf.fleet import Fleet, FleetRobot
 
 FLEET: Final = "tiny"
@@ -31,7 +31,7 @@ HERE = Path(__file__).parent
 COORDINATOR = HERE.parents[1] / "config" / "charger_coordinator.yaml"
 
 
-class Yard:
+class Yard(Party):
     """The fleet and the pads. A robot that arrives at a charger's waypoint stands on that charger's
     pad, and its battery fills while the charger says that it charges."""
 
@@ -50,7 +50,7 @@ class Yard:
 
     # ---- a party on RMF's side
 
-    def hear(self, message: Any, now: float) -> list[Said]:
+    def hear(self, message: d.Message, now: float) -> list[Said]:
         """Charging assignments."""
         return self.fleet.hear(message, now)
 

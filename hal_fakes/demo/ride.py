@@ -4,7 +4,7 @@ it; and whether it went right, from the journal alone."""
 from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
@@ -138,7 +138,7 @@ def _relays(journal: Journal) -> Iterable[str]:
             yield f"{device}'s relays: {_edges(seen)}; expected {_edges(expected)}"
 
 
-def _edges(edges: Iterable[tuple[str, Any]]) -> str:
+def _edges(edges: Iterable[tuple[str, object]]) -> str:
     return ", ".join(f"{signal} {'on' if value else 'off'}" for signal, value in edges) or "none"
 
 

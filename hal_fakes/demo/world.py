@@ -8,12 +8,13 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
-from typing import Any, Final
+from typing import Final
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Publisher, Transport
+from bridges.rmf.words import Requested, Stated
 from hal_fakes.demo.daemons import Daemon, Wrong
 from hal_fakes.demo.journal import SETTLES_S, Journal
 from hal_fakes.plants.plant import Edge
@@ -62,8 +63,8 @@ class World:
         self._parties: list[Party] = []
         self._check = check
         self._transport = transport
-        self._inbox: SimpleQueue[tuple[float, AnyTopic | None, Any]] = SimpleQueue()
-        self._publishers: dict[str, Publisher[Any]] = {
+        self._inbox: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._publishers: dict[str, Publisher[d.Message]] = {
             topic.name: transport.publisher(topic) for topic in PUBLISHED
         }
         self._heard: set[str] = set()
@@ -73,7 +74,7 @@ class World:
 
     def edge(self, edge: Edge) -> None:
         """A plant's edge; from any thread."""
-        self._inbox.put((edge.at, None, edge))
+        self._inbox.put(lambda: self.journal.edge(edge))
 
     def join(self, *parties: Party) -> None:
         """Somebody on RMF's side takes part from now on."""
@@ -115,7 +116,8 @@ class World:
         """Publish these messages, and note those to a daemon in the journal."""
         for topic, message in said:
             if topic in TO_DAEMONS:
-                self.journal.request(message, time.monotonic())  # type: ignore[arg-type]
+                assert isinstance(message, Requested)
+                self.journal.request(message, time.monotonic())
             self._publishers[topic.name].publish(message)
 
     def press(self, device: str, signal_name: str, on: bool) -> None:
@@ -170,26 +172,23 @@ class World:
             if party.wake_at() <= time.time():
                 self.say(party.tick(time.time()))
         try:
-            at, topic, what = self._inbox.get(timeout=timeout_s)
+            taken = self._inbox.get(timeout=timeout_s)
         except Empty:
             pass
         else:
-            self._take(at, topic, what)
+            taken()
         self.journal.flush(time.monotonic() - SETTLES_S)
 
-    def _take(self, at: float, topic: AnyTopic | None, what: Any) -> None:
-        if topic is None:
-            self.journal.edge(what)
-            return
-        self._journal(at, topic, what)
+    def _take(self, at: float, topic: AnyTopic, message: d.Message) -> None:
+        self._journal(at, topic, message)
         for party in self._parties:
             if topic in party.subscribes:
-                self.say(party.hear(what, time.time()))
+                self.say(party.hear(message, time.time()))
 
-    def _journal(self, at: float, topic: AnyTopic, message: Any) -> None:
-        if topic in STATES:
+    def _journal(self, at: float, topic: AnyTopic, message: d.Message) -> None:
+        if isinstance(message, Stated):
             self.journal.state(message, at)
-        elif topic in TO_DAEMONS:
+        elif isinstance(message, Requested) and topic in TO_DAEMONS:
             self.journal.request(message, at)
         elif isinstance(message, d.ChargingAssignments):
             self._sent(message, at)
@@ -210,8 +209,9 @@ class World:
                 self._heard.add(topic.name)
                 self._transport.subscribe(topic, self._to_inbox(topic))
 
-    def _to_inbox(self, topic: AnyTopic) -> Callable[[Any], None]:
-        def put(message: Any) -> None:
-            self._inbox.put((time.monotonic(), topic, message))
+    def _to_inbox(self, topic: AnyTopic) -> Callable[[d.Message], None]:
+        def put(message: d.Message) -> None:
+            at = time.monotonic()
+            self._inbox.put(lambda: self._take(at, topic, message))
 
         return put

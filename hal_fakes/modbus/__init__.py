@@ -2,9 +2,9 @@
 
 A bus on a serial line has its own far side, `hal_fakes/modbus/rtu.py`.
 
-Each device's points are bits of its units, with the plant behind them; an address that nobody has
-answers exception 2, a unit that nobody has exception 11, as a gateway does. On command (`fail DEVICE
-unit|server MODE`) one unit, or the server with all of them, is
+Each device's points are bits of its units, with the plant behind them. As at a gateway, an unknown
+address gets exception 2 and an unknown unit exception 11. On command (`fail DEVICE unit|server MODE`)
+one unit, or the server with all units, is
 
 - `off`: the unit is silent; the server refuses and drops connections
 - `stuck`: the unit's inputs stay as they were; the server takes requests and never answers
@@ -32,9 +32,9 @@ from hal_fakes.modbus.units import FarSide, Units
 
 TRANSACTION: Final = 0
 UNIT: Final = 6
-"""Where a reply on TCP has them."""
+"""Their places in a reply on TCP."""
 LOOK_S: Final = 0.02
-"""How soon a server that is told to be off is off."""
+"""How soon the server obeys `off` (s)."""
 READY_S: Final = 10.0
 
 
@@ -49,9 +49,9 @@ def serve(settings: Settings, stations: Sequence[FarSide]) -> "ModbusServer | Rt
 
 
 class ModbusServer:
-    """The running server, with an asyncio loop in a thread of its own.
+    """A running server, with an asyncio loop in its own thread.
 
-    `replace`: what must stand in the bus's settings instead.
+    `replace`: what to write into the bus's settings instead.
     """
 
     def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
@@ -59,17 +59,17 @@ class ModbusServer:
         self._noise = random.Random("modbus")
         self._kinds = itertools.cycle((0, 1))
         self._port = 0
-        self._server: Any = None
+        self._server: Any = None  # pymodbus types neither its sockets nor a context of ours
         self._closed = False
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="modbus", daemon=True)
         self._thread.start()
         self._run(self._listen())
         self._watch = asyncio.run_coroutine_threadsafe(self._look(), self._loop)
-        self.replace = {"tcp": {"host": "127.0.0.1", "port": self._port}}
+        self.replace: dict[str, object] = {"tcp": {"host": "127.0.0.1", "port": self._port}}
 
     def close(self) -> None:
-        """Hang up on everybody. May be called twice."""
+        """Close every connection. May be called twice."""
         if self._closed:
             return
         self._closed = True
@@ -79,7 +79,7 @@ class ModbusServer:
         self._thread.join()
         self._loop.close()
 
-    def _run(self, work: Coroutine[Any, Any, None]) -> None:
+    def _run(self, work: Coroutine[object, None, None]) -> None:
         asyncio.run_coroutine_threadsafe(work, self._loop).result(READY_S)
 
     async def _listen(self) -> None:
@@ -101,7 +101,7 @@ class ModbusServer:
         await asyncio.sleep(0)  # the connections close in the loop's next round
 
     async def _look(self) -> None:
-        """Be off while told so, and let watchdogs trip."""
+        """Stop and start the server as told, and let watchdogs trip."""
         while True:
             self._units.tick()
             off = self._units.failure("server") == "off"
@@ -112,7 +112,7 @@ class ModbusServer:
             await asyncio.sleep(LOOK_S)
 
     def _send(self, sending: bool, packet: bytes) -> bytes:
-        """What really goes onto the wire."""
+        """The bytes that go onto the wire."""
         if not sending:
             return packet
         server = self._units.failure("server")
@@ -126,7 +126,7 @@ class ModbusServer:
 
 
 def _placeholder() -> SimDevice:
-    """pymodbus wants to hold the registers itself; ours are the plants'."""
+    """pymodbus wants registers of its own; ours are the plants'."""
     return SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS))
 
 

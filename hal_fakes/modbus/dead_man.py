@@ -1,9 +1,9 @@
 """The watchdog of a simulated I/O module, as couplers of the WAGO 750 series have it.
 
-Holding registers: 0x1000 its time (x 100 ms), 0x1003 trigger, 0x1006 state (0 stopped, 1 running,
-2 tripped), 0x1007 starts it again. A trigger counts when its value differs from the last; the first
-one starts the watchdog. When it trips the module's coils go off, and writes to them are refused with
-exception 4 until it is started again.
+Its holding registers: 0x1000 time (x 100 ms), 0x1003 trigger, 0x1006 state (0 stopped, 1 running,
+2 tripped), 0x1007 restart. A trigger counts if its value differs from the last one; the first starts
+the watchdog. When the watchdog trips, the module's coils go off and writes to them get exception 4,
+until it is restarted.
 """
 
 from typing import Final
@@ -35,11 +35,11 @@ class DeadMan:
         return self._registers[STATE] == TRIPPED
 
     def get(self, point: Point, now: float) -> int:
-        """What is read there."""
+        """The value there."""
         return self._registers[point.address]
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """A write; False where nothing can be written, or not now."""
+        """Write a value; False if nothing can be written there now."""
         state = self._registers[STATE]
         if point.address == STATE or (point.address == TIME and state == RUNNING):
             return False
@@ -52,7 +52,7 @@ class DeadMan:
         return True
 
     def expire(self) -> None:
-        """Be late: the next look at it finds it tripped."""
+        """Let it trip at the next look."""
         self._due_at = 0.0
 
     def trips(self, now: float) -> bool:

@@ -1,10 +1,13 @@
 """The far side of a pulse that a module times: pymodbus's server takes any value for a coil's 1."""
 
 import struct
-from typing import Any, Final
+from typing import Final
 
+from pymodbus.datastore import ModbusServerContext
 from pymodbus.pdu import ExceptionResponse, ModbusPDU
 from pymodbus.pdu.bit_message import WriteSingleCoilRequest
+
+from hal_fakes.modbus.units import Units
 
 COIL_VALUES: Final = (0xFF00, 0)
 
@@ -17,10 +20,11 @@ class CoilRequest(WriteSingleCoilRequest):
         super().decode(data)
         self.registers = [int.from_bytes(data[2:4], "big")]
 
-    async def datastore_update(self, context: Any, device_id: int) -> ModbusPDU:
+    async def datastore_update(self, context: ModbusServerContext, device_id: int) -> ModbusPDU:
         """Write the coil. The reply to a flash is its echo."""
         if self.registers[0] in COIL_VALUES:
             return await super().datastore_update(context, device_id)
+        assert isinstance(context, Units)
         refusal = await context.flash(device_id, self.address, self.registers[0])
         if refusal is not None:
             return ExceptionResponse(self.function_code, refusal)

@@ -1,6 +1,6 @@
 """A charging station on registers: its plant in the numbers of its map."""
 
-from typing import Final, cast
+from typing import Final
 
 from bridges.charger.signals import Activity
 from drivers.charger.register import POWER, Settings, cells, charger_map, orders
@@ -36,7 +36,9 @@ class RegisterCharger:
         if point in self._written:
             return self._written[point]
         self.plant.advance(now)
-        shown = self._values(cast(Reading, self.plant.sense("reading")))
+        reading = self.plant.reading()
+        assert isinstance(reading, Reading)
+        shown = self._values(reading)
         word = 0
         for name, points in self._cells.items():
             if point in points:
@@ -86,5 +88,5 @@ def build(name: str, settings: Settings) -> ChargerPlant:
 
 FAKE = Fake[Settings](
     plant=lambda name, settings, wires: build(name, settings),
-    station=lambda plant, settings, bus: RegisterCharger(plant, settings),
+    station=lambda plant, settings: RegisterCharger(plant, settings),
 )

@@ -78,5 +78,5 @@ class RegisterDoor:
 
 FAKE = Fake[Settings](
     plant=lambda name, settings, wires: door.build(name, settings, contacts(settings)),
-    station=lambda plant, settings, bus: RegisterDoor(plant, settings),
+    station=lambda plant, settings: RegisterDoor(plant, settings),
 )

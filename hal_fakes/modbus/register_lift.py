@@ -6,7 +6,6 @@ for a door, one for each hazard.
 
 from collections.abc import Iterator
 from itertools import count
-from typing import Any
 
 import msgspec
 
@@ -16,7 +15,7 @@ from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import at
 from drivers.lift import dry_contact
 from drivers.lift.register import Settings
-from drivers.lift.register_map import DoorField, Flag, LiftMap, MotionField, ServiceField
+from drivers.lift.register_map import DoorField, Field, Flag, LiftMap, MotionField, ServiceField
 from hal_fakes.fake import Fake
 from hal_fakes.plants.lift import LiftPlant, Pace
 from hal_fakes.plants.plant import Plant
@@ -29,12 +28,12 @@ def contacts(settings: Settings) -> dry_contact.Settings:
     """The lift behind the gateway, as the wiring of its contacts."""
     found, inputs, coils = settings.map, count(), count()
 
-    def line(part: Any = None, active: str = "high") -> dict[str, Any]:
-        conditional = {"valid_when": "agv_mode"} if part and part.valid_when else {}
+    def line(part: Field | Flag | None = None, active: str = "high") -> dict[str, str]:
+        when = {"valid_when": part.valid_when} if part and part.valid_when else {}
         point = f"unit {settings.unit} discrete input {next(inputs)}"
-        return {"point": point, "active": active, **conditional}
+        return {"point": point, "active": active, **when}
 
-    def coil() -> dict[str, Any]:
+    def coil() -> dict[str, str]:
         return {"point": f"unit {settings.unit} coil {next(coils)}", "active": "high"}
 
     wired = {h.value: line(getattr(found, h), "low") for h in Hazard if found.shows(h)}
@@ -47,11 +46,12 @@ def contacts(settings: Settings) -> dry_contact.Settings:
         moves = ("moving",) if "moving" in found.motion.codes.values() else ("up", "down")
         wired |= {name: line(found.motion) for name in moves}
     levels = settings.levels()
+    floors = {level: line(found.floor) for level in levels}
     singles = [signal for signal, _, _ in found.commands.singles()]
     plain = {
         **{n: getattr(settings, n) for n in LiftSettings.__struct_fields__},
         "inputs": wired,
-        "floor_code": {"encoding": "one_hot", "lines": {n: line(found.floor) for n in levels}},
+        "floor_code": {"encoding": "one_hot", "lines": floors},
         "outputs": {n: coil() for n in singles if not n.startswith("call_")},
         "calls": {level: coil() for level in levels},
     }
@@ -149,5 +149,5 @@ def build(name: str, settings: Settings, pace: Pace | None = None) -> LiftPlant:
 
 FAKE = Fake[Settings](
     plant=lambda name, settings, wires: build(name, settings),
-    station=lambda plant, settings, bus: RegisterLift(plant, settings),
+    station=lambda plant, settings: RegisterLift(plant, settings),
 )

@@ -1,7 +1,7 @@
-"""The far side of a `modbus` bus that is a serial line: units on RS-485 behind a pseudo-terminal.
+"""The far side of a serial `modbus` bus: units on RS-485 behind a pseudo-terminal.
 
-A unit that is absent is silent. A pseudo-terminal has no baud rate, so each byte is delayed here by its
-time on the wire: a request is complete after its characters and 3.5 of silence, then the reply begins.
+An absent unit is silent. A pseudo-terminal has no baud rate, so this file delays each byte by its time
+on the wire. A request is complete after its characters and 3.5 of silence; then the reply begins.
 With `ignore_echo` in the settings the adapter echoes. `port` is a link that stays the same when the
 adapter is pulled and comes back, as one in /dev/serial/by-id. On command (`fail DEVICE unit|server
 MODE`) one unit, or the server, which is the line with all of them, is
@@ -29,6 +29,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+import msgspec
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
 from pymodbus.framer import FramerRTU
@@ -40,7 +41,7 @@ from hal_fakes.modbus.units import FarSide, Units
 from hal_fakes.plants.plant import FailureMode
 
 LOOK_S: Final = 0.02
-"""How soon an adapter that is to be pulled is gone."""
+"""How soon an adapter is pulled (s)."""
 READY_S: Final = 10.0
 
 
@@ -57,14 +58,14 @@ class Adapter:
         return self._ends[0] if self._ends else None
 
     def plug(self) -> None:
-        """Be there, as another device under the same path. It stays when nobody has it open."""
+        """Appear under the same path, as another device."""
         self._ends = pty.openpty()
         tty.setraw(self._ends[1])
         os.set_blocking(self._ends[0], False)
         self.path.symlink_to(os.ttyname(self._ends[1]))
 
     def pull(self) -> None:
-        """Vanish under whoever has it open. May be called twice."""
+        """Vanish, even while a program has it open. May be called twice."""
         ends, self._ends = self._ends, None
         for end in ends or ():
             os.close(end)
@@ -72,9 +73,9 @@ class Adapter:
 
 
 class RtuLine:
-    """The running line, with a thread of its own. `replace`: what must stand in the bus's settings.
+    """A running line with its own thread. `replace`: what to write into the bus's settings instead.
 
-    `slow_s`: a slow reply's delay. `requests`: every frame that was heard so far.
+    `slow_s`: a slow reply's delay (s). `requests`: every frame heard so far.
     """
 
     def __init__(
@@ -90,7 +91,8 @@ class RtuLine:
         self._directory = tempfile.TemporaryDirectory(prefix="rmf-rs485-", dir=directory)
         self.adapter = Adapter(Path(self._directory.name) / "adapter")
         self.adapter.plug()
-        self.replace = {"serial": {**_plain(settings), "port": str(self.adapter.path)}}
+        place = msgspec.structs.replace(settings, port=str(self.adapter.path))
+        self.replace: dict[str, object] = {"serial": msgspec.to_builtins(place)}
         self.requests: list[bytes] = []
         self._order = itertools.count()
         self._due: list[tuple[float, int, bytes]] = []
@@ -127,7 +129,7 @@ class RtuLine:
                 self._hear(frame)
 
     def _look(self) -> None:
-        """Be pulled out while told so, and let watchdogs trip."""
+        """Pull or plug the adapter as told, and let watchdogs trip."""
         self._units.tick()
         pulled = self._units.failure("server") == "off"
         if pulled != (self.adapter.wire is None):
@@ -135,7 +137,7 @@ class RtuLine:
             (self.adapter.pull if pulled else self.adapter.plug)()
 
     def _listen(self) -> None:
-        """Take what is sent until something is due; it is on the wire for its characters' time."""
+        """Read what is sent until something is due. Its characters take their time on the wire."""
         wire = self.adapter.wire
         readable = select.select([wire] if wire is not None else [], [], [], self._idle_s())[0]
         sent = b""
@@ -154,7 +156,7 @@ class RtuLine:
         return min(LOOK_S, max(0.0, next_at - time.monotonic()))
 
     def _put(self, frame: bytes, begun_at: float) -> None:
-        """Have each byte arrive when its last bit has."""
+        """Let each byte arrive when its last bit does."""
         for i, byte in enumerate(frame):
             at = begun_at + (i + 1) * self._settings.character_s
             heapq.heappush(self._due, (at, next(self._order), bytes((byte,))))
@@ -169,7 +171,7 @@ class RtuLine:
     # ---- the units: frames and their meaning
 
     def _hear(self, frame: bytes) -> None:
-        """A request is complete: its reply, if any, begins now, or when a slow unit is ready."""
+        """A request is complete. Its reply, if any, begins now, or later if the unit is slow."""
         self.requests.append(frame)
         unit = frame[0]
         modes = {self._units.failure("server"), self._units.failure("unit", unit)} - {None}
@@ -182,7 +184,7 @@ class RtuLine:
         self._put(reply, heard_at + (self._slow_s if "slow" in modes else 0.0))
 
     def _reply(self, frame: bytes) -> bytes:
-        """What the unit says; nothing to a frame that is broken."""
+        """The unit's reply; none to a broken frame."""
         crc = int.from_bytes(frame[-2:], "big")
         if len(frame) < 4 or not FramerRTU.check_CRC(frame[:-2], crc):
             return b""
@@ -198,7 +200,7 @@ class RtuLine:
         return self._framer.buildFrame(response)
 
     def _spoiled(self, mode: FailureMode | None, reply: bytes) -> bytes:
-        """What is on the wire instead, the ways of each mode in turn."""
+        """The reply as this mode spoils it. Each mode has several ways, used in turn."""
         if mode == "garbage":
             broken = bytes((reply[-1] ^ 0x55,))
             return reply[:-1] + broken if next(self._kinds) % 2 else reply[: len(reply) // 2]
@@ -216,7 +218,3 @@ class RtuLine:
             return self.requests[-1] + reply
         body = bodies[kind % len(bodies)]
         return body + FramerRTU.compute_CRC(body).to_bytes(2, "big")
-
-
-def _plain(settings: Serial) -> dict[str, object]:
-    return {name: getattr(settings, name) for name in settings.__struct_fields__}

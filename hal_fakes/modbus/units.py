@@ -1,7 +1,6 @@
-"""What pymodbus's servers ask of the units: bits and registers with plants behind them, and how
-they fail.
+"""The units that pymodbus's servers ask: bits and registers with plants behind them, and how they fail.
 
-The same for a gateway (`hal_fakes/modbus.py`) and a serial line (`hal_fakes/modbus/rtu.py`).
+A gateway (`hal_fakes/modbus/__init__.py`) and a serial line (`hal_fakes/modbus/rtu.py`) use the same.
 """
 
 import asyncio
@@ -29,13 +28,13 @@ class Cells(Protocol):
 
     @property
     def plant(self) -> Plant | None:
-        """What is behind them; None for what a module has for itself."""
+        """The plant; None for registers of the module itself."""
 
     def get(self, point: Point, now: float) -> int:
-        """What is read there at `now` (monotonic s)."""
+        """The value there at `now` (monotonic s)."""
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """A write; False where nothing can be written."""
+        """Write a value; False if nothing can be written there."""
 
 
 FarSide: TypeAlias = Wiring | Cells
@@ -51,13 +50,13 @@ TABLES: Final[dict[int, Table]] = {
     15: "coil",
     16: "holding register",
 }
-"""The functions that are served, and the table that each is about."""
+"""Function -> its table."""
 
 
 class Units:
-    """What pymodbus's server asks for and sets: all units. `slow_s`: a slow reply's delay.
+    """All units, as pymodbus's server reads and writes them. `slow_s`: a slow reply's delay (s).
 
-    Coils keep what was written; inputs are what the plants' contacts show.
+    Coils keep what was written; inputs show the plants' contacts.
     """
 
     def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
@@ -97,7 +96,7 @@ class Units:
                 self._plants[unit].append(device.plant)
 
     def tick(self) -> None:
-        """Let the modules' watchdogs trip, and their pulses end, when it is time; called often."""
+        """Let watchdogs trip and pulses end when it is time; called often."""
         now = time.monotonic()
         for coil in [coil for coil, at in self._off_at.items() if at <= now]:
             self._set(coil, False)
@@ -108,7 +107,7 @@ class Units:
                         wiring.drive(name, False, now)
 
     def failure(self, part: Part, unit: int | None = None) -> FailureMode | None:
-        """How the server, or this unit, is told to fail."""
+        """The failure of the server, or of this unit; None if it works."""
         modes = (plant.failures.get(part) for plant in self._plants.get(unit, ()))
         return next((mode for mode in modes if mode is not None), None)
 
@@ -119,7 +118,7 @@ class Units:
     async def async_getValues(
         self, device_id: int, func_code: int, address: int, count: int = 1
     ) -> list[int] | ExcCodes:
-        """The bits or registers of a read request, or of a write's echo."""
+        """The bits or registers for a read request, or for a write's echo."""
         points = await self._points(device_id, func_code, address, count)
         if isinstance(points, ExcCodes):
             return points
@@ -138,7 +137,7 @@ class Units:
         return None
 
     async def flash(self, unit: int, address: int, tenths: int) -> ExcCodes | None:
-        """Switch a coil on for so long; exception 3 where no pulse can be asked for."""
+        """Switch a coil on for this long (0.1 s); exception 3 where no pulse can be requested."""
         coil = self._flashes.get(Point(unit, "coil", address))
         points = await self._points(unit, 5, coil.address if coil else address, 1)
         if isinstance(points, ExcCodes):
@@ -169,7 +168,7 @@ class Units:
     async def _points(
         self, unit: int, function: int, address: int, count: int
     ) -> list[Point] | ExcCodes:
-        """The points that a request is about; or the exception, or the silence, that answers it."""
+        """The points of a request, or the exception for it. Raises NoSuchIdException for silence."""
         table = TABLES.get(function)
         if table is None:
             return ExcCodes.ILLEGAL_FUNCTION

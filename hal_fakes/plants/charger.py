@@ -18,7 +18,7 @@ takes ten times as long for it, `wrong` fails it, `garbage` loses contact while 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 from bridges.charger.signals import CURRENT_FLOWS, Activity
 from drivers.hal.points import Wire
@@ -83,24 +83,26 @@ class ChargerPlant(Machine):
         wires: Iterable[Wire] = (),
         parts: Iterable[str] = PARTS,
     ) -> None:
-        super().__init__(name, wires, parts)
+        self._receivers = {robot: receiver for receiver, robot in receivers.items()}
+        buttons = sorted(("out_of_range", *CAUSES, "robot", "stranger", *self._receivers))
+        super().__init__(name, wires, parts, buttons)
         self._pace = pace
         self.activity = Activity.IDLE
         self.error_text = ""
         self.battery = 0.0
         self.power = not commanded
-        self._receivers = {robot: receiver for receiver, robot in receivers.items()}
         self._asked = asked
         self._checked_at = NEVER
         self._here: list[str] = []
-        self._pressed = dict.fromkeys(("out_of_range", *CAUSES), False)
         self._since = 0.0
         self._until = NEVER
 
-    def sense(self, signal: str) -> Any:
-        """`reading`: everything at once, as a Reading; else whether `robot` or a cause is there."""
-        if signal != "reading":
-            return self.contact(signal)
+    def sense(self, signal: str) -> bool:
+        """Is `robot` or a cause there?"""
+        return self.contact(signal)
+
+    def reading(self) -> Reading:
+        """Everything at once."""
         lasts = self._until - self._since
         progress = 0.0 if lasts == NEVER else (self.now - self._since) / lasts
         flows = self.activity in CURRENT_FLOWS
@@ -131,7 +133,7 @@ class ChargerPlant(Machine):
         """None while a check is under way, or where nobody has asked for one."""
         if self._asked and not self._checked_at <= self.now:
             return None
-        return bool(self._here) and not self._pressed["out_of_range"]
+        return bool(self._here) and not self.pressed["out_of_range"]
 
     def _battery(self) -> float:
         if self.activity is not Activity.CHARGING or self._until == NEVER:
@@ -149,31 +151,24 @@ class ChargerPlant(Machine):
             self.power = asserted
         elif signal == "range_check":
             self._checked_at = self.now + RANGE_CHECK_S / self._pace
-        elif self.activity is Activity.ERROR and not any(self._pressed[c] for c in CAUSES):
+        elif self.activity is Activity.ERROR and not any(self.pressed[c] for c in CAUSES):
             self.error_text = ""
             self._enter(Activity.IDLE)
         self._settle()
 
     def contact(self, signal: str) -> bool:
         """Is the robot, or what is pressed, there?"""
-        return signal in self._here or self._pressed.get(signal, False)
-
-    def actuate(self, signal: str, energised: bool) -> None:
-        """There is no relay."""
+        return self.pressed[signal]
 
     def event_at(self) -> float:
         """When the activity under way ends by itself."""
         return self._until
 
     def act(self, signal: str, asserted: bool) -> None:
-        """A robot comes or leaves, a cause of error comes or goes."""
-        robots = ("robot", "stranger", *self._receivers)
-        if signal in self._pressed:
-            self._pressed[signal] = asserted
-        elif signal not in robots:
-            known = ", ".join(sorted((*self._pressed, *robots)))
-            raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
-        elif asserted and signal not in self._here:
+        """A robot comes or leaves."""
+        if signal in ("out_of_range", *CAUSES):
+            return
+        if asserted and signal not in self._here:
             self._here.append(signal)
             self.battery = ARRIVES_WITH
         elif not asserted and signal in self._here:
@@ -183,7 +178,7 @@ class ChargerPlant(Machine):
         """What is due ends, and what the pad and the causes demand begins."""
         if self.now >= self._until:
             self._end()
-        cause = next((c for c in CAUSES if self._pressed[c]), None)
+        cause = next((c for c in CAUSES if self.pressed[c]), None)
         busy = self.activity in (*CURRENT_FLOWS, Activity.HANDSHAKE)
         if cause and busy:
             self._fault(CAUSES[cause])
@@ -228,7 +223,7 @@ class ChargerPlant(Machine):
         match self.activity:
             case Activity.HANDSHAKE if receiver == "wrong":
                 self._fault("authentication timeout")
-            case Activity.HANDSHAKE if self._pressed["out_of_range"]:
+            case Activity.HANDSHAKE if self.pressed["out_of_range"]:
                 self._fault("the gap is too wide")
             case Activity.HANDSHAKE if receiver == "garbage":
                 self._enter(Activity.CHARGING, LOST_AFTER_S)

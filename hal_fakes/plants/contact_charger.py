@@ -5,7 +5,6 @@ it could charge, `fault` in an error, which ends when its cause has gone.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 from bridges.charger.signals import CURRENT_FLOWS, Activity
 from drivers.charger.dry_contact import Settings
@@ -27,7 +26,7 @@ class ContactCharger(ChargerPlant):
         """The enable relay."""
         Machine.drive(self, signal, asserted, now)
 
-    def sense(self, signal: str) -> Any:
+    def sense(self, signal: str) -> bool:
         """A contact as its wire shows it."""
         return Machine.sense(self, signal)
 

@@ -4,7 +4,7 @@ Contacts: `opened` and `closed` at its limits, `obstruction` (light curtain), `f
 Relay: `hold_open`. To press: `push` (a person's button or hand), `obstruction`, `fire`.
 Failing part `operator`: `off` and `stuck` stand still, `slow` takes five times as long, `wrong` turns
 each command round, `garbage` stops half-way. At a Modbus module `unit` and `server` fail as well
-(`hal_fakes/modbus.py`).
+(`hal_fakes/modbus/`).
 """
 
 from collections.abc import Iterable
@@ -19,6 +19,7 @@ OPEN_S: Final = 2.0
 CLOSE_S: Final = 3.0
 AUTO_CLOSE_S: Final = 1.0
 SLOWNESS: Final = 5.0
+BUTTONS: Final = ("fire", "obstruction", "push")
 
 
 def build(
@@ -46,15 +47,11 @@ class DoorPlant(Machine):
         auto_close_s: float = AUTO_CLOSE_S,
         parts: Iterable[str] = (),
     ) -> None:
-        wires = list(wires)
-        at_module = any(w.point.strip().lower().startswith("unit") for w in wires)
-        of_module = ("unit", "server") if at_module else ()
-        super().__init__(name, wires, ("operator", *parts, *of_module))
+        super().__init__(name, wires, ("operator", *parts), BUTTONS)
         self.position = 0.0
         self._seconds = {1: open_s, -1: close_s}
         self._auto_close_s = auto_close_s
         self._held = False
-        self._pressed = dict.fromkeys(("push", "obstruction", "fire"), False)
         self._wanted = False
         self._close_at = 0.0
         self._course = (0, 0.0)
@@ -68,24 +65,17 @@ class DoorPlant(Machine):
             return self.position == 1.0 and direction == 0
         if signal == "closed":
             return self.position == 0.0 and direction == 0
-        return self._pressed[signal]
+        return self.pressed[signal]
 
     def actuate(self, signal: str, energised: bool) -> None:
         """The hold relay."""
         self._held = energised
 
-    def act(self, signal: str, asserted: bool) -> None:
-        """Push the door, stand in the doorway, or let the fire alarm go off."""
-        if signal not in self._pressed:
-            known = ", ".join(sorted(self._pressed))
-            raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
-        self._pressed[signal] = asserted
-
     def run(self) -> None:
         """Move to where the door is now, and see whether it goes on."""
         self._move()
-        in_the_way = self._pressed["obstruction"] and self.position > 0
-        wanted = self._held or self._pressed["push"] or in_the_way
+        in_the_way = self.pressed["obstruction"] and self.position > 0
+        wanted = self._held or self.pressed["push"] or in_the_way
         if self._wanted and not wanted:
             self._close_at = self.now + self._auto_close_s
         self._wanted = wanted

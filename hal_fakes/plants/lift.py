@@ -21,6 +21,7 @@ Parts that fail: `car` (`off`, `stuck`: stands where it is; `slow`; `wrong`: goe
 from dataclasses import dataclass
 
 from bridges.lift.signals import Hazard, Side
+from drivers.lift import codes
 from drivers.lift.dry_contact import Settings, wires
 from drivers.lift.table import input_rows
 from hal_fakes.fake import Fake
@@ -68,9 +69,8 @@ class LiftPlant(Machine):
         self._sides = {level: _sides(settings, level) for level in self._levels}
         self.doors = {side: CarDoor() for sides in self._sides.values() for side in sides}
         parts = [p for p in FAILS if p != "rear_door_operator" or Side.REAR in self.doors]
-        super().__init__(name, wires(settings), parts)
+        super().__init__(name, wires(settings), parts, _buttons(settings, self.doors))
         self._only_in_agv = {s for s, _, line in input_rows(settings) if line.valid_when}
-        self._pressed = dict.fromkeys(_buttons(settings, self.doors), False)
         self._on: set[str] = set()
         self._people: list[int] = []
         self._let_out = False
@@ -95,11 +95,7 @@ class LiftPlant(Machine):
             self._seen, self._seen_at = self._called(), self.now + CALL_SETTLES_S
 
     def act(self, signal: str, asserted: bool) -> None:
-        """A person or the building."""
-        if signal not in self._pressed:
-            known = ", ".join(self._pressed)
-            raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
-        self._pressed[signal] = asserted
+        """A person calls the car to a landing; in AGV mode nobody can."""
         if signal.startswith("hall_") and asserted and not self.agv:
             self._people.append(self._levels.index(signal.removeprefix("hall_")))
 
@@ -134,7 +130,7 @@ class LiftPlant(Machine):
     # ---- the controller
 
     def _hazard(self, *hazards: Hazard) -> bool:
-        return any(self._pressed.get(h, False) for h in hazards)
+        return any(self.pressed.get(h, False) for h in hazards)
 
     def _called(self) -> int | None:
         """The landing whose call is on; None for none, or for a code that means none."""
@@ -217,7 +213,7 @@ class LiftPlant(Machine):
         here = self.car.standing and side in self._sides[self._levels[self.car.floor]]
         if not here:
             return False
-        if not door.closed and self._pressed[f"{PREFIX[side]}obstruction"]:
+        if not door.closed and self.pressed[f"{PREFIX[side]}obstruction"]:
             return True
         if self._hazard(Hazard.FIRE):
             return self.car.floor == 0
@@ -264,9 +260,8 @@ class LiftPlant(Machine):
             return {}
         course = {0: "stopped", 1: "up", -1: "down"}[self.car.course]
         states = (course,) if self.car.standing else (course, "moving")
-        return _bits(
-            "motion", len(code.bits), next(n for n, s in code.codes.items() if s in states)
-        )
+        number = next(n for n, s in code.codes.items() if s in states)
+        return codes.lines("motion", number, len(code.bits))
 
     def _service_lines(self) -> dict[str, bool]:
         code = self._wiring.inputs.service
@@ -276,7 +271,8 @@ class LiftPlant(Machine):
         states += ["agv_mode"] if self.agv else []
         states += ["normal", *(s for s in code.codes.values() if s not in ("agv_mode", "fault"))]
         numbers = {str(state): number for number, state in reversed(code.codes.items())}
-        return _bits("service", len(code.bits), next(numbers[s] for s in states if s in numbers))
+        number = next(numbers[s] for s in states if s in numbers)
+        return codes.lines("service", number, len(code.bits))
 
     def _floor_lines(self) -> dict[str, bool]:
         """A controller that has no code for between floors shows the last one on."""
@@ -309,10 +305,6 @@ def _slowed(seconds: float, failure: FailureMode | None) -> float | None:
     if failure in ("off", "stuck"):
         return None
     return seconds * SLOWNESS if failure == "slow" else seconds
-
-
-def _bits(prefix: str, width: int, number: int) -> dict[str, bool]:
-    return {f"{prefix}_bit{i}": bool(number >> i & 1) for i in range(width)}
 
 
 FAKE = Fake[Settings](plant=lambda name, settings, wires: build(name, settings))

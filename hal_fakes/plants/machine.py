@@ -20,15 +20,23 @@ class Machine(ABC):
 
     `wires`: the driver's wiring table of this device; empty where the controller has no contacts.
     `parts`: what can fail besides wires (`car`, `door_operator`); the plant looks at `failures`.
-    Wires to an I/O module bring its parts along, `unit` and `server`: `hal_fakes/modbus.py` has those.
+    `buttons`: what can be pressed; `pressed` has each, and whether it is now.
+    Wires to an I/O module add its parts `unit` and `server` (`hal_fakes/modbus/`).
     """
 
-    def __init__(self, name: str, wires: Iterable[Wire] = (), parts: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        name: str,
+        wires: Iterable[Wire] = (),
+        parts: Iterable[str] = (),
+        buttons: Iterable[str] = (),
+    ) -> None:
         self.name = name
         self.edges: list[Edge] = []
         self.on_edge: Callable[[Edge], None] | None = None
         self.now = 0.0
         self.failures: dict[str, FailureMode] = {}
+        self.pressed = dict.fromkeys(buttons, False)
         contacts = [Contact(w, f"{name} {w.signal}") for w in wires]
         at_module = any(c.wire.point.startswith("unit ") for c in contacts)
         self._parts = frozenset((*parts, *(("unit", "server") if at_module else ())))
@@ -44,9 +52,8 @@ class Machine(ABC):
     def contact(self, signal: str) -> bool:
         """Is this contact of the controller asserted, in truth?"""
 
-    @abstractmethod
-    def actuate(self, signal: str, energised: bool) -> None:
-        """A relay of ours has changed at the controller's side; `self.now` is the time."""
+    def actuate(self, signal: str, energised: bool) -> None:  # noqa: B027
+        """A relay of ours has changed at the controller's side at `self.now`. Most have none."""
 
     @abstractmethod
     def run(self) -> None:
@@ -56,9 +63,8 @@ class Machine(ABC):
     def event_at(self) -> float:
         """When the next own event is due: s, or inf. `run` at that time must use it up."""
 
-    @abstractmethod
-    def act(self, signal: str, asserted: bool) -> None:
-        """Somebody presses or releases this. ValueError names what there is."""
+    def act(self, signal: str, asserted: bool) -> None:  # noqa: B027
+        """Somebody has pressed or released this. Most need only know what is pressed."""
 
     # ---- the Plant protocol
 
@@ -83,6 +89,10 @@ class Machine(ABC):
         """Is this contact asserted, as the wire shows it?"""
         return self._sensors[signal].shows
 
+    def reading(self) -> object:
+        """None: it has contacts alone."""
+        return None
+
     def next_at(self) -> float:
         """When something will change if nothing is driven: s, or inf."""
         contacts = (*self._sensors.values(), *self._relays.values())
@@ -92,7 +102,7 @@ class Machine(ABC):
         """Make a wire or part fail from now on; None mends it. ValueError names what there is."""
         contact = self._sensors.get(part) or self._relays.get(part)
         if contact is None and part not in self._parts:
-            known = ", ".join(sorted({*self._parts, *self._sensors, *self._relays}))
+            known = ", ".join(self.names()["fail"])
             raise ValueError(f"{self.name} has no part {part!r}; there are {known}")
         if mode not in (None, *FAILURE_MODES):
             raise ValueError(f"no failure {mode!r}; there are {', '.join(FAILURE_MODES)}")
@@ -104,9 +114,18 @@ class Machine(ABC):
             contact.fail(mode, self.now)
         self._settle()
 
+    def names(self) -> dict[str, list[str]]:
+        """What can `press` and what can `fail`."""
+        parts = sorted({*self._parts, *self._sensors, *self._relays})
+        return {"press": list(self.pressed), "fail": parts}
+
     def press(self, signal: str, asserted: bool, now: float) -> None:
         """A person or the building acts. ValueError names what can be pressed."""
+        if signal not in self.pressed:
+            known = ", ".join(self.pressed)
+            raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
         self.advance(now)
+        self.pressed[signal] = asserted
         self.act(signal, asserted)
         self._settle()
 

@@ -21,7 +21,7 @@ A failing `fan` lets the coil heat up, and a failing `thermometer` is an error, 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from bridges.charger.signals import CURRENT_FLOWS, Activity
 from hal_fakes.plants.machine import Machine
@@ -60,7 +60,7 @@ LINKS: Final = ("node", "heartbeat", "bus", "unit", "server")
 """Parts of the wire, on CAN and on Modbus: its far side has those."""
 PARTS: Final = ("pad", "receiver", "fan", "battery", "thermometer", *LINKS)
 ROBOTS: Final = ("robot", "stranger")
-PRESSED: Final = (*ROBOTS, "misparked", "foreign_object", "transmitter_fault")
+BUTTONS: Final = ("foreign_object", "misparked", *ROBOTS, "transmitter_fault")
 STATION_CAUSES: Final = ("foreign_object", "transmitter_fault")
 
 
@@ -95,14 +95,14 @@ class PadPlant(Machine):
     """
 
     def __init__(self, name: str, pace: float = 1.0) -> None:
-        super().__init__(name, parts=PARTS)
+        super().__init__(name, parts=PARTS, buttons=BUTTONS)
         self._pace = pace
         self.activity = Activity.IDLE
         self.faults: frozenset[str] = frozenset()
         self.battery = 0.0
         self.height_mm = 0.0
         self.enabled = False
-        self._pressed = dict.fromkeys(PRESSED, False)
+        self._occupied = False
         self._since, self._until = 0.0, NEVER
         self._rising_until = NEVER
         self._range, self._range_until = "none", NEVER
@@ -110,10 +110,12 @@ class PadPlant(Machine):
 
     # ---- what a controller sees and does
 
-    def sense(self, signal: str) -> Any:
-        """`reading`: everything at once, as a PadReading; else whether what can be pressed is."""
-        if signal != "reading":
-            return self.contact(signal)
+    def sense(self, signal: str) -> bool:
+        """Is what can be pressed there?"""
+        return self.contact(signal)
+
+    def reading(self) -> PadReading:
+        """Everything at once."""
         lasts = self._until - self._since
         progress = 0.0 if lasts in (0.0, NEVER) else (self.now - self._since) / lasts
         flows = self.activity in CURRENT_FLOWS
@@ -123,9 +125,9 @@ class PadPlant(Machine):
             progress=progress,
             faults=self.faults,
             robot=self._there(),
-            stranger=self._pressed["stranger"],
+            stranger=self.pressed["stranger"],
             gap_mm=CLEARANCE_MM - self.height_mm,
-            offset_mm=OFFSET_MM[self._pressed["misparked"]],
+            offset_mm=OFFSET_MM[self.pressed["misparked"]],
             in_range=self.in_range(),
             range_result=self._range,
             enabled=self.enabled,
@@ -155,36 +157,29 @@ class PadPlant(Machine):
     def in_range(self) -> bool:
         """Can the two coils couple?"""
         gap = CLEARANCE_MM - self.height_mm
-        near = OFFSET_MM[self._pressed["misparked"]] <= OFFSET_MAX_MM
+        near = OFFSET_MM[self.pressed["misparked"]] <= OFFSET_MAX_MM
         return self._there() and near and GAP_MM[0] <= gap <= GAP_MM[1]
 
     # ---- physics
 
     def contact(self, signal: str) -> bool:
         """Is the robot, or what is pressed, there?"""
-        return self._pressed[signal]
-
-    def actuate(self, signal: str, energised: bool) -> None:
-        """There is no relay."""
+        return self.pressed[signal]
 
     def event_at(self) -> float:
         """When something under way ends by itself."""
         return min(self._until, self._rising_until, self._range_until, self._trips_at())
 
     def act(self, signal: str, asserted: bool) -> None:
-        """A robot comes or leaves, a cause of error comes or goes."""
-        if signal not in self._pressed:
-            known = ", ".join(sorted(self._pressed))
-            raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
-        before = self._there()
-        self._pressed[signal] = asserted
-        if self._there() != before:
+        """A robot comes or leaves."""
+        if self._there() != self._occupied:
+            self._occupied = asserted
             full = self.failures.get("battery") == "wrong"
             self.battery = (1.0 if full else ARRIVES_WITH) if asserted else 0.0
             self._move(asserted)
 
     def _there(self) -> bool:
-        return any(self._pressed[robot] for robot in ROBOTS)
+        return any(self.pressed[robot] for robot in ROBOTS)
 
     def run(self) -> None:
         """What is due ends, and what the pad, the heat and the causes demand begins."""
@@ -221,7 +216,7 @@ class PadPlant(Machine):
         return there and self.enabled and self._filled() < 1.0 and not self._causes()
 
     def _causes(self) -> frozenset[str]:
-        found = {name for name in STATION_CAUSES if self._pressed[name]}
+        found = {name for name in STATION_CAUSES if self.pressed[name]}
         if self._warmth() >= TRIP_C:
             found.add("over_temperature")
         if "thermometer" in self.failures:
@@ -250,7 +245,7 @@ class PadPlant(Machine):
                 self._fault(frozenset({"authentication"}))
             case Activity.HANDSHAKE if not self.in_range():
                 wide = CLEARANCE_MM - self.height_mm > GAP_MM[1]
-                off = self._pressed["misparked"]
+                off = self.pressed["misparked"]
                 self._fault(frozenset({"too_far" if wide or off else "too_near"}))
             case Activity.HANDSHAKE:
                 lost = receiver == "garbage"

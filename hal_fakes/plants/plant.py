@@ -1,7 +1,6 @@
-"""What every plant is: physics driven by commands and time, that records each edge and can fail.
+"""What every plant is: physics driven by commands and time. It records each edge and can fail.
 
-`machine.py` has all of it but the physics. A kind's plants are in `<kind>.py`, which
-holds `build(name, settings) -> Plant`.
+`machine.py` has all of it but the physics. A kind's plants are in `<kind>.py`.
 """
 
 from collections.abc import Callable, Mapping
@@ -35,7 +34,7 @@ class Plant(Protocol):
 
     @property
     def failures(self) -> Mapping[str, FailureMode]:
-        """What has been told to fail, and how; the far side of a bus looks for its own parts here."""
+        """Part -> how it fails. The far side of a bus looks for its own parts here."""
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
         """A relay of ours changes."""
@@ -46,11 +45,17 @@ class Plant(Protocol):
     def sense(self, signal: str) -> bool:
         """Is this contact asserted, as the wire shows it (failures included)?"""
 
+    def reading(self) -> object:
+        """What a controller without contacts knows at this instant; None if it has contacts alone."""
+
     def next_at(self) -> float:
         """When something will change if nothing is driven: monotonic seconds, or inf."""
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
         """Make a signal or part fail this way; None mends it. ValueError names the known parts."""
+
+    def names(self) -> Mapping[str, list[str]]:
+        """What can `press` and what can `fail`."""
 
     def press(self, signal: str, asserted: bool, now: float) -> None:
         """A person or the building acts: a fire alarm, a key switch, an obstruction."""

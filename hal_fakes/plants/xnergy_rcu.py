@@ -1,6 +1,6 @@
 """What Xnergy's receiver (RCU) shows of the plant: its numbers, whether on CANopen or on Modbus."""
 
-from typing import Final, cast
+from typing import Final
 
 from bridges.charger.signals import Activity
 from drivers.charger.modbus import Settings, points
@@ -76,7 +76,9 @@ class ModbusRcu:
         if point in self._coils:
             return self._coils[point]
         self.plant.advance(now)
-        found = words(cast(PadReading, self.plant.sense("reading")), self._latched)
+        reading = self.plant.reading()
+        assert isinstance(reading, PadReading)
+        found = words(reading, self._latched)
         self._latched = found["latched_high"] << 16 | found["latched_low"]
         return found[self._names[point]] & 0xFFFF
 
@@ -91,5 +93,5 @@ class ModbusRcu:
 
 FAKE = Fake[Settings](
     plant=lambda name, settings, wires: PadPlant(name),
-    station=lambda plant, settings, bus: ModbusRcu(plant, settings),
+    station=lambda plant, settings: ModbusRcu(plant, settings),
 )

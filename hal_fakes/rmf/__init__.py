@@ -8,8 +8,9 @@ publishes. `now` is RMF's clock in seconds (since the epoch where stamps are to 
 restarted party is a new object.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Final, Protocol
+from typing import Final
 
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import stamp
@@ -21,19 +22,22 @@ Said = tuple[AnyTopic, d.Message]
 NEVER: Final = float("inf")
 
 
-class Party(Protocol):
-    """A node on RMF's side."""
+class Party(ABC):
+    """A node on RMF's side. Some have no timer."""
 
     subscribes: Sequence[AnyTopic]
 
+    @abstractmethod
     def hear(self, message: d.Message, now: float) -> list[Said]:
         """A message has arrived on one of the topics subscribed."""
 
     def tick(self, now: float) -> list[Said]:
         """The timer that was due at `wake_at` fires."""
+        return []
 
     def wake_at(self) -> float:
         """When a timer is due next: s, or inf."""
+        return NEVER
 
 
 def door_request(door: str, requester: str, mode: d.DoorModeValue, now: float) -> d.DoorRequest:

@@ -8,11 +8,11 @@ ChargeBattery.cpp, WaitForCharge.cpp, TaskManager::robot_mode, update_charging_a
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import CHARGING_ASSIGNMENTS, FLEET_STATES, AnyTopic
-from hal_fakes.rmf import Said
+from hal_fakes.rmf import Party, Said
 
 EVERY_S: Final = 1.0
 Graph = Mapping[str, tuple[str, float, float]]
@@ -39,7 +39,7 @@ class FleetRobot:
     mode: d.RobotModeValue = d.RobotModeValue.MODE_IDLE
 
 
-class Fleet:
+class Fleet(Party):
     """Publishes FleetState at 1 Hz and hears ChargingAssignments."""
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS,)
@@ -71,9 +71,9 @@ class Fleet:
         """It drives there in the task that it has, whatever that wants."""
         self._go(self.robots[who], place, now)
 
-    def hear(self, message: Any, now: float) -> list[Said]:
+    def hear(self, message: d.Message, now: float) -> list[Said]:
         """Charging assignments."""
-        if message.fleet_name == self.name:
+        if isinstance(message, d.ChargingAssignments) and message.fleet_name == self.name:
             for assignment in message.assignments:
                 if assignment.waypoint_name not in self.graph:
                     raise AdapterCrashed(assignment.waypoint_name)

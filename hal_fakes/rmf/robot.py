@@ -4,13 +4,14 @@ Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/RobotConte
 1600-1800. The phases are in `phases.py`.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
-from hal_fakes.rmf import NEVER, Said, door_request, has_session
+from hal_fakes.rmf import NEVER, Party, Said, door_request, has_session
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,7 @@ class LiftDestination:
     inside: bool
 
 
-class Phase:
+class Phase(ABC):
     """One step of a robot's task.
 
     `due_at`: its wall timer. `claims_lift`: while it runs, the lift is not released for idleness.
@@ -32,20 +33,20 @@ class Phase:
     due_at = NEVER
     claims_lift = False
 
+    @abstractmethod
     def begin(self, robot: "Robot", now: float) -> list[Said]:
         """It starts."""
-        raise NotImplementedError
 
+    @abstractmethod
     def hear(self, robot: "Robot", message: d.Message, now: float) -> list[Said]:
         """A message, after the context's own rules have seen it."""
-        raise NotImplementedError
 
     def tick(self, robot: "Robot", now: float) -> list[Said]:
         """Its wall timer fires."""
         return []
 
 
-class Robot:
+class Robot(Party):
     """A fleet adapter's RobotContext (`requester_id` is fleet/robot) and its one running phase.
 
     `on_task`: it has a task. `in_car`: its position is inside the lift. Both belong to the story.

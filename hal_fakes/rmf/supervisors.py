@@ -11,10 +11,10 @@ from typing import Final
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
-from hal_fakes.rmf import NEVER, Said, door_request
+from hal_fakes.rmf import Party, Said, door_request
 
 
-class LiftSupervisor:
+class LiftSupervisor(Party):
     """rmf_lift_supervisor: one slot for each lift, which holds the last request of its holder."""
 
     subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_LIFT_REQUESTS, topics.LIFT_STATES)
@@ -30,14 +30,6 @@ class LiftSupervisor:
             case d.LiftState():
                 return self._stated(message, now)
         return []
-
-    def tick(self, now: float) -> list[Said]:
-        """It has no timer."""
-        return []
-
-    def wake_at(self) -> float:
-        """Never."""
-        return NEVER
 
     def _requested(self, request: d.LiftRequest, now: float) -> list[Said]:
         held = self.slots.get(request.lift_name)
@@ -82,7 +74,7 @@ def _satisfies(state: d.LiftState, held: d.LiftRequest) -> bool:
     )
 
 
-class DoorSupervisor:
+class DoorSupervisor(Party):
     """rmf_door_supervisor: who wants each door open, and since when.
 
     The heartbeat goes out on each adapter request and at no other time.
@@ -104,14 +96,6 @@ class DoorSupervisor:
             case d.DoorState():
                 return self._stated(message, now)
         return []
-
-    def tick(self, now: float) -> list[Said]:
-        """It has no timer."""
-        return []
-
-    def wake_at(self) -> float:
-        """Never."""
-        return NEVER
 
     def _opened(self, request: d.DoorRequest, now: float) -> list[Said]:
         wants = self.sessions.setdefault(request.door_name, {})

@@ -1,7 +1,6 @@
 """The coordinator's rules one by one: its core alone, told by hand, in virtual time."""
 
 import dataclasses
-from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
@@ -19,48 +18,42 @@ from bridges.charger_coordinator.memory import (
     Memory,
     Site,
 )
-from bridges.charger_coordinator.report import on_pad
-from bridges.charger_coordinator.signals import FleetSeen, Sighting, StateHeard, Wanted
+from bridges.charger_coordinator.report import SiteReport, on_pad
+from bridges.charger_coordinator.signals import Event, FleetSeen, Sighting, StateHeard, Wanted
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf import definitions as d
 from tests.charger_coordinator.yard import RECEIVERS, settings
+from tests.core import alone
 
 SETTINGS = settings()
 ONE, TWO, THREE = (Robot("tiny", f"AMR0{i}") for i in (1, 2, 3))
 A, B = "charger_a", "charger_b"
 
 
-@dataclass
-class Alone:
-    """`said`: (s, words to the stations); `shows`: what each station does, told once a second."""
+class Alone(alone.Alone[Memory, Event, Site, SiteReport]):
+    """`shows`: what each station does, told once a second; `seen`: the robots that a fleet shows."""
 
-    now: float = 0.0
-    memory: Memory = field(default_factory=lambda: core.initial("site", 0.0))
-    said: list[tuple[float, str]] = field(default_factory=list)
-    shows: dict[str, StateHeard] = field(
-        default_factory=lambda: {A: StateHeard(A, IDLE), B: StateHeard(B, IDLE)}
-    )
-    seen: dict[Robot, Sighting] = field(default_factory=dict)
-    faults: list[str] = field(default_factory=list)
+    def __init__(self) -> None:
+        self.shows = {name: StateHeard(name, IDLE) for name in (A, B)}
+        self.seen: dict[Robot, Sighting] = {}
+        super().__init__(core.initial("site", 0.0), core.decide, Site.of(SETTINGS), True)
 
-    def __post_init__(self) -> None:
-        self.hears(MaySpeak(True))
+    def words(self, message: d.Message) -> str:
+        """Words to the stations are noted."""
+        match message:
+            case d.ChargerRequest():
+                return f"{message.charger_name}: {message.robot_name}"
+            case d.ChargerCancel():
+                return f"{message.charger_name}: cancel"
+        return ""
 
-    def hears(self, event: Any) -> str:
-        decided = core.decide(self.memory, event, self.now, Site.of(SETTINGS))
-        self.memory = decided.memory
-        self.faults = [str(fault) for fault in decided.report.faults]
-        for _, message in decided.publish:
-            match message:
-                case d.ChargerRequest():
-                    self.said.append((self.now, f"{message.charger_name}: {message.robot_name}"))
-                case d.ChargerCancel():
-                    self.said.append((self.now, f"{message.charger_name}: cancel"))
-        return decided.refused
+    @property
+    def faults(self) -> list[str]:
+        return [str(fault) for fault in self.report.faults]
 
     def run(self, seconds: int) -> list[tuple[float, str]]:
         """Let time pass, a second at a time; what was said meanwhile."""
-        said = len(self.said)
+        said = len(self.sent)
         for _ in range(seconds):
             self.now += 1.0
             for shown in self.shows.values():
@@ -68,7 +61,7 @@ class Alone:
             for sighting in self.seen.values():
                 self.hears(FleetSeen((sighting,)))
             self.hears(Woken())
-        return self.said[said:]
+        return self.sent[said:]
 
     def wants(self, who: Robot, place: str | None = None, percent: float = 40.0) -> None:
         """Its fleet shows it so from now on."""
@@ -98,7 +91,7 @@ def test_a_robot_that_passes_with_the_mode_of_its_last_charge_does_not_ask_for_a
     site_.wants(ONE, None)
     site_.seen[ONE] = replace(site_.seen[ONE], place=None)
     site_.run(20)
-    assert site_.said == []
+    assert site_.sent == []
 
 
 def test_a_robot_that_is_full_gives_its_station_up_and_comes_back_only_when_it_is_low() -> None:
@@ -302,9 +295,9 @@ def test_a_request_that_a_rival_held_back_is_sent_afterwards() -> None:
     site_.run(1)
     site_.hears(MaySpeak(False))
     assert site_.run(60) == []
-    site_.said.clear()
+    site_.sent.clear()
     site_.hears(MaySpeak(True))
-    assert site_.said == [(61.0, "charger_a: AMR01")]
+    assert site_.sent == [(61.0, "charger_a: AMR01")]
     assert [text for _, text in site_.run(9)] == ["charger_a: AMR01"] * 9
     assert site_.faults == []
 

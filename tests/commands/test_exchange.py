@@ -54,7 +54,7 @@ def tell(
     for tick in range(10_000):
         now = round(tick * 0.1, 1)
         while left and left[0][0] <= now:
-            seen = take(seen, request, Heard(left[0][1], left.pop(0)[0]))
+            seen = seen.hears(Heard(left[0][1], left.pop(0)[0]), request.about)
         seen = replace(seen, listeners=listeners if now >= listen_from else 0)
         todo = step(request, seen, now)
         if todo.hint and todo.hint not in told.hints:
@@ -64,17 +64,8 @@ def tell(
             return told
         if todo.send is not None:
             told.sent.append((now, todo.send))
-            first = now if seen.first_sent_at is None else seen.first_sent_at
-            seen = replace(seen, first_sent_at=first, last_sent_at=now)
+            seen = seen.sends(now)
     raise AssertionError("it never ended")
-
-
-def take(seen: Seen, request: Request, heard: Heard) -> Seen:
-    if isinstance(heard.message, d.SupervisorHeartbeat):
-        return replace(seen, heartbeat=heard)
-    name = words.device(heard.message)
-    seen = replace(seen, names=seen.names | {name})
-    return replace(seen, states=(*seen.states, heard)) if request.about(heard.message) else seen
 
 
 def every_second(state: d.Message, until: float = 20.0) -> list[tuple[float, d.Message]]:

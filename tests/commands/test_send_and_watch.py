@@ -2,6 +2,7 @@
 
 import argparse
 import io
+import json
 import re
 import signal
 import subprocess
@@ -22,11 +23,11 @@ from bridges.commands.requests import Request
 from bridges.commands.requests.charger import Charge, ChargeCancel
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
-from bridges.core.fields import Rmf
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.choose import open_transport
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
 from bridges.settings.load import load
@@ -160,6 +161,10 @@ def test_once_prints_the_table_or_says_that_nothing_is_there(
     assert out.getvalue().splitlines()[1].split()[:6] == [
         *("lift", "Lift1", "car", "at", "L1,", "door")
     ]
+    told = io.StringIO()
+    assert watch.show_once(watch.listen_on(Told(device)), 0.01, told, as_json=True) == 0
+    (row,) = json.loads(told.getvalue())
+    assert (row["kind"], row["name"], row["held_by"]) == ("lift", "Lift1", HELD.session_id)
     nobody = MemoryTransport(MemoryNetwork(), "alone")
     assert watch.show_once(watch.listen_on(nobody), 0.01, out) == 1
     assert "check the domain and network" in capsys.readouterr().err

@@ -1,12 +1,13 @@
 """What `rmf-bridge watch` shows: rows from messages and a time, in virtual time."""
 
 import argparse
+import json
 from dataclasses import replace
 
 import pytest
 
 from bridges.commands import watch
-from bridges.commands.board import Board, Row, change_line, changes, repaint, table
+from bridges.commands.board import Board, Row, change_line, changes, json_line, repaint, table
 from bridges.commands.graph import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import stamp
@@ -120,6 +121,9 @@ def test_faults_have_a_column_when_there_are_any_and_are_a_change() -> None:
     (row,) = changes(first, faulty)
     assert change_line(row, WALL).endswith("age 0.0 s  DOOR_SILENT")
     assert repaint(faulty, 0, columns=80, lines=24)[0].count("\x1b[31m") == 1
+    assert "\x1b[31m" not in repaint(faulty, 0, columns=80, lines=24, coloured=False)[0]
+    line = json.loads(json_line(row, WALL))
+    assert (line["at"], line["name"], line["faults"]) == (WALL, "ward", "DOOR_SILENT")
 
 
 def test_a_pipe_gets_a_line_for_a_change_and_none_for_an_age() -> None:

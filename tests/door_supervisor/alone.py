@@ -1,54 +1,32 @@
 """The supervisor's core alone, for one door, in virtual time: told by hand, its words written down."""
 
-from typing import Any
-
-from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.door_supervisor import core
-from bridges.door_supervisor.core import Decided
 from bridges.door_supervisor.memory import Limits, Memory
-from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
-from bridges.rmf.definitions import DoorModeValue, DoorRequest
+from bridges.door_supervisor.report import DoorHoldReport
+from bridges.door_supervisor.signals import CloseRequested, Event, OpenRequested, StateHeard
+from bridges.rmf.definitions import DoorModeValue, DoorRequest, Message
+from tests.core import alone
 
 SECOND_NS = 10**9
 
 
-class Alone:
-    """`sent`: (s, word) of each request to the node. Requesters' clocks are ours plus `skew`."""
+class Alone(alone.Alone[Memory, Event, Limits, DoorHoldReport]):
+    """With one door. `faults`: (s, texts), each time that they differ."""
 
     def __init__(self, limits: Limits | None = None, *, speaks: bool = True) -> None:
-        self.limits = limits or Limits()
-        self.now = 0.0
-        self.skew = 100.0
-        self.memory: Memory = core.initial("ward", 0.0)
-        self.sent: list[tuple[float, str]] = []
-        self.refused: list[tuple[float, str]] = []
         self.faults: list[tuple[float, tuple[str, ...]]] = []
-        self.last: Decided
-        self.hears(MaySpeak(speaks))
+        super().__init__(core.initial("ward", 0.0), core.decide, limits or Limits(), speaks)
 
-    def hears(self, event: Any) -> None:
-        """One decision, now."""
-        self.last = core.decide(self.memory, event, self.now, self.limits)
-        self.memory = self.last.memory
-        at = round(self.now, 3)
-        for _, message in self.last.publish:
-            assert isinstance(message, DoorRequest)
-            assert (message.requester_id, message.door_name) == ("door_supervisor", "ward")
-            word = DoorModeValue(message.requested_mode.value).name.removeprefix("MODE_")
-            self.sent.append((at, word))
-        if self.last.refused:
-            self.refused.append((at, self.last.refused))
-        faults = tuple(str(fault) for fault in self.last.report.faults)
+    def words(self, message: Message) -> str:
+        assert isinstance(message, DoorRequest)
+        assert (message.requester_id, message.door_name) == ("door_supervisor", "ward")
+        return DoorModeValue(message.requested_mode.value).name.removeprefix("MODE_")
+
+    def hears(self, event: Event) -> None:
+        super().hears(event)
+        faults = tuple(str(fault) for fault in self.report.faults)
         if faults != (self.faults[-1][1] if self.faults else ()):
-            self.faults.append((at, faults))
-
-    def until(self, at: float) -> None:
-        """Time passes; the core is woken when it wants to be."""
-        while self.last.wake_at <= at:
-            self.now = self.last.wake_at
-            self.hears(Woken())
-            assert self.last.wake_at > self.now, "it wants to be woken at once, for ever"
-        self.now = at
+            self.faults.append((round(self.now, 3), faults))
 
     def opens(self, who: str = "a", *, aged: float = 0.0) -> None:
         """A requester's OPEN, sent `aged` s ago by its own clock."""
@@ -59,7 +37,7 @@ class Alone:
         self.hears(CloseRequested(who, self.stamp(aged)))
 
     def stamp(self, aged: float) -> int:
-        return round((self.now + self.skew - aged) * SECOND_NS)
+        return round(self.stamped(aged) * SECOND_NS)
 
     def shows(self, mode: str, until: float | None = None) -> None:
         """A DoorState; with `until`, one each second from now until then."""

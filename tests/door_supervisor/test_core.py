@@ -198,9 +198,9 @@ def test_each_requester_has_a_clock_of_its_own() -> None:
 
 def test_who_sends_no_stamps_is_believed_in_the_order_of_arrival() -> None:
     desk = Alone()
-    for at, word in enumerate(
-        [OpenRequested, OpenRequested, CloseRequested, OpenRequested, CloseRequested]
-    ):
+    words: list[type[OpenRequested | CloseRequested]] = [OpenRequested, OpenRequested]
+    words += [CloseRequested, OpenRequested, CloseRequested]
+    for at, word in enumerate(words):
         desk.until(float(at))
         desk.hears(word("terminal", 0))
     assert desk.sent == [
@@ -382,13 +382,13 @@ def test_a_door_that_nobody_holds_may_be_silent_and_is_forgotten_after_a_minute(
 
 def test_the_report_names_the_holders_and_the_door_as_it_was_last_seen() -> None:
     desk = Alone()
-    assert desk.last.report == DoorHoldReport(None)
+    assert desk.report == DoorHoldReport(None)
     desk.until(1.0)
     desk.opens("b")
     desk.until(2.0)
     desk.shows("MOVING")
     desk.opens("a")
-    report = desk.last.report
+    report = desk.report
     assert report == DoorHoldReport(2.0, DoorModeValue.MODE_MOVING, (("b", 1.0), ("a", 2.0)))
     assert report.news() == (DoorModeValue.MODE_MOVING, ("b", "a"))
 

@@ -8,6 +8,7 @@ import pytest
 
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Side
 from bridges.settings.load import Config, load
+from drivers.hal.gpio import GpioBus
 from drivers.lift.dry_contact import LiftDryContact, create
 from hal_fakes.plants import lift as lift_plant
 from hal_fakes.simulate import Simulation
@@ -23,6 +24,7 @@ class SimulatedLift:
 
     def __init__(self, simulation: Simulation, config: Config) -> None:
         self.bus = simulation.open_bus("header")
+        assert isinstance(self.bus, GpioBus)
         self._edge = threading.Event()
         self.bus.on_edge(self._edge.set)
         self.driver: LiftDryContact = create("Lift1", config.devices["Lift1"], self.bus)

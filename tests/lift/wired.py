@@ -1,6 +1,6 @@
 """The whole lift without its pins: node, driver, wires and plant, in virtual time."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -42,7 +42,7 @@ class WiredBuilding(Building):
     def canonical(self, point: str) -> str:
         return point
 
-    def lines(self, inputs: dict[str, Pull | None], outputs: dict[str, bool]) -> "_Lines":
+    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> "_Lines":
         return _Lines(self, outputs)
 
     def open(self) -> None:
@@ -66,7 +66,7 @@ class WiredBuilding(Building):
 class _Lines:
     """Levels straight from the plant and to it (`drivers.hal.points.Lines`)."""
 
-    def __init__(self, building: WiredBuilding, safe: dict[str, bool]) -> None:
+    def __init__(self, building: WiredBuilding, safe: Mapping[str, bool]) -> None:
         self._building, self._safe = building, safe
 
     def claim(self) -> None:
@@ -75,7 +75,7 @@ class _Lines:
     def read(self) -> dict[str, bool]:
         return self._building._wiring.levels(self._building.now)
 
-    def write(self, levels: dict[str, bool]) -> None:
+    def write(self, levels: Mapping[str, bool]) -> None:
         for point, level in levels.items():
             self._building._wiring.drive(point, level, self._building.now)
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from bridges.core.fields import Zenoh
 from bridges.rmf.choose import missing_of_dds
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.settings import Zenoh
 from bridges.rmf.transport import Transport
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf.domains import domain_of_this_run

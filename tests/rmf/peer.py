@@ -91,7 +91,7 @@ def hostile(domain: int, transport: str) -> None:
     from cyclonedds.qos import Policy, Qos
     from cyclonedds.topic import Topic as DdsTopic
 
-    from bridges.rmf.loopback import LOOPBACK
+    from bridges.rmf.cyclone import LOOPBACK
     from tests.rmf import idl_types
 
     kept = Domain(domain, LOOPBACK)

@@ -13,8 +13,8 @@ from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.rmf import definitions as d
 from bridges.rmf import graph
+from bridges.rmf.cyclone import LOOPBACK
 from bridges.rmf.dds import DdsTransport
-from bridges.rmf.loopback import LOOPBACK
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import TransportError
 from tests.rmf import peer

@@ -178,8 +178,8 @@ def test_what_a_publisher_of_rmw_zenoh_retains_is_heard_however_late_it_comes(
     ],
 )
 def test_a_token_that_says_nothing_is_passed_over(token: str) -> None:
-    assert zenoh_keys.RmwZenoh(1, "session", "node").end(token) is None
-    assert zenoh_keys.Ros2Dds(1, "session", "node").end(token) is None
+    assert zenoh_keys.RmwZenoh(1, "session", "node").peer(token) is None
+    assert zenoh_keys.Ros2Dds(1, "session", "node").peer(token) is None
 
 
 # --- zenoh-bridge-ros2dds ------------------------------------------------------------------------

@@ -11,8 +11,8 @@ import pytest
 from bridges.serve import directory, places
 from bridges.serve.directory import (
     AlreadyRunning,
-    Holder,
     KeptFile,
+    LockHolder,
     RuntimeDirectory,
     Unknown,
     find,
@@ -23,7 +23,7 @@ from bridges.serve.places import Places
 from bridges.serve.record import Record
 
 FILE = Path("/etc/rmf-bridges/lift.yaml")
-OURS = Holder(os.getpid(), str(FILE), True)
+OURS = LockHolder(os.getpid(), str(FILE), True)
 CLAIMED = Record(str(FILE), b"kind: lift\n", {"make.yaml": b"for: door_register\n"})
 
 
@@ -238,7 +238,7 @@ def test_a_lock_that_is_a_symbolic_link_or_nonsense_says_nothing(tmp_path: Path)
     (tmp_path / "lock").unlink()
     (tmp_path / "lock").write_text(json.dumps({"pid": "all", "file": 1}))
     assert holder(in_one(tmp_path)) is None
-    assert directory._written(tmp_path / "lock") == Holder(0, "", False)
+    assert directory._written(tmp_path / "lock") == LockHolder(0, "", False)
 
 
 def test_a_directory_that_somebody_else_could_have_made_is_not_believed(tmp_path: Path) -> None:

@@ -33,6 +33,11 @@ def problems_of(path: Path, text: str | bytes) -> list[str]:
     return []
 
 
+def texts_of(path: Path, text: str) -> list[str]:
+    """The same without line and column."""
+    return [problem.partition(": ")[2] for problem in problems_of(path, text)]
+
+
 def config_of(path: Path, text: str) -> Config:
     """The Config of a file with this text."""
     path.write_bytes(text.encode())

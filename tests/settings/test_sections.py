@@ -265,7 +265,7 @@ def test_a_misspelt_acceptance_is_told_beside_what_the_driver_says(file: Path) -
     text = changed("    limits:", "    accept_unsafe: {hald: by contract}\n    limits:")
     text = changed("tries: 2", "close_s: 9", changed("{1: in, 2: out}", "{1: yard}", text))
     assert problems_of(file, text) == [
-        "14:16: code 1 is no lane: 'yard'",
+        "14:16: 'codes': code 1 is no lane: 'yard'",
         "15:21: unknown signal 'hald': did you mean 'hold'? known here: opened, closed, hold",
         "16:34: 'close_s' may not be longer than 'open_s'",
     ]

@@ -16,8 +16,8 @@ from msgspec.inspect import (
     type_info,
 )
 
-from bridges.core.fields import Rmf
 from bridges.core.graph_kind import GraphKind
+from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.slips import number_meant
 from tests.settings.reading import changed, problems_of
@@ -117,7 +117,7 @@ SLIPS = {
     ),
     "curly quotes": (
         changed("lanes: [in, out]", "lanes: [\u201cin\u201d, out]"),
-        ["8:13: \u201c is no quote to YAML: write \" or '"],
+        ["8:13: YAML does not read \u201c as a quote: write \" or '"],
     ),
 }
 
@@ -150,7 +150,7 @@ doors:
     outputs: {hold_open: {point: unit 1 coil 0, active: high}}
 """
     assert problems_of(file, text) == [
-        "4:3: 'module' says not where the units are: write tcp: {host: …} or serial: {port: …}",
+        "4:3: 'module' needs a connection: write tcp: {host: …} or serial: {port: …}",
         "7:19: 'on_s' must be shorter than every_s; leave pulse out for a steady hold",
         "8:5: 'inputs' needs 'closed'; without that contact say feedback: estimated",
     ]

@@ -145,7 +145,7 @@ def test_a_structs_own_problem_is_told_at_the_place_that_it_names(file: Path) ->
     text = changed("{1: in, 2: out}", "{1: in, 2: yard, 0x3: roof}")
     text = changed("tries: 2", "close_s: 9", text)
     assert problems_of(file, text) == [
-        "14:5: code 3 is no lane: 'roof'",
-        "14:23: code 2 is no lane: 'yard'",
+        "14:5: 'codes': code 3 is no lane: 'roof'",
+        "14:23: 'codes': code 2 is no lane: 'yard'",
         "15:34: 'close_s' may not be longer than 'open_s'",
     ]

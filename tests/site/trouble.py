@@ -240,7 +240,7 @@ def pressable(device: Device) -> list[str]:
     """What the building does to a device that counts as an ill."""
     plant = device.plant
     if isinstance(plant, LiftPlant):
-        return [h for h in LIFT_HAZARDS if Hazard(h) in plant._pressed]
+        return [h for h in LIFT_HAZARDS if Hazard(h) in plant.pressed]
     if isinstance(plant, DoorPlant):
         return ["obstruction", *(["fire"] if "fire" in plant._sensors else [])]
     return list(CAUSES)

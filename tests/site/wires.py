@@ -13,7 +13,7 @@ from drivers.hal.modbus.points import Point
 from drivers.hal.points import Pull, Wire
 from hal_fakes.http_charger import HttpCharger
 from hal_fakes.modbus.register_door import RegisterDoor
-from hal_fakes.plants.charger import ChargerPlant, Reading
+from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.machine import Machine
 from hal_fakes.wiring import Wiring
 from tests.site.timeline import Timeline
@@ -132,7 +132,7 @@ class HttpFar:
 
     def get_json(self, path: str) -> dict[str, Any]:
         self._plant.advance(self._timeline.now)
-        reading: Reading = self._plant.sense("reading")
+        reading = self._plant.reading()
         self._answers(reading.failures)
         found: dict[str, Any] = json.loads(self._station.body(reading))
         return found

@@ -5,14 +5,18 @@ There is one file for each kind of device; this one has what they share. A reque
 table, most specific first; the last one always applies.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, TypeVar
 
 from bridges.commands.graph import CommandLine, Heard
 from bridges.rmf import words
+from bridges.rmf.definitions import Message, SupervisorHeartbeat
 from bridges.rmf.topics import AnyTopic
+
+State = TypeVar("State", bound=words.Stated)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,20 +33,35 @@ class Seen:
     listeners: int = 0
     first_sent_at: float | None = None
     last_sent_at: float | None = None
-    states: tuple[Heard, ...] = ()
+    states: tuple[Heard[words.Stated], ...] = ()
     names: frozenset[str] = frozenset()
-    heartbeat: Heard | None = None
+    heartbeat: Heard[SupervisorHeartbeat] | None = None
 
-    def latest(self) -> Any:
-        """The last state heard, None before the first."""
-        return self.states[-1].message if self.states else None
+    def hears(self, heard: Heard[Message], about: Callable[[words.Stated], bool]) -> "Seen":
+        """Take a message that was heard. `about(state)`: does the state concern the request?"""
+        message = heard.message
+        if isinstance(message, SupervisorHeartbeat):
+            return replace(self, heartbeat=Heard(message, heard.at))
+        if not isinstance(message, words.Stated):
+            return self
+        states = (*self.states, Heard(message, heard.at)) if about(message) else self.states
+        return replace(self, names=self.names | {words.device(message)}, states=states)
 
-    def answer(self) -> Any:
+    def sends(self, now: float) -> "Seen":
+        """The request is sent now."""
+        first = now if self.first_sent_at is None else self.first_sent_at
+        return replace(self, first_sent_at=first, last_sent_at=now)
+
+    def states_of(self, kind: type[State]) -> list[State]:
+        """The states heard, in order. `kind`: their type."""
+        return [heard.message for heard in self.states if isinstance(heard.message, kind)]
+
+    def answer(self, kind: type[State]) -> State | None:
         """The last state if it was heard after our first request, else None."""
         sent_at = self.first_sent_at
         if sent_at is None or not self.states or self.states[-1].at < sent_at:
             return None
-        return self.states[-1].message
+        return self.states_of(kind)[-1]
 
     def requesters(self, door: str) -> list[str] | None:
         """Who holds the door, by a heartbeat heard after our first request; None without one."""
@@ -80,7 +99,7 @@ class Obstacle(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class Request(ABC):
     """A request about the device of this `name`: to its daemon if `direct`, else to the supervisor."""
 
     name: str
@@ -98,17 +117,17 @@ class Request:
         """The daemon's own topic, or the one that fleet adapters use."""
         return self.own if self.direct or self.adapter is None else self.adapter
 
+    @abstractmethod
     def message(self, seen: Seen) -> words.Requested | None:
         """The message to send, without its stamp; None while it cannot be made yet."""
-        raise NotImplementedError
 
+    @abstractmethod
     def outcome(self, seen: Seen) -> Done | Failed | None:
         """The outcome, if the states show one."""
-        raise NotImplementedError
 
+    @abstractmethod
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """Why there is no effect, judged by the last state; the first `present` one counts."""
-        raise NotImplementedError
 
     def about(self, state: words.Stated) -> bool:
         """Whether the state is of this device."""
@@ -119,7 +138,7 @@ class Request:
         return bool(seen.states)
 
     def nobody(self) -> Obstacle:
-        """No supervisor or daemon listens to the request."""
+        """No supervisor or daemon subscribes to the request."""
         silence = f"no node subscribes to {self.topic.name}"
         if self.topic == self.own:
             listener = self.listener or f"{self.kind} daemon"

@@ -43,7 +43,7 @@ class Charge(_Charger):
 
     def outcome(self, seen: Seen) -> Done | None:
         """Done when a state with our id shows that the charger serves the robot."""
-        answer = seen.answer()
+        answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING or answer.request_id != self.request_id:
             return None
         state = words.plain(d.ChargerStateValue, answer.state)
@@ -51,7 +51,7 @@ class Charge(_Charger):
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """An error, or another request."""
-        state: d.ChargerState = seen.latest()
+        state = seen.states_of(d.ChargerState)[-1]
         cancel = self.line.other("send", "charger", self.name, "--cancel", state.request_id)
         return (
             _error(state),
@@ -83,10 +83,10 @@ class ChargeCancel(_Charger):
 
     def outcome(self, seen: Seen) -> Done | Failed | None:
         """Done when the charger is released or shows another id; Failed if it never showed this one."""
-        answer = seen.answer()
+        answer = seen.answer(d.ChargerState)
         if answer is None or self._holds(answer):
             return None
-        if any(self._holds(heard.message) for heard in seen.states):
+        if any(map(self._holds, seen.states_of(d.ChargerState))):
             return Done(f"{self.name} no longer serves request {self.request_id}")
         state = words.described(answer)
         return Failed(f"{self.name} does not serve request '{self.request_id}' (state: {state})")
@@ -128,7 +128,7 @@ class QueuedCharge(Charge):
 
     def outcome(self, seen: Seen) -> Done | None:
         """Done when a charger serves the robot."""
-        answer = seen.answer()
+        answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING:
             return None
         state = words.plain(d.ChargerStateValue, answer.state)
@@ -150,7 +150,7 @@ class QueuedCharge(Charge):
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """The charger's error, or no charger assigned."""
         text = f"the {COORDINATOR} has not assigned {self.who} a charger: its log says why"
-        return _error(seen.latest()), Obstacle(True, text)
+        return _error(seen.states_of(d.ChargerState)[-1]), Obstacle(True, text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,12 +42,12 @@ class LiftRide(_Lift):
 
     def outcome(self, seen: Seen) -> Done | Failed | None:
         """Done when RequestLift's four fields match; an unserved floor fails at once."""
-        latest = seen.latest()
-        if latest and latest.available_floors and self.floor not in latest.available_floors:
-            floors = ", ".join(latest.available_floors)
-            near = nearest(self.floor, latest.available_floors)
+        states = seen.states_of(d.LiftState)
+        served = states[-1].available_floors if states else ()
+        if served and self.floor not in served:
+            floors, near = ", ".join(served), nearest(self.floor, served)
             return Failed(f"{self.name} serves {floors}, not '{self.floor}'{near}")
-        if not self._fulfilled(seen.answer()):
+        if not self._fulfilled(seen.answer(d.LiftState)):
             return None
         where = "" if self.granted_only else f" at {self.floor}, door open,"
         return Done(f"{self.name} is{where} held by {self.session}; to end that: {self._release}")
@@ -60,7 +60,7 @@ class LiftRide(_Lift):
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """The session, the mode, or the floor or door that the car has not reached."""
-        state: d.LiftState = seen.latest()
+        state = seen.states_of(d.LiftState)[-1]
         name, session, mode = self.name, state.session_id, state.current_mode
         word = words.word(d.LiftMode, mode)
         return (
@@ -91,8 +91,8 @@ class LiftEnd(_Lift):
     session: str = ""
 
     def _ending(self, seen: Seen) -> str:
-        first: str = seen.states[0].message.session_id if seen.states else ""
-        return self.session or first
+        first = (state.session_id for state in seen.states_of(d.LiftState))
+        return self.session or next(first, "")
 
     def message(self, seen: Seen) -> d.LiftRequest | None:
         """END_SESSION as fleets send it: no floor, door 0."""
@@ -110,7 +110,7 @@ class LiftEnd(_Lift):
         session = self._ending(seen)
         if seen.states and not session:
             return Done(f"{self.name} has no session: nothing to end")
-        answer = seen.answer()
+        answer = seen.answer(d.LiftState)
         if answer is None or answer.session_id == session:
             return None
         return Done(f"{self.name} is no longer held by {session}")

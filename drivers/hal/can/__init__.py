@@ -25,19 +25,13 @@ __all__ = [
     "Wanted",
     "describe",
     "named",
-    "open_bus",
     "warnings",
 ]
 
 
-def open_bus(settings: Settings) -> CanBus:
-    """The way onto this bus; nothing is sent or heard yet."""
-    return CanBus(settings)
-
-
 BUS = BusType(
     settings=Settings,
-    open_bus=open_bus,
+    open_bus=CanBus,
     fake="hal_fakes.can",
     where=where,
     warnings=warnings,

@@ -15,9 +15,9 @@ NEVER = float("-inf")
 
 
 class Said(NamedTuple):
-    """A frame of the device's. `mask`: the bits of its id that count. `fresh_s`: how long it does.
+    """A frame that the device sends. `mask`: the bits of its id that count. `length`: in bytes.
 
-    `needed`: without it there is no reading.
+    `fresh_s`: how long it is valid (s). `needed`: without it there is no reading.
     """
 
     id: int
@@ -41,7 +41,7 @@ class Broadcasts:
             bus.listen([Wanted(said.id, said.mask | EXTENDED)], self._hearer(name, said.length))
 
     def read(self) -> dict[str, bytes]:
-        """Every frame that is fresh; waits for one that is needed. Raises HalError."""
+        """Every fresh frame by name: its payload. Waits for one that is needed. Raises HalError."""
         self._bus.take()
         if self._missing():
             self._pause.check()
@@ -53,7 +53,7 @@ class Broadcasts:
         return self._fresh()
 
     def read_after(self, first: str, others: Iterable[str]) -> dict[str, bytes]:
-        """The same once these have come after the `first`, or have had their time. Raises HalError."""
+        """The same, after `others` have followed `first` or `timeout_s` is over. Raises HalError."""
         since = self._at(first)
         self._bus.wait(
             lambda: all(self._at(name, since) > since for name in others),
@@ -62,7 +62,7 @@ class Broadcasts:
         return self._fresh()
 
     def check_pace(self, frame: str, every_s: float) -> None:
-        """Can the scan keep it? Raises HalError."""
+        """Raises HalError if scans are too far apart to send this frame on time."""
         scan_s = self._bus.settings.scan_s
         if every_s < scan_s:
             raise HalError(
@@ -71,7 +71,7 @@ class Broadcasts:
             )
 
     def feed(self, frame_id: int, every_s: float, payload: Callable[[], bytes]) -> bool:
-        """Send a frame if it is due in this scan; True when it was. Raises HalError."""
+        """Send a frame if it is due in this scan; True if it was sent. Raises HalError."""
         now, slack_s = self._bus.now(), self._bus.settings.scan_s / 2
         if now < self._sent_at.get(frame_id, NEVER) + every_s - slack_s:
             return False
@@ -103,7 +103,7 @@ class Broadcasts:
         return {name: payload for name, (payload, _) in self._heard.items() if self._is_fresh(name)}
 
     def _missing(self) -> str:
-        """The first frame that is needed and not fresh; "" when all are."""
+        """The first frame that is needed and not fresh; "" if there is none."""
         needed = (name for name, said in self._frames.items() if said.needed)
         return next((name for name in needed if not self._is_fresh(name)), "")
 

@@ -13,7 +13,7 @@ during which calls fail at once. A bus-off ends with the next frame, or when the
 import random
 import time
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from drivers.hal import Bus, HalError
 from drivers.hal.backoff import Backoff
@@ -21,30 +21,27 @@ from drivers.hal.can.frames import Frame, Hear, LinkDown, Trouble, Wanted, named
 from drivers.hal.can.settings import Settings
 
 if TYPE_CHECKING:
-    from drivers.hal.can.link import Link
+    from drivers.hal.can.link import Link, Vendor
 
 FRAMES_AT_ONCE: Final = 20_000
 """A reading takes no more: a bus at 1 Mbit/s has 8,000 a second."""
 HANG_S: Final = 1.0
-"""A reading that comes so much later than it should shows that we hung."""
+"""A reading this much too late (s) shows that the daemon hung."""
 ROUTES_MAX: Final = 4096
 RECENT_S: Final = 5.0
 OTHERS_MAX: Final = 64
 OTHERS_SHOWN: Final = 5
 
-Vendor = Callable[[], Any]
-"""Opens python-can's bus."""
-
 
 class CanBus(Bus):
-    """One bus and the devices on it. `clock`, `jitter` and `vendor` are a test's."""
+    """One bus and its devices. Tests replace `clock`, `jitter` and `vendor`."""
 
     def __init__(
         self,
         settings: Settings,
         clock: Callable[[], float] = time.monotonic,
         jitter: Callable[[], float] = random.random,
-        vendor: Vendor | None = None,
+        vendor: "Vendor | None" = None,
     ) -> None:
         self.settings = settings
         self.now = clock
@@ -62,21 +59,21 @@ class CanBus(Bus):
         self._deaf = False
 
     def backoff(self) -> Backoff:
-        """Pauses for one device of this bus; `insist` ends them too."""
+        """The backoff of one device; `insist` ends it too."""
         made = Backoff(self.now, self._jitter)
         self._backoffs.append(made)
         return made
 
     def listen(self, wanted: Iterable[Wanted], hear: Hear) -> None:
-        """Have each of these frames given to `hear`, as long as the bus lives."""
+        """Call `hear` with each of these frames, until the bus is closed."""
         self._wanted += [(one, hear) for one in wanted]
         self._routes.clear()
         self._others.clear()
 
     def take(self) -> None:
-        """Give out what has come since the last time. Raises HalError.
+        """Hand out the frames that have come since the last call. Raises HalError.
 
-        After a hang nobody knows how old what has come is: it is thrown away.
+        After a hang the age of these frames is unknown, so they are dropped.
         """
         self._deaf = self.now() - self._taken_at > HANG_S + self.settings.scan_s
         try:
@@ -87,7 +84,7 @@ class CanBus(Bus):
             self._deaf, self._taken_at = False, self.now()
 
     def wait(self, heard: Callable[[], bool], within_s: float) -> bool:
-        """Take what comes until this is so, or for so long. Raises HalError."""
+        """Take frames until `heard()`, or for so long (s); True if heard. Raises HalError."""
         deadline = self.now() + within_s
         while not heard():
             left_s = deadline - self.now()
@@ -109,7 +106,7 @@ class CanBus(Bus):
             raise self._failed(str(error)) from error
 
     def silence(self) -> str:
-        """What is known where somebody is not heard: the bus's own trouble, or who is heard instead."""
+        """Why a device may not be heard: the bus's own trouble, or which ids are heard instead."""
         if self._trouble.text and (
             self._trouble.bus_off or self.now() - self._trouble_at < RECENT_S
         ):
@@ -123,7 +120,7 @@ class CanBus(Bus):
         )
 
     def others(self) -> list[int]:
-        """The ids that were heard lately and that no device wants."""
+        """The ids heard in the last RECENT_S that no device wants."""
         now = self.now()
         return sorted(found for found, at in self._others.items() if now - at < RECENT_S)
 
@@ -177,7 +174,7 @@ class CanBus(Bus):
         return made
 
     def _note(self, trouble: Trouble) -> None:
-        """The controller speaks: of its troubles, or that it works again."""
+        """The controller reports a trouble, or that it works again."""
         self._trouble, self._trouble_at = trouble, self.now()
         if trouble.bus_off:
             raise self._failed(
@@ -197,8 +194,8 @@ class CanBus(Bus):
         return self._backoffs[0].failed(text)
 
 
-def _link(settings: Settings, where: str, vendor: Vendor | None) -> "Link":
-    """The way onto the bus. Only here python-can is imported."""
+def _link(settings: Settings, where: str, vendor: "Vendor | None") -> "Link":
+    """The link to the bus. Only this function imports python-can."""
     from drivers.hal.can.link import Link, slcan, socketcan
 
     place = settings.slcan

@@ -14,7 +14,8 @@ A lost node has a backoff as every device has; its heartbeat or its restart ends
 """
 
 import struct
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from drivers.hal import HalError
 from drivers.hal.backoff import Backoff
@@ -24,6 +25,7 @@ from drivers.hal.can.frames import Frame, Wanted
 if TYPE_CHECKING:
     from drivers.hal.can.sdo import Client
 
+Reply = TypeVar("Reply")
 LATE: Final = 3.0
 SDO_TO_NODE: Final = 0x600
 SDO_FROM_NODE: Final = 0x580
@@ -64,7 +66,7 @@ class CanOpenNode:
         bus.listen([Wanted(SDO_FROM_NODE + node)], self._hear_reply)
 
     def alive(self) -> None:
-        """Take what has come. Raises HalError when there is no heartbeat, or it is not operational."""
+        """Take new frames. Raises HalError if there is no heartbeat, or the node is not operational."""
         self._bus.take()
         if self._beat_limit_s is None:
             return
@@ -80,9 +82,9 @@ class CanOpenNode:
             raise HalError(f"{self._name()} is {state}, not operational: look at the node")
 
     def read(self, index: int, subindex: int, octets: int) -> int:
-        """An unsigned number of so many octets. Raises HalError."""
+        """Read an unsigned number of this many octets. Raises HalError."""
         what = f"read 0x{index:04X}:{subindex:02X}"
-        found = self._exchanged(what, self._sdo_pause, "upload", index, subindex)
+        found = self._exchanged(what, self._sdo_pause, lambda: self._client.upload(index, subindex))
         number = bytes(found)[:octets]
         if len(number) < octets or any(found[octets:]):
             size = f"{len(found)} bytes ({found.hex(' ')})"
@@ -96,20 +98,20 @@ class CanOpenNode:
     ) -> None:
         """Set an unsigned number. Raises HalError; then it may be set or not.
 
-        `safe`: it takes power away, and waits for no pause that a reading has begun.
+        `safe`: it switches power off, so it ignores the backoff of failed readings.
         """
         what = f"write 0x{index:04X}:{subindex:02X}"
         payload = number.to_bytes(octets, "little")
         pause = self._safe_pause if safe else self._sdo_pause
-        self._exchanged(what, pause, "download", index, subindex, payload)
+        self._exchanged(what, pause, lambda: self._client.download(index, subindex, payload))
 
-    def _exchanged(self, what: str, pause: Backoff, call: str, *arguments: Any) -> Any:
+    def _exchanged(self, what: str, pause: Backoff, transfer: Callable[[], Reply]) -> Reply:
         """One SDO transfer by the library. Raises HalError."""
         waits = pause is self._sdo_pause and not pause.insisting
         pause.check(not_yet=waits and self._bus.now() < self._late_until)
         text = f"{self._name()}, {what}: "
         try:
-            found = getattr(self._client, call)(*arguments)
+            found = transfer()
         except TimeoutError:
             raise pause.failed(text + self._no_reply()) from None
         except self._client.ABORTED as error:
@@ -120,8 +122,8 @@ class CanOpenNode:
         return found
 
     def exchange(self, request: bytes) -> bytes:
-        """Send these eight bytes; the reply about the same object. Raises TimeoutError, HalError."""
-        self._bus.take()  # what comes too late for the last question goes here
+        """Send eight bytes; return the reply about the same object. Raises TimeoutError, HalError."""
+        self._bus.take()  # drops a late reply to the last request
         self._answer, self._stray, self._asked = None, "", request[1:4]
         try:
             self.post(request)
@@ -134,7 +136,7 @@ class CanOpenNode:
         return self._answer
 
     def post(self, request: bytes) -> None:
-        """Send these eight bytes, to which no reply comes. Raises HalError."""
+        """Send these eight bytes, which have no reply. Raises HalError."""
         self._bus.send(Frame(SDO_TO_NODE + self._node, request))
 
     def _hear_beat(self, frame: Frame, at: float) -> None:
@@ -179,7 +181,7 @@ class CanOpenNode:
 
 
 def _client(node: CanOpenNode) -> "Client":
-    """The library's, which is imported only here."""
+    """The library's client, imported only here."""
     from drivers.hal.can.sdo import Client
 
     return Client(node.exchange, node.post)

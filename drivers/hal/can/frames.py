@@ -1,43 +1,43 @@
-"""Frames on a CAN bus, as the devices and the bus speak of them."""
+"""Frames on a CAN bus, their ids, and the bus's troubles."""
 
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
 EXTENDED: Final = 1 << 31
-"""In a frame's id: it has 29 bits. (0x123 and an extended 0x123 are two.)"""
+"""Set in an id of 29 bits: 0x123 and an extended 0x123 are different ids."""
 
 
 class Frame(NamedTuple):
-    """One data frame; `id` with EXTENDED where it has 29 bits."""
+    """One data frame. `id` has EXTENDED set if it has 29 bits."""
 
     id: int
     payload: bytes
 
 
 class Trouble(NamedTuple):
-    """The bus's own, from an error frame. `text`: "" when the controller is well again."""
+    """A trouble of the bus itself, from an error frame. `text`: "" if the controller works again."""
 
     text: str
     bus_off: bool
 
 
 class LinkDown(Exception):
-    """The interface cannot be used now. The text says what to look at."""
+    """The interface cannot be used now. The text says what to check."""
 
 
 class Wanted(NamedTuple):
-    """Frames whose id has these bits where `mask` has ones; all of it where there is no mask."""
+    """The frames whose id equals `id` in the bits of `mask`; without a mask, in all bits."""
 
     id: int
     mask: int = 0xFFFF_FFFF
 
     def fits(self, frame_id: int) -> bool:
-        """Is it one of them?"""
+        """Is this one of their ids?"""
         return (frame_id ^ self.id) & self.mask == 0
 
 
 Hear = Callable[[Frame, float], None]
-"""Takes a frame and when it was read (monotonic s)."""
+"""Is called with a frame and the time it was read (monotonic s)."""
 
 
 def named(frame_id: int) -> str:

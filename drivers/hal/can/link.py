@@ -1,14 +1,13 @@
-"""The way onto one CAN bus, by python-can: an interface of the kernel (SocketCAN), or an slcan adapter.
+"""One CAN bus by python-can: an interface of the kernel (SocketCAN), or an slcan adapter.
 
-python-can opens, reads and sends; what its interfaces leave open is settled here:
+python-can opens, reads and sends. This file makes good what it leaves open:
 
-- A reading of nothing does not mean that an slcan adapter has no more: it may have been an
-  acknowledgement. And what is no slcan at all breaks python-can's parser for good, so that the adapter
-  is opened anew.
-- An slcan write waits until the adapter has taken it, without end; here it has `timeout_s`.
-- An interface that is down or gone raises many sorts of exceptions; here all are LinkDown, with a text
-  that says what to do.
-- The bus's own troubles come as error frames (linux/can/error.h), on SocketCAN only.
+- If an slcan adapter returns no frame, more may follow: it may have sent an acknowledgement.
+- Bytes that are not slcan break python-can's parser for good, so the adapter is opened again.
+- python-can's slcan write waits for the adapter without limit; here it has `timeout_s`.
+- An interface that is down or gone raises many types of exceptions. Here each is a LinkDown that says
+  what to do.
+- SocketCAN reports the bus's own troubles as error frames (linux/can/error.h).
 """
 
 import errno
@@ -17,7 +16,7 @@ import os
 import select
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, Final
+from typing import Final
 
 import can
 import serial
@@ -31,9 +30,9 @@ from drivers.hal.can.settings import Slcan
 logging.getLogger("can").setLevel(logging.CRITICAL)  # our texts say it all
 
 FAILURES: Final = (can.CanError, serial.SerialException, OSError, ValueError, IndexError)
-"""What python-can and what is below it may raise; ValueError and IndexError are its parser's."""
+"""What python-can and the libraries below it raise. Its parser raises ValueError and IndexError."""
 IN_ONE_GO: Final = 4096
-"""So many lines of an adapter that are no frames are read at once, and no more."""
+"""How many lines of an adapter that are not frames are read at once, at most."""
 
 BUS_OFF: Final = 0x40
 RESTARTED: Final = 0x100
@@ -46,10 +45,10 @@ TROUBLES: Final = {
     0x10: "transceiver errors",
     0x01: "frames cannot be sent in time",
 }
-"""Bits of an error frame's id (linux/can/error.h), the most telling first."""
+"""Bits of an error frame's id (linux/can/error.h), the most serious first."""
 
 
-Vendor = Callable[[], Any]
+Vendor = Callable[[], BusABC]
 """Opens python-can's bus."""
 
 
@@ -61,7 +60,7 @@ def socketcan(interface: str) -> BusABC:
 
 
 def slcan(settings: Slcan) -> BusABC:
-    """An adapter on a serial port, for us alone."""
+    """An adapter on a serial port, which no other program may open meanwhile."""
     return Adapter(
         settings.port,
         tty_baudrate=settings.baudrate,
@@ -72,21 +71,21 @@ def slcan(settings: Slcan) -> BusABC:
 
 
 class Adapter(slcanBus):
-    """python-can's, which nobody else may open meanwhile, and whose writes do not wait without end."""
+    """python-can's adapter, but exclusive, and with a time limit for writes."""
 
     def _write(self, string: str) -> None:
         with error_check("Could not write to serial device"):
             self.serialPortOrig.write(string.encode() + self.LINE_TERMINATOR)
 
     def open(self) -> None:
-        """For us alone."""
+        """Open the port exclusively."""
         with error_check(exception_type=CanInitializationError):
             self.serialPortOrig.exclusive = True
         super().open()
 
 
 class Link:
-    """One way onto a bus, opened anew when it is needed. `where`: its name, for texts."""
+    """One bus, opened again when it is needed. `where`: its name, for errors."""
 
     def __init__(self, vendor: Vendor, where: str, timeout_s: float) -> None:
         self._vendor = vendor
@@ -96,7 +95,7 @@ class Link:
         self._readable: Callable[[float], bool] | None = None
 
     def open(self) -> None:
-        """Have it open. Raises LinkDown."""
+        """Open it if it is not open. Raises LinkDown."""
         if self._bus is not None:
             return
         try:
@@ -106,7 +105,7 @@ class Link:
         self._readable = _selecting(self._bus)
 
     def receive(self, wait_s: float) -> Frame | Trouble | None:
-        """What comes next; None when nothing does within `wait_s`. Raises LinkDown."""
+        """The next frame or trouble; None if none comes within `wait_s`. Raises LinkDown."""
         assert self._bus is not None
         for _ in range(IN_ONE_GO):
             try:
@@ -122,7 +121,7 @@ class Link:
         return None
 
     def send(self, frame: Frame) -> None:
-        """Send it, or raise LinkDown. Taken by the interface is not yet heard by anybody."""
+        """Send a frame. Raises LinkDown. An interface may take a frame that no device reads."""
         assert self._bus is not None
         message = can.Message(
             arbitration_id=frame.id & ~EXTENDED,
@@ -168,7 +167,7 @@ _HINTS: Final = {
 
 
 def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
-    """How to wait for an slcan adapter's next byte; None where `recv` itself waits as it should."""
+    """How to wait for an slcan adapter's next byte; None if python-can's `recv` waits as it should."""
     port = getattr(bus, "serialPortOrig", None)
     if port is None:
         return None
@@ -177,7 +176,7 @@ def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
 
 
 def _meaning(message: Message) -> Frame | Trouble | None:
-    """Data frames and the controller's troubles; remote and FD frames are nobody's here."""
+    """A data frame or the controller's trouble; None for remote and FD frames, which no device uses."""
     if message.is_error_frame:
         found = message.arbitration_id
         if found & RESTARTED and not found & BUS_OFF:
@@ -191,7 +190,7 @@ def _meaning(message: Message) -> Frame | Trouble | None:
 
 
 def _code(error: BaseException | None) -> int:
-    """The errno of a failure, or of what it was made from."""
+    """The errno of an error or of its cause; 0 if there is none."""
     while error is not None:
         code = getattr(error, "error_code", None) or getattr(error, "errno", None)
         if isinstance(code, int):

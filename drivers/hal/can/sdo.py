@@ -1,9 +1,9 @@
-"""The canopen library's SDO client, on an exchange of ours. Imported with the first node."""
+"""The canopen library's SDO client, which sends through `canopen.py`. Imported with the first node."""
 
 import logging
 import struct
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 from canopen import ObjectDictionary, SdoAbortedError, SdoCommunicationError
 from canopen.sdo.client import SdoClient
@@ -14,9 +14,9 @@ logging.getLogger("canopen").setLevel(logging.CRITICAL)  # our HalErrors say it 
 
 
 class Client(SdoClient):
-    """`exchange`: sends eight bytes and returns the eight that answer. `post`: sends without an answer.
+    """`exchange`: sends eight bytes and returns the eight of the reply. `post`: sends without a reply.
 
-    ABORTED is raised for a refusal, FAILURES for what is no answer.
+    It raises ABORTED if the node refuses, and FAILURES if the reply is not a reply.
     """
 
     ABORTED = SdoAbortedError
@@ -27,13 +27,13 @@ class Client(SdoClient):
         self._exchange = exchange
         self._post = post
 
-    def request_response(self, sdo_request: Any) -> bytes:
-        """One question. Raises ABORTED, and what `exchange` raises."""
+    def request_response(self, sdo_request: bytes) -> bytes:
+        """One request. Raises ABORTED, and what `exchange` raises."""
         reply = self._exchange(bytes(sdo_request))
         if reply[0] == ABORT:
             raise SdoAbortedError(int.from_bytes(reply[4:8], "little"))
         return reply
 
-    def send_request(self, request: Any) -> None:
-        """Without an answer."""
+    def send_request(self, request: bytes) -> None:
+        """A request without a reply."""
         self._post(bytes(request))

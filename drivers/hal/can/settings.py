@@ -34,8 +34,8 @@ class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """A serial or USB adapter that speaks slcan (LAWICEL).
 
     `port`: its path; one in /dev/serial/by-id stays the same.
-    `bitrate`: of the CAN bus.
-    `baudrate`: of the serial port; USB adapters take any.
+    `bitrate`: the bitrate of the CAN bus.
+    `baudrate`: the rate of the serial port; USB adapters take any.
     """
 
     port: Name
@@ -51,13 +51,13 @@ class Settings(
     tag_field="type",
     tag="can",
 ):
-    """One CAN bus: `socketcan` or `slcan`, one of the two.
+    """One CAN bus: either `socketcan` or `slcan`.
 
-    `socketcan`: the kernel's interface (`can0`), whose bitrate is set by `ip link`. Adapters of most
-    makers and the CAN boards of a Raspberry Pi are such.
+    `socketcan`: the kernel's interface (`can0`). `ip link` sets its bitrate. Most adapters and the CAN
+    boards of a Raspberry Pi have one.
     `slcan`: an adapter on a serial port.
-    `timeout_s`: for an answer to one question, and for an adapter to take a frame.
-    `scan_s`: how often the devices are read, and their frames sent.
+    `timeout_s`: how long a reply, or an adapter that takes a frame, may take.
+    `scan_s`: how often the devices are read and their frames are sent.
     """
 
     socketcan: Interface | None = None

@@ -11,13 +11,13 @@ Inputs are sampled: an edge only calls `wake`, because lgpio loses edges.
 
 import time
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
 from bridges.core.fields import Period
 from drivers.hal import BusType, HalError, Where
-from drivers.hal.gpio.bus import GpioBus
+from drivers.hal.gpio.bus import Factory, GpioBus
 from drivers.hal.gpio.header import (
     J8,
     boot_level,
@@ -65,7 +65,7 @@ def where(settings: Settings) -> Where:
 
 
 def open_bus(
-    settings: Settings, factory: Any = None, clock: Callable[[], float] = time.monotonic
+    settings: Settings, factory: Factory | None = None, clock: Callable[[], float] = time.monotonic
 ) -> "GpioBus":
     """The header's pins. Raises HalError that says what to check.
 
@@ -76,7 +76,7 @@ def open_bus(
     return GpioBus(factory, clock)
 
 
-def _lgpio_factory(chip: int | None) -> Any:
+def _lgpio_factory(chip: int | None) -> Factory:
     try:
         from drivers.hal.gpio import pins
     except ImportError as error:

@@ -4,7 +4,7 @@ import logging
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Protocol
 
 from bridges.log import pairs
 from drivers.hal import Bus, HalError
@@ -21,12 +21,45 @@ DROPPED = (
 )
 
 
+class Pin(Protocol):
+    """A pin of gpiozero's that claims as those of `pins.py` do."""
+
+    state: int
+    edges: str
+    when_changed: Callable[[object, object], None] | None
+
+    def output_with_state(self, state: bool) -> None:
+        """Claim it as an output, at this level from the first moment on."""
+
+    def input_with_pull(self, pull: str) -> None:
+        """Claim it as an input with this resistor: `up`, `down` or `floating`."""
+
+    def close(self) -> None:
+        """Let it go."""
+
+
+class Factory(Protocol):
+    """gpiozero's pin factory."""
+
+    def reserve_pins(self, requester: object, *pins: str) -> None:
+        """Keep these pins for one requester. Raises GPIOZeroError where another has them."""
+
+    def release_pins(self, requester: object, *pins: str) -> None:
+        """Let others have them."""
+
+    def pin(self, name: str) -> Pin:
+        """The pin of this name."""
+
+    def close(self) -> None:
+        """Let every pin go."""
+
+
 class GpioBus(Bus):
     """The pins of one header, for the devices of one thread."""
 
     canonical = staticmethod(canonical)
 
-    def __init__(self, factory: Any, clock: Callable[[], float]) -> None:
+    def __init__(self, factory: Factory, clock: Callable[[], float]) -> None:
         self.factory = factory
         self._wake: Callable[[], None] | None = None
         self._devices: list[GpioLines] = []
@@ -41,7 +74,7 @@ class GpioBus(Bus):
         """Call `wake` from gpiozero's thread when an input may have changed. It must not raise."""
         self._wake = wake
 
-    def edge(self, ticks: Any, state: Any) -> None:
+    def edge(self, ticks: object, state: object) -> None:
         """An input has changed: gpiozero's signature."""
         if self._wake is not None:
             self._wake()
@@ -76,7 +109,7 @@ class GpioLines:
         self._bus = bus
         self._pulls = inputs
         self._safe = outputs
-        self._claimed: dict[str, Any] = {}
+        self._claimed: dict[str, Pin] = {}
         self._dropped = False
 
     def claim(self) -> None:
@@ -142,12 +175,12 @@ class GpioLines:
                 levels[point] = bool(self._of(point).state)
         return levels
 
-    def _of(self, point: str) -> Any:
+    def _of(self, point: str) -> Pin:
         if point not in self._claimed:
             raise HalError(f"{describe(point)} is not claimed")
         return self._claimed[point]
 
-    def _pin(self, point: str) -> Any:
+    def _pin(self, point: str) -> Pin:
         """Reserve a pin before using it: gpiozero refuses one that another device holds."""
         self._bus.factory.reserve_pins(self, point)
         self._claimed[point] = self._bus.factory.pin(point)

@@ -11,7 +11,6 @@ lgpio creates a FIFO in the working directory on import, so import it in the run
 import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import lgpio
 from gpiozero import PinFixedPull
@@ -31,7 +30,7 @@ PULLS = {"up": lgpio.SET_PULL_UP, "down": lgpio.SET_PULL_DOWN, "floating": lgpio
 class HeldPin(LGPIOPin):  # type: ignore[misc]
     """One line, claimed in one call and left at its safe level."""
 
-    def __init__(self, factory: Any, info: Any) -> None:
+    def __init__(self, factory: LGPIOFactory, info: object) -> None:
         LocalPiPin.__init__(self, factory, info)  # LGPIOPin's own claims an input
         self._pwm = None
         self._bounce = None
@@ -65,7 +64,7 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
             lgpio.gpio_write(self.factory._handle, self._number, self._safe)
         lgpio.gpio_free(self.factory._handle, self._number)
 
-    def _claim(self, claim: Callable[[int, int, int], Any], level_or_flags: int) -> None:
+    def _claim(self, claim: Callable[[int, int, int], object], level_or_flags: int) -> None:
         try:
             claim(self.factory._handle, self._number, level_or_flags)
         except lgpio.error as error:

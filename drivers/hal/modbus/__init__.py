@@ -3,20 +3,19 @@
     settings.py   settings of the YAML; places.py: address or line; watchdog.py: the modules' watchdogs
     points.py     spelling of contacts and relays; registers.py: spelling of a map's places
     bus.py        the units of one connection or line: retries, pauses
-    lines.py      one device's coils and registers: claim, read, write, read back, let go
-    rivals.py     two masters on one output: a fault by that name, and no relay that chatters
-    dead_man.py   keeps the modules' watchdogs from tripping
-    wire.py       a question and its answer; tcp.py and rtu.py carry them, frames.py spells them
+    lines.py      one device's coils and registers: claim, read, write, read back, release
+    rivals.py     two masters on one output: a fault of its own, and no relay that chatters
+    dead_man.py   arms and refreshes the modules' watchdogs
+    wire.py       a request and its answer; tcp.py and rtu.py carry them, frames.py makes the frames
 
-Only frames.py (pymodbus) and rtu.py (pyserial) import a library. They are imported when a bus needs
-them.
+Only frames.py (pymodbus) and rtu.py (pyserial) import a library. They are imported when a bus needs it.
 """
 
 from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.points import canonical, describe, wire_problems
-from drivers.hal.modbus.settings import Settings, unreachable, warnings, where
+from drivers.hal.modbus.settings import Settings, kept, unreachable, warnings, where
 
 __all__ = [
     "BUS",
@@ -26,20 +25,14 @@ __all__ = [
     "Tcp",
     "canonical",
     "describe",
-    "open_bus",
     "warnings",
     "wire_problems",
 ]
 
 
-def open_bus(settings: Settings) -> ModbusBus:
-    """The bus for these units; it sends nothing yet."""
-    return ModbusBus(settings)
-
-
 BUS = BusType(
     settings=Settings,
-    open_bus=open_bus,
+    open_bus=ModbusBus,
     fake="hal_fakes.modbus",
     where=where,
     warnings=warnings,
@@ -47,4 +40,5 @@ BUS = BusType(
     describe=describe,
     wire_problems=wire_problems,
     unreachable=unreachable,
+    kept=kept,
 )

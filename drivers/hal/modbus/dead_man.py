@@ -24,7 +24,7 @@ DEVICE_FAILURE: Final = 4
 
 
 class Cells(Protocol):
-    """What this needs of a bus."""
+    """What the watchdogs need of a bus."""
 
     def cells(self, points: Iterable[Point]) -> dict[Point, int]:
         """These bits and registers, read now. Raises HalError."""
@@ -34,7 +34,7 @@ class Cells(Protocol):
 
 
 class UnitWatchdog:
-    """The watchdog of one unit. `trips` counts what was noticed."""
+    """The watchdog of one unit. `trips` counts the trips that were noticed."""
 
     def __init__(self, bus: Cells, unit: int, habits: Habits) -> None:
         self._bus = bus
@@ -46,7 +46,7 @@ class UnitWatchdog:
         self.trips = 0
 
     def arm(self) -> None:
-        """Have it armed, as it says itself. Raises HalError."""
+        """Arm it, and read back that it is armed. Raises HalError."""
         if self.armed:
             return
         habits = self._habits
@@ -58,7 +58,7 @@ class UnitWatchdog:
         self.armed = True
 
     def refresh(self, now: float) -> None:
-        """Keep it from tripping, when it is time, and see that it has not. Does not raise."""
+        """If it is time, refresh it and check that it has not tripped. Does not raise."""
         if not self.armed or now < self._refreshed_at + self._habits.refresh_s:
             return
         self._refreshed_at = now
@@ -69,7 +69,7 @@ class UnitWatchdog:
             self.tripped()
 
     def tripped(self) -> None:
-        """Nothing is known of the outputs any longer."""
+        """It has tripped: the outputs are unknown."""
         if self.armed:
             self.armed = False
             self.trips += 1
@@ -98,7 +98,7 @@ class Guard:
         self._seen = {watchdog: watchdog.trips for watchdog in watchdogs}
 
     def check(self) -> None:
-        """Have all armed. Raises HalError, and also once after each trip: outputs went off."""
+        """Arm all. Raises HalError, also once after each trip, because outputs went off."""
         trips = [watchdog for watchdog, seen in self._seen.items() if watchdog.trips != seen]
         for watchdog in self._seen:
             watchdog.arm()
@@ -109,7 +109,7 @@ class Guard:
 
 
 class Watchdogs:
-    """Those of one bus, by unit; none where the YAML has none."""
+    """The watchdogs of one bus, by unit; none if the YAML has none."""
 
     def __init__(self, bus: Cells, settings: Watchdog | None, clock: Callable[[], float]) -> None:
         self._clock = clock
@@ -119,7 +119,7 @@ class Watchdogs:
             self._units = {unit: UnitWatchdog(bus, unit, habits) for unit in settings.units}
 
     def guard(self, units: Iterable[int]) -> Guard:
-        """For a device with outputs at these units."""
+        """The view of a device with outputs at these units."""
         return Guard(self._units[unit] for unit in sorted(set(units)) if unit in self._units)
 
     def refused(self, unit: int, code: int) -> None:

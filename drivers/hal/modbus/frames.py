@@ -1,9 +1,9 @@
-"""pymodbus, kept to what it is good at: frames and their contents. Imported with the first bus.
+"""Modbus frames and their contents, by pymodbus. Imported when a bus needs it.
 
-Its decoders let too much through, so each reply is decoded by a stricter one. Its client is not used:
-it waits for the timeout anew after each byte and by the wall clock, looks up names without limit,
-repeats requests on a connection that may still hold late replies, and takes the reply to another
-function for an answer. Its server, which costs 15 MB, is never imported.
+pymodbus's decoders accept wrong replies, so stricter ones decode them here. Its client is not used: its
+timeout starts again at each byte and follows the wall clock, its name lookup has no limit, it repeats
+requests on a connection that may still hold late replies, and it accepts a reply to another function.
+Its server costs 15 MB and is never imported.
 """
 
 import logging
@@ -34,11 +34,11 @@ from drivers.hal.modbus.wire import Answer, BadReply, Question
 logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # our HalErrors say it all
 
 FAILURES: Final = (ModbusException, struct.error, IndexError, ValueError)
-"""What pymodbus raises about bytes that are no reply."""
+"""What pymodbus raises for bytes that are not a reply."""
 
 
 class CoilRequest(WriteSingleCoilRequest):
-    """Function 5 with any value, not only a coil's two: some modules take a time there."""
+    """Function 5 with any value. Some modules take a time there instead of on and off."""
 
     def encode(self) -> bytes:
         """Address and value."""
@@ -56,7 +56,7 @@ REQUESTS: Final[dict[int, type[ModbusPDU]]] = {
 
 
 class Coils(ReadCoilsResponse):
-    """Bits, as many as it says."""
+    """Bits; the byte count must be right."""
 
     def decode(self, data: bytes) -> None:
         """Raises ValueError for another number of bytes."""
@@ -66,13 +66,13 @@ class Coils(ReadCoilsResponse):
 
 
 class DiscreteInputs(Coils):
-    """The same of another table."""
+    """The same for another table."""
 
     function_code = 2
 
 
 class HoldingRegisters(ReadHoldingRegistersResponse):
-    """Registers, as many as it says."""
+    """Registers; the byte count must be right."""
 
     def decode(self, data: bytes) -> None:
         """Raises ValueError for another number of bytes."""
@@ -82,13 +82,13 @@ class HoldingRegisters(ReadHoldingRegistersResponse):
 
 
 class InputRegisters(HoldingRegisters):
-    """The same of another table."""
+    """The same for another table."""
 
     function_code = 4
 
 
 class CoilEcho(WriteSingleCoilResponse):
-    """A coil's address and value, which pymodbus would take for 1 whatever it is."""
+    """A coil's address and value. pymodbus alone would read every value as 1."""
 
     def decode(self, data: bytes) -> None:
         """Raises ValueError for another number of bytes."""
@@ -116,12 +116,12 @@ RTU: Final = FramerRTU(DECODER)
 
 
 def tcp_request(question: Question, number: int) -> bytes:
-    """The frame that asks this on TCP; `number` is the transaction's, not 0. Raises BadReply."""
+    """The request's frame on TCP. `number`: the transaction's, not 0. Raises BadReply."""
     return TCP.buildFrame(_request(question, number))
 
 
 def tcp_answer(question: Question, number: int, heard: bytes) -> tuple[int, Answer | None]:
-    """How many bytes were used, and the answer if it is there. Raises BadReply."""
+    """How many bytes were used, and the answer once it is complete. Raises BadReply."""
     try:
         used, reply = TCP.handleFrame(heard, question.unit, number)
     except FAILURES as error:
@@ -130,12 +130,12 @@ def tcp_answer(question: Question, number: int, heard: bytes) -> tuple[int, Answ
 
 
 def rtu_request(question: Question) -> bytes:
-    """The frame that asks this on a serial line. Raises BadReply."""
+    """The request's frame on a serial line. Raises BadReply."""
     return RTU.buildFrame(_request(question))
 
 
 def rtu_answer(question: Question, frame: bytes) -> Answer:
-    """What a frame whose CRC is right says. Raises BadReply."""
+    """The answer in a frame whose CRC is right. Raises BadReply."""
     try:
         reply = DECODER.decode(frame[1:-2])
     except FAILURES as error:
@@ -172,7 +172,7 @@ def _request(question: Question, number: int = 0) -> ModbusPDU:
 
 
 def _answer(question: Question, reply: ModbusPDU) -> Answer:
-    """Does it answer the question? Raises BadReply."""
+    """The reply's answer. Raises BadReply if it does not belong to the request."""
     function, asked = question.function, question.value
     if reply.function_code & 0x7F != function:
         raise BadReply(f"function {reply.function_code} instead of {function}")

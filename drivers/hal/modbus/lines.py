@@ -1,10 +1,9 @@
 """One device's coils and registers: the same claim, read, write, read-back and close for each driver.
 
-Nothing is written before a first good reading of what is written. What is written is read back, and
-looked at again in each reading: a module that restarts with its outputs off, or whose watchdog has
-tripped, is noticed; so is another master (`rivals.py`).
-What goes to its safe value is tried for each output, whatever fails meanwhile:
-another output, an input, the unit's watchdog.
+An output is written only after it has been read. It is read back after the write and compared in each
+reading. So a module that restarts with its outputs off is noticed, and so are a tripped watchdog and
+another master (`rivals.py`). Every output that goes to its safe value is written, even if another
+output, an input or the unit's watchdog fails.
 """
 
 from collections.abc import Iterable, Mapping
@@ -21,7 +20,7 @@ from drivers.hal.points import Flash
 
 
 class Units(Protocol):
-    """What lines need of a bus. `safe`: it is for switching off, and waits for no unit's pause."""
+    """What lines need of a bus. `safe`: it switches an output off, so it ignores the unit's backoff."""
 
     def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:
         """One request. Raises HalError."""
@@ -36,14 +35,14 @@ class Units(Protocol):
         """The modules' own watchdogs."""
 
     def insist(self) -> None:
-        """Try at once what is asked next."""
+        """Send the next request at once, without waiting for the backoff."""
 
     def now(self) -> float:
         """Monotonic seconds."""
 
 
 class Image:
-    """Points that are read together, in as few requests as their units take."""
+    """Points that are read together, in as few requests as possible."""
 
     def __init__(self, units: Units, points: Iterable[Point]) -> None:
         self._units = units
@@ -53,7 +52,7 @@ class Image:
     def read(self, safe: bool = False, every: Every | None = None) -> dict[Point, int]:
         """Bits (0 or 1) and registers, read now. Raises HalError.
 
-        With `every` those that can be read, whatever fails.
+        With `every`: the points that can be read, even if others fail.
         """
         image: dict[Point, int] = {}
         asked = list(self._ranges)
@@ -63,7 +62,7 @@ class Image:
         return image
 
     def _part(self, part: Range, asked: list[Range], safe: bool) -> dict[Point, int]:
-        """One request. A module may lack the addresses in a gap: from now on they are left out."""
+        """One request. If the module lacks addresses in a gap, later requests leave the gap out."""
         try:
             return self._units.read(part, safe)
         except Refused as refusal:
@@ -77,10 +76,10 @@ class Image:
 
 
 class Lines:
-    """What one device reads and what drives it (`drivers.hal.points.Lines`), by names.
+    """One device's inputs and outputs by name (`drivers.hal.points.Lines`).
 
-    `safe`: each output's value that asks for nothing. `readable`: outputs can be read back; those that
-    cannot are written anew each time, so that a controller that has restarted hears it again.
+    `safe`: each output's safe value. `readable`: outputs can be read back. Other outputs are written in
+    every scan, so that a controller that has restarted gets them again.
     """
 
     def __init__(
@@ -126,9 +125,9 @@ class Lines:
         self._claimed = True
 
     def read(self) -> dict[str, int]:
-        """Every input's value. Raises HalError, also when an output is not as it was written.
+        """Every input's value. Raises HalError, also if an output differs from what was written.
 
-        After a failure what was written counts as unknown.
+        After a failure the outputs count as unknown.
         """
         known, self._set = self._set, {}
         self._guard.check()
@@ -138,9 +137,9 @@ class Lines:
         return {name: p.of(image[p.cell]) for name, p in self._inputs.items()}
 
     def bring(self, values: Mapping[str, int]) -> None:
-        """Set those of these outputs that are not known to be so. Raises HalError.
+        """Set these outputs, except those known to have the value. Raises HalError.
 
-        Also while another master writes one of the device's outputs.
+        It also raises while another master writes one of the device's outputs.
         """
         changed = {n: value for n, value in values.items() if self._set.get(n) != value}
         self.write(changed if self._readable else values)
@@ -153,18 +152,18 @@ class Lines:
         every.check()
 
     def flash(self, point: str, flash: Flash) -> None:
-        """Ask the module for this pulse. Its coil reads 1, then 0 by itself: it is not compared."""
+        """Request this pulse. The module switches the coil on and off, so it is not compared."""
         self._touched = True
         self._set.pop(point, None)
         self._units.flash(parse(flash.point), flash.on_s)
 
     def outputs(self) -> dict[str, int] | None:
-        """The outputs, read now; None where they cannot be."""
+        """The outputs, read now; None where they cannot be read."""
         image = self._back.read()
         return {n: image[p] for n, p in self._outputs.items()} if self._readable else None
 
     def make_safe(self) -> None:
-        """Every output to its safe value, whatever was known. Raises HalError."""
+        """Set every output to its safe value, even one believed safe. Raises HalError."""
         self.write(self._safe)
 
     def close(self) -> None:
@@ -178,7 +177,7 @@ class Lines:
                 self._units.write(point, self._safe[name], safe=True)
 
     def _write(self, values: Mapping[str, int], every: Every) -> None:
-        """Off first; nothing goes on after a failure. Then each is read back."""
+        """Off first. After a failure nothing is switched on. Then each output is read back."""
         self._touched = self._touched or bool(values)
         safe = {name for name, value in values.items() if value == self._safe[name]}
         written: dict[str, int] = {}

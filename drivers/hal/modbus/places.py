@@ -7,12 +7,13 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from bridges.core.fields import Name
+from drivers.hal.hosts import misspelt_address
 
 BAUDRATES: Final = (
     *(300, 600, 1200, 2400, 4800, 9600, 14400, 19200, 28800, 38400, 56000, 57600, 76800, 115200),
     *(128000, 230400, 250000, 256000, 460800, 500000, 921600, 1000000),
 )
-"""What UARTs are set to."""
+"""The usual rates of UARTs (Bd)."""
 
 
 class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -26,21 +27,23 @@ class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     port: Annotated[int, msgspec.Meta(ge=1, le=65535)] = 502
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """What cannot be right about the address."""
+        """An invalid address."""
         if re.fullmatch(r"[^:]*:[0-9]+", self.host):
             yield ("host",), "write the host alone; its port goes into port"
         elif not re.fullmatch(r"[A-Za-z0-9_.:-]+", self.host):
-            yield ("host",), f"{self.host!r} is no host: write its address, 192.168.1.50 say"
+            yield ("host",), f"{self.host!r} is no host: write its address, such as 192.168.1.50"
+        elif reason := misspelt_address(self.host):
+            yield ("host",), reason
 
 
 class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A serial line (RS-485), as every unit on it is set; a character has 8 data bits.
+    """A serial line (RS-485). Every unit on it has these settings; a character has 8 data bits.
 
     `port`: the adapter's path, best its stable one: /dev/serial/by-id/….
     `baudrate`: bits a second.
     `parity`: the parity bit of each character.
     `stopbits`: stop bits of each character.
-    `ignore_echo`: the adapter hears what it sends, and it is to be dropped.
+    `ignore_echo`: drop the echo of an adapter that hears what it sends.
     """
 
     port: Name
@@ -50,7 +53,7 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ignore_echo: bool = False
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """What cannot be right about the line."""
+        """A relative path; a rate that no unit has."""
         if not self.port.startswith("/"):
             text = "write the whole path, as `ls /dev/serial/by-id/*` prints it"
             yield ("port",), f"{self.port!r} is no serial port: {text}"
@@ -59,20 +62,20 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("baudrate",), text
 
     def warnings(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """What is legal and may be wrong one day."""
+        """A path that may change after a reboot."""
         if re.match(r"/dev/tty(USB|ACM)", self.port):
             text = "may be another adapter after the next start: write its /dev/serial/by-id path"
             yield ("port",), f"{self.port} {text}"
 
     @property
     def character_s(self) -> float:
-        """What one character takes on the wire: start, 8 data, parity and stop bits."""
+        """The time of one character on the wire (s): start, 8 data, parity and stop bits."""
         bits = 9 + (self.parity != "none") + self.stopbits
         return bits / self.baudrate
 
     @property
     def gap_s(self) -> float:
-        """The silence between two frames: 3.5 characters, and 1.75 ms above 19200 baud.
+        """The silence between two frames (s): 3.5 characters, or 1.75 ms above 19200 baud.
 
         Source: Modbus over Serial Line V1.02, 2.5.1.1.
         """

@@ -1,9 +1,9 @@
-"""Where a point is at a Modbus module: unit, table and address, as a YAML spells them.
+"""How a YAML spells a point of a Modbus module: unit, table and address.
 
 A contact is a discrete input, a coil, or one bit of a register; a relay is a coil. Addresses are those
-on the wire: they begin at 0. Manuals often print the data model's numbers, which begin at 1 and carry
-the table in their first digit (coil 0 is 00001, discrete input 0 is 10001, input register 0 is 30001,
-holding register 0 is 40001); such a number is refused with the address that is probably meant.
+on the wire: they begin at 0. Manuals often print the data model's numbers. These begin at 1, and their
+first digit is the table: coil 0 is 00001, discrete input 0 is 10001, input register 0 is 30001, holding
+register 0 is 40001. Such a number is refused, and the error says which address is probably meant.
 """
 
 import re
@@ -14,7 +14,7 @@ from typing import Final, Literal
 from drivers.hal.points import Wire
 
 Table = Literal["coil", "discrete input", "holding register", "input register"]
-"""Places without a unit, registers as a whole among them, are spelled in `registers.py`."""
+"""`registers.py` spells places: points without a unit, and whole registers."""
 
 GAP_MAX: Final[dict[Table, int]] = {
     "coil": 8,
@@ -34,7 +34,7 @@ COUNT_MAX: Final[dict[Table, int]] = {
 """The most that one reply can carry (Modbus Application Protocol V1.1b3, 6.1 to 6.4)."""
 
 BITS: Final = 16
-"""A register has so many; bit 0 is the least."""
+"""The bits of a register; bit 0 is the least significant."""
 
 _MODEL_DIGIT: Final[dict[Table, int]] = {
     "coil": 0,
@@ -60,7 +60,7 @@ _HOW: Final = (
 class Point:
     """One coil, discrete input or register of one unit, or one bit of a register.
 
-    `str` of it is its one spelling.
+    `str` gives its canonical spelling.
     """
 
     unit: int
@@ -76,17 +76,17 @@ class Point:
 
     @property
     def cell(self) -> "Point":
-        """What is read to know it: the whole register, where it is one bit of that."""
+        """The point to read for it: the whole register if it is one bit of a register."""
         return self if self.bit is None else Point(self.unit, self.table, self.address)
 
     def of(self, value: int) -> int:
-        """Its own value, from that of its cell."""
+        """Its value in the value of its cell."""
         return value if self.bit is None else value >> self.bit & 1
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Neighbours of one table that are read with one request."""
+    """Neighbouring addresses of one table, read with one request."""
 
     unit: int
     table: Table
@@ -121,7 +121,7 @@ def canonical(point: str) -> str:
 
 
 def describe(point: str) -> str:
-    """With the number that a manual would print: `unit 1 coil 0 (00001)`."""
+    """The point with the number that a manual prints: `unit 1 coil 0 (00001)`."""
     found = parse(point)
     digit, bit = _MODEL_DIGIT[found.table], "" if found.bit is None else f" bit {found.bit}"
     return f"{found} ({digit}{found.address + 1:04}{bit})"
@@ -163,9 +163,9 @@ def _flash_problems(wire: Wire, output: Point) -> Iterable[str]:
 
 
 def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
-    """The fewest sensible requests that read all of these; gaps up to `gap` are read along.
+    """As few requests as possible that read all of these. Gaps up to `gap` are read as well.
 
-    `gap`: None for what the table allows.
+    `gap`: None for the table's GAP_MAX.
     """
     found: list[Range] = []
     for point in sorted(set(points)):
@@ -178,7 +178,7 @@ def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
 
 
 def pieces(whole: Range, points: Iterable[Point]) -> Sequence[Range]:
-    """The parts of a range that hold nothing but these points."""
+    """The parts of a range that hold only these points."""
     return ranges(set(points).intersection(whole.points()), gap=0)
 
 
@@ -199,7 +199,7 @@ def _table(text: str, words: str) -> Table:
 
 
 def _bit(text: str, table: Table, bit: str | None) -> int | None:
-    """The bit of a register; None of what is one bit already."""
+    """The bit of a register; None for a coil or discrete input."""
     if table in ("coil", "discrete input"):
         if bit is not None:
             raise ValueError(f"{text!r}: a {table} is one bit already: leave 'bit {bit}' out")

@@ -1,8 +1,8 @@
-"""Places of Modbus units, registers among them, as maps and profiles spell them.
+"""How register maps and profiles spell a place: table and address (`holding register 4`, `coil 0`).
 
-They are spelled like points but without a unit (`holding register 4`, `coil 0`): a register map
-serves several units. Addresses are those on the wire, from 0; a number of the data model, which
-begins at 1 (40001 is holding register 0, 30001 input register 0), is refused with what is meant.
+A place has no unit, because a map serves several units. Addresses are those on the wire, from 0. A
+number of the data model begins at 1 (40001 is holding register 0, 30001 input register 0). It is
+refused, and the error says which address is meant.
 """
 
 import re
@@ -14,9 +14,16 @@ import msgspec
 from drivers.hal.modbus.points import Point, Table, address
 
 Word = Annotated[int, msgspec.Meta(ge=0, le=65535)]
-"""What a register holds."""
+"""A register's content."""
 Unit = Annotated[int, msgspec.Meta(ge=0, le=255)]
-Place = Annotated[str, msgspec.Meta(min_length=1, max_length=40)]
+Place = Annotated[
+    str,
+    msgspec.Meta(
+        min_length=1,
+        max_length=40,
+        extra={"number": "its table and its address, which begins at 0 (input register 1)"},
+    ),
+]
 """`holding register 4`, `input register 0x10`, `coil 0` or `discrete input 2`."""
 
 TABLES: Final[dict[str, Table]] = {
@@ -51,6 +58,6 @@ def misplaced(text: str, tables: Collection[str]) -> str | None:
 
 
 def at(unit: int, text: str, base: int = 0) -> Point:
-    """A place that is right, at this unit; `base` is added to its address."""
+    """A valid place at this unit. `base` is added to its address."""
     table, address = place(text)
     return Point(unit, table, address + base)

@@ -1,9 +1,9 @@
-"""Two masters on one output: what reads back other than it was written, again and again.
+"""Two masters on one output: it reads differently from what was written, again and again.
 
-A module that restarts once is written anew at once. Another master that writes the same coil would have
-us switch a relay with it for ever. So after the second time the output is left alone for 1 s, and for
-twice as long each time after, up to 30 s: meanwhile every write of its device fails with the fault's
-name, and only what is safe is written, at once and as often as it takes.
+After the first time the output is written again at once: the module may have restarted. If another
+master writes the coil, that would switch the relay to and fro for ever. So after the second time the
+output is left alone for 1 s, then for twice as long each time, up to 30 s. Meanwhile every write of its
+device fails, and the error names the fault. Only safe values are still written, at once and every time.
 """
 
 import math
@@ -13,13 +13,13 @@ from typing import Final
 from drivers.hal import HalError
 
 AGAIN_S: Final = 5.0
-"""What comes later than this after a pause is not the same trouble."""
+"""A contradiction later than this (s) after a pause counts as a first one."""
 FIRST_S: Final = 1.0
 LONGEST_S: Final = 30.0
 
 
 class Rivals:
-    """Which outputs somebody else writes too, by their names."""
+    """The outputs, by name, that another master writes too."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         self._now = now
@@ -27,14 +27,14 @@ class Rivals:
         self._at: dict[str, float] = {}
 
     def contradicted(self, name: str) -> None:
-        """It does not read as it was written."""
+        """This output reads differently from what was written."""
         now, before_s = self._now(), self._pause_s.get(name, 0.0)
         again = now - self._at.get(name, -math.inf) <= before_s + AGAIN_S
         self._at[name] = now
         self._pause_s[name] = min(max(FIRST_S, 2 * before_s), LONGEST_S) if again else 0.0
 
     def check(self, names: Iterable[str]) -> None:
-        """Raises HalError for the first of these that another master has written just now."""
+        """Raises HalError for the first of these outputs that is left alone now."""
         for name in names:
             if self._now() - self._at.get(name, -math.inf) < self._pause_s.get(name, 0.0):
                 raise HalError(

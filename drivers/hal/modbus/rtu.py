@@ -1,7 +1,7 @@
-"""One serial line with Modbus RTU units: one question, one deadline, and silence between the frames.
+"""A serial line with Modbus RTU units: one request at a time, one deadline, silence between frames.
 
-pyserial opens and configures the port; frames are made and read by pymodbus (`frames.py`). The waiting
-is ours. Imported with the first bus that needs it.
+pyserial opens and configures the port, and pymodbus makes and reads the frames (`frames.py`). This file
+waits and times. It is imported when a bus needs it.
 
 RTU has no transaction number, so a late reply looks like a prompt one. Hence:
 
@@ -21,7 +21,7 @@ import select
 import termios
 import time
 from contextlib import suppress
-from typing import Any, Final
+from typing import Final
 
 import serial
 
@@ -33,41 +33,41 @@ from drivers.hal.modbus.wire import Answer, BadReply, NoReply, Question, Unreach
 LATE: Final = 3.0
 PARITY: Final = {"none": "N", "even": "E", "odd": "O"}
 WRITES: Final = (5, 6, 15, 16)
-"""The functions whose reply may begin as the request does, or be the same."""
+"""The functions whose reply may begin with the same bytes as the request."""
 UNITS: Final = range(1, 248)
 PAUSE_S: Final = 0.05
-"""How long a frame may pause and go on: adapters keep characters back for up to 16 ms."""
+"""The longest pause within a frame: adapters hold characters back for up to 16 ms."""
 FRAME_MAX: Final = 256
 """Characters of the longest frame (Modbus over Serial Line V1.02, 2.5.1)."""
 
 
 class Noise(BadReply):
-    """What came is nobody's frame, and the answer may still come."""
+    """The bytes are no frame. The reply may still come."""
 
 
 class Line:
-    """The way to one serial port, opened anew when it is needed. Nobody else may open it meanwhile."""
+    """One serial port, opened again when it is needed, and for us alone."""
 
     def __init__(self, settings: Serial, timeout_s: float) -> None:
         self._settings = settings
         self._timeout_s = timeout_s
         self._deadline = Deadline()
-        self._port: Any = None
+        self._port: serial.Serial | None = None
         self._busy_until = 0.0
         self._sent_at = 0.0
         self._late: dict[int, float] = {}
         self._stray = b""
 
     def owes(self, unit: int) -> bool:
-        """May this unit still answer an older question, so that a new one had better wait?"""
+        """May this unit still reply to an older request? Then a new one should wait."""
         return time.monotonic() < self._late.get(unit, 0.0)
 
     def begin(self, unit: int) -> None:
-        """A new question to this unit comes: wait until it cannot answer an older one any more."""
+        """Before a new request to this unit: wait until no late reply to an older one can come."""
         time.sleep(max(0.0, self._late.pop(unit, 0.0) - time.monotonic()))
 
     def connect(self) -> None:
-        """Have the port open; a try begins then. Raises Unreachable."""
+        """Open the port if necessary, and start the time of one try. Raises Unreachable."""
         if self._port is None:
             try:
                 self._port = self._opened()
@@ -76,7 +76,7 @@ class Line:
         self._deadline.start(self._timeout_s)
 
     def ask(self, question: Question) -> Answer:
-        """What answers this question. Raises NoReply."""
+        """Send this request, and return its answer. Raises NoReply."""
         try:
             frame = self.exchange(frames.rtu_request(question))
             return frames.rtu_answer(question, frame)
@@ -89,7 +89,7 @@ class Line:
             raise NoReply(f"no Modbus reply to it ({error})") from error
 
     def exchange(self, request: bytes) -> bytes:
-        """Send this frame; the frame that answers it, its CRC checked.
+        """Send this frame, and return the reply's frame, its CRC checked.
 
         Raises TimeoutError, OSError when the port breaks, or BadReply.
         """
@@ -109,11 +109,11 @@ class Line:
         port, self._port = self._port, None
         if port is not None:
             with suppress(OSError, termios.error):
-                port.reset_output_buffer()  # or closing waits for what nobody takes any more
+                port.reset_output_buffer()  # else closing waits until a dead line takes it
             with suppress(OSError, termios.error):
                 port.close()
 
-    def _opened(self) -> Any:
+    def _opened(self) -> serial.Serial:
         port = serial.Serial(
             self._settings.port,
             self._settings.baudrate,
@@ -122,12 +122,14 @@ class Line:
             timeout=0,
             exclusive=True,
         )
-        with suppress(OSError, ValueError):  # only some adapters keep characters back, for 16 ms
+        with suppress(
+            OSError, ValueError
+        ):  # only some adapters know it; others deliver after 16 ms
             port.set_low_latency_mode(True)
         return port
 
     def _settle(self) -> None:
-        """Wait until the line has been silent for long enough; throw away what comes until then."""
+        """Wait until the line is silent for the gap between frames. Bytes until then are dropped."""
         while heard := self._heard(self._busy_until + self._settings.gap_s - time.monotonic()):
             self._stray = heard
         self._stray = b""
@@ -135,14 +137,16 @@ class Line:
     def _send(self, request: bytes) -> None:
         self._sent_at = time.monotonic()
         self._busy_until = self._sent_at + len(request) * self._settings.character_s
-        if request[0] in self._late:  # asked again: this may be what is answered late
+        if request[0] in self._late:  # a repeat, which the unit may answer late too
             self._late[request[0]] = self._sent_at + LATE * self._timeout_s
+        assert self._port  # `connect` has opened it
         if os.write(self._port.fileno(), request) != len(request):
             raise OSError(errno.EIO, "it does not take what is sent")
 
     def _heard(self, within_s: float) -> bytes:
-        """What comes next; nothing when nothing does within this. Raises TimeoutError, OSError."""
+        """The next bytes; none if none come within this time (s). Raises TimeoutError, OSError."""
         left_s = min(max(0.0, within_s), self._deadline.left())
+        assert self._port
         descriptor = self._port.fileno()
         if not select.select([descriptor], [], [], left_s)[0]:
             return b""
@@ -153,7 +157,7 @@ class Line:
         return received
 
     def _without_echo(self, request: bytes) -> bytes:
-        """What follows our own request, which is heard first."""
+        """The bytes after the echo of our own request, which comes first."""
         heard = b""
         while len(heard) < len(request) and request.startswith(heard):
             heard += self._heard(self._timeout_s)
@@ -162,7 +166,7 @@ class Line:
         return heard[len(request) :]
 
     def _answer(self, request: bytes, heard: bytes) -> bytes:
-        """The frame that answers, and not a byte before it. After it a byte of noise may come."""
+        """The reply's frame. No byte may come before it; one of noise may come after it."""
         while True:
             if not request[:1].startswith(heard[:1]) or not _answers(request, heard[1:2]):
                 self._drop(heard)
@@ -175,7 +179,7 @@ class Line:
             heard += more
 
     def _drop(self, heard: bytes) -> None:
-        """Somebody else's frame until the line is silent. Raises Noise when it is none."""
+        """Drop another unit's frame: all bytes until the line is silent. Raises Noise if it is none."""
         while more := self._heard(self._settings.gap_s):
             heard = (heard + more)[: 2 * FRAME_MAX]
         self._stray = heard
@@ -201,12 +205,12 @@ class Line:
 
 
 def _answers(request: bytes, function: bytes) -> bool:
-    """May a reply to this begin so? True for no byte yet."""
+    """May a reply to this have this function? True while the function has not come."""
     return not function or function[0] & 0x7F == request[1]
 
 
 def _complete(heard: bytes) -> int:
-    """The size of the frame that these bytes begin with, once they are all there; else 0."""
+    """The size of the frame that these bytes begin with; 0 until it is complete."""
     size = frames.rtu_size(heard)
     return size if size <= len(heard) else 0
 
@@ -224,6 +228,6 @@ def _checked(frame: bytes, request: bytes, heard: bytes) -> bytes:
 
 
 def _why(error: Exception) -> str:
-    """termios.error is no OSError, and pyserial puts one text into another."""
+    """The error's own text. pyserial wraps texts, and termios.error is not an OSError."""
     text = getattr(error, "strerror", None) or (error.args[-1] if error.args else error)
     return str(text)

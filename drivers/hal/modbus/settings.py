@@ -1,13 +1,14 @@
 """`type: modbus` of a device YAML: where the units are, and how long they may take."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Annotated
 
 import msgspec
 
-from bridges.core.fields import Period
-from drivers.hal import Where
+from bridges.core.fields import Name, Period
+from drivers.hal import Kept, Where
 from drivers.hal.modbus.places import Serial, Tcp
+from drivers.hal.modbus.registers import Unit
 from drivers.hal.modbus.watchdog import Watchdog
 
 Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
@@ -26,9 +27,11 @@ class Settings(
     `tcp`: where the module or gateway listens.
     `serial`: the serial line (Modbus RTU).
     `timeout_s`: for one try of one request.
-    `retries`: how many more tries a request gets.
+    `retries`: how many more tries a request gets after the first.
     `scan_s`: how often every input is read.
     `module_watchdog`: the modules' own watchdog for their outputs.
+    `without_watchdog`: unit -> why its outputs may keep their value when the daemon's machine or the
+    network dies, or how the unit drops them (`its web page: all off after 5 s without a master`).
     """
 
     tcp: Tcp | None = None
@@ -37,13 +40,24 @@ class Settings(
     retries: Annotated[int, msgspec.Meta(ge=0, le=5)] = 1
     scan_s: Period = 0.1
     module_watchdog: Watchdog | None = None
+    without_watchdog: dict[Unit, Name] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """Problems that involve more than one field."""
         if self.tcp is None and self.serial is None:
-            yield (), "says not where the units are: write tcp: {host: …} or serial: {port: …}"
+            yield (), "needs a connection: write tcp: {host: …} or serial: {port: …}"
         elif self.tcp and self.serial:
-            yield ("serial",), "a bus has tcp or serial: write a second bus for the other"
+            yield ("serial",), "a bus has either tcp or serial: define a second bus for the other"
+        for unit in self.without_watchdog:
+            if unit in self.watched():
+                yield (
+                    ("without_watchdog", str(unit)),
+                    f"unit {unit} has a module_watchdog too: delete one",
+                )
+
+    def watched(self) -> Sequence[int]:
+        """The units whose own watchdog drops their outputs."""
+        return self.module_watchdog.units if self.module_watchdog else ()
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
@@ -54,17 +68,42 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield ("module_watchdog", *path), text
 
 
+def kept(settings: Settings, places: Iterable[str]) -> Kept:
+    """The written units whose outputs nothing drops but this daemon."""
+    written = {int(place.split()[1]) for place in places}
+    bare = sorted(written.difference(settings.watched(), settings.without_watchdog))
+    warned = [((), _bare(bare))] if bare else []
+    accepted, idle = [], []
+    for unit, why in settings.without_watchdog.items():
+        path = ("without_watchdog", str(unit))
+        if unit in written:
+            accepted.append((path, f"unit {unit} has no module_watchdog: {why}"))
+        else:
+            idle.append((path, f"nothing is written to unit {unit}: delete this"))
+    return Kept([*warned, *idle], accepted)
+
+
+def _bare(units: Sequence[int]) -> str:
+    which, keep = f"unit {units[0]}", "keeps its outputs"
+    if len(units) > 1:
+        which, keep = f"units {', '.join(map(str, units))}", "keep their outputs"
+    return (
+        f"{which} {keep} when this machine or the cable dies: arm the watchdog of the module"
+        " (module_watchdog), or say why that is safe (without_watchdog)"
+    )
+
+
 def unreachable(settings: Settings, point: str) -> str | None:
-    """On a serial line units are 1 to 247 (Modbus over Serial Line V1.02, 2.2)."""
+    """Why this bus cannot reach the point: a line has units 1 to 247 (Modbus over Serial Line 2.2)."""
     unit = int(point.split()[1])
     if settings.serial is None or 1 <= unit <= 247:
         return None
-    why = "is everybody at once, and nobody answers" if unit == 0 else "is for Modbus TCP"
+    why = "addresses all units, and none answers" if unit == 0 else "is for Modbus TCP"
     return f"unit {unit} {why}: units on a serial line are 1 to 247"
 
 
 def where(settings: Settings) -> Where:
-    """The gateway or module, or the port of the line, which has one owner."""
+    """The gateway or module, or the line's port, which only one daemon can open."""
     if settings.serial:
         return Where(settings.serial.port, local=True, clients="one")
     assert settings.tcp  # or `problems` has said so

@@ -1,4 +1,4 @@
-"""Modbus TCP: one connection, one question, one deadline. Imported with the first bus that needs it."""
+"""Modbus TCP: one connection, one request at a time, one deadline. Imported when a bus needs it."""
 
 import socket
 from typing import Final
@@ -8,11 +8,11 @@ from drivers.hal.modbus import frames
 from drivers.hal.modbus.wire import Answer, BadReply, NoReply, Question, Unreachable
 
 NUMBERS: Final = 0xFFFF
-"""Transactions are numbered from 1 to this; a reply to number 0 would be taken for any."""
+"""Transactions are numbered 1 to this. pymodbus takes a reply numbered 0 for any request's."""
 
 
 class Connection:
-    """The way to one host, made anew when it is needed. `resolve` is a test's in place of DNS."""
+    """The connection to one host, opened again when it is needed. Tests replace `resolve` (DNS)."""
 
     def __init__(
         self, host: str, port: int, timeout_s: float, resolve: Resolve = socket.getaddrinfo
@@ -21,17 +21,17 @@ class Connection:
         self._where = f"{host}:{port}"
         self._dialler = Dialler(host, port, resolve)
         self._socket: socket.socket | None = None
-        self._number = 0  # goes on over connections: no late reply may match on a new one
+        self._number = 0  # counts on over connections, so that no late reply matches
 
     def owes(self, unit: int) -> bool:
-        """Never: replies have numbers here, and no late one can be taken for another's."""
+        """Never: replies have numbers, so a late one is not taken for another."""
         return False
 
     def begin(self, unit: int) -> None:
-        """A new question comes."""
+        """Nothing to wait for."""
 
     def connect(self) -> None:
-        """Have a connection; a try begins here. Raises Unreachable."""
+        """Connect if necessary, and start the time of one try. Raises Unreachable."""
         self._dialler.deadline.start(self._timeout_s)
         if self._socket is None:
             try:
@@ -40,7 +40,7 @@ class Connection:
                 raise Unreachable(self._unreachable(error)) from error
 
     def ask(self, question: Question) -> Answer:
-        """What answers this question; else hang up. Raises NoReply."""
+        """Send this request, and return its answer. Without one, close and raise NoReply."""
         try:
             return self._answer(question)
         except (OSError, BadReply) as error:
@@ -54,7 +54,7 @@ class Connection:
             connection.close()
 
     def _answer(self, question: Question) -> Answer:
-        """Ask, and hear replies until one is to this question. Raises OSError, BadReply."""
+        """Send the request, and read replies until one belongs to it. Raises OSError, BadReply."""
         assert self._socket is not None
         self._number = self._number % NUMBERS + 1
         self._socket.sendall(frames.tcp_request(question, self._number))
@@ -67,7 +67,7 @@ class Connection:
             heard = heard[used:]
 
     def _heard(self) -> bytes:
-        """What comes next. Raises OSError, TimeoutError among them."""
+        """The next bytes. Raises OSError; TimeoutError when the try's time is up."""
         assert self._socket is not None
         self._socket.settimeout(self._dialler.deadline.left())
         received = self._socket.recv(4096)

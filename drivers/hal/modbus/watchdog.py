@@ -47,7 +47,7 @@ class Refresh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class Shows(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A place with the values that mean something.
+    """A place, and the values to look for.
 
     `at`: `holding register N`, `input register N`, `coil N` or `discrete input N`.
     `values`: any of these.
@@ -57,7 +57,7 @@ class Shows(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     values: Annotated[list[Word], msgspec.Meta(min_length=1)]
 
     def problems(self) -> Problems:
-        """A place that there cannot be."""
+        """An invalid place."""
         yield from _place_problems(self.at, tuple(TABLES))
 
 
@@ -105,13 +105,12 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def problems(self) -> Problems:
         """Neither or both of profile and habits; a profile with problems."""
         if len(set(self.units)) < len(self.units):
-            yield ("units",), "a unit stands here twice"
+            yield ("units",), "names a unit twice"
         yield from profile_problems(PROFILE, self.profile, self.habits)
 
     def chosen(self) -> Habits:
         """The habits: those in the YAML, or the profile's."""
-        found: Habits = self.habits or PROFILE.load(self.profile or "")
-        return found
+        return self.habits or PROFILE.load(self.profile or "")
 
     def warnings(self) -> Problems:
         """A profile that nobody has tried."""

@@ -1,7 +1,6 @@
-"""One question to a Modbus unit and what it answers, whatever wire carries them (`tcp.py`, `rtu.py`).
+"""A request to a Modbus unit and its answer. `tcp.py` and `rtu.py` carry both.
 
-Of the protocol, functions 1 to 6 are spoken: reads of the four tables, and writes of one coil or one
-register.
+Only functions 1 to 6 are used: they read the four tables, and write one coil or one register.
 """
 
 from dataclasses import dataclass
@@ -47,22 +46,22 @@ class Question:
 
 
 class Answer(NamedTuple):
-    """What a unit says: bits and registers as numbers, or an exception (0 for none)."""
+    """A unit's reply: bits or registers as numbers, or the number of an exception (0 for none)."""
 
     values: tuple[int, ...] = ()
     exception: int = 0
 
 
 class Unreachable(Exception):
-    """There is no connection; the text says why."""
+    """There is no connection. The text says why."""
 
 
 class NoReply(Exception):
-    """Nothing has come in time, or nothing that answers."""
+    """No reply to the request came in time. The text says what came instead."""
 
 
 class BadReply(Exception):
-    """What came does not answer what was asked."""
+    """The reply does not belong to the request."""
 
 
 class Refused(HalError):
@@ -74,19 +73,19 @@ class Refused(HalError):
 
 
 class Wire(Protocol):
-    """The way to some units, made anew when it is needed."""
+    """The connection or line to some units. It is opened again when it is needed."""
 
     def owes(self, unit: int) -> bool:
-        """May this unit still answer an older question, so that a new one had better wait?"""
+        """May this unit still reply to an older request? Then a new one should wait."""
 
     def begin(self, unit: int) -> None:
-        """A new question to this unit comes: wait until no older answer can be taken for its own."""
+        """Before a new request: wait until no late reply can be taken for the reply to it."""
 
     def connect(self) -> None:
-        """Have a connection; a try begins here. Raises Unreachable."""
+        """Connect if necessary, and start the time of one try. Raises Unreachable."""
 
     def ask(self, question: Question) -> Answer:
-        """What answers this question. Raises NoReply."""
+        """Send this request, and return its answer. Raises NoReply."""
 
     def close(self) -> None:
         """Close the connection. May be called twice."""

@@ -3,19 +3,21 @@
 A test class derives from `ChargerContract` and says how its benches are built.
 """
 
-import contextlib
 import time
-from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any, ClassVar, Literal
 
+import msgspec
 import pytest
 
 from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerOutputs, ChargerSample
-from drivers import Driver, DriverError
-from hal_fakes.plants.plant import Plant
+from drivers import Driver
+from drivers.hal import Bus
+from hal_fakes.plants.plant import FailureMode, Plant
+from tests.drivers import benches
+from tests.drivers.benches import Contract
 from tests.drivers.hal.modbus.module import Time
-from tests.waiting import at_last, wait_until
+from tests.waiting import wait_until
 
 ON, OFF, AS_IT_IS = ChargerOutputs(True), ChargerOutputs(False), ChargerOutputs(None)
 PACE = 20.0
@@ -25,51 +27,53 @@ ChargerDriver = Driver[ChargerSample, ChargerOutputs]
 OnDeath = Literal["stop", "keep"]
 
 
-class Bench:
-    """A charger behind a bus. `clock`: the bus's, for its pauses. `new`: another driver for it."""
+class Bench(benches.Bench[ChargerSample, ChargerOutputs]):
+    """With a charger. `new`: another driver for it, with this `on_death`."""
 
     switch: ClassVar[str] = "power"
 
-    def __init__(self, new: Any, plant: Plant, clock: Time) -> None:
+    def __init__(self, new: Callable[[OnDeath], ChargerDriver], plant: Plant, clock: Time) -> None:
+        super().__init__(new("stop"), plant, clock)
         self.new = new
-        self.driver: ChargerDriver = new("stop")
-        self.plant = plant
-        self.clock = clock
 
     def press(self, signal: str, there: bool = True) -> None:
         """Somebody comes or goes."""
         self.plant.press(signal, there, time.monotonic())
 
-    def switched(self, signal: str = "") -> list[Any]:
+    def switched(self, signal: str = "") -> list[object]:
         """Every command about the power so far, or about this."""
         wanted = signal or self.switch
-        return [e.value for e in self.plant.edges if e.what == "relay" and e.signal == wanted]
+        return [value for name, value in self.relays() if name == wanted]
 
     def scan(self, outputs: ChargerOutputs) -> Activity:
         """One scan; what the station does."""
-        activity = at_last(lambda: self.driver.read().activity, "a reading", self.a_moment)
-        at_last(lambda: self.driver.write(outputs), "written", self.a_moment)
+        activity = self.read().activity
+        self.write(outputs)
         return activity
-
-    def a_moment(self) -> None:
-        """All pauses are over."""
-        self.clock.now += 60.0
 
     def until(self, activity: Activity, outputs: ChargerOutputs) -> None:
         """Scans, until the station reads that."""
         wait_until(lambda: self.scan(outputs) is activity, f"the station is {activity}")
 
-    def patiently(self) -> Activity | str:
-        """What it reads with all pauses over; or why it cannot be read."""
-        self.a_moment()
-        try:
-            return self.driver.read().activity
-        except DriverError as error:
-            return str(error)
+    def does(self) -> Activity | None:
+        """What it does, with all pauses over; None when it cannot be read."""
+        found = self.patiently()
+        return None if isinstance(found, str) else found.activity
 
 
-class ChargerContract(ABC):
-    """On any bus."""
+def news(driver: Any, settings: Any, bus: Bus) -> Callable[[OnDeath], ChargerDriver]:
+    """How a bench makes drivers of this module."""
+
+    def new(on_death: OnDeath) -> ChargerDriver:
+        changed = msgspec.structs.replace(settings, on_death=on_death)
+        made: ChargerDriver = driver.create("a", changed, bus)
+        return made
+
+    return new
+
+
+class ChargerContract(Contract[Bench]):
+    """On any bus. A bench begins with an empty pad."""
 
     link: ClassVar[str]
     """The part of the plant that is the wire."""
@@ -80,25 +84,15 @@ class ChargerContract(ABC):
     foreign_object: ClassVar[str] = "foreign object"
     """How the station calls it."""
 
-    @abstractmethod
-    def benches(self) -> contextlib.AbstractContextManager[Bench]:
-        """A bench with an empty pad; nothing is open yet."""
-
-    @pytest.fixture
-    def bench(self) -> Iterator[Bench]:
-        with self.benches() as bench:
-            yield bench
-            bench.driver.close()
-
     def test_an_idle_station_is_sent_nothing(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         assert [bench.scan(outputs) for outputs in (AS_IT_IS, OFF, AS_IT_IS)] == [Activity.IDLE] * 3
         assert True not in bench.switched()
 
     def test_a_robot_is_charged_while_the_power_is_on_and_not_a_moment_longer(
         self, bench: Bench
     ) -> None:
-        bench.driver.open()
+        bench.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
         assert bool(bench.driver.read().measured.amps) == self.measures
@@ -106,7 +100,7 @@ class ChargerContract(ABC):
         assert bench.switched() == [True, False]
 
     def test_the_same_level_again_sends_no_command(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
         for _ in range(3):
@@ -114,7 +108,7 @@ class ChargerContract(ABC):
         assert bench.switched() == [True]
 
     def test_without_a_wanted_level_a_charge_stays_as_it_is(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
         assert [bench.scan(AS_IT_IS) for _ in range(3)] == [Activity.CHARGING] * 3
@@ -124,7 +118,7 @@ class ChargerContract(ABC):
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
         bench.driver = bench.new("stop")
-        bench.driver.open()
+        bench.open()
         assert bench.scan(AS_IT_IS) is Activity.CHARGING
         assert bench.scan(ON) is Activity.CHARGING
         assert bench.switched() == [True]
@@ -147,7 +141,7 @@ class ChargerContract(ABC):
         assert bench.switched() == [True, False]
 
     def test_an_error_is_read_with_its_text(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
         bench.press("foreign_object")
@@ -156,40 +150,37 @@ class ChargerContract(ABC):
         assert bench.switched()[-1] is False
 
     def test_a_check_of_the_range_is_sent_once_for_a_rise(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         for checks in (0, 1, 1, 2, 2):
             bench.driver.read()
             bench.driver.write(ChargerOutputs(False, range_checks=checks))
         assert len(self.checks(bench)) == 2
 
-    def checks(self, bench: Bench) -> list[Any]:
+    def checks(self, bench: Bench) -> list[object]:
         """The range checks that the station has been asked for."""
         return bench.switched("range_check")
 
     @pytest.mark.parametrize("mode", ["off", "slow", "garbage", "wrong"])
     def test_every_failure_is_a_driver_error_and_never_reads_as_charging(
-        self, bench: Bench, mode: Any
+        self, bench: Bench, mode: FailureMode
     ) -> None:
-        bench.driver.open()
-        bench.plant.fail(self.link, mode)
-        seen: list[Activity | str] = []
-
-        def failing() -> bool:
-            seen.append(bench.patiently())
-            return seen[-1] not in set(Activity) - {Activity.UNKNOWN}
-
-        wait_until(failing, mode)
-        assert not CURRENT_FLOWS & set(seen)
+        bench.open()
+        seen = bench.until_it_fails(self.link, mode, _is_unknown)
+        assert not CURRENT_FLOWS & {sample.activity for sample in seen}
         bench.plant.fail(self.link, None)
-        wait_until(lambda: bench.patiently() is Activity.IDLE, "back")
+        wait_until(lambda: bench.does() is Activity.IDLE, "back")
 
     def test_a_charge_survives_a_link_that_goes_away_and_comes_back(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
         bench.plant.fail(self.cut or self.link, "off")
-        wait_until(lambda: not isinstance(bench.patiently(), Activity), "gone")
+        wait_until(lambda: bench.does() is None, "gone")
         bench.plant.fail(self.cut or self.link, None)
-        wait_until(lambda: bench.patiently() is Activity.CHARGING, "back")
+        wait_until(lambda: bench.does() is Activity.CHARGING, "back")
         bench.scan(ON)
         assert bench.switched() == [True]
+
+
+def _is_unknown(sample: ChargerSample) -> bool:
+    return sample.activity is Activity.UNKNOWN

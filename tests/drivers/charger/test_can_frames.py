@@ -348,9 +348,15 @@ def test_setpoints_are_those_that_the_map_takes() -> None:
 
 @pytest.mark.parametrize("amps", [-1.0, 4000.0])
 def test_a_setpoint_that_the_frame_cannot_say_is_a_problem(amps: float) -> None:
-    [(path, text)] = problems(setpoints=SETPOINTS | {"amps": amps})
-    assert path == ("setpoints",)
-    assert text.startswith('ChargerControl: Expected signal "RefCurrent" value')
+    assert problems(setpoints=SETPOINTS | {"amps": amps}) == [
+        (("setpoints", "amps"), f"is {amps:g}: ChargerControl.RefCurrent takes 0 to 3276.7 A")
+    ]
+
+
+def test_volts_above_their_own_maximum_are_a_problem() -> None:
+    assert problems(setpoints=SETPOINTS | {"volts": 29.5}) == [
+        (("setpoints", "volts"), "is 29.5, above max_volts, which is 29.4")
+    ]
 
 
 def test_what_is_fed_cannot_be_kept() -> None:

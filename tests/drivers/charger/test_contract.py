@@ -3,9 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import ClassVar
-
-import msgspec
+from typing import Any, ClassVar
 
 from bridges.charger.signals import Activity, ChargerOutputs
 from bridges.settings.load import load
@@ -13,10 +11,8 @@ from drivers.charger import dry_contact as charger_contacts
 from drivers.charger import http as charger_http
 from drivers.charger import modbus as charger_modbus
 from drivers.charger import register as charger_register
-from drivers.hal import http, modbus
-from hal_fakes.http import HttpServer
+from drivers.hal import modbus
 from hal_fakes.http_charger import HttpCharger
-from hal_fakes.modbus import ModbusServer
 from hal_fakes.modbus.register_charger import PARTS, RegisterCharger
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.contact_charger import ContactCharger
@@ -24,18 +20,22 @@ from hal_fakes.plants.pad import PadPlant
 from hal_fakes.plants.xnergy_rcu import ModbusRcu
 from hal_fakes.realtime import RealTime
 from hal_fakes.wiring import Wiring
+from tests.drivers.benches import on_http, on_modbus
 from tests.drivers.charger.contract import (
     AS_IT_IS,
     ON,
     PACE,
     Bench,
     ChargerContract,
-    ChargerDriver,
-    OnDeath,
+    news,
 )
-from tests.drivers.hal.modbus.module import Time
 
 CONFIG = Path(__file__).parents[3] / "config"
+
+
+def shipped(file: str, device: str) -> Any:
+    """A device's settings in an example."""
+    return load(CONFIG / file).devices[device]
 
 
 class TestAnotherMakeOnHttp(ChargerContract):
@@ -44,25 +44,13 @@ class TestAnotherMakeOnHttp(ChargerContract):
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        file, device = self.example
-        settings = load(CONFIG / file).devices[device]
+        settings = shipped(*self.example)
         asked = settings.range_check is not None
         plant = ChargerPlant("a", settings.receivers, commanded=True, asked=asked, pace=PACE)
-        world, clock = RealTime({"a": plant}), Time()
-        server = HttpServer([HttpCharger(world.plants["a"], settings)], "", timeout_s=0.5)
-        plain = {"type": "http", "api_base": "tpu", "timeout_s": 0.5, **server.replace}
-        bus = http.HttpBus(msgspec.convert(plain, http.Settings), clock)
-
-        def new(on_death: OnDeath) -> ChargerDriver:
-            changed = msgspec.structs.replace(settings, on_death=on_death)
-            return charger_http.create("a", changed, bus)
-
-        try:
-            yield Bench(new, world.plants["a"], clock)
-        finally:
-            bus.close()
-            server.close()
-            world.close()
+        world = RealTime({"a": plant})
+        station = HttpCharger(world.plants["a"], settings)
+        with on_http(world, station, timeout_s=0.5) as (bus, clock):
+            yield Bench(news(charger_http, settings, bus), station.plant, clock)
 
 
 class TestASupplyOnARelay(TestAnotherMakeOnHttp):
@@ -87,24 +75,13 @@ class TestAReceiverOnModbus(ChargerContract):
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = load(CONFIG / "charger_modbus.yaml").devices["charger_c"]
-        world, clock = RealTime({"a": PadPlant("a", pace=PACE)}), Time()
-        server = ModbusServer([ModbusRcu(world.plants["a"], settings)], slow_s=0.3)
-        plain = {"type": "modbus", "timeout_s": 0.2, **server.replace}
-        bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
+        settings = shipped("charger_modbus.yaml", "charger_c")
+        world = RealTime({"a": PadPlant("a", pace=PACE)})
+        rcu = ModbusRcu(world.plants["a"], settings)
+        with on_modbus(world, [rcu]) as (bus, clock):
+            yield RcuBench(news(charger_modbus, settings, bus), rcu.plant, clock)
 
-        def new(on_death: OnDeath) -> ChargerDriver:
-            changed = msgspec.structs.replace(settings, on_death=on_death)
-            return charger_modbus.create("a", changed, bus)
-
-        try:
-            yield RcuBench(new, world.plants["a"], clock)
-        finally:
-            bus.close()
-            server.close()
-            world.close()
-
-    def checks(self, bench: Bench) -> list[bool]:
+    def checks(self, bench: Bench) -> list[object]:
         return bench.switched("check_range")
 
 
@@ -113,23 +90,12 @@ class TestAnyMakeOnRegisters(ChargerContract):
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = load(CONFIG / "charger_register.yaml").devices["charger_f"]
+        settings = shipped("charger_register.yaml", "charger_f")
         plant = ChargerPlant("a", commanded=True, asked=True, pace=PACE, parts=PARTS)
-        world, clock = RealTime({"a": plant}), Time()
-        server = ModbusServer([RegisterCharger(world.plants["a"], settings)], slow_s=0.3)
-        plain = {"type": "modbus", "timeout_s": 0.2, **server.replace}
-        bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
-
-        def new(on_death: OnDeath) -> ChargerDriver:
-            changed = msgspec.structs.replace(settings, on_death=on_death)
-            return charger_register.create("a", changed, bus)
-
-        try:
-            yield Bench(new, world.plants["a"], clock)
-        finally:
-            bus.close()
-            server.close()
-            world.close()
+        world = RealTime({"a": plant})
+        station = RegisterCharger(world.plants["a"], settings)
+        with on_modbus(world, [station]) as (bus, clock):
+            yield Bench(news(charger_register, settings, bus), station.plant, clock)
 
 
 class ContactBench(Bench):
@@ -147,23 +113,12 @@ class TestContactsAtAModule(ChargerContract):
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = load(CONFIG / "charger_contacts.yaml").devices["charger_e"]
+        settings = shipped("charger_contacts.yaml", "charger_e")
         table = charger_contacts.wires(settings)
-        world, clock = RealTime({"a": ContactCharger("a", table, pace=PACE)}), Time()
+        world = RealTime({"a": ContactCharger("a", table, pace=PACE)})
         wiring = Wiring(world.plants["a"], table, modbus.canonical)
-        server = ModbusServer([wiring], slow_s=0.3)
-        plain = {"type": "modbus", "timeout_s": 0.2, **server.replace}
-        bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
-
-        def new(on_death: OnDeath) -> ChargerDriver:
-            return charger_contacts.create("a", settings, bus)
-
-        try:
-            yield ContactBench(new, world.plants["a"], clock)
-        finally:
-            bus.close()
-            server.close()
-            world.close()
+        with on_modbus(world, [wiring]) as (bus, clock):
+            yield ContactBench(news(charger_contacts, settings, bus), wiring.plant, clock)
 
     def test_a_new_daemon_finds_a_charge_and_can_stop_it(self, bench: Bench) -> None:
         bench.driver.open()

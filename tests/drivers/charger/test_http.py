@@ -16,7 +16,8 @@ from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from bridges.settings.load import load
 from drivers import DriverError
-from drivers.charger.http import DRIVER, Fields, Settings, create, describe, warnings
+from drivers.charger.http import DRIVER, Settings, create, describe, warnings
+from drivers.charger.http_fields import Fields
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
 from drivers.hal import http as bus_file

@@ -10,14 +10,16 @@ from hypothesis import strategies as st
 
 from bridges.charger.settings import robot
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
-from bridges.settings.load import SettingsError, load
+from bridges.settings.load import load
 from drivers import DriverError, json_fields
-from drivers.charger.http import InRange, Settings, create, describe, warnings
+from drivers.charger.http import Settings, create, describe, warnings
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
 from drivers.http_call import Call
+from drivers.json_fields import Flag
 from tests.depth import examples
 from tests.drivers.charger.test_http import Station
+from tests.settings.reading import changed, problems_of
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_http_full.yaml"
 FULL: Settings = load(EXAMPLE).devices["charger_b"]
@@ -69,9 +71,7 @@ def test_a_robots_error_is_told_from_the_stations_and_an_unknown_word_is_unknown
 
 
 def test_a_range_may_be_a_number() -> None:
-    fields = msgspec.structs.replace(
-        FULL.fields, in_range=InRange(field="pad.aligned", when=[1, 3])
-    )
+    fields = msgspec.structs.replace(FULL.fields, in_range=Flag(field="pad.aligned", when=[1, 3]))
     made = msgspec.structs.replace(FULL, fields=fields)
     seen = [read(answer(aligned=value), made).measured.in_range for value in (1, 3, 0, True, "1")]
     assert seen == [True, True, False, False, False]
@@ -269,18 +269,6 @@ def test_the_daemons_end_stops_or_keeps_as_the_yaml_says() -> None:
 # ---- settings
 
 
-def problems(tmp_path: Path, old: str, new: str) -> list[str]:
-    text = EXAMPLE.read_text("utf-8")
-    assert old in text
-    file = tmp_path / "charger.yaml"
-    file.write_text(text.replace(old, new), "utf-8")
-    try:
-        load(file)
-    except SettingsError as error:
-        return [str(problem) for problem in error.problems]
-    return []
-
-
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
@@ -296,7 +284,9 @@ def problems(tmp_path: Path, old: str, new: str) -> list[str]:
 def test_a_profile_that_cannot_be_right_is_refused(
     tmp_path: Path, old: str, new: str, text: str
 ) -> None:
-    assert text in " ".join(problems(tmp_path, old, new))
+    assert text in " ".join(
+        problems_of(tmp_path / "a.yaml", changed(old, new, EXAMPLE.read_text()))
+    )
 
 
 def test_what_cannot_be_stopped_cannot_be_kept_and_who_is_not_known_cannot_be_served(
@@ -324,9 +314,7 @@ def test_a_whole_profile_has_no_warning_and_each_gap_has_its_own() -> None:
 
 
 def test_check_prints_every_place_word_and_receiver() -> None:
-    fields = msgspec.structs.replace(
-        FULL.fields, in_range=InRange(field="pad.aligned", when=[1, 3])
-    )
+    fields = msgspec.structs.replace(FULL.fields, in_range=Flag(field="pad.aligned", when=[1, 3]))
     made = msgspec.structs.replace(FULL, fields=fields)
     assert describe(made, load(EXAMPLE).buses["tpu"])[:14] == [
         ("state", "GET http://192.168.1.61:8080/api/v2/status every 0.5 s"),

@@ -4,84 +4,70 @@ A test class derives from `DoorContract`, or from `WiredDoorContract` where the 
 how its bench is built.
 """
 
-import contextlib
-from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterable
+from typing import TypedDict
 
 import pytest
 
 from bridges.door.signals import DoorOutputs, DoorSample
-from drivers import Driver, DriverError
+from drivers import DriverError
+from drivers.hal.points import Wire
 from hal_fakes.plants.door import DoorPlant
-from hal_fakes.plants.plant import Plant
-from tests.drivers.hal.modbus.module import Time
-from tests.waiting import at_last, wait_until
+from hal_fakes.plants.plant import FailureMode
+from tests.drivers import benches
+from tests.drivers.benches import Contract
+from tests.waiting import wait_until
 
 HOLD, RELEASE = DoorOutputs(hold_open=True), DoorOutputs(hold_open=False)
-QUICK: dict[str, Any] = {"open_s": 0.05, "close_s": 0.05, "auto_close_s": 0.05}
+
+
+class Pace(TypedDict):
+    open_s: float
+    close_s: float
+    auto_close_s: float
+
+
+QUICK: Pace = {"open_s": 0.05, "close_s": 0.05, "auto_close_s": 0.05}
 """A door that is not worth waiting for."""
 
-DoorDriver = Driver[DoorSample, DoorOutputs]
+
+Ends = tuple[bool | None, bool | None]
+"""Does it read open, does it read closed?"""
 
 
-class Bench:
-    """One driver on one bus, with a door behind it. `clock`: the bus's, for its pauses."""
+class Bench(benches.Bench[DoorSample, DoorOutputs]):
+    """With a door."""
 
-    def __init__(self, driver: DoorDriver, plant: Plant, clock: Time | None = None) -> None:
-        self.driver = driver
-        self.plant = plant
-        self.clock = clock or Time()
-
-    def relay(self) -> list[Any]:
+    def relay(self) -> list[object]:
         """Every edge of the hold so far."""
-        return [edge.value for edge in self.plant.edges if edge.what == "relay"]
+        return [value for _, value in self.relays()]
 
-    def ends(self) -> tuple[bool | None, bool | None]:
-        """Does it read open, does it read closed?"""
-        sample = at_last(self.driver.read, "a reading", self.a_moment)
-        return sample.opened, sample.closed
+    def ends(self) -> Ends:
+        """What it reads."""
+        return ends(self.read())
 
-    def write(self, outputs: DoorOutputs) -> None:
-        """These outputs."""
-        at_last(lambda: self.driver.write(outputs), "written", self.a_moment)
+    def reads(self, wanted: Ends) -> bool:
+        """Does it read this, with all pauses over?"""
+        found = self.patiently()
+        return isinstance(found, DoorSample) and ends(found) == wanted
 
-    def a_moment(self) -> None:
-        """All pauses are over."""
-        self.clock.now += 60.0
 
-    def patiently(self) -> tuple[bool | None, bool | None] | str:
-        """The same with all pauses over; or why it could not be read."""
-        self.a_moment()
-        try:
-            sample = self.driver.read()
-        except DriverError as error:
-            return str(error)
-        return sample.opened, sample.closed
+def ends(sample: DoorSample) -> Ends:
+    return sample.opened, sample.closed
 
 
 OPEN, CLOSED, BETWEEN = (True, False), (False, True), (False, False)
 
 
-class DoorContract(ABC):
-    """On any bus."""
-
-    @abstractmethod
-    def benches(self) -> contextlib.AbstractContextManager[Bench]:
-        """A bench with a closed door; nothing is open yet."""
-
-    @pytest.fixture
-    def bench(self) -> Iterator[Bench]:
-        with self.benches() as bench:
-            yield bench
-            bench.driver.close()
+class DoorContract(Contract[Bench]):
+    """On any bus. A bench begins with a closed door."""
 
     def test_opening_the_driver_moves_nothing(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         assert (bench.ends(), bench.relay()) == (CLOSED, [])
 
     def test_a_held_door_opens_and_a_released_one_closes_by_itself(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         bench.write(HOLD)
         wait_until(lambda: bench.ends() == OPEN, "open")
         bench.write(RELEASE)
@@ -89,44 +75,40 @@ class DoorContract(ABC):
         assert bench.relay() == [True, False]
 
     def test_a_door_that_stops_on_its_way_reads_neither_open_nor_closed(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         bench.plant.fail("operator", "garbage")
         bench.write(HOLD)
         wait_until(lambda: bench.ends() != CLOSED, "it has left the closed end")
         assert [bench.ends() for _ in range(20)] == [BETWEEN] * 20
 
     def test_a_cut_limit_contact_never_reads_open(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         bench.write(HOLD)
         wait_until(lambda: bench.ends() == OPEN, "open")
         bench.plant.fail("opened", "off")
         wait_until(lambda: bench.ends() == BETWEEN, "neither")
 
     def test_open_and_closed_at_once_does_not_read_as_open(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         bench.plant.fail("opened", "wrong")
         wait_until(lambda: bench.ends() != CLOSED, "seen")
-        sample = at_last(bench.driver.read, "a reading", bench.a_moment)
+        sample = bench.read()
         assert sample.opened == sample.closed
         assert sample.closed or sample.lost
 
     def test_writing_the_same_again_sends_no_command(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         for _ in range(3):
             bench.write(HOLD)
         assert bench.relay() == [True]
 
     def test_make_safe_and_close_each_release_the_door(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         bench.write(HOLD)
         bench.driver.make_safe()
         bench.write(HOLD)
         bench.driver.close()
         assert bench.relay() == [True, False] * 2
-
-    def test_closing_what_was_never_open_touches_nothing(self, bench: Bench) -> None:
-        bench.driver.close()
-        assert bench.relay() == []
 
 
 class WiredDoorContract(DoorContract):
@@ -136,7 +118,7 @@ class WiredDoorContract(DoorContract):
     def test_a_link_that_is_gone_is_a_driver_error_and_a_hold_survives_it(
         self, bench: Bench, part: str
     ) -> None:
-        bench.driver.open()
+        bench.open()
         bench.write(HOLD)
         wait_until(lambda: bench.ends() == OPEN, "open")
         bench.plant.fail(part, "off")
@@ -144,29 +126,22 @@ class WiredDoorContract(DoorContract):
         with pytest.raises(DriverError):
             bench.driver.open()
         bench.plant.fail(part, None)
-        wait_until(lambda: bench.patiently() == OPEN, "back")
-        bench.driver.open()
+        wait_until(lambda: bench.reads(OPEN), "back")
+        bench.open()
         bench.write(HOLD)
         assert bench.relay() == [True]
 
     @pytest.mark.parametrize("mode", ["garbage", "wrong", "slow", "stuck"])
     def test_every_failure_is_a_driver_error_and_never_reads_as_open(
-        self, bench: Bench, mode: Any
+        self, bench: Bench, mode: FailureMode
     ) -> None:
-        bench.driver.open()
-        bench.plant.fail("server", mode)
-        seen = []
-
-        def failing() -> bool:
-            seen.append(bench.patiently())
-            return isinstance(seen[-1], str)
-
-        wait_until(failing, mode)
-        assert OPEN not in seen
+        bench.open()
+        seen = bench.until_it_fails("server", mode, lambda sample: False)
+        assert OPEN not in map(ends, seen)
         bench.plant.fail("server", None)
-        wait_until(lambda: bench.patiently() == CLOSED, "back")
+        wait_until(lambda: bench.reads(CLOSED), "back")
 
 
-def quick(name: str, wires: Any) -> DoorPlant:
+def quick(name: str, wires: Iterable[Wire]) -> DoorPlant:
     """A door that is there in no time."""
     return DoorPlant(name, wires, **QUICK)

@@ -1,6 +1,6 @@
 """Every driver of a door keeps the same contract."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, ClassVar
 
@@ -8,19 +8,12 @@ import msgspec
 
 from drivers.door import dry_contact as door_dry_contact
 from drivers.door import register as door_register
-from drivers.hal import gpio, modbus
-from hal_fakes.gpio import WiredFactory
-from hal_fakes.modbus import ModbusServer
+from drivers.hal import modbus
 from hal_fakes.modbus.register_door import RegisterDoor, contacts
-from hal_fakes.modbus.rtu import RtuLine
-from hal_fakes.modbus.units import FarSide
 from hal_fakes.realtime import RealTime
 from hal_fakes.wiring import Wiring
+from tests.drivers.benches import RS485, on_modbus, on_pins
 from tests.drivers.door.contract import Bench, DoorContract, WiredDoorContract, quick
-from tests.drivers.hal.modbus.module import Time
-
-TIMEOUT_S = 0.2
-RS485 = modbus.Serial(port="/dev/null", baudrate=57600, parity="none", stopbits=1)
 
 
 def dry(
@@ -40,31 +33,6 @@ def dry(
     return msgspec.convert(plain, door_dry_contact.Settings)
 
 
-@contextmanager
-def served(
-    far_sides: Iterable[FarSide],
-    world: RealTime,
-    create: Any,
-    settings: Any,
-    serial: modbus.Serial | None,
-) -> Iterator[Bench]:
-    """A bench in front of a Modbus server, or a line, with these far sides."""
-    clock = Time()
-    server = (
-        RtuLine(far_sides, serial, slow_s=2.2 * TIMEOUT_S)
-        if serial
-        else ModbusServer(far_sides, slow_s=1.5 * TIMEOUT_S)
-    )
-    plain = {"type": "modbus", "timeout_s": TIMEOUT_S, **server.replace}
-    bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
-    try:
-        yield Bench(create("door", settings, bus), world.plants["door"], clock)
-    finally:
-        bus.close()
-        server.close()
-        world.close()
-
-
 class TestDryContactsOnModbus(WiredDoorContract):
     flash: ClassVar[dict[str, str]] = {}
     serial: ClassVar[modbus.Serial | None] = None
@@ -76,8 +44,8 @@ class TestDryContactsOnModbus(WiredDoorContract):
         wires = door_dry_contact.wires(settings)
         world = RealTime({"door": quick("door", wires)})
         wiring = Wiring(world.plants["door"], wires, modbus.canonical)
-        with served([wiring], world, door_dry_contact.create, settings, self.serial) as bench:
-            yield bench
+        with on_modbus(world, [wiring], self.serial) as (bus, clock):
+            yield Bench(door_dry_contact.create("door", settings, bus), wiring.plant, clock)
 
 
 class TestDryContactsOnRs485(TestDryContactsOnModbus):
@@ -99,14 +67,8 @@ class TestDryContactsOnGpio(DoorContract):
         wires = door_dry_contact.wires(settings)
         world = RealTime({"door": quick("door", wires)})
         plant = world.plants["door"]
-        factory = WiredFactory([Wiring(plant, wires, gpio.canonical)], lock=world.lock)
-        world.on_step.append(factory.show)
-        bus = gpio.open_bus(gpio.Settings(), factory)
-        try:
+        with on_pins(world, plant, wires) as bus:
             yield Bench(door_dry_contact.create("door", settings, bus), plant)
-        finally:
-            bus.close()
-            world.close()
 
 
 class RegisterContract(WiredDoorContract):
@@ -120,8 +82,8 @@ class RegisterContract(WiredDoorContract):
         settings = msgspec.convert(self.settings, door_register.Settings)
         world = RealTime({"door": quick("door", contacts(settings))})
         door = RegisterDoor(world.plants["door"], settings)
-        with served([door], world, door_register.create, settings, self.serial) as bench:
-            yield bench
+        with on_modbus(world, [door], self.serial) as (bus, clock):
+            yield Bench(door_register.create("door", settings, bus), door.plant, clock)
 
 
 class TestTheGenericRegisterDoor(RegisterContract):

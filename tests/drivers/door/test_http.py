@@ -9,17 +9,18 @@ import msgspec
 import pytest
 
 from bridges.door.signals import DoorOutputs, DoorSample
-from bridges.settings.load import SettingsError, load
+from bridges.settings.load import load
 from drivers import DriverError
 from drivers.door import http as door_http
 from drivers.door.http import Settings, create
 from drivers.hal import HalError, http
-from hal_fakes.http import HttpServer
 from hal_fakes.http_door import PARTS, HttpDoor, contacts
 from hal_fakes.plants.door import DoorPlant
+from hal_fakes.plants.plant import FailureMode
 from hal_fakes.realtime import RealTime
+from tests.drivers.benches import on_http
 from tests.drivers.door.contract import CLOSED, HOLD, OPEN, QUICK, RELEASE, Bench, WiredDoorContract
-from tests.drivers.hal.modbus.module import Time
+from tests.settings.reading import changed, texts_of
 from tests.waiting import wait_until
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "door_http.yaml"
@@ -34,16 +35,10 @@ class HttpContract(WiredDoorContract):
     @contextmanager
     def benches(self) -> Iterator[Bench]:
         plant = DoorPlant("door", contacts(self.settings), parts=PARTS, **QUICK)
-        world, clock = RealTime({"door": plant}), Time()
-        server = HttpServer([HttpDoor(world.plants["door"], self.settings)], "", timeout_s=0.3)
-        plain = {"type": "http", "api_base": "relay", "timeout_s": 0.3, **server.replace}
-        bus = http.HttpBus(msgspec.convert(plain, http.Settings), clock)
-        try:
-            yield Bench(create("door", self.settings, bus), world.plants["door"], clock)
-        finally:
-            bus.close()
-            server.close()
-            world.close()
+        world = RealTime({"door": plant})
+        station = HttpDoor(world.plants["door"], self.settings)
+        with on_http(world, station, timeout_s=0.3) as (bus, clock):
+            yield Bench(create("door", self.settings, bus), station.plant, clock)
 
     @pytest.mark.parametrize("part", ["server", "headers"])
     def test_a_link_that_is_gone_is_a_driver_error_and_a_hold_survives_it(
@@ -53,7 +48,7 @@ class HttpContract(WiredDoorContract):
 
     @pytest.mark.parametrize("mode", ["garbage", "wrong", "slow"])
     def test_every_failure_is_a_driver_error_and_never_reads_as_open(
-        self, bench: Bench, mode: Any
+        self, bench: Bench, mode: FailureMode
     ) -> None:
         super().test_every_failure_is_a_driver_error_and_never_reads_as_open(bench, mode)
 
@@ -178,13 +173,8 @@ WRONG = {
 @pytest.mark.parametrize("old", WRONG)
 def test_what_would_leave_a_door_held_or_unseen_is_refused(tmp_path: Path, old: str) -> None:
     new, wanted = WRONG[old]
-    text = EXAMPLE.read_text()
-    assert text.count(old) == 1
-    file = tmp_path / "door.yaml"
-    file.write_text(text.replace(old, new))
-    with pytest.raises(SettingsError) as caught:
-        load(file)
-    assert [problem.text for problem in caught.value.problems] == [wanted]
+    found = texts_of(tmp_path / "door.yaml", changed(old, new, EXAMPLE.read_text()))
+    assert found == [wanted]
 
 
 def test_a_relay_without_a_timer_is_taken_with_a_reason(tmp_path: Path) -> None:

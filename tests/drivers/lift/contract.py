@@ -5,20 +5,18 @@ how its bench is built. The lift has the landings B1, G and 1 and stands at B1, 
 wires: `fire_alarm`, `agv_mode`, `door_opened`, `door_closed`, `moving`, and a line for each landing.
 """
 
-import contextlib
 import time
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
-from drivers import Driver, DriverError
+from drivers import DriverError
 from hal_fakes.plants.lift import Pace
-from hal_fakes.plants.plant import Plant
-from tests.drivers.hal.modbus.module import Time
-from tests.waiting import at_last, wait_until
+from hal_fakes.plants.plant import FailureMode
+from tests.drivers import benches
+from tests.drivers.benches import Contract
+from tests.waiting import wait_until
 
 QUICK = Pace(floor_s=0.2, door_s=0.05, agv_s=0.02, dwell_s=0.1)
 """A lift that is not worth waiting for."""
@@ -27,28 +25,9 @@ IDLE = LiftSample("B1", Door.CLOSED, motion=Motion.STOPPED, agv=False)
 OFF, AGV = LiftOutputs(), LiftOutputs(agv_request=True)
 CALL, HOLD = LiftOutputs(True, call="1"), LiftOutputs(True, hold_door=Side.FRONT)
 
-LiftDriver = Driver[LiftSample, LiftOutputs]
 
-
-class Bench:
-    """One driver on one bus, with a lift behind it. `clock`: the bus's, for its pauses."""
-
-    def __init__(self, driver: LiftDriver, plant: Plant, clock: Time | None = None) -> None:
-        self.driver = driver
-        self.plant = plant
-        self.clock = clock or Time()
-
-    def relays(self) -> list[tuple[str, Any]]:
-        """Every edge of every output so far."""
-        return [(edge.signal, edge.value) for edge in self.plant.edges if edge.what == "relay"]
-
-    def read(self) -> LiftSample:
-        """A reading."""
-        return at_last(self.driver.read, "a reading", self._pause)
-
-    def write(self, outputs: LiftOutputs) -> None:
-        """These outputs."""
-        at_last(lambda: self.driver.write(outputs), "written", self._pause)
+class Bench(benches.Bench[LiftSample, LiftOutputs]):
+    """With a lift."""
 
     def until(self, holds: Callable[[LiftSample], bool], what: str) -> list[LiftSample]:
         """Reads until this is so; all that was read on the way."""
@@ -70,37 +49,16 @@ class Bench:
         self.write(HOLD)
         return seen + self.until(lambda sample: sample.door is Door.OPEN, "its door is open")
 
-    def patiently(self) -> LiftSample | str:
-        """What it reads with all pauses over; or why it could not be read."""
-        self._pause()
-        try:
-            return self.driver.read()
-        except DriverError as error:
-            return str(error)
 
-    def _pause(self) -> None:
-        self.clock.now += 60.0
-
-
-class LiftContract(ABC):
-    """On any bus."""
-
-    @abstractmethod
-    def benches(self) -> contextlib.AbstractContextManager[Bench]:
-        """A bench with an idle lift; nothing is open yet."""
-
-    @pytest.fixture
-    def bench(self) -> Iterator[Bench]:
-        with self.benches() as bench:
-            yield bench
-            bench.driver.close()
+class LiftContract(Contract[Bench]):
+    """On any bus. A bench begins with an idle lift."""
 
     def test_opening_the_driver_moves_nothing(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         assert (bench.read(), bench.relays()) == (IDLE, [])
 
     def test_a_call_brings_the_car_and_the_door_is_held_open_there(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         seen = bench.rides()
         assert [sample.level for sample in seen if sample.door is Door.OPEN] == ["1"]
         assert bench.relays() == [
@@ -113,7 +71,7 @@ class LiftContract(ABC):
     def test_a_car_on_its_way_is_moving_and_between_landings_with_its_door_closed(
         self, bench: Bench
     ) -> None:
-        bench.driver.open()
+        bench.open()
         bench.plant.fail("car", "slow")
         bench.write(AGV)
         bench.until(lambda sample: sample.agv is True, "AGV mode")
@@ -123,7 +81,7 @@ class LiftContract(ABC):
         assert {sample.door for sample in way} == {Door.CLOSED}
 
     def test_another_call_goes_on_after_the_one_before_it_is_off(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         bench.write(AGV)
         for level in ("G", "1", "B1"):
             bench.write(LiftOutputs(True, call=level))
@@ -136,13 +94,13 @@ class LiftContract(ABC):
         ]
 
     def test_writing_the_same_again_sends_no_command(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         for _ in range(3):
             bench.write(CALL)
         assert sorted(bench.relays()) == [("agv_mode_request", True), ("call_1", True)]
 
     def test_make_safe_and_close_each_switch_everything_off(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         for end in (bench.driver.make_safe, bench.driver.close):
             before = len(bench.relays())
             bench.write(HOLD)
@@ -154,12 +112,8 @@ class LiftContract(ABC):
                 ("door_open", True),
             ]
 
-    def test_closing_what_was_never_open_touches_nothing(self, bench: Bench) -> None:
-        bench.driver.close()
-        assert bench.relays() == []
-
     def test_a_fire_is_read_for_as_long_as_its_contact_says_so(self, bench: Bench) -> None:
-        bench.driver.open()
+        bench.open()
         for burns in (True, False):
             bench.plant.press("fire_alarm", burns, time.monotonic())
             hazards = {Hazard.FIRE} if burns else set()
@@ -177,7 +131,7 @@ class LiftContract(ABC):
     def test_a_cut_wire_reads_as_the_safe_one_of_its_two_meanings(
         self, bench: Bench, wire: str, safe: Callable[[LiftSample], bool]
     ) -> None:
-        bench.driver.open()
+        bench.open()
         bench.rides()
         bench.plant.fail(wire, "off")
         bench.until(safe, f"{wire} is cut")
@@ -190,7 +144,7 @@ class WiredLiftContract(LiftContract):
     def test_a_link_that_is_gone_is_a_driver_error_and_the_outputs_survive_it(
         self, bench: Bench, part: str
     ) -> None:
-        bench.driver.open()
+        bench.open()
         bench.rides()
         edges = bench.relays()
         bench.plant.fail(part, "off")
@@ -199,23 +153,15 @@ class WiredLiftContract(LiftContract):
             bench.driver.open()
         bench.plant.fail(part, None)
         wait_until(lambda: isinstance(bench.patiently(), LiftSample), "back")
-        bench.driver.open()
+        bench.open()
         bench.write(HOLD)
         assert bench.relays() == edges
 
     @pytest.mark.parametrize("mode", ["garbage", "wrong", "slow", "stuck"])
     def test_every_failure_is_a_driver_error_and_never_a_false_reading(
-        self, bench: Bench, mode: Any
+        self, bench: Bench, mode: FailureMode
     ) -> None:
-        bench.driver.open()
-        bench.plant.fail("server", mode)
-        seen: list[LiftSample | str] = []
-
-        def failing() -> bool:
-            seen.append(bench.patiently())
-            return isinstance(seen[-1], str)
-
-        wait_until(failing, mode)
-        assert {sample for sample in seen if isinstance(sample, LiftSample)} <= {IDLE}
+        bench.open()
+        assert set(bench.until_it_fails("server", mode, lambda sample: False)) <= {IDLE}
         bench.plant.fail("server", None)
         wait_until(lambda: bench.patiently() == IDLE, "back")

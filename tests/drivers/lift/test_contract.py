@@ -7,20 +7,16 @@ from typing import Any, ClassVar
 
 import msgspec
 
-from drivers.hal import gpio, modbus
+from drivers.hal import modbus
 from drivers.lift import register
 from drivers.lift.dry_contact import Settings, create, wires
-from hal_fakes.gpio import WiredFactory
-from hal_fakes.modbus import ModbusServer, register_lift
-from hal_fakes.modbus.rtu import RtuLine
+from hal_fakes.modbus import register_lift
 from hal_fakes.plants.lift import LiftPlant
 from hal_fakes.realtime import RealTime
 from hal_fakes.wiring import Wiring
-from tests.drivers.hal.modbus.module import Time
+from tests.drivers.benches import RS485, on_modbus, on_pins
 from tests.drivers.lift.contract import QUICK, Bench, LiftContract, WiredLiftContract
 from tests.drivers.lift.wirings import FLOORS, inputs, line, whole
-
-TIMEOUT_S = 0.2
 
 
 class TestDryContactsOnModbus(WiredLiftContract):
@@ -34,22 +30,9 @@ class TestDryContactsOnModbus(WiredLiftContract):
     def benches(self) -> Iterator[Bench]:
         settings = msgspec.convert(self.wired(), Settings)
         world = RealTime({"lift": LiftPlant("lift", settings, QUICK)})
-        plant = world.plants["lift"]
-        far_side = [Wiring(plant, wires(settings), modbus.canonical)]
-        server = (
-            RtuLine(far_side, self.serial, slow_s=2.2 * TIMEOUT_S)
-            if self.serial
-            else ModbusServer(far_side, slow_s=1.5 * TIMEOUT_S)
-        )
-        plain = {"type": "modbus", "timeout_s": TIMEOUT_S, **server.replace}
-        clock = Time()
-        bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
-        try:
-            yield Bench(create("lift", settings, bus), plant, clock)
-        finally:
-            bus.close()
-            server.close()
-            world.close()
+        wiring = Wiring(world.plants["lift"], wires(settings), modbus.canonical)
+        with on_modbus(world, [wiring], self.serial) as (bus, clock):
+            yield Bench(create("lift", settings, bus), wiring.plant, clock)
 
 
 def number(register: int, codes: dict[int, str], **more: Any) -> dict[str, Any]:
@@ -85,18 +68,9 @@ class TestRegistersWithCallsAsNumbers(WiredLiftContract):
         settings = msgspec.convert(plain, register.Settings)
         assert list(settings.problems()) == []
         world = RealTime({"lift": register_lift.build("lift", settings, QUICK)})
-        plant = world.plants["lift"]
-        far_side = register_lift.RegisterLift(plant, settings)
-        server = ModbusServer([far_side], slow_s=1.5 * TIMEOUT_S)
-        wire = {"type": "modbus", "timeout_s": TIMEOUT_S, **server.replace}
-        clock = Time()
-        bus = modbus.ModbusBus(msgspec.convert(wire, modbus.Settings), clock)
-        try:
-            yield Bench(register.create("lift", settings, bus), plant, clock)
-        finally:
-            bus.close()
-            server.close()
-            world.close()
+        far_side = register_lift.RegisterLift(world.plants["lift"], settings)
+        with on_modbus(world, [far_side]) as (bus, clock):
+            yield Bench(register.create("lift", settings, bus), far_side.plant, clock)
 
 
 class TestRegistersWithCallsInOneWord(TestRegistersWithCallsAsNumbers):
@@ -118,7 +92,7 @@ class TestRegistersThatCannotBeReadBack(TestRegistersWithCallsAsNumbers):
 
 
 class TestDryContactsOnRs485(TestDryContactsOnModbus):
-    serial: ClassVar = modbus.Serial(port="/dev/null", baudrate=57600, parity="none", stopbits=1)
+    serial: ClassVar = RS485
 
 
 def in_registers(part: Any) -> Any:
@@ -156,11 +130,5 @@ class TestDryContactsOnGpio(LiftContract):
         settings = msgspec.convert(plain, Settings)
         world = RealTime({"lift": LiftPlant("lift", settings, QUICK)})
         plant = world.plants["lift"]
-        factory = WiredFactory([Wiring(plant, wires(settings), gpio.canonical)], lock=world.lock)
-        world.on_step.append(factory.show)
-        bus = gpio.open_bus(gpio.Settings(), factory)
-        try:
+        with on_pins(world, plant, wires(settings)) as bus:
             yield Bench(create("lift", settings, bus), plant)
-        finally:
-            bus.close()
-            world.close()

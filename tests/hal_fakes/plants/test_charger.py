@@ -58,7 +58,7 @@ def test_a_robot_that_leaves_is_disconnected_and_the_next_one_starts_anew() -> N
 def test_the_handshake_shows_how_far_it_is() -> None:
     plant = parked()
     plant.advance(2.0)
-    reading = plant.sense("reading")
+    reading = plant.reading()
     assert (reading.activity, reading.progress) == (Activity.HANDSHAKE, 0.5)
 
 
@@ -69,13 +69,13 @@ def test_the_handshake_shows_how_far_it_is() -> None:
 def test_an_error_stays_until_it_is_cleared_after_its_cause_has_gone(cause: str, text: str) -> None:
     plant = parked()
     plant.press(cause, True, 5.0)
-    assert (plant.sense("reading").error_text, plant.sense(cause)) == (text, True)
+    assert (plant.reading().error_text, plant.sense(cause)) == (text, True)
     plant.drive("clear_error", True, 6.0)
     plant.press(cause, False, 7.0)
     plant.advance(8.0)
     plant.drive("clear_error", True, 9.0)
     plant.advance(12.0)
-    assert plant.sense("reading").error_text == ""
+    assert plant.reading().error_text == ""
     assert plant.edges == [
         Edge(1.0, "a", "sensor", "state", "handshake"),
         Edge(3.0, "a", "sensor", "state", "charging"),
@@ -117,7 +117,7 @@ def test_the_robots_receiver_fails_in_five_ways(
 def test_a_handshake_that_hangs_shows_no_progress_and_a_mended_receiver_is_recognised() -> None:
     plant = parked(("receiver", "stuck"))
     plant.advance(100.0)
-    assert plant.sense("reading").progress == 0.0
+    assert plant.reading().progress == 0.0
     silent = parked(("receiver", "off"))
     silent.advance(50.0)
     silent.fail("receiver", None)
@@ -173,11 +173,11 @@ def test_the_station_sees_the_receiver_of_who_came_last_and_nobodys_when_it_is_s
         ("robot", False),
     ):
         plant.press(robot, here, 1.0)
-        seen.append(plant.sense("reading").receiver)
+        seen.append(plant.reading().receiver)
     assert seen == ["7", "8", "9999", "8", "7", ""]
     plant.press("robot", True, 2.0)
     plant.fail("receiver", "off")
-    assert plant.sense("reading").receiver == ""
+    assert plant.reading().receiver == ""
 
 
 def test_a_battery_fills_and_the_station_says_how_long_it_takes() -> None:
@@ -185,7 +185,7 @@ def test_a_battery_fills_and_the_station_says_how_long_it_takes() -> None:
     readings = []
     for at in (2.0, 3.0, 21.0, 39.5):
         plant.advance(at)
-        reading = plant.sense("reading")
+        reading = plant.reading()
         left_s = reading.time_to_full_s
         whole = left_s if left_s is None else round(left_s)
         readings.append((reading.battery, reading.volts, reading.amps, whole))
@@ -199,21 +199,21 @@ def test_a_battery_fills_and_the_station_says_how_long_it_takes() -> None:
 
 def test_a_robot_out_of_range_is_seen_so_and_cannot_be_charged() -> None:
     plant = parked()
-    assert plant.sense("reading").in_range is True
+    assert plant.reading().in_range is True
     plant.press("out_of_range", True, 2.0)
-    assert plant.sense("reading").in_range is False
+    assert plant.reading().in_range is False
     plant.advance(4.0)
-    assert plant.sense("reading").error_text == "the gap is too wide"
+    assert plant.reading().error_text == "the gap is too wide"
 
 
 def test_a_range_check_takes_a_moment() -> None:
     plant = commanded(asked=True)
     plant.press("robot", True, 1.0)
-    seen = [plant.sense("reading").in_range]
+    seen = [plant.reading().in_range]
     plant.drive("range_check", True, 2.0)
     for at in (2.2, 2.4):
         plant.advance(at)
-        seen.append(plant.sense("reading").in_range)
+        seen.append(plant.reading().in_range)
     assert seen == [None, None, True]
 
 

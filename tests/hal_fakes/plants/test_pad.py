@@ -1,7 +1,5 @@
 """The plant of a charger with a pad: physics in virtual time, each part failing as it is told."""
 
-from typing import cast
-
 import pytest
 
 from bridges.charger.signals import Activity
@@ -21,7 +19,7 @@ def parked(*failures: tuple[str, FailureMode], enabled: bool = True) -> PadPlant
 
 def at(plant: PadPlant, now: float) -> PadReading:
     plant.advance(now)
-    return cast(PadReading, plant.sense("reading"))
+    return plant.reading()
 
 
 def states(plant: PadPlant, until: float) -> list[tuple[float, object]]:

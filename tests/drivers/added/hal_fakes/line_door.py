@@ -38,5 +38,5 @@ class LineDoor:
 
 FAKE: Fake[Any] = Fake(
     plant=lambda name, settings, wires: door.build(name, settings, CONTACTS),
-    station=lambda plant, settings, bus: LineDoor(plant, settings.called),
+    station=lambda plant, settings: LineDoor(plant, settings.called),
 )

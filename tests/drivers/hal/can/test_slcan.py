@@ -38,7 +38,7 @@ class Desk:
 
     def __init__(self) -> None:
         self.echo = Echo()
-        self.port = SlcanPort({})
+        self.port = SlcanPort()
         self.side = CanSide(self.port, [self.echo], slow_s=0.2)
         self.clock = Clock()
         self.bus = self.opened()

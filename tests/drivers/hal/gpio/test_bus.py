@@ -22,23 +22,16 @@ class Contacts(Machine):
     """A plant without physics."""
 
     def __init__(self, wires: Sequence[Wire] = WIRES) -> None:
-        super().__init__("plant", wires)
-        self.asserted: set[str] = set()
+        super().__init__("plant", wires, buttons=[wire.signal for wire in wires])
 
     def contact(self, signal: str) -> bool:
-        return signal in self.asserted
-
-    def actuate(self, signal: str, energised: bool) -> None:
-        pass
+        return self.pressed[signal]
 
     def run(self) -> None:
         pass
 
     def event_at(self) -> float:
         return float("inf")
-
-    def act(self, signal: str, asserted: bool) -> None:
-        (self.asserted.add if asserted else self.asserted.discard)(signal)
 
 
 class Bench:

@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from drivers.hal import HalError
-from drivers.hal.http import HttpBus, Settings, open_bus
+from drivers.hal.http import BUS, HttpBus, Settings
 from tests.depth import examples
 from tests.drivers.hal.http.far_end import (
     Caller,
@@ -554,7 +554,7 @@ def test_who_insists_is_not_held_back_by_the_pause_after_a_failure() -> None:
 
 def test_a_bus_is_opened_without_sending_anything_and_may_be_closed_twice() -> None:
     with FarEnd(always(answer())) as far:
-        bus = open_bus(Settings(api_base=f"127.0.0.1:{far.port}"))
+        bus = BUS.open_bus(Settings(api_base=f"127.0.0.1:{far.port}"))
         bus.on_edge(lambda: None)
         bus.close()
         bus.close()

@@ -19,11 +19,10 @@ from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires
 from drivers.hal import gpio, modbus
 from drivers.hal.points import Flash, HalError, Wire
-from hal_fakes.modbus import ModbusServer
-from hal_fakes.modbus.rtu import RtuLine
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.realtime import RealTime
 from hal_fakes.wiring import Wiring
+from tests.drivers.benches import RS485, on_modbus
 from tests.drivers.hal.modbus.line import SerialModule, rtu
 from tests.drivers.hal.modbus.module import Module, Time, bus_to, door, frame
 from tests.settings.reading import problems_of
@@ -243,9 +242,6 @@ def test_a_pulse_whose_failure_the_core_has_heard_of_is_not_repeated_either(
     assert held(module, lost_at=4.0) == [*flashes, (9.0, "0500000000")]
 
 
-RTU = modbus.Serial(port="/dev/null", baudrate=57600, parity="none", stopbits=1)
-
-
 @contextmanager
 def site(serial: modbus.Serial | None, on_s: float) -> Iterator[tuple[DryContactDoor, DoorPlant]]:
     """The driver in front of the fake module with a quick door behind it."""
@@ -253,19 +249,14 @@ def site(serial: modbus.Serial | None, on_s: float) -> Iterator[tuple[DryContact
     plant = DoorPlant("door", wires(settings), open_s=0.05, close_s=0.05, auto_close_s=0.05)
     world = RealTime({"door": plant})
     wired = [Wiring(plant, wires(settings), modbus.canonical)]
-    server = RtuLine(wired, serial, slow_s=1.0) if serial else ModbusServer(wired, slow_s=1.0)
-    plain = {"type": "modbus", "timeout_s": 2.0, **server.replace}
-    bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings))
-    driver = create("door", settings, bus)
-    driver.open()
-    yield driver, plant
-    driver.close()
-    bus.close()
-    server.close()
-    world.close()
+    with on_modbus(world, wired, serial, timeout_s=2.0) as (bus, _):
+        driver = create("door", settings, bus)
+        driver.open()
+        yield driver, plant
+        driver.close()
 
 
-@pytest.fixture(params=[None, RTU], ids=["tcp", "rtu"])
+@pytest.fixture(params=[None, RS485], ids=["tcp", "rtu"])
 def serial(request: pytest.FixtureRequest) -> modbus.Serial | None:
     where: modbus.Serial | None = request.param
     return where

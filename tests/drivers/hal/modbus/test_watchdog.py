@@ -225,7 +225,7 @@ from bridges.settings.load import load
 from drivers.door import dry_contact
 from drivers.hal import modbus
 config = load(sys.argv[1])
-bus = modbus.open_bus(config.buses["module"])
+bus = modbus.ModbusBus(config.buses["module"])
 door = dry_contact.create("ward_door", config.devices["ward_door"], bus)
 door.open()
 pause = threading.Event()
@@ -280,14 +280,16 @@ SHORT = (
         ("{units: [1], profile: wago-750}", []),
         ("{units: [1], habits: " + SHORT % ("0.5", "coil 2") + "}", []),
         ("{units: [1]}", ["7:5: 'module_watchdog' needs 'habits', or a profile: wago-750"]),
-        ("{units: [1, 1], profile: wago-750}", ["7:23: a unit stands here twice"]),
+        ("{units: [1, 1], profile: wago-750}", ["7:23: 'units': names a unit twice"]),
         (
             "{units: [1], profile: wago}",
             ["7:44: unknown profile 'wago': did you mean 'wago-750'? known here: wago-750"],
         ),
         (
             "{units: [1], habits: " + SHORT % ("0.6", "coil 2") + "}",
-            ["7:66: one late scan would drop the outputs: at most 0.5, half of time_s"],
+            [
+                "7:66: 'refresh_s': one late scan would drop the outputs: at most 0.5, half of time_s"
+            ],
         ),
         (
             "{units: [1], habits: " + SHORT % ("0.5", "input register 2") + "}",

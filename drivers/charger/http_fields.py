@@ -1,0 +1,113 @@
+"""Where a charging station's HTTP answer holds what, and the values that are read there."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Final, Literal
+
+import msgspec
+
+from bridges.charger.signals import FaultSide, Measured
+from drivers import json_fields
+from drivers.charger.state_codes import CODE_MAX
+from drivers.json_fields import Field, Flag
+
+Answer = Mapping[str, object]
+"""One JSON object."""
+WORD_MAX: Final = 64
+Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
+TextMeans = Literal["none", "station", "robot"]
+WEEK_S: Final = 7 * 86400
+
+
+class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A measurement.
+
+    `field`: the field of the answer that holds it.
+    `scale`: the factor from the maker's unit to ours (0.001 for mV).
+    """
+
+    field: Field
+    scale: float = 1.0
+
+
+class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The fields of the answer to `state_path`: names with dots between them.
+
+    `state`: the station's state; `codes` says what it means.
+    `error_text`: the station's own text for an error: any text means an error, whatever `state` is.
+    `error_texts`: text -> the side of the error, `station` or `robot`; or `none` for a text that means
+    no error (`OK`). For other texts `codes` gives the side, if it can.
+    `receiver_id`: the id of the receiver that it sees; null or "" when it sees none.
+    `in_range`: whether the robot stands where it can be charged.
+    `volts`: the voltage at the battery.
+    `amps`: the current into the battery.
+    `battery_percent`: the battery's charge, 0 to 100.
+    `time_to_full_s`: the time until the battery is full (s).
+    """
+
+    state: Field = "state"
+    error_text: Field = "error_msg"
+    error_texts: dict[Word, TextMeans] = msgspec.field(default_factory=dict)
+    receiver_id: Field | None = None
+    in_range: Flag | None = None
+    volts: Number | None = None
+    amps: Number | None = None
+    battery_percent: Number | None = None
+    time_to_full_s: Number | None = None
+
+    def code(self, answer: Answer, words: Mapping[str, int]) -> int | str:
+        """The maker's number for its state, or its word if `words` does not list it.
+
+        Raises DriverError for anything else.
+        """
+        code = json_fields.needed(answer, self.state)
+        if words and isinstance(code, str):
+            word = json_fields.clean(code, WORD_MAX)
+            return words.get(word, word)
+        if words or not isinstance(code, int) or isinstance(code, bool):
+            raise json_fields.wrong(self.state, code, "a text" if words else "a whole number")
+        if not 0 <= code <= CODE_MAX:
+            raise json_fields.wrong(self.state, code, f"0 to {CODE_MAX}")
+        return code
+
+    def error(self, answer: Answer) -> tuple[str, FaultSide]:
+        """The station's words for its error, and whose it is by these words. Raises DriverError."""
+        said = json_fields.text(answer, self.error_text)
+        means = self.error_texts.get(said)
+        return ("", "") if means == "none" else (said, means or "")
+
+    def measured(self, answer: Answer) -> Measured:
+        """The receiver and the measurements. A flag of null is no. Raises DriverError."""
+        return Measured(
+            receiver_id=self.receiver_id and json_fields.name(answer, self.receiver_id),
+            in_range=json_fields.flag(answer, self.in_range) if self.in_range else None,
+            volts=_number(answer, self.volts),
+            amps=_number(answer, self.amps),
+            battery_percent=_number(answer, self.battery_percent, 100, "0 to 100"),
+            time_to_full_s=_number(answer, self.time_to_full_s, WEEK_S, "0 s to a week"),
+        )
+
+    def rows(self, has_codes: bool) -> Iterator[tuple[str, str]]:
+        """Rows for `check`; none when every field is where the first station has it."""
+        for name in self.__struct_fields__ if self != Fields() else ():
+            place = getattr(self, name)
+            if place and name != "error_texts" and (has_codes or name != "state"):
+                yield f"field {name}", _place(place)
+        for text, means in self.error_texts.items():
+            yield f"text {text}", "no error" if means == "none" else f"{means}'s error"
+
+
+def _number(
+    answer: Answer, number: Number | None, most: float = math.inf, bounds: str = ""
+) -> float | None:
+    """The value in our unit; where it has `bounds` it is 0 to `most`. Raises DriverError."""
+    value = json_fields.number(answer, number.field, number.scale) if number else None
+    if number and value is not None and bounds and not 0 <= value <= most:
+        raise json_fields.wrong(number.field, value, bounds)
+    return value
+
+
+def _place(place: str | Number | Flag) -> str:
+    if isinstance(place, Number):
+        return place.field if place.scale == 1.0 else f"{place.field} x {place.scale:g}"
+    return json_fields.place_text(place) if isinstance(place, Flag) else place

@@ -1,0 +1,160 @@
+"""What the contracts of lift, door and charger drivers share: a bench, and the buses it stands on."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any, Generic, TypeVar
+
+import msgspec
+import pytest
+
+from drivers import Driver, DriverError
+from drivers.hal import gpio, http, modbus
+from drivers.hal.points import Wire
+from hal_fakes.gpio import WiredFactory
+from hal_fakes.http import HttpServer, Station
+from hal_fakes.modbus import ModbusServer
+from hal_fakes.modbus.rtu import RtuLine
+from hal_fakes.modbus.units import FarSide
+from hal_fakes.plants.plant import FailureMode, Plant
+from hal_fakes.realtime import RealTime
+from hal_fakes.wiring import Wiring
+from tests.drivers.hal.modbus.module import Time
+from tests.waiting import at_last, wait_until
+
+TIMEOUT_S = 0.2
+RS485 = modbus.Serial(port="/dev/null", baudrate=57600, parity="none", stopbits=1)
+
+Sample = TypeVar("Sample")
+Outputs = TypeVar("Outputs")
+
+
+class Bench(Generic[Sample, Outputs]):
+    """One driver on one bus, with a plant behind it. `clock`: the bus's, for its pauses."""
+
+    def __init__(
+        self, driver: Driver[Sample, Outputs], plant: Plant, clock: Time | None = None
+    ) -> None:
+        self.driver = driver
+        self.plant = plant
+        self.clock = clock or Time()
+
+    def relays(self) -> list[tuple[str, object]]:
+        """Every edge of every output so far."""
+        return [(edge.signal, edge.value) for edge in self.plant.edges if edge.what == "relay"]
+
+    def open(self) -> None:
+        """Open the driver."""
+        at_last(self.driver.open, "open", self.a_moment)
+
+    def read(self) -> Sample:
+        """A reading."""
+        return at_last(self.driver.read, "a reading", self.a_moment)
+
+    def write(self, outputs: Outputs) -> None:
+        """These outputs."""
+        at_last(lambda: self.driver.write(outputs), "written", self.a_moment)
+
+    def a_moment(self) -> None:
+        """All pauses are over."""
+        self.clock.now += 60.0
+
+    def patiently(self) -> Sample | str:
+        """What it reads with all pauses over; or why it cannot be read."""
+        self.a_moment()
+        try:
+            return self.driver.read()
+        except DriverError as error:
+            return str(error)
+
+    def until_it_fails(
+        self, part: str, mode: FailureMode, makes_no_sense: Callable[[Sample], bool]
+    ) -> list[Sample]:
+        """A part fails; what is still read until a reading is an error, or makes no sense."""
+        self.plant.fail(part, mode)
+        seen: list[Sample] = []
+
+        def failing() -> bool:
+            found = self.patiently()
+            if isinstance(found, str):
+                return True
+            seen.append(found)
+            return makes_no_sense(found)
+
+        wait_until(failing, mode)
+        return seen
+
+
+B = TypeVar("B", bound="Bench[Any, Any]")
+
+
+class Contract(ABC, Generic[B]):
+    """Each test of it has a bench of its own."""
+
+    @abstractmethod
+    def benches(self) -> AbstractContextManager[B]:
+        """A bench with a plant that is idle; nothing is open yet."""
+
+    @pytest.fixture
+    def bench(self) -> Iterator[B]:
+        with self.benches() as bench:
+            yield bench
+            bench.driver.close()
+
+    def test_closing_what_was_never_open_touches_nothing(self, bench: B) -> None:
+        bench.driver.close()
+        assert bench.relays() == []
+
+
+@contextmanager
+def on_modbus(
+    world: RealTime,
+    far_sides: Sequence[FarSide],
+    serial: modbus.Serial | None = None,
+    timeout_s: float = TIMEOUT_S,
+) -> Iterator[tuple[modbus.ModbusBus, Time]]:
+    """A bus to a simulated gateway, or line, on which these are."""
+    clock = Time()
+    server = (
+        RtuLine(far_sides, serial, slow_s=2.2 * timeout_s)
+        if serial
+        else ModbusServer(far_sides, slow_s=1.5 * timeout_s)
+    )
+    plain = {"type": "modbus", "timeout_s": timeout_s, **server.replace}
+    bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
+    try:
+        yield bus, clock
+    finally:
+        bus.close()
+        server.close()
+        world.close()
+
+
+@contextmanager
+def on_http(
+    world: RealTime, station: Station, timeout_s: float
+) -> Iterator[tuple[http.HttpBus, Time]]:
+    """A bus to a simulated controller that answers HTTP."""
+    clock = Time()
+    server = HttpServer([station], "", timeout_s)
+    plain = {"type": "http", "timeout_s": timeout_s, **server.replace}
+    bus = http.HttpBus(msgspec.convert(plain, http.Settings), clock)
+    try:
+        yield bus, clock
+    finally:
+        bus.close()
+        server.close()
+        world.close()
+
+
+@contextmanager
+def on_pins(world: RealTime, plant: Plant, wires: Sequence[Wire]) -> Iterator[gpio.GpioBus]:
+    """A simulated header, wired to this plant."""
+    factory = WiredFactory([Wiring(plant, wires, gpio.canonical)], lock=world.lock)
+    world.on_step.append(factory.show)
+    bus = gpio.open_bus(gpio.Settings(), factory)
+    try:
+        yield bus
+    finally:
+        bus.close()
+        world.close()
