@@ -44,20 +44,25 @@ def answers(config: Config, bus_name: str, whole: bool) -> Iterator[Finding]:
         yield wrong(subject, str(error), "no device on it can be served", LOOK_AT.get(kind, TEXTS))
         return
     try:
-        yield from _readings(config, bus_name, bus, subject)
+        yield from readings(config, bus_name, bus, subject)
         yield from SCANS.get(kind, _nothing)(config, bus_name, bus, whole)
     finally:
         bus.close()
 
 
 def _opened(config: Config, bus_name: str) -> Bus:
-    settings = config.buses[bus_name]
-    if getattr(settings, "module_watchdog", None) is not None:
-        settings = msgspec.structs.replace(settings, module_watchdog=None)
-    return config.bus_type(bus_name).open_bus(settings)
+    return config.bus_type(bus_name).open_bus(unarmed(config.buses[bus_name]))
 
 
-def _readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[Finding]:
+def unarmed(settings: msgspec.Struct) -> msgspec.Struct:
+    """A bus's settings without the modules' watchdogs, which a reading would arm."""
+    if getattr(settings, "module_watchdog", None) is None:
+        return settings
+    return msgspec.structs.replace(settings, module_watchdog=None)
+
+
+def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[Finding]:
+    """What each device of this bus answers, decoded by its driver."""
     devices = config.devices_on(bus_name)
     drivers = {n: config.driver_type(n).create(n, config.devices[n], bus) for n in devices}
     _listened(bus)
