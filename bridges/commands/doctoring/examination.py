@@ -11,7 +11,7 @@ from bridges.commands.doctoring.answers import answers, numbers
 from bridges.commands.doctoring.chips import line
 from bridges.commands.doctoring.finding import Finding, note, ok, wrong
 from bridges.commands.doctoring.machine import Machine
-from bridges.commands.doctoring.served import DAEMON, NOT_ASKED, Served, served
+from bridges.commands.doctoring.served import DAEMON, NOT_ASKED, Served, served, unseen
 from bridges.commands.doctoring.users import User, user, users
 from bridges.serve import directory
 from bridges.serve import places as kept
@@ -53,10 +53,10 @@ def examined(
     try:
         places = directory.find(file, asked.runtime_dir)
     except (directory.Unknown, PermissionError) as error:
-        yield wrong(DAEMON, str(error), NOT_ASKED, "sudo before the command")
-        return
-    yield from health.directories(machine, places, who)
-    now = served(places, file, time.time())
+        places, now = kept.of_service(file), unseen(str(error))
+    else:
+        yield from health.directories(machine, places, who)
+        now = served(places, file, time.time())
     yield from now.findings
     for name in config.buses:
         yield from _way(config, name, machine, who, now)

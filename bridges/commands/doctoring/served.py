@@ -37,7 +37,7 @@ def served(places: Places, file: Path, wall: float) -> Served:
     try:
         holder = directory.holder(places)
     except directory.Unknown as error:
-        return _unseen(str(error))
+        return unseen(str(error))
     if holder is None:
         return _nobody(places, file)
     if not holder.serves:
@@ -47,7 +47,8 @@ def served(places: Places, file: Path, wall: float) -> Served:
     return Served(list(_told(one)), f"process {holder.pid} serves it", True)
 
 
-def _unseen(why: str) -> Served:
+def unseen(why: str) -> Served:
+    """This user cannot see whether a daemon runs."""
     return Served([wrong(DAEMON, why, NOT_ASKED, "sudo before the command")], why, None)
 
 

@@ -1,6 +1,7 @@
 """`rmf-bridge doctor` on real wires: Modbus, HTTP and CAN, and on RMF's graph."""
 
 import json
+import signal
 import socket
 import subprocess
 import sys
@@ -139,6 +140,17 @@ def test_the_bus_of_a_running_daemon_is_not_opened(
         assert found["kill test"] == [("wrong", f"process {running.process.pid} serves it")]
 
 
+def test_where_a_daemon_cannot_be_seen_no_bus_is_opened(
+    tapped: Tapped, module: Module, tmp_path: Path
+) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "lock").symlink_to(tmp_path / "elsewhere")
+    code, found = doctor(tapped.file, tmp_path, "--listen", "0", "--kill-test", "--yes")
+    assert (code, [level for level, _ in found["daemon"]]) == (2, ["wrong"])
+    assert [level for level, _ in found["kill test"]] == ["wrong"]
+    assert (tapped.clients, "bus module" in found, module.relay()) == (0, False, [])
+
+
 def test_after_a_death_the_outputs_come_first(
     tapped: Tapped, module: Module, tmp_path: Path
 ) -> None:
@@ -160,6 +172,21 @@ def test_the_kill_test_shows_that_the_guard_switches_off(module: Module, tmp_pat
         "ward_door hold_open was on, its process was killed with -9, and the guard"
     )
     assert module.relay() == [True, False]
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGHUP])
+def test_a_doctor_that_dies_in_its_kill_test_leaves_nothing_on(
+    module: Module, tmp_path: Path, number: int
+) -> None:
+    words: list[str | Path] = ["doctor", module.file, "--runtime-dir", tmp_path / "run"]
+    words += ["--listen", "0", "--kill-test", "--yes"]
+    with subprocess.Popen(command(*words), env=environment(), stdout=subprocess.DEVNULL) as ended:
+        wait_until(lambda: module.relay() == [True], "the relay is on")
+        ended.send_signal(number)
+        wait_until(lambda: module.relay() == [True, False], "the relay is off")
+        assert ended.wait(PATIENCE_S) in (-number, 130)
+    places = Places(tmp_path / "run", tmp_path / "run")
+    wait_until(lambda: not Records(places, module.file).unreleased(), "it is verified off")
 
 
 def test_the_kill_test_switches_nothing_on_a_dead_bus(module: Module, tmp_path: Path) -> None:
