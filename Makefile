@@ -16,7 +16,7 @@ help:
 	@echo "make test-ros  the tests that need ROS 2, in a shell that has sourced its setup file"
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
-	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again"
+	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make man     the manual page, build/rmf-bridge.1"
@@ -81,7 +81,7 @@ flood: .venv/ready
 
 # Without SEED one is drawn, and printed.
 soak: .venv/ready
-	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED))
+	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED)) $(if $(RMF),--rmf $(RMF))
 
 torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))

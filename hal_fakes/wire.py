@@ -21,5 +21,6 @@ def wire() -> Wire:
 
 
 def join(name: str, domain_id: int) -> Transport:
-    """A node on this wire, on this machine alone."""
-    return open_transport(Rmf(transport=wire(), domain_id=domain_id), name, localhost=True)
+    """A node of RMF's newest release on this wire, on this machine alone."""
+    rmf = Rmf(transport=wire(), domain_id=domain_id, release="kilted")
+    return open_transport(rmf, name, localhost=True)

@@ -20,11 +20,13 @@ PATIENCE_S: Final = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The next step: a request to send now, a hint to print once, or the outcome."""
+    """The next step: a request to send now, a hint to print once, or the outcome. `direct`: the request
+    goes to the device's own daemon."""
 
     send: words.Requested | None = None
     hint: str = ""
     outcome: Done | Failed | None = None
+    direct: bool = False
 
 
 def step(request: Request, seen: Seen, now: float) -> Step:
@@ -34,15 +36,17 @@ def step(request: Request, seen: Seen, now: float) -> Step:
         return Step(outcome=over)
     if now >= seen.began_at + seen.timeout_s:
         return Step(outcome=Failed(_reason(request, seen, now)))
-    hint = _hint(request, seen, now)
-    return Step(request.message(seen), hint) if _may_send(request, seen, now) else Step(hint=hint)
+    hint, direct = _hint(request, seen, now), request.goes_direct(seen, now)
+    if not _may_send(request, seen, now, direct=direct):
+        return Step(hint=hint)
+    return Step(request.message(seen), hint, direct=direct)
 
 
-def _may_send(request: Request, seen: Seen, now: float) -> bool:
+def _may_send(request: Request, seen: Seen, now: float, *, direct: bool) -> bool:
     if seen.last_sent_at is not None:
         return now >= seen.last_sent_at + REPEAT_S
     heard_or_late = request.ready(seen) or now >= seen.began_at + PATIENCE_S
-    return seen.listeners > 0 and heard_or_late
+    return (direct or seen.listeners > 0) and heard_or_late
 
 
 def _hint(request: Request, seen: Seen, now: float) -> str:

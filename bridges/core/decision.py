@@ -61,6 +61,12 @@ class RivalSeen(msgspec.Struct, frozen=True):
     """Another node publishes states under this device's name."""
 
 
+class Attended(msgspec.Struct, frozen=True):
+    """Whether any node publishes the requests that this device obeys."""
+
+    yes: bool
+
+
 class OperatorReset(msgspec.Struct, frozen=True):
     """`rmf-bridge reset`: latched faults may clear if their cause is gone."""
 
@@ -96,6 +102,11 @@ class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     refused: str = ""
     publish: tuple[Said, ...] = ()
 
+
+RELEASED_LATELY = "released a moment ago"
+STARTING = "inputs settle after the start"
+EXPECTED = frozenset({RELEASED_LATELY, STARTING})
+"""Kinds of refusal that belong to every handover and every start: they are counted, and no warning."""
 
 LONGEST_DETAIL = 300
 

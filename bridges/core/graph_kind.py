@@ -18,9 +18,13 @@ from bridges.rmf.topics import Topic
 
 @dataclass(frozen=True, slots=True)
 class MaySpeak:
-    """Whether the core may publish. It may not during the quiet start or while a rival publishes."""
+    """Whether the core may publish. It may not during the quiet start or while a rival publishes.
+
+    `at_once`: during the quiet start what a restart must not interrupt may be sent: no rival is there.
+    """
 
     yes: bool
+    at_once: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +62,7 @@ class GraphKind(Generic[S, L, M, E, R]):
     whenever it has changed. For a kind whose memory must survive a restart: `persist(memories)`, which
     gives the same bytes until something worth keeping changes, and `restore(kept, settings, now)`,
     which raises ValueError for any other bytes. The memory is saved before `together` is sent.
+    `urgent(memory)`: does it hold something that a restart must not interrupt (`MaySpeak.at_once`)?
 
     For a kind with more settings than a few numbers: `tables(settings)`, for `check`, and
     `warnings(settings)`, (path, text) of what is legal but may be a mistake. `speaks_of(settings)`: the
@@ -81,6 +86,7 @@ class GraphKind(Generic[S, L, M, E, R]):
     together: Callable[[Mapping[str, M]], tuple[Topic[Message], Message]] | None = None
     persist: Callable[[Mapping[str, M]], bytes] | None = None
     restore: Callable[[bytes, S, float], Mapping[str, M]] | None = None
+    urgent: Callable[[M], bool] = lambda memory: False
     tables: Callable[[S], Iterable[Table]] = lambda settings: ()
     warnings: Callable[[S], Iterable[tuple[tuple[str, ...], str]]] | None = None
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()

@@ -56,6 +56,7 @@ class Kind(Generic[S, L, M, X, E, O, R]):
     `alarm_topics(settings)`: what a device publishes beside its states.
     `on_map(settings)`: which of its settings name a place on RMF's map, as (path, what it is, name).
     The device's own name is checked for every kind.
+    `attended_by`: the topic of requests whose publishers the core is told of (`Attended`), if any.
     """
 
     name: str
@@ -72,6 +73,7 @@ class Kind(Generic[S, L, M, X, E, O, R]):
     published: Callable[[M, R], M] = lambda memory, report: memory
     alarm_topics: Callable[[S], tuple[Topic[Message], ...]] = lambda settings: ()
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
+    attended_by: Topic[Message] | None = None
 
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]

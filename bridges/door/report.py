@@ -8,6 +8,7 @@ from bridges.core.decision import Fault
 from bridges.door.memory import (
     DoorLimits,
     Memory,
+    lost_at,
     opening_ends_at,
     rivalled,
     too_long_at,
@@ -81,6 +82,9 @@ def _faults(memory: Memory, view: View, now: float, limits: DoorLimits) -> Itera
         yield from _contradictions(memory, view, now, limits)
     if now >= too_long_at(memory, limits):
         yield Fault("DOOR_OPEN_TOO_LONG", f"held for RMF longer than {limits.t.max_hold_s} s")
+    if now >= lost_at(memory, limits):
+        lost_s = limits.t.supervisor_lost_s
+        yield Fault("SUPERVISOR_LOST", f"no node publishes door_requests for {lost_s} s: released")
 
 
 def _silence(memory: Memory, limits: DoorLimits) -> Iterator[Fault]:

@@ -94,6 +94,15 @@ class Senses(msgspec.Struct, frozen=True):
     position: Position = Position()
 
 
+class Forgotten(msgspec.Struct, frozen=True):
+    """RMF's supervisor asks for another session instead (`by`), `since` when. `ended`: the forgotten
+    robot's own END was heard once (`bridges/lift/forgotten.py`)."""
+
+    by: str
+    since: float
+    ended: bool = False
+
+
 class Session(msgspec.Struct, frozen=True):
     """Who holds the lift, what was requested, and how far the ride has come.
 
@@ -101,6 +110,8 @@ class Session(msgspec.Struct, frozen=True):
     `agv_seen`: AGV mode has come on for our request. `arrived`: the car has stood at the destination.
     `call_at`: when the present call began. `waiting`, `since`: what we wait for, and since when.
     `tries`: how often that has failed. `retry_at`: outputs stay off until then (inf: latched).
+    `forgotten`: RMF's supervisor asks for another session. `own_stamp`: the newest stamp (ns) of the
+    robot's own requests, as its adapter sent them.
     """
 
     id: str
@@ -116,6 +127,8 @@ class Session(msgspec.Struct, frozen=True):
     tries: int = 0
     retry_at: float | None = None
     fault: Fault | None = None
+    forgotten: Forgotten | None = None
+    own_stamp: int = 0
 
 
 class Grace(msgspec.Struct, frozen=True):

@@ -5,7 +5,8 @@ their order. A number is aligned to its own size, counted from the end of the he
 length with the closing NUL as uint32, the UTF-8 bytes and the NUL; a sequence is its length as uint32
 and its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and what rmw_cyclonedds and rmw_fastrtps send.
 
-The encoder and decoder of each type are built once, from the annotations in `definitions.py`.
+The encoder and decoder of each type and release are built once, from the annotations in
+`definitions.py`. A field that a release lacks is not sent, and is read as its default.
 """
 
 import struct
@@ -14,7 +15,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, TypeVar
 
-from bridges.rmf.definitions import field_types
+from bridges.rmf.releases import NEWEST, Release
 
 T = TypeVar("T")
 Value = Any
@@ -33,7 +34,7 @@ class CdrError(ValueError):
     """These bytes are not a message of this type, or this message cannot be encoded."""
 
 
-def encode(message_type: type, message: object) -> bytes:
+def encode(message_type: type, message: object, release: Release = NEWEST) -> bytes:
     """The message as little endian CDR with its header.
 
     Characters that no string on the wire can hold (a NUL, half a surrogate pair) become `?`: a strange
@@ -42,13 +43,13 @@ def encode(message_type: type, message: object) -> bytes:
     """
     out = bytearray(LITTLE_ENDIAN)
     try:
-        _put(message_type)(out, message)
+        _put(message_type, release)(out, message)
     except (struct.error, OverflowError, TypeError, AttributeError, ValueError) as error:
         raise CdrError(f"{message!r} cannot be sent as {message_type.__name__}: {error}") from error
     return bytes(out)
 
 
-def decode(message_type: type[T], sample: bytes) -> T:
+def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T:
     """The message in a sample, of either byte order. Raises CdrError for anything else.
 
     Up to three bytes may follow the last field, because RTPS pads payloads to a multiple of four.
@@ -57,7 +58,7 @@ def decode(message_type: type[T], sample: bytes) -> T:
     if order is None:
         raise CdrError(f"not plain CDR: the sample begins with {sample[:4].hex(' ') or 'nothing'}")
     try:
-        message, end = _get(typing.cast(type, message_type), order)(sample, 4)
+        message, end = _get(typing.cast(type, message_type), order, release)(sample, 4)
     except (struct.error, IndexError) as error:
         raise CdrError(f"cut short: {error}") from error
     except UnicodeDecodeError as error:
@@ -71,7 +72,7 @@ _ORDERS = {LITTLE_ENDIAN[:2]: "<", BIG_ENDIAN[:2]: ">"}
 
 
 @cache
-def _put(kind: type) -> Put:
+def _put(kind: type, release: Release) -> Put:
     """The function that appends a value of this type."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
@@ -81,8 +82,9 @@ def _put(kind: type) -> Put:
     if kind is bool:
         return _put_bool
     if typing.get_origin(kind) is tuple:
-        return _putting_sequence(_put(typing.get_args(kind)[0]))
-    return _putting_struct([(name, _put(member)) for name, member in field_types(kind).items()])
+        return _putting_sequence(_put(typing.get_args(kind)[0], release))
+    fields = release.fields(kind)
+    return _putting_struct([(name, _put(member, release)) for name, member in fields.items()])
 
 
 def _put_byte(out: bytearray, value: int) -> None:
@@ -134,7 +136,7 @@ def _putting_struct(members: list[tuple[str, Put]]) -> Put:
 
 
 @cache
-def _get(kind: type, order: str) -> Get:
+def _get(kind: type, order: str, release: Release) -> Get:
     """The function that reads a value of this type at a position: it returns the value and its end."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
@@ -144,8 +146,9 @@ def _get(kind: type, order: str) -> Get:
     if kind is bool:
         return _get_bool
     if typing.get_origin(kind) is tuple:
-        return _getting_sequence(_get(typing.get_args(kind)[0], order), order)
-    return _getting_struct(kind, [_get(member, order) for member in field_types(kind).values()])
+        return _getting_sequence(_get(typing.get_args(kind)[0], order, release), order)
+    fields = release.fields(kind)
+    return _getting_struct(kind, {name: _get(f, order, release) for name, f in fields.items()})
 
 
 def _get_byte(sample: bytes, at: int) -> tuple[int, int]:
@@ -198,12 +201,11 @@ def _getting_sequence(get_element: Get, order: str) -> Get:
     return get
 
 
-def _getting_struct(kind: type, members: list[Get]) -> Get:
+def _getting_struct(kind: type, members: dict[str, Get]) -> Get:
     def get(sample: bytes, at: int) -> tuple[object, int]:
-        values = []
-        for get_member in members:
-            value, at = get_member(sample, at)
-            values.append(value)
-        return kind(*values), at
+        values = {}
+        for name, get_member in members.items():
+            values[name], at = get_member(sample, at)
+        return kind(**values), at
 
     return get

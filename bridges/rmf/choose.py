@@ -12,7 +12,9 @@ import re
 from collections.abc import Mapping, Sequence
 
 from bridges.log import pairs
+from bridges.rmf.cyclone import static_peers
 from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.releases import RELEASES, Release
 from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport, TransportError
 
@@ -42,9 +44,11 @@ def open_transport(
     `ros_args`: `--ros-args` and the arguments after it on the command line.
     """
     domain = domain_id(rmf, os.environ)
-    loopback = localhost or stays_on_loopback(rmf, os.environ)
-    network = "localhost" if loopback else "subnet"
     speaks, reason = _choice(rmf)
+    peers = [] if speaks == "zenoh" else static_peers(os.environ)
+    loopback = localhost or stays_on_loopback(rmf, os.environ, peers)
+    network = "localhost" if loopback else "subnet"
+    release = RELEASES.get(rmf.release)
     log.info(pairs("transport", speaks=speaks, domain_id=domain, network=network, reason=reason))
     node_name = re.sub(r"\W", "_", node_name, flags=re.ASCII)  # ROS allows no other characters
     if speaks == "ros2":
@@ -55,10 +59,10 @@ def open_transport(
             " rename topics with `topics:` in the YAML"
         )
     if speaks == "dds":
-        return _open_dds(node_name, domain, loopback=loopback)
+        return _open_dds(node_name, domain, loopback=loopback, release=release)
     from bridges.rmf.zenoh import ZenohTransport
 
-    return ZenohTransport(node_name, domain, loopback=loopback, settings=rmf.zenoh)
+    return ZenohTransport(node_name, domain, loopback=loopback, settings=rmf.zenoh, release=release)
 
 
 def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
@@ -71,10 +75,11 @@ def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
     return int(text)
 
 
-def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str]) -> bool:
+def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str] = ()) -> bool:
     """Whether the YAML, ROS_LOCALHOST_ONLY or ROS_AUTOMATIC_DISCOVERY_RANGE asks for it.
 
-    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable.
+    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable, and LOCALHOST
+    reaches static `peers` all the same.
     """
     if rmf.network == "localhost" or environ.get("ROS_LOCALHOST_ONLY") == "1":
         return True
@@ -84,7 +89,7 @@ def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str]) -> bool:
             f"ROS_AUTOMATIC_DISCOVERY_RANGE is {text!r}: use SUBNET or LOCALHOST. With OFF"
             " this node would find no other; other values are unknown"
         )
-    return text == "LOCALHOST"
+    return text == "LOCALHOST" and not peers
 
 
 def _choice(rmf: Rmf) -> tuple[str, str]:
@@ -143,9 +148,9 @@ def _open_ros2(
     return Ros2Transport(node_name, domain, loopback=loopback, ros_args=ros_args)
 
 
-def _open_dds(node_name: str, domain: int, *, loopback: bool) -> Transport:
+def _open_dds(node_name: str, domain: int, *, loopback: bool, release: Release | None) -> Transport:
     if missing := missing_of_dds():
         raise TransportError(NO_CYCLONEDDS.format(missing))
     from bridges.rmf.dds import DdsTransport
 
-    return DdsTransport(node_name, domain, loopback=loopback)
+    return DdsTransport(node_name, domain, loopback=loopback, release=release)

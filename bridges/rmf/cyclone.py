@@ -22,17 +22,28 @@ def configuration(environ: Mapping[str, str]) -> str:
     """The configuration of a node on the network: ours, then CYCLONEDDS_URI's.
 
     As rmw_cyclonedds makes it (ROS 2 Jazzy, rmw_node.cpp): static peers by unicast beside multicast,
-    and participant indices that peers can guess. SYSTEM_DEFAULT leaves everything to Cyclone.
+    and participant indices that peers can guess. LOCALHOST is without multicast: this machine and the
+    peers. SYSTEM_DEFAULT leaves everything to Cyclone.
     """
     own = environ.get("CYCLONEDDS_URI", "")
-    if environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "SYSTEM_DEFAULT":
+    wanted = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
+    if wanted == "SYSTEM_DEFAULT":
         return own
-    peers = [peer.strip() for peer in environ.get("ROS_STATIC_PEERS", "").split(";")]
-    named = "".join(f"<Peer address={quoteattr(peer)}/>" for peer in peers if peer)
+    here = ["localhost"] if wanted == "LOCALHOST" else []
+    named = "".join(
+        f"<Peer address={quoteattr(peer)}/>" for peer in [*here, *static_peers(environ)]
+    )
+    silent = "<General><AllowMulticast>false</AllowMulticast></General>" if here else ""
     ours = (
-        "<CycloneDDS><Domain><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+        f"<CycloneDDS><Domain>{silent}<Discovery><ParticipantIndex>auto</ParticipantIndex>"
         f"<MaxAutoParticipantIndex>{MOST_PROCESSES}</MaxAutoParticipantIndex>"
         + (f"<Peers>{named}</Peers>" if named else "")
         + "</Discovery></Domain></CycloneDDS>"
     )
     return f"{ours},{own}" if own else ours
+
+
+def static_peers(environ: Mapping[str, str]) -> list[str]:
+    """The hosts in ROS_STATIC_PEERS."""
+    peers = (peer.strip() for peer in environ.get("ROS_STATIC_PEERS", "").split(";"))
+    return [peer for peer in peers if peer]

@@ -31,8 +31,10 @@ from cyclonedds.topic import Topic as DdsTopic
 from bridges.log import pairs
 from bridges.rmf import addresses, cyclone, notices
 from bridges.rmf.dds_ends import DdsPublisher, DdsSubscription
+from bridges.rmf.dds_peers import DdsPeers
 from bridges.rmf.graph import NodeOnGraph
 from bridges.rmf.idl import sample_type
+from bridges.rmf.releases import Release
 from bridges.rmf.threaded import Threaded
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
@@ -63,15 +65,18 @@ class DdsTransport(Threaded):
 
     `loopback`: stay on this machine, whatever CYCLONEDDS_URI says. Otherwise, when the machine's
     addresses change, the node leaves the graph and joins again with the same ends, and publishers send
-    again what they retain. Raises TransportError when the domain cannot be joined.
+    again what they retain. `release`: None to follow RMF's. Raises TransportError when the domain
+    cannot be joined.
     """
 
     speaks = "dds"
 
     refusals = (DDSException,)
 
-    def __init__(self, node_name: str, domain_id: int, *, loopback: bool) -> None:
-        super().__init__(node_name)
+    def __init__(
+        self, node_name: str, domain_id: int, *, loopback: bool, release: Release | None = None
+    ) -> None:
+        super().__init__(node_name, release)
         self._failed = False
         self._entities: list[core.Entity] = []
         self._topics: dict[str, DdsTopic] = {}
@@ -83,6 +88,7 @@ class DdsTransport(Threaded):
         self._joined = False
         self._look_at = -math.inf
         self._addresses: addresses.Addresses = frozenset()
+        self._dds_peers = DdsPeers(self._peers)
         try:
             with self._reporting(f"{CANNOT_JOIN} {domain_id}"):
                 self._join()
@@ -135,6 +141,8 @@ class DdsTransport(Threaded):
         self._waitset = self._keep(core.WaitSet(self._participant))
         self._leaving = self._keep(core.GuardCondition(self._participant))
         self._waitset.attach(self._leaving)
+        for reader in self._dds_peers.join(self._participant):
+            self._waitset.attach(self._keep(core.ReadCondition(self._keep(reader), ANY_SAMPLE)))
         self._node = NodeOnGraph(self._participant, self.name)
         self._entities += [self._node.topic, self._node.writer]
         self._joined = True
@@ -172,13 +180,17 @@ class DdsTransport(Threaded):
     def _topic(self, topic: AnyTopic) -> DdsTopic:
         name = f"rt/{topic.name}"
         if name not in self._topics:
-            kind = sample_type(topic.type)
+            kind = sample_type(topic.type, self.release)
             self._topics[name] = self._keep(DdsTopic(self._participant, name, kind))
         return self._topics[name]
 
     def _attach(self, end: DdsPublisher | DdsSubscription) -> None:
-        """Make the DDS entities of an end."""
-        entity = self._keep(end.create(self._participant, self._topic(end.topic)))
+        """Make the DDS entities of an end, if the release has its message."""
+        self._peers.ours(end.topic, publishes=isinstance(end, DdsPublisher))
+        if not self.release.has(end.topic.type):
+            end.drop()
+            return
+        entity = self._keep(end.create(self._participant, self._topic(end.topic), self.release))
         entity.set_status_mask(end.watched)
         self._waitset.attach(entity)
         if isinstance(end, DdsPublisher):
@@ -204,10 +216,20 @@ class DdsTransport(Threaded):
             self._stop.wait(LOOK_EVERY_S)
             return
         self._waitset.wait(dds_infinity if self._loopback else LOOK_EVERY_NS)
+        if self._dds_peers.look():
+            self._follow_release()
         taken = [subscription.take() for subscription in self._subscriptions]
         if not any(taken):
             for end in self._ends:
-                end.log_misfits()
+                end.log_misfits(self._peers)
+
+    def _follow_release(self) -> None:
+        """Join again if RMF is of another release in which a message of ours differs."""
+        before = self.release
+        if self._peers.settle() and any(self._peers.differs(e.topic, before) for e in self._ends):
+            self._join_anew()
+        else:
+            self._peers.name_misfits()
 
     def _recover(self, error: Exception) -> None:
         """After an unexpected exception: log it once, and join again after a pause."""

@@ -13,7 +13,9 @@ from cyclonedds.idl import IdlStruct, annotations
 from cyclonedds.idl import types as idl_types
 
 from bridges.rmf import cdr
-from bridges.rmf.definitions import PACKAGES, Message, field_types
+from bridges.rmf.definitions import PACKAGES, Message
+from bridges.rmf.releases import NEWEST, Release
+from bridges.rmf.rihs01 import type_hash
 
 
 class Sample(Protocol):
@@ -24,25 +26,27 @@ class Sample(Protocol):
     def __init__(self, message: Message) -> None: ...
 
 
-_made: dict[type, type[Sample]] = {}
+_made: dict[str, type[Sample]] = {}
+"""By the type's hash: releases with the same message share its class."""
 
 
-def sample_type(message_type: type) -> type[Sample]:
+def sample_type(message_type: type, release: Release = NEWEST) -> type[Sample]:
     """The one class for a message type in cyclonedds, with its name in DDS as ROS has it.
 
     cyclonedds sets `sample_info` on the instances that it has read.
     """
-    if message_type not in _made:
-        _made[message_type] = _make(message_type)
-    return _made[message_type]
+    key = type_hash(message_type, release)
+    if key not in _made:
+        _made[key] = _make(message_type, release)
+    return _made[key]
 
 
-def _make(message_type: type) -> type[Sample]:
+def _make(message_type: type, release: Release) -> type[Sample]:
     def body(namespace: dict[str, object]) -> None:
         namespace["__annotations__"] = {
-            name: _idl(kind) for name, kind in field_types(message_type).items()
+            name: _idl(kind, release) for name, kind in release.fields(message_type).items()
         }
-        namespace.update(_calls(message_type))
+        namespace.update(_calls(message_type, release))
 
     # In cyclonedds a dot stands for the `::` of IDL.
     typename = f"{PACKAGES[message_type]}.msg.dds_.{message_type.__name__}_"
@@ -51,17 +55,17 @@ def _make(message_type: type) -> type[Sample]:
     return final
 
 
-def _calls(message_type: type) -> dict[str, object]:
+def _calls(message_type: type, release: Release) -> dict[str, object]:
     """The methods that cyclonedds calls. `options` name the encoding; each sample states it too."""
 
     def __init__(self: Sample, message: Message) -> None:
         self.message = message
 
     def serialize(self: Sample, **options: object) -> bytes:
-        return cdr.encode(message_type, self.message)
+        return cdr.encode(message_type, self.message, release)
 
     def deserialize(cls: type[Sample], sample: bytes, /, **options: object) -> Sample:
-        return cls(cdr.decode(message_type, sample))
+        return cls(cdr.decode(message_type, sample, release))
 
     def deserialize_key(cls: type[Sample], sample: bytes, /, **options: object) -> None:
         """Called when a writer has gone, never for a message. RMF's types have no keys."""
@@ -74,9 +78,9 @@ def _calls(message_type: type) -> dict[str, object]:
     }
 
 
-def _idl(kind: type) -> object:
+def _idl(kind: type, release: Release) -> object:
     if typing.get_origin(kind) is typing.Annotated:
         return getattr(idl_types, typing.get_args(kind)[1])
     if typing.get_origin(kind) is tuple:
-        return idl_types.sequence[_idl(typing.get_args(kind)[0])]
-    return kind if kind in (str, bool) else sample_type(kind)
+        return idl_types.sequence[_idl(typing.get_args(kind)[0], release)]
+    return kind if kind in (str, bool) else sample_type(kind, release)

@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 from bridges.rmf import cdr, notices
 from bridges.rmf.definitions import Message
+from bridges.rmf.releases import NEWEST, Release
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, Receive, TransportError, any_type
 
@@ -29,9 +30,10 @@ class MemoryTransport:
 
     speaks = "memory"
 
-    def __init__(self, network: MemoryNetwork, node_name: str) -> None:
+    def __init__(self, network: MemoryNetwork, node_name: str, release: Release = NEWEST) -> None:
         self.name = node_name
         self.dropped: dict[str, int] = {}
+        self.release = release
         self._network = network
         self._closed = False
 
@@ -56,6 +58,10 @@ class MemoryTransport:
     def lives(self) -> bool:
         """Until it is closed."""
         return not self._closed
+
+    def faults(self) -> list[tuple[str, str]]:
+        """None: all nodes are of one process and one release."""
+        return []
 
     def wall(self) -> float:
         """The wall clock (s since the epoch)."""
@@ -84,7 +90,7 @@ class _Publisher:
         """Deliver at once. Raises CdrError for a message that no wire could carry."""
         if self not in self._network.publishers:
             raise TransportError(f"topic {self.topic.name}: the node has left the graph")
-        cdr.encode(self.topic.type, message)
+        cdr.encode(self.topic.type, message, self.node.release)
         if self.topic.publish.durability == "transient_local":
             self.retained.append(message)
         for subscription in self._network.subscriptions:

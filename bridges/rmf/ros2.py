@@ -8,6 +8,7 @@ Source: rclpy 7.1 (ROS 2 Jazzy), its public API; RCLError and InvalidHandle are 
 this file imports rclpy, only ros_types.py the message packages, and only choose.py imports this one.
 """
 
+import atexit
 import logging
 import os
 import threading
@@ -31,10 +32,10 @@ from rclpy.qos import (
 )
 
 from bridges.log import pairs
-from bridges.rmf import cdr, notices, topics
+from bridges.rmf import cdr, notices, ros_peers, topics
 from bridges.rmf.cyclone import LOOPBACK
 from bridges.rmf.definitions import Message
-from bridges.rmf.ros_types import ros_type
+from bridges.rmf.ros_types import installed, ros_type
 from bridges.rmf.threaded import Threaded
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, Receive, TransportError, any_type
@@ -79,10 +80,11 @@ class Ros2Transport(Threaded):
         loopback: bool,
         ros_args: Sequence[str] = (),
     ) -> None:
-        super().__init__(node_name)
+        super().__init__(node_name, installed())
         self._pause = threading.Event()
         self._publishers: list[_Publisher] = []
         self._deaf: list[_Subscription] = []
+        self._subscribed: list[AnyTopic] = []
         self._context = Context()
         try:
             with _environment(ON_LOOPBACK if loopback else {}):
@@ -91,6 +93,8 @@ class Ros2Transport(Threaded):
             self._context.try_shutdown()
             raise TransportError(f"cannot join ROS domain {domain_id}: {error}") from error
         self._start(self._spin, "ros2")
+        # An executor's thread that outlives the interpreter aborts it, as where a start is refused.
+        atexit.register(self.close)
 
     def publisher(self, topic: AnyTopic) -> "_Publisher":
         """Declare a publisher with `topic.publish` QoS. Raises TransportError, also for a missing ROS
@@ -106,9 +110,19 @@ class Ros2Transport(Threaded):
         """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
         with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
             subscription = _Subscription(self, topic, any_type(received), others_only=others_only)
+            self._subscribed.append(topic)
             if others_only:
                 self._deaf.append(subscription)
         return subscription
+
+    def faults(self) -> list[tuple[str, str]]:
+        """What keeps it apart from others; from any thread."""
+        if not self.lives:
+            return []
+        published = [(end.topic, True) for end in list(self._publishers)]
+        subscribed = [(topic, False) for topic in list(self._subscribed)]
+        ros_peers.look(self.node, self._peers, [*published, *subscribed])
+        return self._peers.faults()
 
     def wall(self) -> float:
         """ROS's time (s since the epoch): the wall clock, or `/clock` where use_sim_time is set."""
@@ -120,6 +134,7 @@ class Ros2Transport(Threaded):
             if self._closed:
                 return
             self._closed = True
+        atexit.unregister(self.close)
         self._pause.set()
         self._leaving.trigger()
         self._join_thread()
@@ -176,7 +191,7 @@ class _Publisher:
         self.topic = topic
         self._transport = transport
         self.end = transport.node.create_publisher(
-            ros_type(topic.type),
+            ros_type(topic.type, transport.release),
             topic.name,
             _profile(topic.publish),
             event_callbacks=PublisherEventCallbacks(
@@ -188,9 +203,10 @@ class _Publisher:
         """Send. Raises TransportError if it was not sent, CdrError if no sample can hold it."""
         if not self._transport.lives:
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        sample = cdr.encode(self.topic.type, message)
+        release = self._transport.release
+        sample = cdr.encode(self.topic.type, message, release)
         for subscription in self._transport.heard_back(self.topic):
-            subscription.said.append(cdr.decode(self.topic.type, sample))
+            subscription.said.append(cdr.decode(self.topic.type, sample, release))
         try:
             self.end.publish(sample)
         except RuntimeError as error:
@@ -229,7 +245,7 @@ class _Subscription:
         self._received = received
         self._others_only = others_only
         self._end = transport.node.create_subscription(
-            ros_type(topic.type),
+            ros_type(topic.type, transport.release),
             topic.name,
             self._take,
             _profile(topic.subscribe),
@@ -257,7 +273,7 @@ class _Subscription:
 
     def _take(self, sample: bytes) -> None:
         try:
-            message = cdr.decode(self.topic.type, sample)
+            message = cdr.decode(self.topic.type, sample, self._transport.release)
         except cdr.CdrError as error:
             notices.drop(self._transport.dropped, self.topic, error)
             return

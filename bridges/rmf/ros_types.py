@@ -8,7 +8,8 @@ import importlib
 import typing
 from typing import Protocol
 
-from bridges.rmf.definitions import PACKAGES, field_types
+from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.releases import DEFAULT, DIFFERING, NEWEST, RELEASES, Release
 from bridges.rmf.transport import TransportError
 
 NAMES = {str: "string", bool: "boolean", "byte": "octet", "float32": "float", "float64": "double"}
@@ -22,7 +23,26 @@ class RosMessage(Protocol):
     def get_fields_and_field_types(cls) -> dict[str, str]: ...
 
 
-def ros_type(message_type: type) -> type[RosMessage]:
+def installed() -> Release:
+    """The release of RMF's message packages that are installed; the default if they are of none."""
+    fitting = (one for one in RELEASES.values() if all(_fits(kind, one) for kind in DIFFERING))
+    return next(fitting, DEFAULT)
+
+
+def _fits(message_type: type, release: Release) -> bool:
+    """Is it installed as this release has it, or not at all if the release lacks it?"""
+    try:
+        module = importlib.import_module(f"{PACKAGES[message_type]}.msg")
+    except ImportError:
+        return True  # told when it is wanted
+    found: type[RosMessage] | None = getattr(module, message_type.__name__, None)
+    if found is None or not release.has(message_type):
+        return found is None and not release.has(message_type)
+    theirs = found.get_fields_and_field_types()
+    return list(theirs.items()) == list(fields_of(message_type, release).items())
+
+
+def ros_type(message_type: type, release: Release = NEWEST) -> type[RosMessage]:
     """The ROS class of a message type. Raises TransportError if it is missing or has other fields."""
     package, name = PACKAGES[message_type], message_type.__name__
     try:
@@ -38,8 +58,8 @@ def ros_type(message_type: type) -> type[RosMessage]:
             f"the installed {package} has no {name}: install a newer one, or use `transport: dds`"
         )
     for nested in sorted(_nested_in(message_type), key=lambda kind: kind.__name__):
-        ros_type(nested)
-    theirs, ours = found.get_fields_and_field_types(), fields_of(message_type)
+        ros_type(nested, release)
+    theirs, ours = found.get_fields_and_field_types(), fields_of(message_type, release)
     if list(theirs.items()) != list(ours.items()):
         raise TransportError(
             f"the installed {package}/{name} has the fields {theirs}; this version of rmf-bridge needs"
@@ -56,9 +76,9 @@ def how_to_install(package: str) -> str:
     )
 
 
-def fields_of(message_type: type) -> dict[str, str]:
+def fields_of(message_type: type, release: Release = NEWEST) -> dict[str, str]:
     """Field -> type, as `get_fields_and_field_types()` names it."""
-    return {name: _name(kind) for name, kind in field_types(message_type).items()}
+    return {name: _name(kind) for name, kind in release.fields(message_type).items()}
 
 
 def _name(kind: type) -> str:
@@ -71,6 +91,6 @@ def _name(kind: type) -> str:
 
 
 def _nested_in(message_type: type) -> set[type]:
-    kinds = field_types(message_type).values()
+    kinds = NEWEST.fields(message_type).values()
     sequences = {typing.get_args(kind)[0] for kind in kinds if typing.get_origin(kind) is tuple}
     return PACKAGES.keys() & {*kinds, *sequences}

@@ -102,6 +102,9 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     `diagnostics`: publish the health of the daemon and its devices each second on `/diagnostics`.
     `topics`: RMF's topic name -> the name that the site uses.
     `zenoh`: routers, keys and credentials of transport `zenoh`.
+    `release`: of which release RMF's messages are: `jazzy` (Humble, Iron and Jazzy) or `kilted`
+    (Kilted, Lyrical and newer). `auto` follows the fleet adapters on the graph, and is `jazzy` without
+    one. Transport `ros2` takes what is installed.
     """
 
     transport: Literal["auto", "ros2", "dds", "zenoh"] = "auto"
@@ -111,8 +114,11 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     diagnostics: bool = True
     topics: dict[Name, Name] = msgspec.field(default_factory=dict)
     zenoh: Zenoh | None = None
+    release: Literal["auto", "jazzy", "kilted"] = "auto"
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """What would have no effect."""
+        if self.release != "auto" and self.transport == "ros2":
+            yield ("release",), "transport ros2 takes what is installed: leave it out"
         if self.zenoh and self.transport in ("ros2", "dds"):
             yield ("zenoh",), f"transport {self.transport} does not read it: write transport: zenoh"

@@ -6,19 +6,34 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import ClassVar
 
+from bridges.rmf.peers import Peers
+from bridges.rmf.releases import Release
 from bridges.rmf.transport import TransportError
 
 
 class Threaded:
-    """A node on the graph, with one thread. `refusals`: the exceptions by which its library refuses."""
+    """A node on the graph, with one thread. `refusals`: the exceptions by which its library refuses.
+
+    `release`: None to follow RMF's.
+    """
 
     refusals: ClassVar[tuple[type[Exception], ...]]
 
-    def __init__(self, node_name: str) -> None:
+    def __init__(self, node_name: str, release: Release | None = None) -> None:
         self.name = node_name
+        self._peers = Peers(release)
         self.dropped: dict[str, int] = {}
         self._lock = threading.Lock()
         self._closed = False
+
+    @property
+    def release(self) -> Release:
+        """The release of RMF's messages that it speaks now."""
+        return self._peers.release
+
+    def faults(self) -> list[tuple[str, str]]:
+        """(code, detail) of what keeps it apart from others now; from any thread."""
+        return self._peers.faults()
 
     @property
     def lives(self) -> bool:

@@ -38,6 +38,10 @@ class Topic(Generic[M_co]):
         """The same topic under another name."""
         return replace(self, name=name)
 
+    def live(self) -> "Topic[M_co]":
+        """The same topic for who wants nothing that was retained."""
+        return replace(self, subscribe=VOLATILE)
+
 
 AnyTopic = Topic[d.Message]
 """A topic of any message type."""

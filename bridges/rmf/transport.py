@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Protocol, TypeVar, cast
 
 from bridges.rmf.definitions import Message
+from bridges.rmf.releases import Release
 from bridges.rmf.topics import Topic
 
 M = TypeVar("M", bound=Message)
@@ -60,6 +61,13 @@ class Transport(Protocol):
     name: str
     speaks: str
     dropped: dict[str, int]
+
+    @property
+    def release(self) -> Release:
+        """The release of RMF's messages that it speaks now."""
+
+    def faults(self) -> list[tuple[str, str]]:
+        """(code, detail) of what keeps this node apart from others now; from any thread."""
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Declare a publisher with `topic.publish` QoS."""

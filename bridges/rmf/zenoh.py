@@ -10,13 +10,10 @@ these files import zenoh, and only choose.py imports this one.
 """
 
 import atexit
-import ctypes
-import json
 import logging
 import threading
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from itertools import count
 from queue import Empty, SimpleQueue
@@ -27,13 +24,15 @@ from zenoh.handlers import Callback
 
 from bridges.log import pairs
 from bridges.rmf import addresses, notices, zenoh_config
+from bridges.rmf.releases import Release
 from bridges.rmf.settings import Zenoh
 from bridges.rmf.threaded import Threaded
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
-from bridges.rmf.zenoh_config import Configuration
 from bridges.rmf.zenoh_ends import Order, ZenohEnd, ZenohPublisher, ZenohSubscription
 from bridges.rmf.zenoh_keys import WAYS, Keys
+from bridges.rmf.zenoh_peers import ZenohPeers
+from bridges.rmf.zenoh_session import closed, opened, trim_memory
 
 log = logging.getLogger(__name__)
 
@@ -56,15 +55,22 @@ class ZenohTransport(Threaded):
     refusals = (zenoh.ZError,)
 
     def __init__(
-        self, node_name: str, domain_id: int, *, loopback: bool, settings: Zenoh | None = None
+        self,
+        node_name: str,
+        domain_id: int,
+        *,
+        loopback: bool,
+        settings: Zenoh | None = None,
+        release: Release | None = None,
     ) -> None:
-        super().__init__(node_name)
+        super().__init__(node_name, release)
         self._settings = settings or Zenoh()
         self._domain_id = domain_id
         self._loopback = loopback
         self._failed = False
         self._ends: tuple[ZenohEnd, ...] = ()
         self._deaf: set[str] = set()
+        self._watcher = ZenohPeers(self._peers, lambda: self._orders.put(self._follow_release))
         self._orders: SimpleQueue[Order] = SimpleQueue()
         self._session: zenoh.Session | None = None
         self._linked: bool | None = None
@@ -84,7 +90,12 @@ class ZenohTransport(Threaded):
     def publisher(self, topic: AnyTopic) -> ZenohPublisher:
         """Declare a publisher with `topic.publish` QoS."""
         publisher = ZenohPublisher(
-            topic, self._orders.put, self._withdraw, lambda: self.lives, self._deaf
+            topic,
+            self._orders.put,
+            self._withdraw,
+            lambda: self.lives,
+            self._deaf,
+            self._watcher.tell,
         )
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             self._attach(publisher)
@@ -102,6 +113,7 @@ class ZenohTransport(Threaded):
             self.dropped,
             others_only=others_only,
             attached=self._settings.keys == "rmw_zenoh",
+            tell=self._watcher.tell,
         )
         with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
             self._attach(subscription)
@@ -132,14 +144,14 @@ class ZenohTransport(Threaded):
         else:
             ways = [zenoh_config.on_the_site(self._settings)]
         try:
-            session = _opened(ways)
+            session = opened(ways)
         except zenoh.ZError as error:
             self._why_unlinked = str(error).partition(" at /")[
                 0
             ]  # a place in zenoh's source follows
             return
         way, name = WAYS[self._settings.keys], str(session.zid())
-        self._keys: Keys = way(self._domain_id, name, self.name)
+        self._keys: Keys = way(self._domain_id, name, self.name, self.release)
         self._numbers = count(1)
         self._presence = session.liveliness().declare_token(self._keys.presence())
         self._neighbours = {}
@@ -147,11 +159,13 @@ class ZenohTransport(Threaded):
             Callback(partial(self._neighbour, self._neighbours), indirect=False), history=True
         )
         self._session = session
-        _trim_memory()
+        self._witnesses = self._watcher.watch(session, self._keys)
+        trim_memory()
 
     def _attach(self, end: ZenohEnd) -> None:
-        """Give an end its place in the session, if there is one."""
-        if self._session is None:
+        """Give an end its place in the session, if there is one and the release has its message."""
+        self._peers.ours(end.topic, publishes=isinstance(end, ZenohPublisher))
+        if self._session is None or not self.release.has(end.topic.type):
             return
         number = next(self._numbers)
         if isinstance(end, ZenohSubscription) and end.others_only:
@@ -186,8 +200,8 @@ class ZenohTransport(Threaded):
         self._deaf.clear()
         self._neighbours = {}
         if session:
-            held += [self._presence, self._events]
-            closing = threading.Thread(target=_close, args=(session, held), daemon=True)
+            held += [self._presence, self._events, self._witnesses]
+            closing = threading.Thread(target=closed, args=(session, held), daemon=True)
             closing.start()
             self._closing.append(closing)
 
@@ -204,6 +218,21 @@ class ZenohTransport(Threaded):
             except (TransportError, zenoh.ZError) as error:  # for example, a secret is missing now
                 self._why_unlinked = str(error)
                 self._leave()
+
+    def _follow_release(self) -> None:
+        """Give the ends whose message differs in RMF's release a new place."""
+        before = self.release
+        if not self._peers.settle():
+            self._peers.name_misfits()
+            return
+        with self._lock:
+            if self._closed or self._session is None:
+                return
+            self._keys.release = self.release
+            for end in self._ends:
+                if self._peers.differs(end.topic, before):
+                    end.leave()
+                    self._attach(end)
 
     # --- our thread ----------------------------------------------------------------------------
 
@@ -270,32 +299,6 @@ class ZenohTransport(Threaded):
         else:
             reason = self._why_unlinked or NO_ROUTER
             log.warning(pairs("not_linked", node=self.name, connect=where, reason=reason))
-
-
-def _opened(ways: list[Configuration]) -> zenoh.Session:
-    """A session with the first of these configurations that works. Raises ZError if none does."""
-    wanted, *further = ways
-    config = zenoh.Config()
-    for key, value in wanted.items():
-        config.insert_json5(key, json.dumps(value))
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError:
-        if further:
-            return _opened(further)
-        raise
-
-
-def _close(session: zenoh.Session, held: list[object]) -> None:
-    with suppress(zenoh.ZError):  # on a dead link the farewell is lost
-        session.close()  # type: ignore[no-untyped-call]
-    held.clear()
-
-
-def _trim_memory() -> None:
-    """Return freed memory to the system: opening a session leaves 2.5 MB of it in this process."""
-    with suppress(AttributeError):  # a C library other than glibc has no such call
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _nothing() -> None:

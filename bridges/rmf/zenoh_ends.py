@@ -23,9 +23,11 @@ from zenoh.handlers import Callback
 from bridges.rmf import cdr, notices, zenoh_keys
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
+from bridges.rmf.releases import NEWEST
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Receive, TransportError
-from bridges.rmf.zenoh_keys import Keys, Kind
+from bridges.rmf.zenoh_keys import Keys
+from bridges.rmf.zenoh_place import Place, Tell
 
 HEARTBEAT_S: Final = 0.5
 """As in rmw_zenoh: so long after a retained message its number is sent again. So subscribers notice a
@@ -47,86 +49,21 @@ class Declared(Protocol):
         """Take it off the graph."""
 
 
-class Place:
-    """An end's place in one session: its token, and the tokens of its peers.
-
-    Peers are the ends of the other kind on the same topic, in any process. `peers`: those that this
-    end reaches, by their tokens. `unheard`: the gids of those that do not fit. `misfit(token, policy)`:
-    called on zenoh's thread for each peer that does not fit.
-    """
+class ZenohEnd(ABC):
+    """What publishers and subscriptions share. `do(order)`: runs it on the transport's thread. `tell`:
+    as `Place`."""
 
     def __init__(
-        self,
-        session: zenoh.Session,
-        keys: Keys,
-        kind: Kind,
-        topic: AnyTopic,
-        number: int,
-        misfit: Callable[[str, str], None],
+        self, topic: AnyTopic, notice: str, do: Callable[[Order], None], tell: Tell
     ) -> None:
-        self.key = keys.data(topic)
-        self.token = keys.token(kind, topic, number)
-        self.gid = zenoh_keys.gid(self.token)
-        self.peers: dict[str, zenoh_keys.Peer] = {}
-        self.unheard: set[bytes] = set()
-        self._keys = keys
-        self._kind = kind
-        self._topic = topic
-        self._misfit = misfit
-        retained = topic.publish if kind == "MP" else topic.subscribe
-        self._transient_local = retained.durability == "transient_local"
-        self._live = session.liveliness()
-        self._watching = self._live.declare_subscriber(
-            keys.others("MS" if kind == "MP" else "MP", topic),
-            Callback(self._look, indirect=False),
-            history=True,
-        )
-        self._alive: zenoh.LivelinessToken | None = None
-
-    def appear(self) -> None:
-        """Declare the token: the end sends or hears now."""
-        self._alive = self._live.declare_token(self.token)
-
-    def leave(self) -> None:
-        """Withdraw the token."""
-        if self._alive:
-            self._alive.undeclare()  # type: ignore[no-untyped-call]
-        self._watching.undeclare()  # type: ignore[no-untyped-call]
-
-    def _look(self, sample: Sample) -> None:
-        """A peer's token has come or gone. Called on zenoh's thread."""
-        token = str(sample.key_expr)
-        if sample.kind == SampleKind.DELETE:
-            self.peers.pop(token, None)
-            self.unheard.discard(zenoh_keys.gid(token))
-        elif (peer := self._keys.peer(token)) is None:
-            return
-        elif policy := self._incompatible(peer):
-            self.unheard.add(zenoh_keys.gid(token))
-            self._misfit(token, policy)
-        else:
-            self.peers[token] = peer
-
-    def _incompatible(self, theirs: zenoh_keys.Peer) -> str:
-        """The QoS policy by which DDS would not match the two ends; "" if it would match them."""
-        if theirs.type != self._keys.type(self._topic):
-            return "type"
-        wants, keeps = theirs.transient_local, self._transient_local
-        if self._kind == "MS":
-            wants, keeps = keeps, wants
-        return "durability" if wants and not keeps else ""
-
-
-class ZenohEnd(ABC):
-    """What publishers and subscriptions share. `do(order)`: runs it on the transport's thread."""
-
-    def __init__(self, topic: AnyTopic, notice: str, do: Callable[[Order], None]) -> None:
         self.topic = topic
         self.place: Place | None = None
         self._end: Declared | None = None
         self._notice = notice
         self._noticed: set[str] = set()
         self._do = do
+        self._tell = tell
+        self._release = NEWEST
 
     @abstractmethod
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
@@ -169,8 +106,9 @@ class ZenohPublisher(ZenohEnd):
         withdraw: Callable[["ZenohPublisher"], None],
         lives: Callable[[], bool],
         deaf: set[str],
+        tell: Tell,
     ) -> None:
-        super().__init__(topic, notices.NOT_SERVED, do)
+        super().__init__(topic, notices.NOT_SERVED, do, tell)
         self._withdraw = withdraw
         self._lives = lives
         self._deaf = deaf
@@ -180,7 +118,8 @@ class ZenohPublisher(ZenohEnd):
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
         """Take a place in a session, and send what was retained again for late joiners."""
-        place = Place(session, keys, "MP", self.topic, number, self.log_misfit)
+        place = Place(session, keys, "MP", self.topic, number, self.log_misfit, self._tell)
+        self._release = keys.release
         self._end = end = self._declared(session, place.key)
         place.appear()
         self.place, self._sent = place, 0
@@ -191,7 +130,7 @@ class ZenohPublisher(ZenohEnd):
         """Send. Raises TransportError if it was not sent, CdrError if no sample can hold it."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        sample = cdr.encode(self.topic.type, message)
+        sample = cdr.encode(self.topic.type, message, self._release)
         self._retained.append(sample)
         place, end = self.place, self._end  # another thread may clear them at any time
         if place is None or end is None:
@@ -255,8 +194,9 @@ class ZenohSubscription(ZenohEnd):
         *,
         others_only: bool,
         attached: bool,
+        tell: Tell,
     ) -> None:
-        super().__init__(topic, notices.NOT_HEARD, do)
+        super().__init__(topic, notices.NOT_HEARD, do, tell)
         self.others_only = others_only
         self._rung = False
         self._own_session = ""
@@ -267,7 +207,8 @@ class ZenohSubscription(ZenohEnd):
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
         """Take a place in a session."""
-        place = Place(session, keys, "MS", self.topic, number, self.log_misfit)
+        place = Place(session, keys, "MS", self.topic, number, self.log_misfit, self._tell)
+        self._release = keys.release
         self.place, self._own_session = place, keys.session
         origin = Locality.REMOTE if self.others_only else Locality.ANY
         on_sample = Callback(self._arrived, indirect=False)
@@ -332,4 +273,4 @@ class ZenohSubscription(ZenohEnd):
             raise CdrError("without the attachment of a ROS node")
         if sender in place.unheard:
             return None
-        return cdr.decode(self.topic.type, bytes(sample.payload))
+        return cdr.decode(self.topic.type, bytes(sample.payload), self._release)

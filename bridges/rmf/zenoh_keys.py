@@ -10,6 +10,7 @@ A liveliness token is a key that exists as long as its session. Tokens tell othe
 publisher or a subscription is there. An end is a publisher or a subscription.
 """
 
+import re
 import struct
 from dataclasses import dataclass
 from typing import Final, Literal, Protocol
@@ -17,6 +18,8 @@ from typing import Final, Literal, Protocol
 import xxhash
 
 from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.peers import WITNESSES, Announced
+from bridges.rmf.releases import NEWEST, Release
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import AnyTopic, Qos
 
@@ -25,6 +28,7 @@ Kind = Literal["MP", "MS"]
 NODE_ID: Final = 0
 _HEAD: Final = struct.Struct("<qqB")
 GID_LENGTH: Final = 16
+HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,18 +36,20 @@ class Peer:
     """What a token says of an end.
 
     `type`: the message type, with the hash where the token has one. `transient_local`: a publisher
-    retains its messages; a subscription wants retained ones.
+    retains its messages; a subscription wants retained ones. `announced`: its topic, type and hash.
     """
 
     session: str
     type: str
     transient_local: bool
+    announced: Announced
 
 
 class Keys(Protocol):
     """The names of one node's ends, in one of the two ways. `session`: the zenoh session's id."""
 
     session: str
+    release: Release
 
     def presence(self) -> str:
         """The token of the node itself."""
@@ -60,6 +66,9 @@ class Keys(Protocol):
     def others(self, kind: Kind, topic: AnyTopic) -> str:
         """A key expression that matches the tokens of all ends of this kind on a topic."""
 
+    def witnesses(self) -> list[str]:
+        """Key expressions that match the tokens which tell RMF's release (`peers.py`)."""
+
     def peer(self, token: str) -> Peer | None:
         """What a token says of its end; None for the token of anything else."""
 
@@ -67,8 +76,10 @@ class Keys(Protocol):
 class RmwZenoh:
     """rmw_zenoh's keys for a node in a ROS domain. In a token, `%` replaces a name's slashes."""
 
-    def __init__(self, domain_id: int, session: str, node_name: str) -> None:
-        self.session = session
+    def __init__(
+        self, domain_id: int, session: str, node_name: str, release: Release = NEWEST
+    ) -> None:
+        self.session, self.release = session, release
         self._domain = domain_id
         self._node = f"%/%/{node_name}"  # enclave "/", namespace "/"
 
@@ -80,7 +91,7 @@ class RmwZenoh:
 
     def type(self, topic: AnyTopic) -> str:
         name = f"{PACKAGES[topic.type]}::msg::dds_::{topic.type.__name__}_"
-        return f"{name}/{type_hash(topic.type)}"
+        return f"{name}/{type_hash(topic.type, self.release)}"
 
     def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
         qos = _qos(topic, kind)
@@ -96,12 +107,21 @@ class RmwZenoh:
     def others(self, kind: Kind, topic: AnyTopic) -> str:
         return f"@ros2_lv/{self._domain}/*/*/*/{kind}/*/*/*/{_name(topic, '%')}/**"
 
+    def witnesses(self) -> list[str]:
+        return [
+            f"@ros2_lv/{self._domain}/*/*/*/{_kind(publishes)}/*/*/*/*/{package}::msg::dds_::{name}_/**"
+            for package, name, publishes in _witnesses()
+        ]
+
     def peer(self, token: str) -> Peer | None:
         parts = token.split("/")
         qos = parts[12].split(":") if len(parts) > 12 else []
         if len(qos) < 6:
             return None
-        return Peer(parts[2], "/".join(parts[10:12]), qos[1] == "1")
+        kind = parts[10].replace("::msg::dds_::", "/msg/").removesuffix("_")
+        topic = parts[9].strip("%").replace("%", "/")
+        announced = Announced(topic, kind, parts[11], parts[5] == "MP")
+        return Peer(parts[2], "/".join(parts[10:12]), qos[1] == "1", announced)
 
 
 class Ros2Dds:
@@ -110,8 +130,10 @@ class Ros2Dds:
     Keys hold no domain, because a bridge serves only one, and no type, because the token states it.
     """
 
-    def __init__(self, domain_id: int, session: str, node_name: str) -> None:
-        self.session = session
+    def __init__(
+        self, domain_id: int, session: str, node_name: str, release: Release = NEWEST
+    ) -> None:
+        self.session, self.release = session, release
 
     def presence(self) -> str:
         return f"@/{self.session}/@ros2_lv"
@@ -126,18 +148,27 @@ class Ros2Dds:
         qos = _qos(topic, kind)
         retained = int(qos.durability == "transient_local")
         # No key fields; reliable; durability; keep last; user data of the bridge's DDS end.
-        text = f":1:{retained}:0,{qos.depth}:typehash={type_hash(topic.type)};"
+        text = f":1:{retained}:0,{qos.depth}:typehash={type_hash(topic.type, self.release)};"
         return f"@/{self.session}/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/{self.type(topic)}/{text}"
 
     def others(self, kind: Kind, topic: AnyTopic) -> str:
         return f"@/*/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/*/*"
+
+    def witnesses(self) -> list[str]:
+        return [
+            f"@/*/@ros2_lv/{_kind(publishes)}/*/{package}§msg§{name}/*"
+            for package, name, publishes in _witnesses()
+        ]
 
     def peer(self, token: str) -> Peer | None:
         parts = token.split("/")
         qos = parts[6].split(":") if len(parts) > 6 else []
         if len(qos) < 4:
             return None
-        return Peer(parts[1], parts[5], qos[2] == "1")
+        found = HASH.search(parts[6])
+        topic, kind = parts[4].replace("§", "/"), parts[5].replace("§", "/")
+        announced = Announced(topic, kind, found[1] if found else "", parts[3] == "MP")
+        return Peer(parts[1], parts[5], qos[2] == "1", announced)
 
 
 WAYS: Final[dict[str, type[RmwZenoh] | type[Ros2Dds]]] = {
@@ -162,6 +193,15 @@ def sender(attached: bytes) -> bytes | None:
     if len(attached) != _HEAD.size + GID_LENGTH or attached[_HEAD.size - 1] != GID_LENGTH:
         return None
     return attached[_HEAD.size :]
+
+
+def _kind(publishes: bool) -> Kind:
+    return "MP" if publishes else "MS"
+
+
+def _witnesses() -> list[tuple[str, str, bool]]:
+    split = ((*name.partition("/msg/"), publishes) for name, publishes in sorted(WITNESSES))
+    return [(package, name, publishes) for package, _, name, publishes in split]
 
 
 def _qos(topic: AnyTopic, kind: Kind) -> Qos:

@@ -83,6 +83,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
         self._reset = False
+        self._may = MaySpeak(False)
         self._hears: dict[str, Subscription] = {}
         self._unsaid: list[tuple[Topic[Message], Message]] = []
         self._shown: set[str] = set()
@@ -186,13 +187,22 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _look_around(self) -> None:
         """Declare our publishers when we may speak, and withdraw them when not."""
-        if not self.presence.look(self._clock.monotonic()):
+        self.presence.look(self._clock.monotonic())
+        may = MaySpeak(self.presence.may_speak, self._must_at_once())
+        if may == self._may:
             return
-        if self.presence.may_speak:
+        self._may = may
+        if may.yes or may.at_once:
             self._outlet.open(self._kind.publishes)
         else:
             self._outlet.close()
-        self._decide_all(MaySpeak(self.presence.may_speak))
+        self._decide_all(may)
+
+    def _must_at_once(self) -> bool:
+        """Is there something that cannot wait for the end of the quiet start, and no rival?"""
+        if self.presence.may_speak or self.presence.rivals:
+            return False
+        return any(self._kind.urgent(subject.memory) for subject in self.subjects.values())
 
     def _wake(self) -> None:
         now = self._clock.monotonic()
@@ -251,7 +261,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         subject = Subject(name, memory, self._core, self._will_say, refusals, clock)
         self.subjects[name] = subject
         self._requesters += self._remembered(subject)
-        self._decide(subject, MaySpeak(self.presence.may_speak))
+        self._decide(subject, self._may)
         return subject
 
     def _decide(self, subject: Subject[M, GraphEvent[E], None, R], event: GraphEvent[E]) -> None:

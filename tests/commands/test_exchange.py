@@ -103,7 +103,7 @@ def test_nothing_is_sent_while_nobody_listens_and_a_supervisor_is_missed() -> No
     request = LiftRide("Lift1", "L3", ME, line=CommandLine(typed, ("--localhost",)))
     told = tell(request, every_second(LIFT), listeners=0, timeout_s=5.0)
     missed = (
-        "no lift supervisor runs in this domain: no node subscribes to adapter_lift_requests;"
+        "no lift supervisor runs in this domain: no node publishes lift_requests;"
         " to ask the lift's own daemon:"
         " rmf-bridge send lift Lift1 L3 --session 'my robot' --localhost --direct"
     )

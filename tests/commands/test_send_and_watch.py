@@ -268,6 +268,7 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(
         states = node.publisher(topics.LIFT_STATES)
         requests: list[d.LiftRequest] = []
         node.subscribe(topics.ADAPTER_LIFT_REQUESTS, requests.append)
+        node.publisher(topics.LIFT_REQUESTS)  # as a supervisor has it
         with command("send lift Lift1 L3 --session fleet/robot", speaks, domain) as process:
             wait_until(lambda: states.matched() > 0, "send listens to lift_states")
             states.publish(LIFT)

@@ -97,6 +97,7 @@ def test_a_restart_closes_nothing_and_the_next_heartbeat_lists_who_holds() -> No
         graph.until(quarter / 4)
         graph.shows(2)
     assert graph.heard == [
+        *[(at, "OPEN ward") for at in (20.0, 21.0, 22.0)],
         (23.0, "OPEN ward"),
         (23.0, "beat ward:a"),
         (24.0, "OPEN ward"),

@@ -5,8 +5,10 @@ from typing import Any
 
 import pytest
 
-from bridges.rmf.choose import missing_of_dds
+from bridges.rmf.choose import missing_of_dds, missing_of_ros
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.releases import NEWEST, Release
+from bridges.rmf.ros_types import installed
 from bridges.rmf.settings import Zenoh
 from bridges.rmf.transport import Transport
 from bridges.rmf.zenoh import ZenohTransport
@@ -20,6 +22,9 @@ if missing_of_dds():
         "test_network.py",
         "test_wires.py",
     ]
+
+RELEASE = NEWEST if missing_of_ros() else installed()
+"""What the tests speak: where ROS is installed, its release on every wire."""
 
 Join = Callable[[str], Transport]
 """Open a node of this name on the graph of this test."""
@@ -85,16 +90,18 @@ def observer(join_dds: Join) -> Iterator[Any]:
     gc.collect()
 
 
-def joining(transport: str, domain: int) -> Join:
+def joining(transport: str, domain: int, release: Release | None = RELEASE) -> Join:
     """What opens nodes of this transport in this domain, on loopback."""
 
     def join(name: str) -> Transport:
         if transport.startswith("zenoh"):
-            return ZenohTransport(name, domain, loopback=True, settings=ZENOH[transport])
+            ways = ZENOH[transport]
+            return ZenohTransport(name, domain, loopback=True, settings=ways, release=release)
         # Imported here: there may be no ROS.
         module = importlib.import_module(f"bridges.rmf.{transport}")
         kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
-        node: Transport = getattr(module, kind)(name, domain, loopback=True)
+        wanted = {} if transport == "ros2" else {"release": release}  # that takes what is installed
+        node: Transport = getattr(module, kind)(name, domain, loopback=True, **wanted)
         return node
 
     return join

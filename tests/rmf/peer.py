@@ -17,11 +17,13 @@ from bridges.rmf import topics
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher
 from tests.rmf import zenoh_hostile
-from tests.rmf.conftest import joining
+from tests.rmf.conftest import RELEASE, joining
 from tests.waiting import wait_until
 
 TOPICS: dict[str, Topic[Any]] = {
-    name: topic for name, topic in vars(topics).items() if isinstance(topic, Topic)
+    name: topic
+    for name, topic in vars(topics).items()
+    if isinstance(topic, Topic) and RELEASE.has(topic.type)
 }
 
 

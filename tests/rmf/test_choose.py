@@ -63,6 +63,20 @@ def test_the_network_is_the_narrower_of_yaml_and_ros(
     assert stays_on_loopback(rmf, environ) is expected
 
 
+@pytest.mark.parametrize(
+    ("environ", "expected"),
+    [
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, False),
+        ({"ROS_LOCALHOST_ONLY": "1"}, True),
+    ],
+)
+def test_localhost_with_static_peers_reaches_them_as_in_ros(
+    environ: dict[str, str], expected: bool
+) -> None:
+    assert stays_on_loopback(Rmf(), environ, ["10.0.0.5"]) is expected
+    assert stays_on_loopback(Rmf(network="localhost"), environ, ["10.0.0.5"])
+
+
 @pytest.mark.parametrize("text", ["OFF", "localhost", "WORLD"])
 def test_a_range_in_which_nobody_is_found_is_refused(text: str) -> None:
     with pytest.raises(TransportError, match="use SUBNET or LOCALHOST"):

@@ -28,6 +28,15 @@ PEERS = '<Peers><Peer address="10.0.0.5"/><Peer address="rmf.local"/></Peers>'
         ({"ROS_STATIC_PEERS": "10.0.0.5;rmf.local"}, AUTO.format(PEERS)),
         ({"ROS_STATIC_PEERS": ";; 10.0.0.5; rmf.local ;"}, AUTO.format(PEERS)),
         ({"ROS_STATIC_PEERS": '"<&'}, AUTO.format("<Peers><Peer address='\"&lt;&amp;'/></Peers>")),
+        (
+            {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": "10.0.0.5"},
+            AUTO.format(
+                '<Peers><Peer address="localhost"/><Peer address="10.0.0.5"/></Peers>'
+            ).replace(
+                "<Discovery>",
+                "<General><AllowMulticast>false</AllowMulticast></General><Discovery>",
+            ),
+        ),
         ({"CYCLONEDDS_URI": "file:///c.xml"}, AUTO.format("") + ",file:///c.xml"),
         (
             {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", "ROS_STATIC_PEERS": "10.0.0.5"},

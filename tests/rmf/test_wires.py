@@ -16,7 +16,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from tests.rmf import golden_qos, peer
-from tests.rmf.conftest import ROS2, Join, joining
+from tests.rmf.conftest import RELEASE, ROS2, Join, joining
 from tests.rmf.domains import domain_of_this_run
 from tests.rmf.golden_qos import GOLDEN
 from tests.rmf.observing import PUBLICATION, SUBSCRIPTION, seen
@@ -197,7 +197,9 @@ def test_each_end_has_the_type_the_type_hash_and_the_qos_of_the_golden_table(
     assert [as_ros_shows(end.qos) for end in ends] == golden
     for end in ends:
         assert end.qos[Policy.DataRepresentation] == Policy.DataRepresentation(True, False)
-        assert end.qos[Policy.Userdata].data.decode() == f"typehash={type_hash(topic.type)};"
+        assert (
+            end.qos[Policy.Userdata].data.decode() == f"typehash={type_hash(topic.type, RELEASE)};"
+        )
     if golden[0].durability == "TRANSIENT_LOCAL":
         kept = ends[0].qos[Policy.DurabilityService].history
         assert kept == Policy.History.KeepLast(golden[0].depth)

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from bridges.core.graph_kind import GraphKind
 from bridges.rmf.definitions import Message
+from bridges.rmf.releases import NEWEST
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Subscription
 from bridges.serve.clock import Clock
@@ -136,6 +137,7 @@ class WorldTransport:
     """A node's place in the world (`bridges.rmf.transport.Transport`)."""
 
     speaks = "memory"
+    release = NEWEST
 
     def __init__(self, world: World, name: str) -> None:
         self.name = name
@@ -155,6 +157,9 @@ class WorldTransport:
         return _End(self, topic)
 
     lives = True
+
+    def faults(self) -> list[tuple[str, str]]:
+        return []
 
     def wall(self) -> float:
         return EPOCH + self.world.now

@@ -73,6 +73,7 @@ class DdsPlace:
         self._timeline = timeline
         self._closed = False
         self._inner = wire.join(name.replace("/", "_"), domain)
+        self.release = self._inner.release
 
     def publisher(self, topic: Topic[Any]) -> Publisher[Any]:
         return self._inner.publisher(topic)
@@ -88,6 +89,9 @@ class DdsPlace:
     @property
     def lives(self) -> bool:
         return self._inner.lives
+
+    def faults(self) -> list[tuple[str, str]]:
+        return self._inner.faults()
 
     def wall(self) -> float:
         return self._inner.wall()

@@ -25,7 +25,8 @@ class Seen:
 
     `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
     request, in order. `names`: every device of the kind that was heard. `heartbeat`: the latest of the
-    door supervisor.
+    door supervisor. `boarded`: what the lift's diagnostics say of a robot inside, "yes" or "no"; "" if
+    they were not heard.
     """
 
     began_at: float
@@ -36,6 +37,7 @@ class Seen:
     states: tuple[Heard[words.Stated], ...] = ()
     names: frozenset[str] = frozenset()
     heartbeat: Heard[SupervisorHeartbeat] | None = None
+    boarded: str = ""
 
     def hears(self, heard: Heard[Message], about: Callable[[words.Stated], bool]) -> "Seen":
         """Take a message that was heard. `about(state)`: does the state concern the request?"""
@@ -129,6 +131,15 @@ class Request(ABC):
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """Why there is no effect, judged by the last state; the first `present` one counts."""
 
+    @property
+    def supervisor(self) -> AnyTopic | None:
+        """The topic on which the supervisor speaks, if others hear adapters as it does."""
+        return None
+
+    def goes_direct(self, seen: Seen, now: float) -> bool:
+        """Whether it is time to ask the device's own daemon, which the supervisor has not done."""
+        return False
+
     def about(self, state: words.Stated) -> bool:
         """Whether the state is of this device."""
         return words.device(state) == self.name
@@ -140,6 +151,8 @@ class Request(ABC):
     def nobody(self) -> Obstacle:
         """No supervisor or daemon subscribes to the request."""
         silence = f"no node subscribes to {self.topic.name}"
+        if self.supervisor is not None:
+            silence = f"no node publishes {self.supervisor.name}"
         if self.topic == self.own:
             listener = self.listener or f"{self.kind} daemon"
             return Obstacle(True, f"no {listener} runs in this domain: {silence}", self._loopback())

@@ -7,7 +7,10 @@ from typing import Final
 from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen, nearest
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
+from bridges.rmf.topics import AnyTopic
 
+OBEYS_WITHIN_S: Final = 5.0
+"""A supervisor that obeys ends a session within a few states."""
 SHUT_OUT: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
 
 
@@ -16,6 +19,11 @@ class _Lift(Request):
     kind = "lift"
     states, own = topics.LIFT_STATES, topics.LIFT_REQUESTS
     adapter = topics.ADAPTER_LIFT_REQUESTS
+
+    @property
+    def supervisor(self) -> AnyTopic | None:
+        """A lift's own daemon hears adapters too: only who speaks to it is a supervisor."""
+        return None if self.direct else self.own
 
     @property
     def _release(self) -> str:
@@ -86,9 +94,15 @@ class LiftRide(_Lift):
 
 @dataclass(frozen=True, slots=True)
 class LiftEnd(_Lift):
-    """End `session`; if it is "", that of the first LiftState heard."""
+    """End `session`; if it is "", that of the first LiftState heard.
+
+    `falls_back`: if the supervisor does not obey within OBEYS_WITHIN_S, the lift's own daemon is asked;
+    where a robot may be inside, only if the operator says that the car is empty (`car_empty`).
+    """
 
     session: str = ""
+    falls_back: bool = False
+    car_empty: bool = False
 
     def _ending(self, seen: Seen) -> str:
         first = (state.session_id for state in seen.states_of(d.LiftState))
@@ -115,9 +129,29 @@ class LiftEnd(_Lift):
             return None
         return Done(f"{self.name} is no longer held by {session}")
 
+    def goes_direct(self, seen: Seen, now: float) -> bool:
+        """The supervisor, if there is one, has had its time, and nobody is in the car."""
+        asked_at = seen.began_at if seen.first_sent_at is None else seen.first_sent_at
+        late = now >= asked_at + OBEYS_WITHIN_S
+        return self.falls_back and not self.direct and late and self._outside(seen)
+
+    def nobody(self) -> Obstacle:
+        """Without a supervisor too, a robot may be in the car."""
+        found = super(LiftEnd, self).nobody()
+        if self.direct or self.car_empty or not self.falls_back:
+            return found
+        return found._replace(remedy=f"if the car is empty: {self.line.again_with('--car-empty')}")
+
+    def _outside(self, seen: Seen) -> bool:
+        return self.car_empty or seen.boarded == "no"
+
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """The session is still shown."""
-        if self.direct:
+        if self.falls_back and not self._outside(seen):
+            text = f"{self.name} still shows the session, and its robot may be in the car: look into it"
+            there = self.line.again_with("--car-empty")
+            return (Obstacle(True, text, f"if the car is empty: {there}"),)
+        if self.direct or self.falls_back:
             text = f"{self.name} still shows the session: its daemon's log says why"
             return (Obstacle(True, text),)
         text = f"{self.name} still shows the session: the supervisor may have dropped the request"

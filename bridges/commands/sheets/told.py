@@ -7,6 +7,7 @@ import msgspec
 
 from bridges.core.graph_kind import GraphKind
 from bridges.core.table import Table
+from bridges.rmf import instead
 from bridges.settings import names as named
 from bridges.settings.load import Config
 from bridges.settings.nodes import Problem
@@ -72,10 +73,21 @@ def told(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = 
         sha256=hashlib.sha256(config.text).hexdigest(),
         buses=[_bus(config, bus) for bus in config.buses],
         parts=[_graph(config)] if config.section is not None else _devices(config),
-        notes=[*notes, *map(str, config.notes)],
+        notes=[*notes, *map(str, config.notes), *_lacking(config)],
         errors=list(errors),
         warnings=list(config.warnings),
     )
+
+
+def _lacking(config: Config) -> list[str]:
+    """What takes another way where RMF's release lacks its message."""
+    kind = named.kind_called(config.kind)
+    if isinstance(kind, GraphKind):
+        topics = [*kind.publishes]
+    else:
+        topics = [t for device in config.devices.values() for t in kind.alarm_topics(device)]
+    lines = [line for topic in topics for line in instead.told(topic, config.rmf.release)]
+    return list(dict.fromkeys(lines))
 
 
 def _bus(config: Config, name: str) -> BusTold:
