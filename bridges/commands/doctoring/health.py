@@ -16,27 +16,20 @@ FREE_LEAST: Final = 50 << 20
 
 def clock(machine: Machine) -> Iterator[Finding]:
     """The subject `clock`: RMF compares the stamps of states with its own clock."""
-    printed = machine.printed("timedatectl", "show")
-    said = dict(line.partition("=")[::2] for line in (printed or "").splitlines())
+    found = "it is not synchronised"
     means = (
         "states carry wrong stamps, and RMF may take them for old; durations do not depend on it"
     )
-    match said.get("NTPSynchronized"):
-        case "yes":
-            yield ok("clock", "it is synchronised")
-        case "no" if said.get("NTP") == "no":
-            yield warning(
-                "clock",
-                "it is not synchronised, and NTP is off",
-                means,
-                "sudo timedatectl set-ntp true",
-            )
-        case "no":
-            do = "timedatectl timesync-status; is the time server reached? A Pi has no clock of its own"
-            yield warning("clock", "it is not synchronised", means, do)
-        case _:
-            do = "look with chronyc tracking, or whatever sets this machine's clock"
-            yield note("clock", "timedatectl does not say whether it is synchronised", means, do)
+    do = "timedatectl timesync-status; is the time server reached? A Pi has no clock of its own"
+    synchronised = machine.synchronised()
+    if synchronised:
+        yield ok("clock", "it is synchronised")
+    elif synchronised is None:
+        yield note("clock", "the kernel does not say whether it is synchronised", means, do)
+    elif "NTP=no" in (machine.printed("timedatectl", "show") or "").splitlines():
+        yield warning("clock", f"{found}, and NTP is off", means, "sudo timedatectl set-ntp true")
+    else:
+        yield warning("clock", found, means, do)
 
 
 def watchdog(machine: Machine) -> Iterator[Finding]:

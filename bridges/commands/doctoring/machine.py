@@ -17,6 +17,9 @@ from typing import Final
 COMMAND_S: Final = 3.0
 PLACES: Final = ("usr/sbin", "usr/bin", "sbin", "bin")
 TEXT_MAX: Final = 1 << 20
+TIMEX_MAX: Final = 512
+"""More than any kernel's struct timex; zeroes ask and set nothing."""
+TIME_ERROR: Final = 5
 
 
 def _ioctl(device: Path, request: int, argument: bytes) -> bytes:
@@ -31,16 +34,26 @@ def _installed(package: str) -> bool:
     return importlib.util.find_spec(package) is not None
 
 
+def _synchronised() -> bool | None:
+    """Whether the kernel's clock is kept right by somebody: adjtimex(2), which is asked only."""
+    import ctypes
+
+    state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_MAX))
+    return None if state < 0 else state != TIME_ERROR
+
+
 @dataclass(frozen=True, slots=True)
 class Machine:
     """`ioctl(device, request, argument)` gives what the kernel fills in, or raises OSError.
 
-    `installed(package)`: can this Python import it? `uid`, `gids`: of this process.
+    `installed(package)`: can this Python import it? `synchronised()`: is the clock, None if that is not
+    known. `uid`, `gids`: of this process.
     """
 
     root: Path = Path("/")
     ioctl: Callable[[Path, int, bytes], bytes] = _ioctl
     installed: Callable[[str], bool] = _installed
+    synchronised: Callable[[], bool | None] = _synchronised
     uid: int = field(default_factory=os.geteuid)
     gids: frozenset[int] = field(default_factory=lambda: frozenset({os.getegid(), *os.getgroups()}))
 

@@ -21,8 +21,14 @@ class MadeUp:
     ) -> None:
         self.root = root
         self._chips: dict[str, tuple[str, Mapping[int, str], Collection[int]]] = {}
+        self.synchronised: bool | None = True
         self.machine = Machine(
-            root, self._ioctl, installed.__contains__, os.geteuid() + 1, frozenset(gids)
+            root,
+            self._ioctl,
+            installed.__contains__,
+            lambda: self.synchronised,
+            os.geteuid() + 1,
+            frozenset(gids),
         )
         self.user = User("pi", self.machine.uid, self.machine.gids, service=False)
         (root / "proc").mkdir()

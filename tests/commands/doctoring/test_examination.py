@@ -20,7 +20,6 @@ def pi(root: Path) -> MadeUp:
     made.chip(0, "pinctrl-bcm2711")
     made.write(f"/etc/systemd/system/{UNIT}")
     made.write("/etc/passwd", "rmf-bridge:x:990:991::/:/usr/sbin/nologin\n")
-    made.command("timedatectl", "NTP=yes\nNTPSynchronized=yes\n")
     made.command("systemctl", "10s\n")
     made.write("/dev/watchdog0")
     made.write(PERSIST, "N\n")
@@ -47,7 +46,7 @@ def test_each_thing_that_is_amiss_is_told_and_the_rest_is_looked_at_all_the_same
 ) -> None:
     made = pi(tmp_path / "pi")
     made.chip(0, "pinctrl-bcm2711", held={18: "other"}, mode=0o600)
-    made.command("timedatectl", "NTP=no\nNTPSynchronized=no\n")
+    made.synchronised = False
     made.command("systemctl", "0\n")
     made.write(PERSIST, "Y\n")
     made.write("/etc/group", "root:x:0:\n")

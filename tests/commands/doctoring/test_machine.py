@@ -9,6 +9,7 @@ import pytest
 from bridges.commands.doctoring import health
 from bridges.commands.doctoring.can import interface
 from bridges.commands.doctoring.finding import Finding, exit_code, note, ok, warning, wrong
+from bridges.commands.doctoring.machine import Machine
 from bridges.commands.doctoring.ports import port
 from bridges.commands.doctoring.users import UNIT, user, users
 from bridges.serve.places import Places
@@ -60,18 +61,24 @@ def test_the_services_user_has_the_groups_of_the_unit(made: MadeUp) -> None:
 
 
 @pytest.mark.parametrize(
-    ("printed", "level"),
+    ("synchronised", "printed", "found"),
     [
-        ("NTP=yes\nNTPSynchronized=yes\n", "ok"),
-        ("NTP=no\nNTPSynchronized=no\n", "warning"),
-        ("NTP=yes\nNTPSynchronized=no\n", "warning"),
-        (None, "note"),
+        (True, "NTP=no", [("ok", "it is synchronised")]),  # chrony keeps it
+        (False, "NTP=no", [("warning", "it is not synchronised, and NTP is off")]),
+        (False, "NTP=yes", [("warning", "it is not synchronised")]),
+        (None, "", [("note", "the kernel does not say whether it is synchronised")]),
     ],
 )
-def test_the_clock(made: MadeUp, printed: str | None, level: str) -> None:
-    if printed is not None:
-        made.command("timedatectl", printed)
-    assert [one.level for one in health.clock(made.machine)] == [level]
+def test_the_clock(
+    made: MadeUp, synchronised: bool | None, printed: str, found: list[tuple[str, str]]
+) -> None:
+    made.synchronised = synchronised
+    made.command("timedatectl", printed)
+    assert told(list(health.clock(made.machine))) == found
+
+
+def test_this_machines_kernel_says_whether_its_clock_is_synchronised() -> None:
+    assert Machine().synchronised() in (True, False, None)
 
 
 @pytest.mark.parametrize(
