@@ -10,7 +10,7 @@ export PYTHONDONTWRITEBYTECODE :=
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
-	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
+	@echo "make demo-charging  two fleets, two chargers and their coordinator: the scenarios by number, 100 s"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
 	@echo "make deep    all tests, every walk to its full depth: some minutes more"
 	@echo "make test-ros  the tests that need ROS 2, in a shell that has sourced its setup file"

@@ -174,7 +174,9 @@ def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) 
         what = holder.ended or "the charger was at fault"
         return [Fault("STILL_CHARGING", f"{holder.request.request_id}: {what}")]
     if shown is RELEASED and holder.ended == "start timeout":
-        return [Fault("START_TIMEOUT", f"{holder.request.who} did not start to charge in time")]
+        late = f"{holder.request.who} did not start to charge in time"
+        why = pad.not_ready(memory.sample) if memory.sample else ""
+        return [Fault("START_TIMEOUT", f"{late}: {why}" if why else late)]
     return []
 
 

@@ -6,6 +6,9 @@ pad without a request, so that the station shows an error, may have that very st
 
 A station where a robot has failed is tried again only if no other one suits the robot: a second
 station shows which side was at fault.
+
+Beside another node's charging schedule, a robot gets the station that the schedule has dedicated to it:
+RMF drives it to no other. A robot that the schedule does not name may have the one where it stands.
 """
 
 from collections.abc import Iterator
@@ -41,16 +44,20 @@ def _granted(memory: Memory, wish: Wish, station: str, now: float, site: Site) -
 
 
 def _free_for(memory: Memory, wish: Wish, now: float, site: Site) -> Iterator[str]:
-    return (s for s in _suiting(memory, wish, site) if _free(memory, s, wish.robot, now, site))
+    return (s for s in suiting(memory, wish, site) if _free(memory, s, wish.robot, now, site))
 
 
-def _suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
+def suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
     """The stations to try, best first: the operator's, the one where it stands, the dedicated one, then
     the YAML's order."""
-    suiting, failed = site.robots[wish.robot], memory.strikes.get(wish.robot, ())
-    untried = [station for station in suiting if station not in failed] or list(suiting)
-    stands_at = site.station_at(memory.place_of(wish.robot))
-    first = (wish.station, stands_at, memory.preferred.get(wish.robot))
+    here = memory.stands_at(wish.robot, site)
+    dedicated = memory.preferred.get(wish.robot)
+    if not memory.alone:
+        scheduled = here or "" if dedicated is None else dedicated
+        return [s for s in dict.fromkeys((wish.station, scheduled)) if s in site.places]
+    suit, failed = site.robots[wish.robot], memory.strikes.get(wish.robot, ())
+    untried = [station for station in suit if station not in failed] or list(suit)
+    first = (wish.station, here, dedicated)
     return sorted(untried, key=lambda s: first.index(s) if s in first else len(first))
 
 
@@ -77,7 +84,7 @@ def in_the_way(
             for who, standing in memory.robots.items()
             if who != robot
             and now < standing.at + REMEMBERED_S
-            and standing.sighting.place == site.places[station]
+            and memory.stands_at(who, site) == station
         ),
         None,
     )

@@ -20,7 +20,7 @@ from bridges.serve import diagnostics
 KINDS: Final = {d.LiftState: "lift", d.DoorState: "door", d.ChargerState: "charger"}
 COORDINATOR: Final = "charger_coordinator"
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
-SECONDS: Final = re.compile(r"\d+(\.\d+)? s\b")
+SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +167,7 @@ class Board:
             yield Row(
                 "coordinator",
                 words.printable(diagnosis.status.name.partition(": ")[0]),
-                "passive: another node assigns chargers" if passive else "assigns chargers",
+                "passive: another coordinator works" if passive else _coordinates(diagnosis),
                 waiting=words.printable(queue),
                 simulated=self._simulated(diagnosis, now),
                 faults=_faults([diagnosis]),
@@ -188,6 +188,14 @@ class Board:
     def _simulated(self, diagnosis: Diagnosis, now: float) -> bool:
         daemon = self._daemon(diagnosis, now)
         return daemon is not None and diagnostics.SIMULATED in daemon.status.message
+
+
+def _coordinates(diagnosis: Diagnosis) -> str:
+    """What the coordinator does, and its schedule."""
+    silent = diagnosis.value("assigns").startswith("no:")
+    does = "asks for chargers that another node assigns" if silent else "assigns chargers"
+    schedule = diagnosis.value("schedule")
+    return words.printable(f"{does}, schedule {schedule}" if schedule else does)
 
 
 def _faults(found: Iterable[Diagnosis]) -> str:

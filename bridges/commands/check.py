@@ -7,7 +7,7 @@ about a file are gathered once (`sheets/told.py`), and printed as text, as JSON 
 import argparse
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -26,6 +26,10 @@ EXIT_CODES = (
 )
 
 
+COORDINATOR = "charger_coordinator"
+NO_COORDINATOR = "this is compared with a charger coordinator's YAML, and no FILE is one"
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `check`."""
     parser.description = f"{parser.description} {EXIT_CODES}."
@@ -37,6 +41,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--building-map",
         metavar="MAP",
         help="compare the names with RMF's: a *.building.yaml, or a navigation graph",
+    )
+    parser.add_argument(
+        "--fleet-config",
+        metavar="CONFIG",
+        action="append",
+        default=[],
+        help="compare a charger coordinator with a fleet adapter's config.yaml; with a navigation"
+        " graph as --building-map the positions too. Once for each fleet",
     )
     parser.add_argument(
         "--several-machines",
@@ -58,6 +70,8 @@ def run(args: argparse.Namespace) -> int:
     except SettingsError as error:
         return _tell([wrong(args.building_map, error.problems)], args)
     right, found = _read(args.files, building)
+    for file in args.fleet_config:
+        found |= _beside_fleet(file, right, found, building)
     together = across([config for config, _ in right.values()], not args.several_machines)
     files = [_with(found[file], together) for file in args.files]
     return _tell(files, args)
@@ -103,12 +117,52 @@ def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Probl
     return [], [f"same names as in {building.file}: {names}"]
 
 
-def _with(file: Told, together: Found) -> Told:
-    """A file's findings, with those from comparing it with the others."""
+def _beside_fleet(
+    file: str,
+    right: Mapping[str, tuple[Config, Told]],
+    found: Mapping[str, Told],
+    building: "BuildingMap | None",
+) -> dict[str, Told]:
+    """What is told of each coordinator, with what was found beside this fleet's configuration."""
+    from bridges.settings.fleet_config import load_fleet
+    from bridges.settings.fleet_names import compared
+
+    ours = {f: config for f, (config, _) in right.items() if config.kind == COORDINATOR}
+    try:
+        fleet = load_fleet(file)
+    except SettingsError as error:
+        first = next(iter(ours or found))
+        return {first: _more(found[first], errors=error.problems)}
+    if not ours:
+        first = next(iter(found))
+        return {first: _more(found[first], errors=[fleet.problem((), NO_COORDINATOR)])}
+    told_of = {}
+    for name, config in ours.items():
+        beside = compared(config, fleet, building)
+        told_of[name] = _more(found[name], beside.errors, beside.warnings, beside.notes)
+    return told_of
+
+
+def _more(
+    file: Told,
+    errors: Sequence[Problem] = (),
+    warnings: Sequence[Problem] = (),
+    notes: Sequence[str] = (),
+) -> Told:
     return msgspec.structs.replace(
         file,
-        errors=[*file.errors, *(p for p in together.errors if p.file == file.file)],
-        warnings=[*file.warnings, *(p for p in together.warnings if p.file == file.file)],
+        errors=[*file.errors, *errors],
+        warnings=[*file.warnings, *warnings],
+        notes=[*file.notes, *notes],
+    )
+
+
+def _with(file: Told, together: Found) -> Told:
+    """A file with what was found about it among the others."""
+    return _more(
+        file,
+        [p for p in together.errors if p.file == file.file],
+        [p for p in together.warnings if p.file == file.file],
     )
 
 

@@ -16,6 +16,7 @@ import msgspec
 
 from bridges.rmf import words
 from bridges.rmf.definitions import Message
+from bridges.rmf.renamed import Renamed
 from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Transport, TransportError
@@ -59,7 +60,8 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
     from bridges.rmf.choose import open_transport
 
     rmf = overridden(_configured(args.config), args)
-    return open_transport(rmf, node_name, localhost=args.localhost, ros_args=args.ros_args)
+    joined = open_transport(rmf, node_name, localhost=args.localhost, ros_args=args.ros_args)
+    return Renamed(joined, rmf.topics) if rmf.topics else joined
 
 
 def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:

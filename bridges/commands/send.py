@@ -201,8 +201,7 @@ class _Exchange:
         self.request, self.out, self.transport = request, out, transport
         self.publishers: dict[str, Publisher[d.Message]] = {}
         self.publisher = self._publisher(request.topic)
-        heard = request.states, topics.DOOR_SUPERVISOR_HEARTBEAT, topics.DIAGNOSTICS
-        self.inbox = Inbox(transport, *heard)
+        self.inbox = Inbox(transport, request.states, *request.answers, topics.DIAGNOSTICS)
         self.supervisor = (
             None
             if request.supervisor is None

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Union
 
 from bridges.core.decision import Decision, M, OperatorReset, R
-from bridges.core.kind import AnyDeviceKind, E, L, Place, S
+from bridges.core.kind import Answer, AnyDeviceKind, E, L, Place, S
 from bridges.core.table import Table
 from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
@@ -21,10 +21,12 @@ class MaySpeak:
     """Whether the core may publish. It may not during the quiet start or while a rival publishes.
 
     `at_once`: during the quiet start what a restart must not interrupt may be sent: no rival is there.
+    `alone`: no other node publishes on a topic of `yields`.
     """
 
     yes: bool
     at_once: bool = False
+    alone: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +45,8 @@ class GraphKind(Generic[S, L, M, E, R]):
     `devices_key`: the YAML's section of its settings. `settings`: the struct that reads it.
     `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
     RequestRefused; `wall` is our clock (s since the epoch).
-    `publishes`: the topics that it sends on. `sole`: those on which only one node may send; while
-    another node does, ours only listens.
+    `publishes`: the topics that it sends on. `sole`: those on which only one node may have a publisher;
+    while another node has one, ours only listens. `yields`: those on which it alone falls silent then.
     `device_name`: which subject a message is about. `shown_by`: the topic on which a subject publishes
     its own states, which proves that it exists (a request may name anything); None if there is only
     one subject. `reserved(settings)`: the subjects that the YAML names.
@@ -56,6 +58,8 @@ class GraphKind(Generic[S, L, M, E, R]):
     `decide`: the core. Its messages have no stamps: `stamped(message, time)` adds them when they are
     sent. `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`:
     may this subject be forgotten?
+    `answer(asked, reason)`: what is said when a request is refused; None for nothing. `asked`: the
+    message if it was refused at once, else the event.
     `on_map(settings)`: which settings name a place on RMF's map (`bridges/core/kind.py`).
 
     For a kind with one message about all its subjects: `together(memories)`, sent each second and
@@ -91,8 +95,10 @@ class GraphKind(Generic[S, L, M, E, R]):
     warnings: Callable[[S], Iterable[tuple[tuple[str, ...], str]]] | None = None
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
     speaks_of: Callable[[S], Iterable[Place]] = lambda settings: ()
+    yields: tuple[Topic[Message], ...] = ()
     shown_by: Topic[Message] | None = None
     reserved: Callable[[S], Collection[str]] = lambda settings: ()
+    answer: Callable[[object, str], Answer | None] = lambda asked, reason: None
     requester: Callable[[E], str] = lambda event: ""
     requesters: Callable[[M], Collection[str]] = lambda memory: ()
 

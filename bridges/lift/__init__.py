@@ -27,7 +27,7 @@ KIND: Kind[
     initial=core.initial,
     decide=core.decide,
     published=core.published,
-    alarm_topics=messages.alarm_topics,
+    publishes=messages.alarm_topics,
     on_map=lambda settings: settings.on_map(),
     state_message=messages.state_message,
     summary=messages.summary,

@@ -243,20 +243,21 @@ def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
 
 
 def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory:
-    """Latch a fire as `fire_reset` says. Forget a rival once it has been silent for RIVAL_QUIET_S."""
+    """Latch a fire as `fire_reset` says, and an alarm until an operator resets. Forget a rival once it
+    has been silent for RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
     manual = limits.fire_reset == "manual"
     rival_at = memory.rival_at
     return replace(
         memory,
         fire_latched=manual and (burning or memory.fire_latched),
-        alarmed=memory.alarmed or burning,
+        alarmed=memory.alarmed or bool(limits.alarm_on & view.hazards),
         rival_at=None if rival_at is None or now >= rival_at + RIVAL_QUIET_S else rival_at,
     )
 
 
 def _alarms(before: bool, memory: Memory, limits: LiftLimits) -> tuple[Said, ...]:
-    """`true` once when a fire alarm comes; `false` once when an operator resets."""
+    """`true` once when a hazard of `alarm_on` comes; `false` once when an operator resets."""
     if memory.alarmed == before or limits.alarm == "none":
         return ()
     if limits.alarm == FIRE_ALARM_TRIGGER.name:

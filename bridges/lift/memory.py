@@ -22,7 +22,8 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """What the core needs of a lift's settings.
 
     `stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations.
-    `debounce`: signal -> s. `by_call`: a call brings AGV mode.
+    `debounce`: signal -> s. `alarm_on`: the hazards that are told on the topic `alarm`. `by_call`: a
+    call brings AGV mode.
     """
 
     stops: Mapping[str, Stop]
@@ -30,6 +31,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     debounce: Mapping[str, float] = {}
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
+    alarm_on: frozenset[Hazard] = frozenset({Hazard.FIRE})
     by_call: bool = False
 
     @classmethod
@@ -41,6 +43,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
             debounce,
             settings.fire_reset,
             settings.alarm,
+            frozenset(map(Hazard, settings.alarm_on)),
             by_call=settings.agv_mode == "by_call",
         )
 

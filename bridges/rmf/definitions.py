@@ -279,6 +279,7 @@ Message = (
     | Alert
     | Bool
     | EmergencySignal
+    | DiagnosticStatus
     | DiagnosticArray
 )
 

@@ -60,9 +60,13 @@ DOOR_SUPERVISOR_HEARTBEAT = Topic("door_supervisor_heartbeat", d.SupervisorHeart
 CHARGER_STATES = Topic("charger_states", d.ChargerState)
 CHARGER_REQUESTS = Topic("charger_requests", d.ChargerRequest)
 CHARGER_CANCELS = Topic("charger_cancels", d.ChargerCancel)
+# Ours: RMF has no message that answers a request.
+CHARGER_REFUSALS = Topic("charger_refusals", d.DiagnosticStatus)
 # Requests to the charger coordinator; RMF has no such topics.
 ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
 ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
+# Nothing is sent on it. Its publisher shows that a coordinator serves the graph: a second one waits.
+CHARGER_COORDINATOR = Topic("charger_coordinator", d.Bool)
 FLEET_STATES = Topic("fleet_states", d.FleetState)
 # rmf_charging_schedule retains it, for fleet adapters that start later.
 CHARGING_ASSIGNMENTS = Topic(

@@ -17,7 +17,7 @@ Named = Callable[[Topic[Message]], Topic[Message]]
 
 
 class Outlet:
-    """Publishers that are declared and withdrawn together.
+    """Publishers that are declared while their node may speak.
 
     Where RMF's release lacks a topic's message, `bridges/rmf/instead.py` says what is sent. An alarm
     and its end take the same way, whatever is learnt of the release between.
@@ -31,10 +31,12 @@ class Outlet:
         self._lock = threading.Lock()
 
     def open(self, topics: Iterable[Topic[Message]]) -> None:
-        """Declare those that are not declared yet and that RMF's release has. Raises TransportError."""
-        for topic in topics:
-            if self._transport.release.has(topic.type):
-                self._end(topic)
+        """Declare these that RMF's release has, and withdraw all others. Raises TransportError."""
+        wanted = {t.name: t for t in topics if self._transport.release.has(t.type)}
+        for name in self._ends.keys() - wanted.keys():
+            self._ends.pop(name).close()
+        for topic in wanted.values():
+            self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> None:
         """Publish. A failure is logged: the next message may get through."""
@@ -65,9 +67,3 @@ class Outlet:
     def heard_by(self) -> dict[str, int]:
         """The number of subscriptions that receive each topic, by the topic's name."""
         return {name: end.matched() for name, end in self._ends.copy().items()}
-
-    def close(self) -> None:
-        """Withdraw every publisher."""
-        for end in self._ends.values():
-            end.close()
-        self._ends.clear()

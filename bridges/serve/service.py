@@ -164,8 +164,8 @@ class Devices:
         return {name: node.status() for name, (node, _) in self._placed.items()}
 
     def _topics(self) -> list[Topic[Message]]:
-        alarms = {t for d in self._config.devices.values() for t in self._kind.alarm_topics(d)}
-        return [self._kind.states, *alarms]
+        others = {t for d in self._config.devices.values() for t in self._kind.publishes(d)}
+        return [self._kind.states, *others]
 
     def _loop(self, bus_name: str, open_bus: OpenBus) -> Loop:
         settings = self._config.buses[bus_name]

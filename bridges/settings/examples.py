@@ -38,6 +38,9 @@ WRITTEN: dict[str, object] = {
     "accept_unsafe": {"fire_alarm": "the panel supervises its own loop"},
     "station": {"MobileErrors.GridError": "the grid supply is not right"},
     "robot": {"MobileErrors.OverTemperature": "the receiver is too hot"},
+    "at_height": "PadStatus.AtHeight",
+    "range_ok": "PadStatus.RangeOk",
+    "temperatures": {"coil": "MobileTerminals.CoilTemperature"},
     "state_words": {"READY": 0, "CHARGING": 2},
     "doors": ["ward_door"],
     "lifts": ["Lift1"],
@@ -60,11 +63,16 @@ def example(struct: type, field: mi.Field) -> str:
     return f"{field.encode_name}: {shown}"
 
 
+def device_yamls() -> list[Path]:
+    """The shipped device YAMLs; `fleet_*.yaml` are configurations of RMF's fleet adapters."""
+    return sorted(f for f in CONFIG.glob("*.yaml") if not f.name.startswith("fleet_"))
+
+
 @functools.cache
 def _shown() -> Found:
     """The shortest value of each struct's field in the shipped files that is not its default."""
     found: Found = {}
-    for file in sorted(CONFIG.glob("*.yaml")):
+    for file in device_yamls():
         config = load(file)
         tops = [config.rmf, *config.buses.values(), *config.devices.values(), config.section]
         for top in tops:

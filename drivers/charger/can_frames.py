@@ -187,7 +187,8 @@ class FrameDriver:
         if self._undiagnosed(meant.activity, values):
             state, *_ = self._map.state_frames()
             values = self._values(self._frames.read_after(state, self._map.error_frames()))
-        found = with_errors(meant, self._errors(values, meant.activity))
+        codes = self._map.state.codes if self._map.state else None
+        found = with_errors(meant, self._errors(values, meant.activity), codes)
         self._seen = True
         return ChargerSample(
             found.activity,
@@ -262,6 +263,11 @@ class FrameDriver:
         position = "" if activity is Activity.ERROR else self._map.out_of_range
         return self._map.errors.found(lambda at: 0 if at == position else values.get(at))
 
+    def _valid(self, signal: str, value: float) -> bool:
+        """The DBC file's [min|max]: a value outside is no reading."""
+        low, high = self._dbc.bounds(*signal.split("."))
+        return low <= value <= high
+
     def _measured(self, values: dict[str, float]) -> Measured:
         found = self._map
         receiver = values.get(found.receiver or "")
@@ -269,22 +275,30 @@ class FrameDriver:
         return Measured(
             receiver_id=_receiver(receiver),
             in_range=None if out is None else not out,
+            range_ok=_flag(values, found.range_ok),
+            at_height=_flag(values, found.at_height),
             volts=_rounded(values.get(found.volts or "")),
             amps=_rounded(values.get(found.amps or "")),
+            temperatures=tuple(
+                (name, round(values[signal], 3))
+                for name, signal in found.temperatures.items()
+                if signal in values and self._valid(signal, values[signal])
+            ),
         )
 
 
 def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
-    """The frames to receive. A reading needs those of the state and the receiver."""
+    """The frames to receive. A reading needs those of the state and of the pad."""
     state = found.state_frames()
-    receiver = (found.receiver or "").split(".")[0]
+    pad = (found.receiver, found.range_ok, found.at_height)
+    needed = {*state, *(signal.split(".")[0] for signal in pad if signal)}
     return {
         name: Said(
             id=frames.id(name),
             mask=found.masks.get(name, 0x1FFF_FFFF),
             length=frames.length(name),
             fresh_s=found.state_timeout_s if name in state else found.others_timeout_s,
-            needed=name in {*state, receiver},
+            needed=name in needed,
         )
         for name in found.frames()
     }
@@ -294,6 +308,11 @@ def _heard(values: Mapping[str, float], signal: str) -> float:
     if signal not in values:
         raise DriverError(f"{signal} is not heard, and a rule looks at it")
     return values[signal]
+
+
+def _flag(values: Mapping[str, float], signal: str | None) -> bool | None:
+    """None where the map has no such signal."""
+    return None if signal is None else bool(values[signal])
 
 
 def _receiver(number: float | None) -> str | None:

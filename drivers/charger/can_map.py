@@ -85,6 +85,10 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     `receiver`: the receiver's id as a number; 0 is none. Without its frame there is no reading.
     `out_of_range`: not 0 while the robot stands where it cannot be charged. If it is in `errors` too,
     it counts as an error only in an error state: a robot that has not arrived yet is no error.
+    `range_ok`: not 0 while the robot stands where it can be charged, if the charger says so all the
+    time. `at_height`: not 0 while a pad that the charger moves is where it charges. While one of these
+    is 0 there is no power; without their frames there is no reading.
+    `temperatures`: name -> the signal of a temperature (°C), shown in status and diagnostics.
     `rules`: derive the state from other signals; tried before its codes.
     `errors`: signals that mean an error, whatever the state is.
     `send`: the frames that the driver sends.
@@ -99,6 +103,9 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     amps: Signal | None = None
     receiver: Signal | None = None
     out_of_range: Signal | None = None
+    range_ok: Signal | None = None
+    at_height: Signal | None = None
+    temperatures: dict[Name, Signal] = msgspec.field(default_factory=dict)
     rules: list[Rule] = msgspec.field(default_factory=list)
     errors: Errors = Errors()
     send: Annotated[list[Sent], msgspec.Meta(min_length=1)]
@@ -127,9 +134,11 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """Each signal that is read: (where in the map, Frame.Signal)."""
         if self.state:
             yield ("state", "at"), self.state.at
-        for key in ("volts", "amps", "receiver", "out_of_range"):
+        for key in ("volts", "amps", "receiver", "out_of_range", "range_ok", "at_height"):
             if signal := getattr(self, key):
                 yield (key,), signal
+        for name, signal in self.temperatures.items():
+            yield ("temperatures", name), signal
         for path, signal in self.errors.places():
             yield ("errors", *path), signal
         for path, signal in by_rules.places(self.rules):
@@ -171,7 +180,8 @@ def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
     for path, signal in found.signals():
         at = named(frames.id(signal.split(".")[0]))
         if path[0] not in ("errors", "rules"):
-            yield path[0], f"{signal} ({at})"
+            what = f"temperature {path[1]}" if path[0] == "temperatures" else path[0]
+            yield what, f"{signal} ({at})"
         elif path[1] in ("station", "robot"):
             text = getattr(found.errors, path[1])[signal]
             yield f"{path[1]}'s error", f"{signal} ({at}): {text}"
@@ -234,7 +244,7 @@ def _values(found: FrameMap, path: tuple[str, ...]) -> Iterator[tuple[float, str
         yield _SAMPLES.get(path[0], 1.0), ""
 
 
-_SAMPLES: Final = {"volts": 25.8, "amps": 12.9, "receiver": 4711.0}
+_SAMPLES: Final = {"volts": 25.8, "amps": 12.9, "receiver": 4711.0, "temperatures": 20.0}
 
 
 def _physical(frames: dbc.Dbc, frame: str, signal: str, value: float) -> str:

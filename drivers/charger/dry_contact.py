@@ -11,7 +11,7 @@ from typing import Final
 import msgspec
 
 from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
 from bridges.core.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
@@ -21,6 +21,8 @@ from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
 CUT_MUST_READ: Final = {
     "fault": (True, "a fault of the station is not seen"),
     "ready": (False, "a station that is not ready reads ready"),
+    "at_height": (False, "a pad that is down reads at its height, and is energised"),
+    "range_ok": (False, "a robot that stands badly reads in range, and is energised"),
 }
 """Signal -> (the level that a cut wire must read as, what goes wrong if it does not)."""
 ENABLE: Final = "enable"
@@ -33,11 +35,16 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     `charging`: current flows, also while it ramps down.
     `ready`: the station can charge the next robot; without this contact it always counts as ready.
     `fault`: the station is out of order.
+    `at_height`: the pad, which the station moves, is where it charges. Without it there is no power; it
+    is a fault if it is lost while current flows.
+    `range_ok`: the robot stands where it can be charged. Without it there is no power.
     """
 
     charging: Input
     ready: Input | None = None
     fault: Input | None = None
+    at_height: Input | None = None
+    range_ok: Input | None = None
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -164,7 +171,8 @@ def decode(shown: Mapping[str, bool], enabled: bool) -> ChargerSample:
     elif enabled:
         activity = Activity.HANDSHAKE
     on = [signal for signal, asserted in shown.items() if asserted]
-    return ChargerSample(activity, "+".join(on) or "no contact", text, side=side)
+    pad = Measured(range_ok=shown.get("range_ok"), at_height=shown.get("at_height"))
+    return ChargerSample(activity, "+".join(on) or "no contact", text, pad, side=side)
 
 
 DRIVER = DriverType(

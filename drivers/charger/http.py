@@ -27,7 +27,7 @@ from drivers import json_fields
 from drivers.charger import rules
 from drivers.charger.http_fields import Fields, Word
 from drivers.charger.rules import Errors, Rule, judged
-from drivers.charger.state_codes import Code, Codes, first_side
+from drivers.charger.state_codes import Code, Codes
 from drivers.driver_type import DriverType
 from drivers.hal import http
 from drivers.http_call import Call, Calls, claim, send, timer_unseen, told
@@ -212,8 +212,8 @@ class HttpCharger:
         fields = self._settings.fields
         has_codes = self._settings.codes is not None
         code = fields.code(answer, self._settings.state_words) if has_codes else None
-        found = judged(self._settings, lambda at: json_fields.needed(answer, at), code)
-        said, text_side = fields.error(answer)
+        said, side = fields.error(answer)
+        found = judged(self._settings, lambda at: json_fields.needed(answer, at), code, side)
         shown = Activity.ERROR if said else found.activity
         self._activity, self._at_fault = found.does, shown in AT_FAULT
         return ChargerSample(
@@ -221,7 +221,7 @@ class HttpCharger:
             found.code,
             "; ".join(filter(None, (found.text, said))),
             fields.measured(answer),
-            first_side((found.side, text_side)),
+            found.side,
             charges=shown is Activity.ERROR and found.does is Activity.CHARGING,
         )
 

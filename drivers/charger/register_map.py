@@ -16,7 +16,7 @@ from drivers.profiles import Profile
 Problems = Iterator[tuple[tuple[str, ...], str]]
 Bit = Annotated[int, msgspec.Meta(ge=0, le=31)]
 MEASURED: Final = ("volts", "amps", "battery_percent", "time_to_full_s")
-KNOWN: Final = ("state", "receiver", "in_range", *MEASURED)
+KNOWN: Final = ("state", "receiver", "in_range", "range_ok", "at_height", *MEASURED)
 """The values whose names have a meaning of their own."""
 
 
@@ -124,8 +124,10 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
     `values`: name -> its place. `state` is the number that `codes` lists; `volts`, `amps`,
     `battery_percent` and `time_to_full_s` are shown; `receiver` is the id of the receiver that it sees,
-    0 for none; `in_range` is not 0 while a robot stands where it can be charged. Rules and errors may
-    use any name.
+    0 for none; `in_range` is not 0 while a robot stands where it can be charged. `range_ok` is the same
+    where the station needs no check for it, and `at_height` is not 0 while a pad that it moves is where
+    it charges: while one of these is 0 there is no power. Rules and errors may use any name.
+    `temperatures`: name -> the value that is this temperature (°C), shown in status and diagnostics.
     `codes`: what the numbers of `state` mean; not needed with `rules`.
     `rules`: derive the state from other values; tried before `codes`. Their places are names of
     `values`.
@@ -138,6 +140,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     values: Annotated[dict[Name, Number], msgspec.Meta(min_length=1)]
     codes: Codes | None = None
     rules: list[Rule] = msgspec.field(default_factory=list)
+    temperatures: dict[Name, Name] = msgspec.field(default_factory=dict)
     errors: Errors = Errors()
     power: Power | None = None
     clear_error: Order | None = None
@@ -150,6 +153,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
             yield ("values",), "needs 'state', of which codes speaks"
         looked_at = [(("rules", *path), at) for path, at in by_rules.places(self.rules)]
         looked_at += [(("errors", *path), at) for path, at in self.errors.places()]
+        looked_at += [(("temperatures", name), at) for name, at in self.temperatures.items()]
         for path, name in looked_at:
             if name not in self.values:
                 yield path, unknown("value", name, list(self.values))

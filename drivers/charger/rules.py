@@ -222,14 +222,14 @@ class Judged:
         return self.activity is Activity.ERROR and self.does is Activity.CHARGING
 
 
-def judged(station: "Station", read: Read, code: int | str | None) -> Judged:
-    """The state from rules, codes and errors. `code`: the maker's state, if there are codes.
+def judged(station: "Station", read: Read, code: int | str | None, told: FaultSide = "") -> Judged:
+    """The state from rules, codes and errors.
 
+    `code`: the maker's state, if there are codes. `told`: whose fault it is by the station's own text.
     An entry of `errors` makes it an error, whatever the state is. Raises DriverError.
     """
-    return with_errors(
-        meaning(station.rules, station.codes, read, code), station.errors.found(read)
-    )
+    meant = meaning(station.rules, station.codes, read, code)
+    return with_errors(meant, station.errors.found(read), station.codes, told)
 
 
 class Meant(NamedTuple):
@@ -251,11 +251,15 @@ def meaning(rules: list[Rule], codes: Codes | None, read: Read, code: int | str 
     return Meant(*UNKNOWN, "of no rule")
 
 
-def with_errors(meant: Meant, errors: Found) -> Judged:
-    """The state with what is wrong."""
+def with_errors(
+    meant: Meant, errors: Found, codes: Codes | None = None, told: FaultSide = ""
+) -> Judged:
+    """The state with what is wrong. `told`: the side of an error that is told in words."""
     wrong: Found = [(meant.side, meant.text), *errors] if meant.text else errors
     shown = Activity.ERROR if wrong else meant.activity
-    side = first_side([meant.side, *(whose for whose, _ in wrong)])
+    side = first_side([meant.side, told, *(whose for whose, _ in wrong)])
+    if codes is not None:
+        side = side or codes.unnamed_side(meant.code)
     return Judged(shown, side, meant.code, said(wrong), meant.activity)
 
 

@@ -4,6 +4,7 @@ The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 """
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from drivers.driver_type import DriverType
@@ -50,7 +51,7 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
 
 def notes(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
     """Choices that the site makes and should know of: (path below the device, text)."""
-    return lift_checks.notes(settings, lift_checks.sees_fire(settings))
+    return lift_checks.notes(settings, partial(lift_checks.sees, settings))
 
 
 def debounce(settings: Settings) -> Mapping[str, float]:

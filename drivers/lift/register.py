@@ -36,6 +36,7 @@ class Settings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         """Problems that involve more than one field."""
         levels, commands = self.levels(), self.map.commands
         yield from checks.floors(self)
+        yield from checks.alarm(self)
         landings = set(self.map.floor.codes.values())
         yield from checks.named("code", ("map", "floor", "codes"), landings, levels)
         if commands.call:
@@ -72,6 +73,7 @@ def warnings(settings: Settings) -> Problems:
     fire, told = found.shows(Hazard.FIRE), found.shows("agv_mode")
     asks, holds = bool(commands.agv_mode_request), bool(commands.door_open)
     yield from checks.missing(settings, ("map",), told, asks, fire, holds)
+    yield from checks.unseen(settings, found.shows)
     if not commands.read_back:
         text = "commands cannot be read back: that they are off is not verified"
         yield ("map", "commands", "read_back"), text
@@ -79,7 +81,7 @@ def warnings(settings: Settings) -> Problems:
 
 def notes(settings: Settings) -> Problems:
     """Choices that the site makes and should know of: (path below the device, text)."""
-    return checks.notes(settings, settings.map.shows(Hazard.FIRE))
+    return checks.notes(settings, settings.map.shows)
 
 
 def debounce(settings: Settings) -> Mapping[str, float]:

@@ -128,6 +128,14 @@ class FrameCharger:
                 said[signal] = round(value, 1)
         for signal in (*known.errors.station, *known.errors.robot):
             said[signal] = float(signal.split(".")[1] in shown)
+        for signal in known.temperatures.values():
+            said[signal] = round(reading.coil_c)
+        for flag, holds in (
+            (known.range_ok, reading.in_range),
+            (known.at_height, reading.at_height),
+        ):
+            if flag:
+                said[flag] = float(holds)
         if known.out_of_range:
             said[known.out_of_range] = float(reading.robot and not reading.in_range)
         return said | self._by_rules(reading, said, wrong)

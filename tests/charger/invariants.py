@@ -72,6 +72,8 @@ def power_has_a_reason(step: Step) -> None:
         assert not step.ledger.out
         assert step.seen
         assert step.seen.activity not in BAD
+        assert step.seen.measured.at_height is not False
+        assert step.seen.measured.range_ok is not False
         assert shown.state is not State.CHARGER_RELEASED
     if power is None and _sighted(step):
         assert step.seen

@@ -91,8 +91,9 @@ def test_from_every_state_a_sound_station_comes_back_and_charges_who_asks(site: 
 def _mended(world: World, limits: ChargerLimits) -> World:
     """The pad is clear, all answers, nothing is wrong, and an operator resets what is latched."""
     world = replace(world, readable=True, writable=True)
-    steps = ("idle", "the pad is clear", "in range", "A cancels", "B cancels", 32.0, "reset", 4.0)
-    return walker(limits).path(world, *steps, seen=check)
+    steps = ("idle", "the pad is clear", "in range", "gap right", "pad at height")
+    then = ("A cancels", "B cancels", 32.0, "reset", 4.0)
+    return walker(limits).path(world, *steps, *then, seen=check)
 
 
 def _charged(world: World, limits: ChargerLimits) -> World:

@@ -129,7 +129,7 @@ class Ledger:
         for name, node in self.nodes.items():
             self.hears(node.shown(name))
         for who, wants in self.wants.items():
-            sighting = Sighting(who, wants, SITE.waits_at[who], 40.0, "task" if wants else "")
+            sighting = Sighting(who, wants, SITE.waits_at[who], 40.0, "task" if wants else "work")
             self.hears(FleetSeen((sighting,)))
         self.hears(Woken())
 

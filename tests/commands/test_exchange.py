@@ -3,8 +3,10 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import msgspec
 import pytest
 
+from bridges.charger.refusals import Refusal
 from bridges.commands.exchange import step
 from bridges.commands.graph import CommandLine, Heard
 from bridges.commands.requests import Done, Failed, Request, Seen
@@ -362,6 +364,43 @@ def test_a_charger_that_shows_our_request_has_taken_it(state: int) -> None:
 )
 def test_a_charger_that_does_not_serve_us_says_why(state: d.ChargerState, reason: str) -> None:
     assert tell(CHARGE, every_second(state)).outcome == Failed(reason)
+
+
+REFUSAL = Refusal(
+    request_id="r1",
+    charger="a",
+    robot="fleet/robot",
+    reason="charger occupied",
+    state="CHARGING",
+    held_by="fleet/other",
+    held_request="r0",
+)
+
+
+def test_a_refusal_ends_the_command_at_once_and_says_who_has_the_charger() -> None:
+    busy = replace(CHARGER, state=3, request_id="r0")
+    others = msgspec.structs.replace(REFUSAL, request_id="r7")
+    told = tell(CHARGE, [(0.5, busy), (0.6, others.message()), (0.7, REFUSAL.message())])
+    text = (
+        "a refuses the request: charger occupied: fleet/other has it (request r0);"
+        " to cancel that: rmf-bridge send charger a --cancel r0"
+    )
+    assert (told.outcome, told.at) == (Failed(text), 0.7)
+
+
+def test_a_refusal_that_a_cancel_would_not_help_proposes_none() -> None:
+    unknown = msgspec.structs.replace(REFUSAL, reason="robot has no receiver here")
+    told = tell(CHARGE, [(0.5, CHARGER), (0.7, unknown.message())])
+    text = "a refuses the request: robot has no receiver here: fleet/other has it (request r0)"
+    assert told.outcome == Failed(text)
+
+
+def test_a_refusal_of_a_charger_that_nobody_has_names_its_error() -> None:
+    hot = msgspec.structs.replace(
+        REFUSAL, reason="charger in error", held_by="", held_request="", error="station: hot"
+    )
+    told = tell(CHARGE, [(0.5, CHARGER), (0.7, hot.message())])
+    assert told.outcome == Failed("a refuses the request: charger in error: station: hot")
 
 
 @pytest.mark.parametrize("after", [CHARGER, replace(CHARGER, state=4, request_id="r1")])

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import pytest
 from msgspec.structs import replace as replace_struct
 
+from bridges.charger.refusals import Refusal
 from bridges.cli import main
 from bridges.commands import send, watch
 from bridges.commands.graph import add_graph_arguments, overridden
@@ -27,6 +28,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.choose import open_transport
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.renamed import Renamed
 from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
@@ -122,6 +124,47 @@ def test_a_request_reaches_the_device_once_and_its_effect_ends_the_command(
         *("state", "request", "state", "done")
     ]
     assert len(device.requests) == 1
+
+
+def test_a_refused_request_for_a_charger_ends_with_who_has_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    class Refusing(Device):
+        def _obey(self, request: Any) -> None:
+            refusal = Refusal(
+                request_id=request.request_id,
+                charger="a",
+                robot="fleet/robot",
+                reason="charger occupied",
+                held_by="fleet/other",
+                held_request="r1",
+            )
+            MemoryTransport(self.network, "charger").publisher(topics.CHARGER_REFUSALS).publish(
+                refusal.message()
+            )
+
+    device = Refusing(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, BUSY)
+    wanted = Charge("a", "fleet", "robot", "r2", 30)
+    assert send.send(Told(device), wanted, 60.0, io.StringIO()) == 1
+    assert capsys.readouterr().err == (
+        "rmf-bridge send: a refuses the request: charger occupied: fleet/other has it"
+        " (request r1); to cancel that: rmf-bridge send charger a --cancel r1\n"
+    )
+
+
+def test_send_and_watch_use_the_topic_names_of_the_sites_yaml() -> None:
+    network = MemoryNetwork()
+    singular = {"charger_states": "charger_state", "charger_requests": "charger_request"}
+    ours = Renamed(MemoryTransport(network, "command"), singular)
+    site = MemoryTransport(network, "site")
+    asked: list[Any] = []
+    site.subscribe(topics.CHARGER_REQUESTS.named("charger_request"), asked.append)
+    heard: list[Any] = []
+    ours.subscribe(topics.CHARGER_STATES, heard.append)
+    site.publisher(topics.CHARGER_STATES.named("charger_state")).publish(CHARGER)
+    request = d.ChargerRequest("a", "fleet", "robot", d.Duration(30), "r1")
+    ours.publisher(topics.CHARGER_REQUESTS).publish(request)
+    assert (heard, asked, ours.lives) == ([CHARGER], [request], True)
 
 
 def test_a_request_carries_the_time_at_which_it_was_sent() -> None:

@@ -273,6 +273,12 @@ def test_the_coordinator_has_a_row_with_its_queue_its_faults_and_whether_it_assi
         faults="STATION_SILENT (b: no ChargerState comes)",
     )
     assert board(told(passive=False)).rows(100.0, WALL) == [row]
-    passive = replace(row, state="passive: another node assigns chargers")
+    passive = replace(row, state="passive: another coordinator works")
     assert board(told(passive=True)).rows(100.0, WALL) == [passive]
+    site["assigns"] = "no: another node publishes charging_assignments"
+    site["schedule"] = "22:00-05:00 tiny to 98 %: under way"
+    beside = (
+        "asks for chargers that another node assigns, schedule 22:00-05:00 tiny to 98 %: under way"
+    )
+    assert board(told(passive=False)).rows(100.0, WALL) == [replace(row, state=beside)]
     assert board(told(passive=False)).rows(104.0, WALL) == []

@@ -195,6 +195,7 @@ class Story:
         debounce: dict[str, float] | None = None,
         fire_reset: Any = "auto",
         alarm: Any = "none",
+        alarm_on: Any = ("fire_alarm",),
         agv_mode: Any = "requested",
         kind: AnyDeviceKind = KIND,
         **limits: Any,
@@ -205,6 +206,7 @@ class Story:
             limits=Durations(**limits),
             fire_reset=fire_reset,
             alarm=alarm,
+            alarm_on=list(alarm_on),
             agv_mode=agv_mode,
         )
         self.limits = LiftLimits.of(self.settings, DEBOUNCE if debounce is None else debounce)

@@ -147,6 +147,7 @@ def test_a_navigation_graph_is_read_down_to_its_names() -> None:
             "waypoint": {"pad_a": 7, "pharmacy": 8},
         },
         {"Lift1": {"L1": 3, "L2": 10}},
+        {"pad_a": ("L1", 1.5, -2.0), "pharmacy": ("L1", 3.0, -4.0)},
     )
 
 

@@ -61,7 +61,7 @@ class DeviceDaemon:
         """A new one: nothing remembered."""
         device, kind = self.device, self.device.kind
         self._place = Place(self._air, self.name, lambda: None)
-        topics = [kind.states, *kind.alarm_topics(device.settings)]
+        topics = [kind.states, *kind.publishes(device.settings)]
         self._publishers = {topic.name: self._place.publisher(topic) for topic in topics}
         limits = kind.limits(device.settings, device.debounce)
         clock = Clock(

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from typing import ClassVar, NamedTuple, TypeVar
 
+from bridges.charger.refusals import Refusal, read
 from bridges.commands.graph import CommandLine, Heard
 from bridges.rmf import words
-from bridges.rmf.definitions import Message, SupervisorHeartbeat
+from bridges.rmf.definitions import DiagnosticStatus, Message, SupervisorHeartbeat
 from bridges.rmf.topics import AnyTopic
 
 State = TypeVar("State", bound=words.Stated)
@@ -26,7 +27,7 @@ class Seen:
     `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
     request, in order. `names`: every device of the kind that was heard. `heartbeat`: the latest of the
     door supervisor. `boarded`: what the lift's diagnostics say of a robot inside, "yes" or "no"; "" if
-    they were not heard.
+    they were not heard. `refusals`: those of chargers, after our first request.
     """
 
     began_at: float
@@ -38,12 +39,16 @@ class Seen:
     names: frozenset[str] = frozenset()
     heartbeat: Heard[SupervisorHeartbeat] | None = None
     boarded: str = ""
+    refusals: tuple[Refusal, ...] = ()
 
     def hears(self, heard: Heard[Message], about: Callable[[words.Stated], bool]) -> "Seen":
         """Take a message that was heard. `about(state)`: does the state concern the request?"""
         message = heard.message
         if isinstance(message, SupervisorHeartbeat):
             return replace(self, heartbeat=Heard(message, heard.at))
+        if isinstance(message, DiagnosticStatus):
+            refusal = read(message) if self.first_sent_at is not None else None
+            return replace(self, refusals=(*self.refusals, refusal)) if refusal else self
         if not isinstance(message, words.Stated):
             return self
         states = (*self.states, Heard(message, heard.at)) if about(message) else self.states
@@ -102,7 +107,10 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Request(ABC):
-    """A request about the device of this `name`: to its daemon if `direct`, else to the supervisor."""
+    """A request about the device of this `name`: to its daemon if `direct`, else to the supervisor.
+
+    `answers`: topics that are heard beside the states.
+    """
 
     name: str
     direct: bool = field(default=False, kw_only=True)
@@ -113,6 +121,7 @@ class Request(ABC):
     own: ClassVar[AnyTopic]
     adapter: ClassVar[AnyTopic | None] = None
     listener: ClassVar[str] = ""
+    answers: ClassVar[tuple[AnyTopic, ...]] = ()
 
     @property
     def topic(self) -> AnyTopic:

@@ -22,6 +22,7 @@ class DoorMove(Request):
     kind = "door"
     states, own = topics.DOOR_STATES, topics.DOOR_REQUESTS
     adapter = topics.ADAPTER_DOOR_REQUESTS
+    answers = (topics.DOOR_SUPERVISOR_HEARTBEAT,)
 
     @property
     def mode(self) -> d.DoorModeValue:

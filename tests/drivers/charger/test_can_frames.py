@@ -19,6 +19,7 @@ from bridges.charger.signals import (
 )
 from bridges.core.decision import Sampled
 from bridges.settings.load import SettingsError, load
+from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_frames import (
     DRIVER,
@@ -111,6 +112,37 @@ def test_published_temperatures_are_scaled() -> None:
     assert found == {"HeatsinkTemperature": 24.5}
     found = frames.decode("StationStatus", bytes.fromhex("0000000000005a00"))
     assert found == {"GridVoltage": 230.4}
+
+
+def test_the_temperatures_of_the_map_are_read_and_one_without_a_reading_is_left_out(
+    charger: Charger,
+) -> None:
+    charger.status()
+    charger.says(0x1FFD0102, "0000000056000000")  # 0x56 is 24.5 degrees
+    charger.says(0x1FFD0103, "00ff000000000000")  # 0xFF is no reading
+    assert charger.driver.read().measured.temperatures == (("heatsink", 24.5),)
+    charger.status()
+    charger.says(0x1FFD0103, "0060000000000000")
+    assert charger.driver.read().measured.temperatures == (("heatsink", 24.5), ("coil", 32.0))
+
+
+def test_height_and_range_are_signals_of_the_map_and_without_them_there_is_no_reading() -> None:
+    charger = Charger()
+    pad = {"range_ok": "MobileErrors.FanSlow", "at_height": "MobileErrors.GridDerating"}
+    found = msgspec.structs.replace(PROFILE.load("wiferion"), **pad)
+    charger.driver = create("c", Settings(map=found, setpoints=SETPOINTS), charger.bus)
+    charger.bus.take()
+    charger.status()
+    with pytest.raises(DriverError, match="MobileErrors"):
+        charger.driver.read()
+    seen = []
+    for payload in ("0000000000000000", "0000000000000001", "0000000000000021"):
+        charger.status()
+        charger.says(0x1FFD0104, payload)
+        measured = charger.driver.read().measured
+        seen.append((measured.at_height, measured.range_ok))
+    assert seen == [(False, False), (False, True), (True, True)]
+    charger.bus.close()
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,15 @@ from tests.settings.reading import changed, texts_of
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_register.yaml"
 SETTINGS: Settings = load(EXAMPLE).devices["charger_f"]
-WELL = {"state": 0.0, "fault": 0.0, "flags": 0.0, "volts": 48.5, "amps": 0.0, "in_range": 1.0}
+WELL = {
+    "state": 0.0,
+    "fault": 0.0,
+    "flags": 0.0,
+    "volts": 48.5,
+    "amps": 0.0,
+    "in_range": 1.0,
+    "coil": 31.0,
+}
 
 
 @pytest.mark.parametrize(
@@ -67,7 +75,7 @@ def test_what_it_measures_is_told() -> None:
     assert SETTINGS.map
     values = {**WELL, "receiver": 4711.0}
     assert decode(SETTINGS.map, values) == ChargerSample(
-        Activity.IDLE, 0, measured=Measured("4711", True, 48.5, 0.0)
+        Activity.IDLE, 0, measured=Measured("4711", True, 48.5, 0.0, temperatures=(("coil", 31.0),))
     )
     assert decode(SETTINGS.map, {**WELL, "receiver": 0}).measured.receiver_id == ""
 
@@ -139,4 +147,5 @@ def test_each_value_is_told_by_what_its_registers_hold() -> None:
         ("amps", "unit 3 input register 4", "0x050A", "12.9 A"),
         ("in_range", "unit 3 discrete input 0", "0", "0"),
         ("in_range", "unit 3 discrete input 0", "1", "1"),
+        ("coil", "unit 3 input register 5", "0x0001", "1"),
     )
