@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridges.commands.doctoring.answers import numbers, ranges, readings, unarmed
+from bridges.settings.examples import device_yamls
 from bridges.settings.load import load
 from hal_fakes.simulate import Simulation
 from tests.waiting import wait_until
@@ -14,7 +15,7 @@ from tests.waiting import wait_until
 CONFIG = Path(__file__).parents[3] / "config"
 ASKED = sorted(
     path.name
-    for path in CONFIG.glob("*.yaml")
+    for path in device_yamls()
     if {"modbus", "http", "can"} & set(load(path).bus_types.values())
 )
 
