@@ -10,13 +10,13 @@ export PYTHONDONTWRITEBYTECODE :=
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
-	@echo "make demo-charging  three robots, two chargers and their coordinator: five situations, one minute"
+	@echo "make demo-charging  two fleets, two chargers and their coordinator: the scenarios by number, 100 s"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
 	@echo "make deep    all tests, every walk to its full depth: some minutes more"
 	@echo "make test-ros  the tests that need ROS 2, in a shell that has sourced its setup file"
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
-	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again"
+	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make man     the manual page, build/rmf-bridge.1"
@@ -39,8 +39,9 @@ demo-charging: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo charging
 
 # Many tests wait for a process or a wire: more of them than there are cores run side by side.
-# What was waited for on a wire and never came is tried again, and said; every other failure counts at once.
-SIDE_BY_SIDE := -n 8 --dist load --maxschedchunk 2 --reruns 2 --only-rerun 'never happened'
+# Each test goes to the next free worker, in the order of conftest.py: long ones first. Tests that share a
+# process stay together (mark xdist_group).
+SIDE_BY_SIDE := -n 8 --dist loadgroup --no-loadscope-reorder
 test: .venv/ready lint
 	$(BIN)/pytest $(SIDE_BY_SIDE)
 
@@ -90,7 +91,7 @@ flood: .venv/ready
 
 # Without SEED one is drawn, and printed.
 soak: .venv/ready
-	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED))
+	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED)) $(if $(RMF),--rmf $(RMF))
 
 torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))

@@ -4,9 +4,9 @@ import signal
 import sys
 import threading
 
-from bridges.core.fields import Rmf
 from bridges.rmf.choose import open_transport
 from bridges.rmf.definitions import LiftRequest, LiftState
+from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 from hal_fakes.wire import Wire
 

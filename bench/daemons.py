@@ -15,8 +15,8 @@ from typing import Any
 import yaml
 
 from bench.figures import Row
-from bridges.core.fields import Rmf
 from bridges.rmf.choose import open_transport
+from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport
 from hal_fakes.wire import Wire
 

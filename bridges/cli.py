@@ -32,6 +32,10 @@ COMMANDS = {
         "show every daemon on this machine: state, faults and what to do",
         "status --json",
     ),
+    "doctor": (
+        "look for what keeps a bridge from working on this machine; nothing is switched",
+        "doctor my_lift.yaml --scan",
+    ),
     "send": (
         "send a request as RMF does, and wait for its effect",
         "send lift Lift1 L3 --session me --direct --localhost",

@@ -34,7 +34,7 @@ class DriverType(Generic[Settings, Sample, Outputs]):
     `describe(settings, bus's settings)`: rows for `check` (what, meaning) if there are no wires.
     `tables(settings)`: codes, pulses and frames, for `check` (`bridges/core/table.py`).
     `claims(settings)`: (place, path) of each place, besides the wires', that no other device may use.
-    `warnings(settings)`: (path, text) of valid settings that deserve a second look.
+    `warnings(settings)`: (path, text) of valid settings that may be a mistake.
     `notes(settings)`: (path, text) of settings that a site may want, and should know about.
     `unwired(settings)`: signals without a wire that `accept_unsafe` may name too.
     `fake`: the name of the module that stands in for the hardware in `run --simulate`

@@ -1,5 +1,6 @@
 """Commands over HTTP: their settings in the YAML, and how a driver sends them."""
 
+import re
 from collections.abc import Iterable
 from typing import Annotated, Protocol
 
@@ -51,6 +52,17 @@ def send(bus: Calls, call: Call | None, safe: bool = False) -> None:
     """Send this command; None sends nothing. Raises HalError."""
     if call:
         bus.send(call.path, call.method, call.body, safe)
+
+
+def claim(call: Call) -> str:
+    """The command as a claim: what no other device of this bus may send."""
+    return f"{call.method} {call.path}{f' {call.body}' if call.body else ''}"
+
+
+def timer_unseen(call: Call, off_s: float) -> bool:
+    """Is the relay's timer (s) no number of this command? In seconds, or in ms."""
+    numbers = re.findall(r"[0-9]+(?:\.[0-9]+)?", f"{call.path} {call.body or ''}")
+    return not {off_s, 1000 * off_s}.intersection(map(float, numbers))
 
 
 def told(call: Call, api: http.Base) -> str:

@@ -80,5 +80,8 @@ def _near(test: Test) -> Iterator[Value]:
     for limit in (test.above, test.below):
         if limit is not None:
             yield from (limit + 1, limit - 1, limit)
+    numbers = [n for n in test.one_of if isinstance(n, int | float) and not isinstance(n, bool)]
+    if numbers:
+        yield max(numbers) + 1
     if any(isinstance(value, bool) for value in test.one_of):
         yield from (True, False)

@@ -6,6 +6,7 @@ AF_UNIX, lines of text, words with spaces in quotes. Each line is answered `ok` 
   `{"at": s monotonic, "device": …, "what": "relay"|"sensor", "signal": …, "value": …}`
 - `fail DEVICE PART MODE`: a wire or part fails (`off`, `stuck`, `slow`, `garbage`, `wrong`); `ok` mends
 - `press DEVICE SIGNAL on|off`: a person or the building acts
+- `names`: answered with a line of JSON, `{DEVICE: {"press": [SIGNAL, …], "fail": [PART, …]}}`
 """
 
 import contextlib
@@ -79,7 +80,10 @@ class Control:
         words: list[str] = []
         try:
             words = shlex.split(line)
-            self._obey(words)
+            if words == ["names"]:
+                answer = json.dumps({name: plant.names() for name, plant in self._plants.items()})
+            else:
+                self._obey(words)
         except ValueError as error:
             answer = f"error {error}"
         with self._lock:
@@ -98,8 +102,8 @@ class Control:
                 self._plant(device).press(signal, how == "on", time.monotonic())
             case _:
                 raise ValueError(
-                    "not understood; say: follow | fail DEVICE PART off|stuck|slow|garbage|wrong|ok"
-                    " | press DEVICE SIGNAL on|off"
+                    "not understood; say: follow | names | fail DEVICE PART"
+                    " off|stuck|slow|garbage|wrong|ok | press DEVICE SIGNAL on|off"
                 )
 
     def _plant(self, device: str) -> Plant:

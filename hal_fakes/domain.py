@@ -1,5 +1,6 @@
 """A ROS domain that nobody on this machine uses, on DDS or zenoh, for the demo and the tests."""
 
+import atexit
 import random
 import socket
 from collections.abc import Iterator
@@ -13,17 +14,13 @@ DOMAINS: Final = range(10, 70)
 CLAIM: Final = "\0rmf-bridges-test-domain-{}"
 
 
-_kept: Final[list[socket.socket]] = []
-"""The claims of this process, kept until it ends."""
-
-
 def free_domain() -> int:
     """One in which no participant of this machine is, claimed until this process ends.
 
     Raises OSError when there is none.
     """
     domain, claim = _claimed()
-    _kept.append(claim)
+    atexit.register(claim.close)
     return domain
 
 

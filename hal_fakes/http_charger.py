@@ -91,8 +91,11 @@ class HttpCharger:
             put(answer, fields.error_text, reading.error_text)
         if fields.receiver_id:
             put(answer, fields.receiver_id, reading.receiver or None)
-        if where := fields.in_range:
-            put(answer, where.field, value_of(where, bool(reading.in_range)))
+        for name in ("in_range", "range_ok", "at_height"):
+            if where := getattr(fields, name):
+                put(answer, where.field, value_of(where, bool(getattr(reading, name))))
+        for number in fields.temperatures.values():
+            put(answer, number.field, reading.celsius / number.scale)
         percent = None if reading.battery is None else 100 * reading.battery
         for name, value in (("battery_percent", percent), *_numbers(reading)):
             if number := getattr(fields, name):

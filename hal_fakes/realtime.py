@@ -115,6 +115,9 @@ class _Serialised:
         with self._world.lock:
             return self._plant.reading()
 
+    def names(self) -> Mapping[str, list[str]]:
+        return self._plant.names()
+
     def next_at(self) -> float:
         with self._world.lock:
             return self._plant.next_at()

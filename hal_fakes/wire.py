@@ -3,8 +3,8 @@
 import os
 from typing import Literal
 
-from bridges.core.fields import Rmf
 from bridges.rmf.choose import missing_of_dds, open_transport
+from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport, TransportError
 
 Wire = Literal["dds", "zenoh"]
@@ -21,5 +21,6 @@ def wire() -> Wire:
 
 
 def join(name: str, domain_id: int) -> Transport:
-    """A node on this wire, on this machine alone."""
-    return open_transport(Rmf(transport=wire(), domain_id=domain_id), name, localhost=True)
+    """A node of RMF's newest release on this wire, on this machine alone."""
+    rmf = Rmf(transport=wire(), domain_id=domain_id, release="kilted")
+    return open_transport(rmf, name, localhost=True)

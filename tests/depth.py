@@ -10,12 +10,12 @@ T = TypeVar("T")
 
 
 def depth(default: T, deep: T) -> T:
-    """A depth of a walk, or how much it must find at least."""
+    """The first in `make test`, the second in `make deep`: a walk's depth, or how much it must find."""
     return deep if DEEP else default
 
 
 def part(of: Sequence[T], one_in: int, first: int = 0) -> Sequence[T]:
-    """One in so many of these by default, beginning with this one."""
+    """In `make test` one in `one_in` of these, from number `first` on; in `make deep` all of them."""
     return of if DEEP else of[first::one_in]
 
 

@@ -23,12 +23,17 @@ LEASE_S = 9.5
 
 
 def wait_until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
-    """Look again and again until the condition holds; fail by name when it never does."""
+    """Look again and again until the condition holds; fail by name when it never does.
+
+    The longer it has taken, the longer the pause before the next look: a look costs CPU, which what is
+    waited for needs.
+    """
     pause = threading.Event()
-    deadline = time.monotonic() + patience_s
+    began = time.monotonic()
     while not condition():
-        assert time.monotonic() < deadline, f"never happened: {what}"
-        pause.wait(0.005)
+        waited = time.monotonic() - began
+        assert waited < patience_s, f"never happened: {what}"
+        pause.wait(min(0.003 + waited / 16, 0.05))
 
 
 def at_last(step: Callable[[], T], what: str, between: Callable[[], object] = lambda: None) -> T:

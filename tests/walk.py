@@ -12,7 +12,7 @@ Seen = Callable[[Any], None]
 
 
 def unseen(step: object) -> None:
-    """Not looked at."""
+    """For a walk whose steps nobody looks at."""
 
 
 def reached(
@@ -53,7 +53,7 @@ def histories(
 
 @dataclass(frozen=True)
 class Walker(Generic[W, M]):
-    """A world that goes on by moves, at once, and by waiting (s); each tells `seen` of its steps."""
+    """How a world goes on: by a move, in no time, or by waiting (s). Both tell `seen` of each step."""
 
     moves: Mapping[str, M]
     waits: Sequence[float]

@@ -1,12 +1,17 @@
 """Chargers: ChargerRequest becomes commands to a station, and its readings become ChargerState."""
 
-from bridges.charger import core, messages
+from bridges.charger import core, messages, refusals
 from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Cancelled, ChargerOutputs, ChargerSample, Requested
 from bridges.core.kind import Kind
-from bridges.rmf.topics import CHARGER_CANCELS, CHARGER_REQUESTS, CHARGER_STATES
+from bridges.rmf.topics import (
+    CHARGER_CANCELS,
+    CHARGER_REFUSALS,
+    CHARGER_REQUESTS,
+    CHARGER_STATES,
+)
 
 KIND: Kind[
     ChargerSettings,
@@ -31,4 +36,6 @@ KIND: Kind[
     decide=core.decide,
     state_message=messages.state_message,
     summary=messages.summary,
+    publishes=lambda settings: (CHARGER_REFUSALS,),
+    answer=refusals.answer,
 )

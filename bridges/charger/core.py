@@ -12,8 +12,8 @@
 4. A cancel ends the request that it names and no other. If current flows, the power is switched off,
    and the state stays CHARGING until the station has stopped. A full battery ends a request likewise.
 5. The station is energised only for the robot that it is assigned to, once that robot is seen on the
-   pad and in range. Another robot gets no power: the state is ERROR with its name, and the request
-   goes on waiting.
+   pad and in range, and while a pad that moves is at its height. Another robot gets no power: the state
+   is ERROR with its name, and the request goes on waiting.
 6. At a fault the power is switched off before the fault is reported. It comes back only with a new
    request. A station that is at fault, or that goes on charging when told to stop, is out of service
    (PROTECTION): the state is ERROR until its errors have been cleared and a good reading follows. A
@@ -30,6 +30,7 @@ from msgspec.structs import replace
 
 from bridges.charger import pad, report, session
 from bridges.charger.memory import ChargerLimits, Memory, Session, rivalled, unreachable
+from bridges.charger.refusals import OCCUPIED
 from bridges.charger.report import ChargerReport
 from bridges.charger.signals import (
     AT_FAULT,
@@ -90,6 +91,7 @@ def _take(memory: Memory, event: Event, now: float, limits: ChargerLimits) -> tu
 
 def _sampled(memory: Memory, sample: ChargerSample, now: float, limits: ChargerLimits) -> Memory:
     came = unreachable(memory, limits)
+    sample = pad.judged(sample)
     memory = replace(
         memory,
         sample=sample,
@@ -183,7 +185,7 @@ def _request(
     if on_pad and session.shown_released(holder, now, limits):
         again = session.granted(request, now, limits)
         return replace(_held(memory, None), holder=again), ""
-    return memory, "charger occupied"
+    return memory, OCCUPIED
 
 
 def _granted(
@@ -193,7 +195,7 @@ def _granted(
     if memory.adopted and on_pad:
         return replace(memory, holder=replace(holder, started=True), adopted=False), ""
     if report.state(memory) is not report.IDLE:
-        return memory, "charger occupied"
+        return memory, OCCUPIED
     return replace(memory, holder=holder), ""
 
 
@@ -265,4 +267,6 @@ def _power(memory: Memory, now: float, limits: ChargerLimits) -> bool | None:
         return False
     if holder is None:
         return None if pad.left_alone(memory, limits) else False
+    if pad.not_ready(memory.sample):
+        return False
     return holder.started or session.cleared_to_start(memory, limits)

@@ -105,13 +105,19 @@ def summary(report: ChargerReport) -> Mapping[str, str]:
     }
     optional = {
         "receiver": measured.receiver_id,
+        "in_range": measured.in_range,
+        "range_ok": measured.range_ok,
+        "at_height": measured.at_height,
         "volts": measured.volts,
         "amps": measured.amps,
         "battery_percent": measured.battery_percent,
         "time_to_full_s": measured.time_to_full_s,
+        **{f"{name}_celsius": celsius for name, celsius in measured.temperatures},
     }
     return texts | {key: _short(value) for key, value in optional.items() if value is not None}
 
 
 def _short(value: str | float) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     return value if isinstance(value, str) else str(round(value, 2))

@@ -1,7 +1,12 @@
-"""Who stands on the pad: does the receiver that the station sees belong to the request's robot?
+"""Who stands on the pad, and may the pad be energised?
 
-Without `receivers` in the YAML no robot is verified: any robot counts as the one of the request. With
-`receivers`, a station that does not say which receiver it sees charges nobody.
+Does the receiver that the station sees belong to the request's robot? Without `receivers` in the YAML
+no robot is verified: any robot counts as the one of the request. With `receivers`, a station that does
+not say which receiver it sees charges nobody.
+
+A station that moves its pad, or that says whether a robot is in range, gives no power unless the pad is
+at its height and the robot in range. Nothing announces that a robot leaves, so both are only read: a
+pad that has left its height while current flows is a fault of the station.
 
 If something stands on the pad that should not, ChargerState's error_message says so.
 `Misplaced.text` writes that text and `misplaced_in` reads it. An id that would make the text
@@ -13,15 +18,17 @@ import re
 from typing import Literal
 
 import msgspec
+from msgspec.structs import replace
 
 from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.settings import Robot
-from bridges.charger.signals import CURRENT_FLOWS, ChargerSample
+from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerSample
 from bridges.core.decision import Fault
 
 WRONG_DOCKING = "WRONG_DOCKING"
 WRONG_DOCKING_TEXT = "wrong docking: "
 UNKNOWN_RECEIVER_TEXT = "unknown receiver "
+HEIGHT_LOST_TEXT = "the pad left its height under power"
 RECEIVER_NOT_TOLD_TEXT = "receivers are given, and the charger does not say which one it sees"
 
 _BARE = r"[^\s\",/\\]+"
@@ -65,6 +72,26 @@ def seen(sample: ChargerSample | None, limits: ChargerLimits) -> Pad:
         return Pad("empty")
     known = limits.receivers.get(receiver)
     return Pad("robot" if known else "stranger", receiver, known)
+
+
+def not_ready(sample: ChargerSample) -> str:
+    """Why the pad must not be energised for anybody; "" if the station says nothing against it."""
+    if sample.measured.at_height is False:
+        return "the pad is not at its height"
+    return "the robot is not in range" if sample.measured.range_ok is False else ""
+
+
+def judged(sample: ChargerSample) -> ChargerSample:
+    """The reading, as a fault of the station if the pad has left its height under power."""
+    if sample.activity is not Activity.CHARGING or sample.measured.at_height is not False:
+        return sample
+    return replace(
+        sample,
+        activity=Activity.ERROR,
+        error_text=HEIGHT_LOST_TEXT,
+        side="station",
+        charges=True,
+    )
 
 
 class Misplaced(msgspec.Struct, frozen=True):

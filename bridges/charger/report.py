@@ -6,7 +6,6 @@ RMF's ChargerState has one text for everything that is wrong. From that text the
 """
 
 from enum import StrEnum
-from typing import Any
 
 import msgspec
 from msgspec.structs import replace
@@ -94,7 +93,7 @@ class ChargerReport(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...] = ()
     measured: Measured = Measured()
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """All but the age and the measurements, which change with each reading."""
         measured = Measured(receiver_id=self.measured.receiver_id)
         return replace(self, read_at=None, measured=measured)
@@ -173,9 +172,12 @@ def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) 
     stopping = memory.sample and memory.sample.activity is Activity.STOPPING
     if shown is CHARGING and not stopping and holder.over and holder.ended != "full":
         what = holder.ended or "the charger was at fault"
-        return [Fault("STILL_CHARGING", f"{holder.request.request_id}: {what}")]
+        whose = holder.request.request_id or holder.request.who
+        return [Fault("STILL_CHARGING", f"{whose}: {what}")]
     if shown is RELEASED and holder.ended == "start timeout":
-        return [Fault("START_TIMEOUT", f"{holder.request.who} did not start to charge in time")]
+        late = f"{holder.request.who} did not start to charge in time"
+        why = pad.not_ready(memory.sample) if memory.sample else ""
+        return [Fault("START_TIMEOUT", f"{late}: {why}" if why else late)]
     return []
 
 

@@ -111,7 +111,7 @@ def range_checked(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or holder.started or holder.over:
         return memory
-    if sample.measured.in_range is None or sample.activity in AT_FAULT:
+    if sample.measured.in_range is None or sample.activity in AT_FAULT or pad.not_ready(sample):
         return memory
     if not pad.seen(sample, limits).may_be(holder.request.who):
         return memory

@@ -40,8 +40,10 @@ class Measured(msgspec.Struct, frozen=True):
     """What a richer controller knows beside its state; None where it does not say.
 
     `receiver_id`: the receiver on the pad, "" if there is none. `in_range`: the robot's coil is where
-    it can be charged; False too until a range check has shown that. `volts`, `amps`: at the battery.
-    `battery_percent`: its charge.
+    it can be charged; False too until a range check has shown that. `range_ok`: the same where the
+    station says so all the time, without a check. `at_height`: a pad that the station moves is where
+    it charges. `volts`, `amps`: at the battery. `battery_percent`: its charge. `temperatures`: name
+    and °C.
     """
 
     receiver_id: str | None = None
@@ -50,6 +52,9 @@ class Measured(msgspec.Struct, frozen=True):
     amps: float | None = None
     battery_percent: float | None = None
     time_to_full_s: float | None = None
+    range_ok: bool | None = None
+    at_height: bool | None = None
+    temperatures: tuple[tuple[str, float], ...] = ()
 
 
 class ChargerSample(msgspec.Struct, frozen=True):

@@ -5,13 +5,13 @@ recognised by its id when its station shows it.
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final
 
 import msgspec
 from msgspec import Meta
 
 from bridges.charger.settings import Robot, robot
-from bridges.charger_coordinator.memory import Grant, Memory, Wish
+from bridges.charger_coordinator.memory import By, Grant, Memory, Wish
 from bridges.charger_coordinator.settings import Settings
 from bridges.core import keep
 from bridges.core.keep import Text
@@ -24,11 +24,12 @@ class WishRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A Wish; `robot` is FLEET/ROBOT, as everywhere here."""
 
     robot: Text
-    by: Literal["fleet", "operator"]
+    by: By
     task_id: str
     station: str
     request_id: str
     start_timeout_s: Annotated[float, Meta(ge=0, le=86400)]
+    called: bool = False
 
 
 class GrantRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -64,13 +65,15 @@ def persist(memories: Mapping[str, Memory]) -> bytes:
         {str(who): list(where) for who, where in sorted(memory.strikes.items())},
         {str(who): task for who, task in sorted(memory.served.items())},
         list(memory.over),
-        {str(who): station for who, station in sorted(memory.preferred.items())},
+        {str(who): station for who, station in sorted(memory.preferred.items()) if station},
     )
     return msgspec.json.encode(record)
 
 
 def _wish(w: Wish) -> WishRecord:
-    return WishRecord(str(w.robot), w.by, w.task_id, w.station, w.request_id, w.start_timeout_s)
+    return WishRecord(
+        str(w.robot), w.by, w.task_id, w.station, w.request_id, w.start_timeout_s, w.called
+    )
 
 
 def _grant(g: Grant) -> GrantRecord:
@@ -96,7 +99,7 @@ def _memory(found: Record, settings: Settings, now: float) -> Memory:
     wishes: dict[Robot, Wish] = {}
     for w in found.wishes:
         if who := ours(w.robot):
-            wish = Wish(who, w.by, w.task_id, w.station, w.request_id, w.start_timeout_s)
+            wish = Wish(who, w.by, w.task_id, w.called, w.station, w.request_id, w.start_timeout_s)
             wishes.setdefault(who, wish)
     grants = {
         name: Grant(who, g.request_id, now, g.start_timeout_s, started=g.started, over=g.over)

@@ -1,7 +1,7 @@
 """What the coordinator remembers, and what it needs of its settings."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Literal, TypeVar
 
 import msgspec
@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from bridges.charger.report import Diagnosis, diagnosis
 from bridges.charger.settings import Robot
+from bridges.charger_coordinator.schedule import Charging, LocalTime
 from bridges.charger_coordinator.settings import Settings
 from bridges.charger_coordinator.signals import Sighting, Wanted
 from bridges.core.durations import AGES_AGO
@@ -35,20 +36,31 @@ class Site:
     """What the core needs of the settings.
 
     `robots`: robot -> the stations that suit it, best first. `waits_at`: robot -> the waypoint where
-    it waits. `places`: station -> waypoint. `receivers`: receiver id -> robot.
+    it waits. `places`: station -> fleet -> waypoint. `receivers`: receiver id -> robot.
     """
 
     robots: Mapping[Robot, tuple[str, ...]]
     waits_at: Mapping[Robot, str]
-    places: Mapping[str, str]
+    places: Mapping[str, Mapping[str, str]]
     receivers: Mapping[str, Robot]
     start_timeout_s: float
     full_percent: float
     again_percent: float
+    leaves_s: float
+    schedule: tuple[Charging, ...] = ()
+    _stations: Mapping[tuple[str, str], str] = field(init=False, repr=False)
 
-    def station_at(self, place: str | None) -> str | None:
-        """Which station is at this waypoint; None for none."""
-        return next((name for name, at in self.places.items() if at == place), None)
+    def __post_init__(self) -> None:
+        found = {
+            (fleet, place): name
+            for name, places in self.places.items()
+            for fleet, place in places.items()
+        }
+        object.__setattr__(self, "_stations", found)
+
+    def station_at(self, fleet: str, place: str | None) -> str | None:
+        """Which station is at this waypoint of the fleet's graph; None for none."""
+        return self._stations.get((fleet, place or ""))
 
     @classmethod
     def of(cls, settings: Settings) -> "Site":
@@ -62,19 +74,32 @@ class Site:
             start_timeout_s=settings.start_timeout_s,
             full_percent=settings.full_percent,
             again_percent=settings.again_percent,
+            leaves_s=settings.leaves_s,
+            schedule=tuple(settings.schedule),
         )
 
 
-class Wish(msgspec.Struct, frozen=True):
-    """One robot's need to be charged. `by`: its fleet's state shows it, or an operator requested it.
+By = Literal["fleet", "schedule", "operator"]
+WHOSE: Final[Mapping[By, str]] = {
+    "fleet": "by the robot",
+    "schedule": "by the schedule",
+    "operator": "by an operator",
+}
 
-    `task_id`: the robot's task, if by a fleet. `station`, `request_id`, `start_timeout_s`: those of the
+
+class Wish(msgspec.Struct, frozen=True):
+    """One robot's need to be charged. `by`: its fleet's state shows it, a schedule says so, or an
+    operator requested it.
+
+    `task_id`: the robot's task, if not by an operator. `called`: that task began after the robot was
+    given a station, so it is the drive there. `station`, `request_id`, `start_timeout_s`: those of the
     operator's request.
     """
 
     robot: Robot
-    by: Literal["fleet", "operator"]
+    by: By
     task_id: str = ""
+    called: bool = False
     station: str = ""
     request_id: str = ""
     start_timeout_s: float = 0.0
@@ -110,16 +135,23 @@ class Grant(msgspec.Struct, frozen=True):
 
 
 class Standing(msgspec.Struct, frozen=True):
-    """A robot as its fleet showed it at `at`. `since`: since when its place and mode are the same
-    (-inf: since its first state)."""
+    """A robot as its fleet showed it at `at`. `since`: since when place, mode and task are the same;
+    `here_since`: since when the place is (-inf: since its first state)."""
 
     sighting: Sighting
     at: float
     since: float = AGES_AGO
+    here_since: float = AGES_AGO
+
+    @property
+    def works(self) -> bool:
+        """Is it in a task other than charging, as far as its fleet shows?"""
+        return bool(self.sighting.task_id) and not self.sighting.charges
 
 
 class Seen(msgspec.Struct, frozen=True):
-    """A station's last state, heard at `at`. `since`: since when state and error are the same."""
+    """A station's last state, heard at `at`. `since`: since when state and error are the same.
+    `full_in_s`: as it said then."""
 
     state: ChargerStateValue
     request_id: str
@@ -127,6 +159,7 @@ class Seen(msgspec.Struct, frozen=True):
     error: str
     at: float
     since: float
+    full_in_s: float = 0.0
 
     @property
     def diagnosis(self) -> Diagnosis:
@@ -134,30 +167,50 @@ class Seen(msgspec.Struct, frozen=True):
         return diagnosis(self.error) if self.state is ERROR else Diagnosis.NONE
 
 
+class Nudge(msgspec.Struct, frozen=True):
+    """That a robot was told to leave a pad. `why`: the request of its own station, or the station that
+    it blocks. `count`: how often. `at`: the last time."""
+
+    why: str
+    count: int
+    at: float
+
+
 class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
+    `may_speak`: it may publish. `alone`: no other node publishes charging assignments.
+
     `wishes`: in the order in which they are served. `grants`: by station. `strikes`: robot -> the
-    stations where it has failed. `served`: robot -> the task in which it was charged. `over`: ids of
+    stations where it has failed. `served`: robot -> the task in which it was charged. `rested`: robots
+    that the schedule need not charge again before it ends. `absent`: robot -> until when it is not
+    called again, because it did not leave its place. `over`: ids of
     the last operators' requests that have ended, so that late repeats are refused. `count`: requests
     made so far. `robots`, `stations`: as last heard, and when. `shunned`: station -> until when it is
     passed over, because it took no request. `preferred`: robot -> the station that another node has
-    dedicated to it. `assigned`: the assignments last published. `alerts`: the faults that a person has
-    been told of.
+    dedicated to it. `nudges`: robots told to leave a pad. `receivers`: robot -> the error of its own
+    receiver. `when`: the local time. `assigned`: the assignments last published. `alerts`: the faults
+    that a person has been told of.
     """
 
     began_at: float = 0.0
     may_speak: bool = False
+    alone: bool = True
     wishes: tuple[Wish, ...] = ()
     grants: Mapping[str, Grant] = msgspec.field(default_factory=dict)
     strikes: Mapping[Robot, tuple[str, ...]] = msgspec.field(default_factory=dict)
     served: Mapping[Robot, str] = msgspec.field(default_factory=dict)
+    rested: frozenset[Robot] = frozenset()
+    absent: Mapping[Robot, float] = msgspec.field(default_factory=dict)
     over: tuple[str, ...] = ()
     count: int = 0
     robots: Mapping[Robot, Standing] = msgspec.field(default_factory=dict)
     stations: Mapping[str, Seen] = msgspec.field(default_factory=dict)
     shunned: Mapping[str, float] = msgspec.field(default_factory=dict)
     preferred: Mapping[Robot, str] = msgspec.field(default_factory=dict)
+    nudges: Mapping[Robot, Nudge] = msgspec.field(default_factory=dict)
+    receivers: Mapping[Robot, str] = msgspec.field(default_factory=dict)
+    when: LocalTime | None = None
     assigned: tuple[ChargingAssignments, ...] = ()
     alerts: frozenset[str] = frozenset()
 
@@ -173,6 +226,16 @@ class Memory(msgspec.Struct, frozen=True):
         """The waypoint of ours at which its fleet saw it last."""
         standing = self.robots.get(robot)
         return standing.sighting.place if standing else None
+
+    def stands_at(self, robot: Robot, site: Site) -> str | None:
+        """The station at which its fleet saw it last; None for none."""
+        place = self.place_of(robot)
+        return None if place is None else site.station_at(robot.fleet, place)
+
+    @property
+    def assigns(self) -> bool:
+        """May it tell the robots where to charge?"""
+        return self.may_speak and self.alone
 
     def faulty(self, robot: Robot) -> bool:
         """Has it failed too often? It is not tried again until an operator resets."""

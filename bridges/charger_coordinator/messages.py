@@ -3,26 +3,34 @@
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from datetime import datetime
+from zoneinfo import ZoneInfo
 
 from bridges.charger.messages import accept_request as accept_charger_request
+from bridges.charger.refusals import refused
 from bridges.charger.settings import ChargerSettings, Robot
 from bridges.charger_coordinator.keep import SITE
 from bridges.charger_coordinator.report import SiteReport
+from bridges.charger_coordinator.schedule import LocalTime
 from bridges.charger_coordinator.settings import Fleet, Settings
 from bridges.charger_coordinator.signals import (
     Dedicated,
     FleetSeen,
+    ReceiverHeard,
     Sighting,
     StateHeard,
     Unwanted,
     Wanted,
 )
 from bridges.core.decision import RequestRefused
+from bridges.core.kind import Answer
 from bridges.core.names import LONGEST_TEXT, check_length
 from bridges.rmf import definitions as d
 from bridges.rmf.definitions import Time
+from bridges.rmf.stamps import in_seconds
+from bridges.rmf.topics import CHARGER_REFUSALS
 
+CHARGE = d.ChargingMode.MODE_CHARGE
 CHARGES = (d.RobotModeValue.MODE_CHARGING, d.RobotModeValue.MODE_DOCKING)
 
 
@@ -31,14 +39,23 @@ def accept_fleet(state: d.FleetState, settings: Settings, wall: float) -> FleetS
     fleet = settings.fleets.get(state.name)
     if fleet is None:
         raise RequestRefused("fleet not ours", f"{state.name!r}")
-    places = {*settings.places().values(), *(r.waits_at for r in fleet.robots.values())}
-    return FleetSeen(
-        tuple(
-            _sighting(state.name, robot, fleet, places, settings.near_m)
-            for robot in state.robots
-            if robot.name in fleet.robots
-        )
+    stations = (places[state.name] for places in settings.places().values())
+    places = {*stations, *(robot.waits_at for robot in fleet.robots.values())}
+    seen = tuple(
+        _sighting(state.name, robot, fleet, places, settings.near_m)
+        for robot in state.robots
+        if robot.name in fleet.robots
     )
+    return FleetSeen(seen, local_time(wall, settings.timezone))
+
+
+def local_time(wall: float, timezone: str | None) -> LocalTime:
+    """The local time of day, and the day.
+
+    `wall`: s since the epoch. `timezone`: its name; None for the machine's.
+    """
+    at = datetime.fromtimestamp(wall, ZoneInfo(timezone) if timezone else None)
+    return LocalTime(at.weekday(), at.hour * 60 + at.minute)
 
 
 def _sighting(
@@ -65,9 +82,12 @@ def _nearest(at: d.Location, fleet: Fleet, places: set[str], near_m: float) -> s
     return min(near, key=lambda name: near[name], default=None)
 
 
-def accept_state(state: d.ChargerState, settings: Settings, wall: float) -> StateHeard:
-    """A ChargerState as an event. Raises RequestRefused."""
-    if state.charger_name not in settings.stations:
+def accept_state(
+    state: d.ChargerState, settings: Settings, wall: float
+) -> StateHeard | ReceiverHeard:
+    """The ChargerState of a station, or of a robot's receiver, as an event. Raises RequestRefused."""
+    receiver_of = settings.rcus().get(state.charger_name)
+    if receiver_of is None and state.charger_name not in settings.stations:
         raise RequestRefused("station not ours", f"{state.charger_name!r}")
     if state.state not in set(d.ChargerStateValue):
         raise RequestRefused("unknown state", f"{state.charger_name}: {state.state}")
@@ -75,6 +95,9 @@ def accept_state(state: d.ChargerState, settings: Settings, wall: float) -> Stat
         request_id=state.request_id, robot_fleet=state.robot_fleet, robot_name=state.robot_name
     )
     check_length(LONGEST_TEXT, error_message=state.error_message)
+    if receiver_of is not None:
+        failed = state.state == d.ChargerStateValue.CHARGER_ERROR
+        return ReceiverHeard(receiver_of, state.error_message if failed else "")
     named = Robot(state.robot_fleet, state.robot_name)
     return StateHeard(
         state.charger_name,
@@ -82,6 +105,7 @@ def accept_state(state: d.ChargerState, settings: Settings, wall: float) -> Stat
         state.request_id,
         named if named.fleet and named.name else None,
         state.error_message,
+        in_seconds(state.time_to_fully_charged),
     )
 
 
@@ -105,21 +129,19 @@ def accept_withdrawal(cancel: d.ChargerCancel, settings: Settings, wall: float) 
 def accept_assignments(
     message: d.ChargingAssignments, settings: Settings, wall: float
 ) -> Dedicated:
-    """Another node's charging assignments as an event: those of our robots to our stations."""
-    stations = {place: name for name, place in settings.places().items()}
-    known = settings.robots()
+    """Another node's charging assignments as an event: which of our stations each of our robots has."""
+    fleet, known = message.fleet_name, settings.robots()
+    stations = {places.get(fleet): name for name, places in settings.places().items()}
     return Dedicated(
         tuple(
-            (who, stations[assignment.waypoint_name])
-            for assignment in message.assignments
-            if assignment.mode == d.ChargingMode.MODE_CHARGE
-            and assignment.waypoint_name in stations
-            and (who := Robot(message.fleet_name, assignment.robot_name)) in known
+            (who, stations.get(one.waypoint_name, "") if one.mode == CHARGE else "")
+            for one in message.assignments
+            if (who := Robot(fleet, one.robot_name)) in known
         )
     )
 
 
-def subject(message: Any) -> str:
+def subject(message: object) -> str:
     """Every message is about the site: the queue spans its stations."""
     return SITE
 
@@ -132,5 +154,28 @@ def stamped(message: d.Message, time: Time) -> d.Message:
 
 
 def summary(report: SiteReport, now: float) -> Mapping[str, str]:
-    """The stations and the queue, in a line."""
-    return {**dict(report.stations), "queue": ", ".join(report.queue) or "-"}
+    """The stations, the schedule, and the queue with its reasons."""
+    return {
+        **dict(report.stations),
+        "assigns": report.assigns,
+        **({"schedule": "; ".join(report.schedule)} if report.schedule else {}),
+        "queue": "; ".join(report.queue) or "-",
+        **({"did not come": ", ".join(map(str, report.absent))} if report.absent else {}),
+    }
+
+
+def answer(asked: object, reason: str) -> Answer | None:
+    """What is said when a request for any charger is refused; None for what is none."""
+    match asked:
+        case d.ChargerRequest():
+            who, station, request_id = (
+                Robot(asked.fleet_name, asked.robot_name),
+                asked.charger_name,
+                asked.request_id,
+            )
+        case Wanted():
+            who, station, request_id = asked.robot, asked.station, asked.request_id
+        case _:
+            return None
+    refusal = refused(request_id, station or "any", who, reason)
+    return Answer(CHARGER_REFUSALS, refusal.message(), refusal.told())

@@ -6,9 +6,12 @@ pad without a request, so that the station shows an error, may have that very st
 
 A station where a robot has failed is tried again only if no other one suits the robot: a second
 station shows which side was at fault.
+
+Beside another node's charging schedule, a robot gets the station that the schedule has dedicated to it:
+RMF drives it to no other. A robot that the schedule does not name may have the one where it stands.
 """
 
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from msgspec.structs import replace
@@ -20,13 +23,17 @@ from bridges.charger_coordinator.memory import ERROR, IDLE, NODE, Grant, Memory,
 
 REMEMBERED_S: Final = 30.0
 """How long a robot's last place counts, after its fleet has shown it."""
+Here = Mapping[str, Sequence[Robot]]
+"""Station -> the robots that stand there."""
 
 
 def allot(memory: Memory, now: float, site: Site) -> Memory:
     """Give the free stations to the robots that wait, in the order of the queue."""
+    here = standing(memory, now, site)
     for wish in memory.wishes:
         if memory.station_of(wish.robot) is None:
-            station = next(_free_for(memory, wish, now, site), None)
+            stations = suiting(memory, wish, site)
+            station = next((s for s in stations if _free(memory, s, wish.robot, now, here)), None)
             if station is not None:
                 memory = _granted(memory, wish, station, now, site)
     return memory
@@ -40,24 +47,24 @@ def _granted(memory: Memory, wish: Wish, station: str, now: float, site: Site) -
     return replace(memory, count=count).with_grant(station, grant)
 
 
-def _free_for(memory: Memory, wish: Wish, now: float, site: Site) -> Iterator[str]:
-    return (s for s in _suiting(memory, wish, site) if _free(memory, s, wish.robot, now, site))
-
-
-def _suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
+def suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
     """The stations to try, best first: the operator's, the one where it stands, the dedicated one, then
     the YAML's order."""
-    suiting, failed = site.robots[wish.robot], memory.strikes.get(wish.robot, ())
-    untried = [station for station in suiting if station not in failed] or list(suiting)
-    stands_at = site.station_at(memory.place_of(wish.robot))
-    first = (wish.station, stands_at, memory.preferred.get(wish.robot))
+    here = memory.stands_at(wish.robot, site)
+    dedicated = memory.preferred.get(wish.robot)
+    if not memory.alone:
+        scheduled = here or "" if dedicated is None else dedicated
+        return [s for s in dict.fromkeys((wish.station, scheduled)) if s in site.places]
+    suit, failed = site.robots[wish.robot], memory.strikes.get(wish.robot, ())
+    untried = [station for station in suit if station not in failed] or list(suit)
+    first = (wish.station, here, dedicated)
     return sorted(untried, key=lambda s: first.index(s) if s in first else len(first))
 
 
-def _free(memory: Memory, station: str, robot: Robot, now: float, site: Site) -> bool:
+def _free(memory: Memory, station: str, robot: Robot, now: float, here: Here) -> bool:
     if not memory.speaks(station, now) or now < memory.shunned.get(station, now):
         return False
-    if station in memory.grants or in_the_way(memory, station, robot, now, site):
+    if station in memory.grants or in_the_way(here, station, robot):
         return False
     seen = memory.stations[station]
     if seen.state is not ERROR:
@@ -67,17 +74,16 @@ def _free(memory: Memory, station: str, robot: Robot, now: float, site: Site) ->
     return is_refused and seen.request_id.startswith(UNREQUESTED)
 
 
-def in_the_way(
-    memory: Memory, station: str, robot: Robot | None, now: float, site: Site
-) -> Robot | None:
-    """Another robot that stands at the station, by its fleet's state; None if there is none."""
-    return next(
-        (
-            who
-            for who, standing in memory.robots.items()
-            if who != robot
-            and now < standing.at + REMEMBERED_S
-            and standing.sighting.place == site.places[station]
-        ),
-        None,
-    )
+def standing(memory: Memory, now: float, site: Site) -> Here:
+    """The robots that stand at each station, by their fleets' states of the last REMEMBERED_S."""
+    here: dict[str, list[Robot]] = {}
+    for who, seen in memory.robots.items():
+        station = memory.stands_at(who, site)
+        if station is not None and now < seen.at + REMEMBERED_S:
+            here.setdefault(station, []).append(who)
+    return here
+
+
+def in_the_way(here: Here, station: str, robot: Robot) -> Robot | None:
+    """Another robot that stands at the station; None if there is none."""
+    return next((who for who in here.get(station, ()) if who != robot), None)

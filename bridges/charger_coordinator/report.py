@@ -10,24 +10,27 @@
 """
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 from msgspec.structs import replace
 
 from bridges.charger.pad import misplaced_in
-from bridges.charger.report import Diagnosis
+from bridges.charger.report import Diagnosis, diagnosis
 from bridges.charger.settings import Robot
+from bridges.charger_coordinator import astray
 from bridges.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
     ERROR,
     NODE,
+    WHOSE,
     Grant,
     Memory,
     Seen,
     Site,
 )
+from bridges.charger_coordinator.reasons import queued, reasons
 from bridges.core.decision import Fault
 from bridges.core.durations import due_at
 from bridges.rmf import definitions as d
@@ -46,41 +49,66 @@ TITLES: Final = {
     "STATION_OUT_OF_SERVICE": "A charger is out of service",
     "STATION_SILENT": "A charger is silent",
     "WRONG_STATION": "A robot is at the wrong charger",
+    "PAD_BLOCKED": "A robot blocks a charger",
+    "RECEIVER_ERROR": "A robot's receiver reports an error",
     "REQUEST_NOT_TAKEN": "A charger takes no request",
 }
+ASKS_S: Final = 5.0
+"""A robot that comes to a pad unannounced asks for it by its fleet's state, a few seconds later."""
 ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
 
 
 class SiteReport(msgspec.Struct, frozen=True):
     """The site as it is shown. `read_at`: when a station was last heard (monotonic s). `stations`:
-    (station, its state and its robot). `queue`: the robots that wait, in order."""
+    (station, its state, its robot and who wanted that). `queue`: the robots that wait, in order, each
+    with what it waits for. `waiting`: the same robots alone. `assigns`: who tells the robots where to
+    charge. `schedule`: its times. `absent`: robots that were called and did not come."""
 
     read_at: float | None
     stations: tuple[tuple[str, str], ...] = ()
     queue: tuple[str, ...] = ()
+    waiting: tuple[Robot, ...] = ()
+    assigns: str = ""
+    schedule: tuple[str, ...] = ()
+    absent: tuple[Robot, ...] = ()
     faults: tuple[Fault, ...] = ()
 
-    def news(self) -> Any:
-        """What is worth a line in the log."""
-        return self.stations, self.queue
+    def news(self) -> object:
+        """What is worth a line in the log: not the time that passes."""
+        return self.stations, self.waiting, self.assigns, self.schedule, self.absent
 
 
 def report(memory: Memory, now: float, site: Site) -> SiteReport:
     """The site as it is now."""
-    queue = [w.robot for w in memory.wishes if memory.station_of(w.robot) is None]
+    waiting = queued(memory)
     return SiteReport(
         read_at=max((seen.at for seen in memory.stations.values()), default=None),
-        stations=tuple((name, _of(memory, name)) for name in site.places),
-        queue=tuple(map(str, queue)),
+        stations=tuple((name, _of(memory, name, now)) for name in site.places),
+        queue=tuple(reasons(memory, now, site)),
+        waiting=tuple(wish.robot for wish in waiting),
+        assigns=_assigns(memory),
+        schedule=tuple(one.text(memory.when) for one in site.schedule),
+        absent=tuple(who for who, until in memory.absent.items() if now < until),
         faults=tuple(_faults(memory, now, site)),
     )
 
 
-def _of(memory: Memory, name: str) -> str:
-    """`CHARGING fleet/robot`, `IDLE`, or `?` before the first state."""
+def _assigns(memory: Memory) -> str:
+    if memory.alone:
+        return "yes" if memory.may_speak else "no"
+    return "no: another node publishes charging_assignments"
+
+
+def _of(memory: Memory, name: str, now: float) -> str:
+    """`CHARGING fleet/robot, by the schedule`, `IDLE`, or `?` before the first state."""
     seen, grant = memory.stations.get(name), memory.grants.get(name)
     state = "?" if seen is None else seen.state.name.removeprefix("CHARGER_")
-    return state if grant is None or grant.over else f"{state} {grant.robot}"
+    if grant is None or grant.over:
+        return state
+    wish = memory.wish(grant.robot)
+    whose = f", {WHOSE[wish.by]}" if wish else ""
+    told = ", told to leave another pad" if grant.robot in memory.nudges else ""
+    return f"{state} {grant.robot}{whose}{told}"
 
 
 def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
@@ -92,33 +120,38 @@ def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
         if now >= memory.silent_since(name):
             yield Fault("STATION_SILENT", f"{name}: no ChargerState comes")
         elif name in memory.stations:
-            yield from _shown(memory, name, memory.stations[name], site)
+            yield from _shown(memory, name, memory.stations[name], now, site)
         if now < memory.shunned.get(name, now):
             yield Fault("REQUEST_NOT_TAKEN", f"{name}: its daemon's log says why")
+    for one in astray.found(memory, now, site).values():
+        if astray.alarming(memory, one, now):
+            yield _misplaced(one)
+    for who, error in memory.receivers.items():
+        if error and diagnosis(error) is not Diagnosis.LOST:
+            yield Fault("RECEIVER_ERROR", f"the receiver on {who}: {error}")
 
 
-def _shown(memory: Memory, name: str, seen: Seen, site: Site) -> Iterator[Fault]:
+def _shown(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Iterator[Fault]:
     """Faults that a station's state shows."""
     if seen.diagnosis in (Diagnosis.STATION, Diagnosis.LOST, Diagnosis.UNCLEAR):
         yield Fault("STATION_OUT_OF_SERVICE", f"{name}: {seen.error}")
     if seen.diagnosis is not Diagnosis.PAD:
         return
-    who = on_pad(seen.error, site)
-    expected = memory.station_of(who) if who else None
-    if who is None or expected != name:
-        belongs = f"it is expected at {expected}" if expected else "nobody asked for that"
+    who = astray.on_pad(seen.error, site)
+    unasked = who is not None and memory.station_of(who) is None and now >= seen.since + ASKS_S
+    if who is None or unasked:
         what = who or _stranger(seen.error)
-        yield Fault("WRONG_STATION", f"{what} stands at {name}, {belongs}")
+        yield Fault("WRONG_STATION", f"{what} stands at {name}, nobody asked for that")
 
 
-def on_pad(error: str, site: Site) -> Robot | None:
-    """Which of our robots stands on the pad, by the station's error; None if it is none of ours."""
-    found = misplaced_in(error)
-    if found is None:
-        return None
-    if found.robot is None:
-        return site.receivers.get(found.receiver)
-    return found.robot if found.robot in site.robots else None
+def _misplaced(one: astray.Astray) -> Fault:
+    if one.expected:
+        text = f"{one.who} stands at {one.station}, it is expected at {one.expected}"
+        return Fault("WRONG_STATION", text)
+    why = "RMF has no charging task that would send it away (finishing_request: charge has one)"
+    return Fault(
+        "PAD_BLOCKED", f"{one.who} stands at {one.station}, and {one.waiter} waits for it: {why}"
+    )
 
 
 def _stranger(error: str) -> str:
@@ -140,7 +173,7 @@ def messages(
         if now >= _due_at(memory, name, grant):
             found.append(_to_station(name, grant))
             memory = memory.with_grant(name, replace(grant, sent_at=now))
-    assignments = tuple(_assignments(memory, site))
+    assignments = tuple(_assignments(memory, now, site)) if memory.alone else ()
     if assignments != memory.assigned:
         found += [(CHARGING_ASSIGNMENTS, message) for message in assignments]
     new = {str(fault): fault for fault in faults}
@@ -150,10 +183,11 @@ def messages(
 
 
 def due(memory: Memory) -> list[float]:
-    """When requests and cancels are due."""
+    """When requests, cancels and faults are due."""
     if not memory.may_speak:
         return []
-    return [_due_at(memory, name, grant) for name, grant in memory.grants.items()]
+    asks = [seen.since + ASKS_S for seen in memory.stations.values()]
+    return asks + [_due_at(memory, name, grant) for name, grant in memory.grants.items()]
 
 
 def _due_at(memory: Memory, name: str, grant: Grant) -> float:
@@ -172,13 +206,15 @@ def _to_station(name: str, grant: Grant) -> tuple[AnyTopic, d.Message]:
     return CHARGER_REQUESTS, d.ChargerRequest(name, who.fleet, who.name, timeout, grant.request_id)
 
 
-def _assignments(memory: Memory, site: Site) -> Iterator[d.ChargingAssignments]:
-    """Every robot's place, fleet by fleet, in the order of names."""
+def _assignments(memory: Memory, now: float, site: Site) -> Iterator[d.ChargingAssignments]:
+    """Every robot's place, fleet by fleet, in the order of names. One that is told to leave a pad has
+    for a moment another mode (`astray.py`)."""
     fleets: dict[str, list[d.ChargingAssignment]] = {}
     for who in sorted(site.robots):
-        station = memory.station_of(who)
-        mode = d.ChargingMode.MODE_WAIT if station is None else d.ChargingMode.MODE_CHARGE
-        place = site.waits_at[who] if station is None else site.places[station]
+        station, told = memory.station_of(who), astray.is_told(memory, who, now)
+        charges = (station is None) == told
+        mode = d.ChargingMode.MODE_CHARGE if charges else d.ChargingMode.MODE_WAIT
+        place = site.places[station][who.fleet] if station and not told else site.waits_at[who]
         assignment = d.ChargingAssignment(who.name, place, int(mode))
         fleets.setdefault(who.fleet, []).append(assignment)
     return (d.ChargingAssignments(name, tuple(them)) for name, them in fleets.items())

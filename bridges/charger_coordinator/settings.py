@@ -6,15 +6,17 @@
 import math
 from collections.abc import Iterator
 from typing import Annotated
+from zoneinfo import ZoneInfo
 
 import msgspec
 from msgspec import Meta
 
 from bridges.charger.settings import ReceiverId, Robot, StartTimeout
-from bridges.core.fields import GraphSettings, Name
-from bridges.core.kind import Place
+from bridges.charger_coordinator import schedule as times
+from bridges.charger_coordinator.schedule import Charging
+from bridges.core.fields import GraphSettings, Name, Timeout
+from bridges.core.kind import CHARGER, WAYPOINT, Place
 from bridges.core.table import Table
-from bridges.settings.building_map import CHARGER, WAYPOINT
 
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
 Near = Annotated[float, Meta(ge=0.1, le=5, extra={"unit": "m"})]
@@ -40,21 +42,25 @@ class Station(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     """A charger, under the name that its own daemon publishes.
 
     `waypoint`: what the navigation graphs call the place; the same name when absent.
+    `waypoints`: fleet -> what that fleet's graph calls it, where it differs.
     """
 
     waypoint: Name | None = None
+    waypoints: dict[Name, Name] = msgspec.field(default_factory=dict)
 
 
 class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One robot.
 
     `stations`: those that suit it, best first. `waits_at`: its own waypoint, where it waits for a
-    station and stays when it needs none. `receivers`: the ids of its receivers.
+    station and stays when it needs none. `receivers`: the ids of its receivers. `rcu`: the name under
+    which the daemon of its own receiver publishes, if it has one: a robot's part, and no station.
     """
 
     stations: Stations
     waits_at: Name
     receivers: list[ReceiverId] = msgspec.field(default_factory=list)
+    rcu: Name | None = None
 
 
 class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -77,7 +83,11 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
     `start_timeout_s`: how long a station is kept for a robot that is on its way.
     `near_m`: a robot stands at the nearest waypoint, if that is no farther away than this.
     `full_percent`: the charge at which a robot gives up its station.
-    `again_percent`: a robot that was charged is charged again in the same task only below this.
+    `again_percent`: below this a robot without a task is charged. One that was charged comes back in
+    its task only below this.
+    `leaves_s`: how long a robot may stay on a pad that it no longer needs while another waits for it.
+    `schedule`: times of the week at which robots without a task are charged.
+    `timezone`: that of the schedule's times (Asia/Singapore); this machine's when absent.
     """
 
     stations: dict[Name, Station]
@@ -86,12 +96,18 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
     near_m: Near = 1.0
     full_percent: Full = 100.0
     again_percent: Low = 90.0
+    leaves_s: Timeout = 60.0
+    schedule: list[Charging] = msgspec.field(default_factory=list)
+    timezone: Name | None = None
 
     def on_map(self) -> Iterator[Place]:
         """The stations' places and each fleet's waypoints, which RMF's map must name too."""
         for name, station in self.stations.items():
-            path = ("stations", name, *(["waypoint"] if station.waypoint else []))
-            yield path, CHARGER, station.waypoint or name
+            if set(self.fleets) - set(station.waypoints):
+                path = ("stations", name, *(["waypoint"] if station.waypoint else []))
+                yield path, CHARGER, station.waypoint or name
+            for fleet, waypoint in station.waypoints.items():
+                yield ("stations", name, "waypoints", fleet), CHARGER, waypoint
         for fleet, settings in self.fleets.items():
             for name in settings.waypoints:
                 yield ("fleets", fleet, "waypoints", name), WAYPOINT, name
@@ -103,50 +119,79 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
                 yield (key,), f"'{key}' is empty: there is nothing to coordinate"
         if self.again_percent > self.full_percent:
             yield ("again_percent",), "is above full_percent: a full robot would come back at once"
-        for name, place in self.places().items():
-            if not self._graphs_with(place):
-                text = f"stands at '{place}', which is in no fleet's waypoints"
-                yield ("stations", name, "waypoint"), text
+        for name, station in self.stations.items():
+            for path, text in self._of_station(name, station):
+                yield ("stations", name, *path), text
         for name, fleet in self.fleets.items():
-            for path, text in self._of_fleet(fleet):
+            for path, text in self._of_fleet(name, fleet):
                 yield ("fleets", name, *path), text
         yield from self._doubles()
+        yield from self._of_schedule()
 
-    def _graphs_with(self, place: str) -> list[str]:
-        return [name for name, fleet in self.fleets.items() if place in fleet.waypoints]
+    def _of_station(self, name: str, station: Station) -> Iterator[tuple[tuple[str, ...], str]]:
+        places = self.places()[name]
+        if not self._graphs_with(name):
+            text = (
+                f"'{name}' stands at '{station.waypoint or name}', which is in no fleet's waypoints"
+            )
+            yield ("waypoint",), text
+        for fleet in station.waypoints:
+            if fleet not in self.fleets:
+                yield ("waypoints", fleet), f"no fleet '{fleet}'; there are {', '.join(places)}"
+            elif places[fleet] not in self.fleets[fleet].waypoints:
+                yield ("waypoints", fleet), f"'{places[fleet]}' is not in that fleet's waypoints"
 
-    def _of_fleet(self, fleet: Fleet) -> Iterator[tuple[tuple[str, ...], str]]:
+    def _graphs_with(self, station: str) -> list[str]:
+        """The fleets that know the station's place."""
+        places = self.places()[station]
+        return [name for name, fleet in self.fleets.items() if places[name] in fleet.waypoints]
+
+    def _of_fleet(self, fleet_name: str, fleet: Fleet) -> Iterator[tuple[tuple[str, ...], str]]:
         known = ", ".join(fleet.waypoints) or "none"
+        chargers = {places[fleet_name] for places in self.places().values()}
         for name, robot in fleet.robots.items():
             if robot.waits_at not in fleet.waypoints:
                 text = f"no waypoint '{robot.waits_at}' in this fleet's list ({known})"
                 yield ("robots", name, "waits_at"), text
-            elif robot.waits_at in self.places().values():
+            elif robot.waits_at in chargers:
                 text = f"'{robot.waits_at}' is a charger's place: a robot waits somewhere else"
                 yield ("robots", name, "waits_at"), text
             for i, station in enumerate(robot.stations):
                 path = ("robots", name, "stations", str(i))
                 if station not in self.stations:
                     yield path, f"no station '{station}'; there are {', '.join(self.stations)}"
-                elif (place := self.places()[station]) not in fleet.waypoints:
-                    if not self._graphs_with(place):
+                elif (place := self.places()[station][fleet_name]) not in fleet.waypoints:
+                    if not self._graphs_with(station):
                         continue
                     yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
 
     def _doubles(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """One place, one robot; one receiver, one robot."""
+        """One place, one robot; one receiver, one robot; one name, one station or receiver."""
         taken: dict[tuple[str, str], str] = {}
-        for station, place in self.places().items():
-            owner = taken.setdefault(("place", place), station)
-            if owner != station:
-                yield ("stations", station), f"stands at '{place}', as '{owner}' does"
+        for station, places in self.places().items():
+            for fleet, place in places.items():
+                owner = taken.setdefault((fleet, place), station)
+                if owner != station:
+                    text = f"'{station}' stands at '{place}', as '{owner}' does"
+                    yield ("stations", station), text
+                    break
+        taken |= {("rcu", station): f"the station '{station}'" for station in self.stations}
         for who, robot in self.robots().items():
             path = ("fleets", who.fleet, "robots", who.name)
             things = [("waits_at", robot.waits_at), *(("receivers", r) for r in robot.receivers)]
-            for key, thing in things:
+            for key, thing in [*things, *([("rcu", robot.rcu)] if robot.rcu else [])]:
                 owner = taken.setdefault((key, thing), str(who))
                 if owner != str(who):
                     yield (*path, key), f"'{thing}' is {owner}'s already: it can be one robot's"
+
+    def _of_schedule(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        least, most = self.again_percent, self.full_percent
+        for path, text in times.problems(self.schedule, self.fleets, self.robots(), least, most):
+            yield ("schedule", *path), text
+        try:
+            ZoneInfo(self.timezone or "UTC")
+        except (KeyError, OSError, ValueError):  # ZoneInfoNotFoundError is a KeyError
+            yield ("timezone",), f"no time zone '{self.timezone}' on this machine (Asia/Singapore)"
 
     def robots(self) -> dict[Robot, RobotSettings]:
         """Every robot, by fleet and name."""
@@ -156,13 +201,20 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
             for name, robot in fleet.robots.items()
         }
 
-    def places(self) -> dict[str, str]:
-        """Station -> the waypoint where it is."""
-        return {name: station.waypoint or name for name, station in self.stations.items()}
+    def places(self) -> dict[str, dict[str, str]]:
+        """Station -> fleet -> the waypoint where it is."""
+        return {
+            name: {fleet: at.waypoints.get(fleet, at.waypoint or name) for fleet in self.fleets}
+            for name, at in self.stations.items()
+        }
+
+    def rcus(self) -> dict[str, Robot]:
+        """The name under which a robot's own receiver publishes -> the robot."""
+        return {robot.rcu: who for who, robot in self.robots().items() if robot.rcu}
 
 
 def tables(settings: Settings) -> Iterator[Table]:
-    """Each robot and its places, then each station and its waypoint."""
+    """Each robot and its places, each station and its waypoint, and the schedule."""
     yield Table(
         "robots",
         ("robot", "charges at", "waits at", "receivers"),
@@ -171,7 +223,22 @@ def tables(settings: Settings) -> Iterator[Table]:
             for who, r in settings.robots().items()
         ),
     )
-    yield Table("stations", ("charger", "at waypoint"), tuple(settings.places().items()))
+    yield Table(
+        "stations",
+        ("charger", "at waypoint"),
+        tuple((name, _named(places)) for name, places in settings.places().items()),
+    )
+    if settings.schedule:
+        rows = tuple((one.text(None),) for one in settings.schedule)
+        yield Table("schedule", ("robots without a task are charged",), rows)
+
+
+def _named(places: dict[str, str]) -> str:
+    """`dock_b`, or `tiny: dock_b, big: station_2` where the fleets differ."""
+    names = set(places.values())
+    if len(names) == 1:
+        return names.pop()
+    return ", ".join(f"{fleet}: {place}" for fleet, place in places.items())
 
 
 def speaks_of(settings: Settings) -> Iterator[Place]:

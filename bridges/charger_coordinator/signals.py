@@ -3,6 +3,7 @@
 import msgspec
 
 from bridges.charger.settings import Robot
+from bridges.charger_coordinator.schedule import LocalTime
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf.definitions import ChargerStateValue
@@ -20,19 +21,28 @@ class Sighting(msgspec.Struct, frozen=True):
 
 
 class FleetSeen(msgspec.Struct, frozen=True):
-    """A FleetState, with the robots that the YAML names."""
+    """A FleetState, with the robots that the YAML names. `when`: the local time; None if not known."""
 
     robots: tuple[Sighting, ...]
+    when: LocalTime | None = None
 
 
 class StateHeard(msgspec.Struct, frozen=True):
-    """A ChargerState. `robot`: None where it names none."""
+    """A ChargerState. `robot`: None where it names none. `full_in_s`: 0 where it is not known."""
 
     station: str
     state: ChargerStateValue
     request_id: str = ""
     robot: Robot | None = None
     error: str = ""
+    full_in_s: float = 0.0
+
+
+class ReceiverHeard(msgspec.Struct, frozen=True):
+    """A ChargerState of a robot's own receiver, which is no station. `error`: "" without one."""
+
+    robot: Robot
+    error: str
 
 
 class Wanted(msgspec.Struct, frozen=True):
@@ -51,9 +61,19 @@ class Unwanted(msgspec.Struct, frozen=True):
 
 
 class Dedicated(msgspec.Struct, frozen=True):
-    """Another node's charging assignments: each robot and the station that it is to use."""
+    """Another node's charging assignments: each robot and the station that it is to use, or ""."""
 
     stations: tuple[tuple[Robot, str], ...]
 
 
-Event = FleetSeen | StateHeard | Wanted | Unwanted | Dedicated | MaySpeak | OperatorReset | Woken
+Event = (
+    FleetSeen
+    | StateHeard
+    | ReceiverHeard
+    | Wanted
+    | Unwanted
+    | Dedicated
+    | MaySpeak
+    | OperatorReset
+    | Woken
+)

@@ -4,12 +4,14 @@ RMF's states have no field for faults, queues and simulations. Our daemons publi
 `/diagnostics`.
 """
 
+import json
 import re
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Final
 
+from bridges.commands.columns import aligned
 from bridges.commands.graph import SILENT_AFTER_S, Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import words
@@ -18,15 +20,15 @@ from bridges.serve import diagnostics
 KINDS: Final = {d.LiftState: "lift", d.DoorState: "door", d.ChargerState: "charger"}
 COORDINATOR: Final = "charger_coordinator"
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
-SECONDS: Final = re.compile(r"\d+(\.\d+)? s\b")
+SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
     """One device, the charger coordinator, or a robot with its assigned place.
 
-    `waiting`: the supervisor's or coordinator's queue. `age`: age of the reading. `mark`: why not to
-    trust the row. `simulated`: no hardware is behind it. `faults`: those that its daemons report.
+    `waiting`: the supervisor's or coordinator's queue. `age`: age of the reading. `mark`: why the row
+    may be wrong. `simulated`: no hardware is behind it. `faults`: those that its daemons report.
     """
 
     kind: str
@@ -53,7 +55,7 @@ class Row:
         return (*state, self.waiting, self.age, marks, self.faults)
 
     def news(self) -> tuple[object, ...]:
-        """The parts whose change is worth a line: running seconds are left out."""
+        """The parts whose change is printed: seconds that only count on are left out."""
         told = (self.state, self.held_by, self.waiting, self.mark, self.faults)
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 
@@ -92,12 +94,12 @@ class Board:
     """The latest state and diagnosis of each device."""
 
     def __init__(self) -> None:
-        self._latest: dict[tuple[str, str], Heard] = {}
+        self._latest: dict[tuple[str, str], Heard[words.Stated]] = {}
         self._requesters: dict[str, str] = {}
         self._places: dict[str, str] = {}
         self._diagnoses: dict[str, Diagnosis] = {}
 
-    def take(self, heard: Heard) -> None:
+    def take(self, heard: Heard[d.Message]) -> None:
         """Take one message that was heard."""
         match heard.message:
             case d.SupervisorHeartbeat():
@@ -112,9 +114,9 @@ class Board:
             case d.DiagnosticArray():
                 for status in heard.message.status:
                     self._diagnose(status, heard.at)
-            case state:
+            case d.LiftState() | d.DoorState() | d.ChargerState() as state:
                 key = (KINDS[type(state)], words.device(state))
-                self._latest[key] = heard
+                self._latest[key] = Heard(state, heard.at)
 
     def rows(self, now: float, wall: float) -> list[Row]:
         """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
@@ -133,7 +135,9 @@ class Board:
         ):
             self._diagnoses[status.name] = diagnosis
 
-    def _device(self, kind: str, name: str, heard: Heard, now: float, wall: float) -> Row:
+    def _device(
+        self, kind: str, name: str, heard: Heard[words.Stated], now: float, wall: float
+    ) -> Row:
         state = heard.message
         found = [
             one for one in self._current(now) if one.device == (kind, name) and not one.of_daemon
@@ -163,7 +167,7 @@ class Board:
             yield Row(
                 "coordinator",
                 words.printable(diagnosis.status.name.partition(": ")[0]),
-                "passive: another node assigns chargers" if passive else "assigns chargers",
+                "passive: another coordinator works" if passive else _coordinates(diagnosis),
                 waiting=words.printable(queue),
                 simulated=self._simulated(diagnosis, now),
                 faults=_faults([diagnosis]),
@@ -186,12 +190,20 @@ class Board:
         return daemon is not None and diagnostics.SIMULATED in daemon.status.message
 
 
+def _coordinates(diagnosis: Diagnosis) -> str:
+    """What the coordinator does, and its schedule."""
+    silent = diagnosis.value("assigns").startswith("no:")
+    does = "asks for chargers that another node assigns" if silent else "assigns chargers"
+    schedule = diagnosis.value("schedule")
+    return words.printable(f"{does}, schedule {schedule}" if schedule else does)
+
+
 def _faults(found: Iterable[Diagnosis]) -> str:
     texts = [text for diagnosis in found for text in diagnosis.faults()]
     return words.printable("; ".join(dict.fromkeys(texts)))
 
 
-def _order(entry: tuple[tuple[str, str], Heard]) -> tuple[int, str]:
+def _order(entry: tuple[tuple[str, str], Heard[words.Stated]]) -> tuple[int, str]:
     (kind, name), _ = entry
     return list(KINDS.values()).index(kind), name
 
@@ -205,7 +217,7 @@ def _age(stamped_at: float, wall: float) -> str:
     return f"{age / 60:.0f} min" if age < 7200 else f"{age / 3600:.0f} h"
 
 
-def _mark(heard: Heard, now: float, wall: float) -> str:
+def _mark(heard: Heard[words.Stated], now: float, wall: float) -> str:
     silent_s = now - heard.at
     age = wall - words.stamped_at(heard.message)
     if silent_s > SILENT_AFTER_S:
@@ -226,9 +238,7 @@ def table(rows: Iterable[Row]) -> list[str]:
         for heading, *cells in zip(HEADINGS, *shown, strict=True)
         if heading not in optional or any(cells)
     ]
-    widths = [max(map(len, column)) for column in columns]
-    lines = zip(*columns, strict=True)
-    return ["  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in lines]
+    return aligned([*zip(*columns, strict=True)])
 
 
 def changes(before: list[Row], after: list[Row]) -> list[Row]:
@@ -247,7 +257,14 @@ def change_line(row: Row, wall: float) -> str:
     return "  ".join(parts)
 
 
-def repaint(rows: list[Row], lines_before: int, columns: int, lines: int) -> tuple[str, int]:
+def json_line(row: Row, wall: float) -> str:
+    """A changed row as one line of JSON, with the time of the change (s since the epoch)."""
+    return json.dumps({"at": round(wall, 3), **asdict(row)})
+
+
+def repaint(
+    rows: list[Row], lines_before: int, columns: int, lines: int, *, coloured: bool = True
+) -> tuple[str, int]:
     """The text that redraws a terminal showing `lines_before` lines of the table, and the new number
     of lines. No line wraps and nothing scrolls away.
     """
@@ -258,5 +275,6 @@ def repaint(rows: list[Row], lines_before: int, columns: int, lines: int) -> tup
     text = f"\x1b[{lines_before}A" if lines_before else ""
     for i, line in enumerate(shown):
         line = line[: columns - 1]
-        text += f"\r\x1b[K\x1b[31m{line}\x1b[0m\n" if i in marked else f"\r\x1b[K{line}\n"
+        red = coloured and i in marked
+        text += f"\r\x1b[K\x1b[31m{line}\x1b[0m\n" if red else f"\r\x1b[K{line}\n"
     return text + "\x1b[J", len(shown)

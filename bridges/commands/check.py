@@ -1,13 +1,13 @@
 """`rmf-bridge check FILE...`: what is wrong with device YAMLs, or all that an electrician signs.
 
-Each file is read and judged, then all of them together (`bridges/settings/across.py`). What is told of
-a file is gathered once (`sheets/told.py`): as text, as JSON, and as a sheet to print.
+Each file is read and checked, then all of them together (`bridges/settings/across.py`). The findings
+about a file are gathered once (`sheets/told.py`), and printed as text, as JSON or as a sheet.
 """
 
 import argparse
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -26,6 +26,10 @@ EXIT_CODES = (
 )
 
 
+COORDINATOR = "charger_coordinator"
+NO_COORDINATOR = "this is compared with a charger coordinator's YAML, and no FILE is one"
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `check`."""
     parser.description = f"{parser.description} {EXIT_CODES}."
@@ -37,6 +41,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--building-map",
         metavar="MAP",
         help="compare the names with RMF's: a *.building.yaml, or a navigation graph",
+    )
+    parser.add_argument(
+        "--fleet-config",
+        metavar="CONFIG",
+        action="append",
+        default=[],
+        help="compare a charger coordinator with a fleet adapter's config.yaml; with a navigation"
+        " graph as --building-map the positions too. Once for each fleet",
     )
     parser.add_argument(
         "--several-machines",
@@ -58,6 +70,8 @@ def run(args: argparse.Namespace) -> int:
     except SettingsError as error:
         return _tell([wrong(args.building_map, error.problems)], args)
     right, found = _read(args.files, building)
+    for file in args.fleet_config:
+        found |= _beside_fleet(file, right, found, building)
     together = across([config for config, _ in right.values()], not args.several_machines)
     files = [_with(found[file], together) for file in args.files]
     return _tell(files, args)
@@ -74,7 +88,7 @@ def _building(file: str | None) -> "BuildingMap | None":
 def _read(
     files: Sequence[str], building: "BuildingMap | None"
 ) -> tuple[dict[str, tuple[Config, Told]], dict[str, Told]]:
-    """Each file, once: those that could be read, and what is told of every one."""
+    """Each file, once: (the readable ones, the findings of all)."""
     right: dict[str, tuple[Config, Told]] = {}
     found: dict[str, Told] = {}
     for file in dict.fromkeys(files):
@@ -89,7 +103,7 @@ def _read(
 
 
 def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Problem], list[str]]:
-    """Its names beside the map's: (problems, what else is to be said)."""
+    """Compare its names with the map's: (problems, notes)."""
     if building is None:
         return [], []
     from bridges.settings.map_names import mismatches, places
@@ -103,17 +117,57 @@ def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Probl
     return [], [f"same names as in {building.file}: {names}"]
 
 
-def _with(file: Told, together: Found) -> Told:
-    """A file with what was found about it among the others."""
+def _beside_fleet(
+    file: str,
+    right: Mapping[str, tuple[Config, Told]],
+    found: Mapping[str, Told],
+    building: "BuildingMap | None",
+) -> dict[str, Told]:
+    """What is told of each coordinator, with what was found beside this fleet's configuration."""
+    from bridges.settings.fleet_config import load_fleet
+    from bridges.settings.fleet_names import compared
+
+    ours = {f: config for f, (config, _) in right.items() if config.kind == COORDINATOR}
+    try:
+        fleet = load_fleet(file)
+    except SettingsError as error:
+        first = next(iter(ours or found))
+        return {first: _more(found[first], errors=error.problems)}
+    if not ours:
+        first = next(iter(found))
+        return {first: _more(found[first], errors=[fleet.problem((), NO_COORDINATOR)])}
+    told_of = {}
+    for name, config in ours.items():
+        beside = compared(config, fleet, building)
+        told_of[name] = _more(found[name], beside.errors, beside.warnings, beside.notes)
+    return told_of
+
+
+def _more(
+    file: Told,
+    errors: Sequence[Problem] = (),
+    warnings: Sequence[Problem] = (),
+    notes: Sequence[str] = (),
+) -> Told:
     return msgspec.structs.replace(
         file,
-        errors=[*file.errors, *(p for p in together.errors if p.file == file.file)],
-        warnings=[*file.warnings, *(p for p in together.warnings if p.file == file.file)],
+        errors=[*file.errors, *errors],
+        warnings=[*file.warnings, *warnings],
+        notes=[*file.notes, *notes],
+    )
+
+
+def _with(file: Told, together: Found) -> Told:
+    """A file with what was found about it among the others."""
+    return _more(
+        file,
+        [p for p in together.errors if p.file == file.file],
+        [p for p in together.warnings if p.file == file.file],
     )
 
 
 def _tell(files: Sequence[Told], args: argparse.Namespace) -> int:
-    """Print it, write the sheet; the exit code."""
+    """Print the findings and write the sheet. Returns the exit code."""
     errors = sum(len(file.errors) for file in files)
     code = os.EX_CONFIG if errors else 0
     if args.json:
@@ -140,7 +194,7 @@ def _print(file: Told, quiet: bool) -> None:
 
 
 def _verdict(files: Sequence[Told], quiet: bool) -> None:
-    """The last line: that all is right, or how many errors there are."""
+    """The last line: `OK`, or the number of errors."""
     errors, warnings = _counts(files)
     also = f", {_many(warnings, 'warning')}" if warnings else ""
     if errors:
@@ -154,13 +208,13 @@ def _many(number: int, what: str) -> str:
 
 
 def _complain(lines: Iterable[str]) -> None:
-    """To stderr, after what was printed: the two often end in one log."""
+    """Write to stderr, after flushing stdout: the two often end in one log."""
     sys.stdout.flush()
     sys.stderr.writelines(f"{line}\n" for line in lines)
 
 
 def _write_sheet(files: Sequence[Told], path: str) -> int:
-    """Write the commissioning sheet; 0, or the exit code when that fails."""
+    """Write the commissioning sheet. Returns 0, or another exit code if that fails."""
     from bridges.commands.sheets.html import page
 
     try:

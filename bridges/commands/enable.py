@@ -26,6 +26,7 @@ from bridges.commands.services import (
     unit,
 )
 from bridges.serve import drop_in
+from bridges.serve.places import GROUPS
 from bridges.settings.across import taken
 from bridges.settings.load import Config, Problem, SettingsError, load
 
@@ -75,7 +76,7 @@ def groups(root: Path) -> set[str]:
     """The groups of this system that a service may be given."""
     with suppress(OSError):
         lines = (root / "etc/group").read_text("utf-8", "replace").splitlines()
-        return {line.partition(":")[0] for line in lines} & set(drop_in.GROUPS)
+        return {line.partition(":")[0] for line in lines} & set(GROUPS)
     return set()
 
 

@@ -1,8 +1,8 @@
 """When `send` sends, when it ends, and what it says when the request has no effect.
 
-Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as RMF does.
-Only a state heard after the first request counts: an earlier one may show the same for another
-reason. What each request asks for, and what fulfils it, is in `requests/`.
+Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as in RMF.
+Only a state heard after the first request counts, because an earlier one may show the same for another
+reason. Each request's message, and what fulfils it, are in `requests/`.
 """
 
 from collections.abc import Iterable
@@ -15,16 +15,18 @@ from bridges.rmf import words
 
 REPEAT_S: Final = 1.0
 PATIENCE_S: Final = 2.0
-"""States come at 1 Hz: after two silent periods `send` gives a hint."""
+"""States come at 1 Hz. After two seconds of silence `send` gives a hint."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The next step: a request to send now, a hint to print once, or the outcome."""
+    """The next step: a request to send now, a hint to print once, or the outcome. `direct`: the request
+    goes to the device's own daemon."""
 
     send: words.Requested | None = None
     hint: str = ""
     outcome: Done | Failed | None = None
+    direct: bool = False
 
 
 def step(request: Request, seen: Seen, now: float) -> Step:
@@ -34,19 +36,21 @@ def step(request: Request, seen: Seen, now: float) -> Step:
         return Step(outcome=over)
     if now >= seen.began_at + seen.timeout_s:
         return Step(outcome=Failed(_reason(request, seen, now)))
-    hint = _hint(request, seen, now)
-    return Step(request.message(seen), hint) if _may_send(request, seen, now) else Step(hint=hint)
+    hint, direct = _hint(request, seen, now), request.goes_direct(seen, now)
+    if not _may_send(request, seen, now, direct=direct):
+        return Step(hint=hint)
+    return Step(request.message(seen), hint, direct=direct)
 
 
-def _may_send(request: Request, seen: Seen, now: float) -> bool:
+def _may_send(request: Request, seen: Seen, now: float, *, direct: bool) -> bool:
     if seen.last_sent_at is not None:
         return now >= seen.last_sent_at + REPEAT_S
     heard_or_late = request.ready(seen) or now >= seen.began_at + PATIENCE_S
-    return seen.listeners > 0 and heard_or_late
+    return (direct or seen.listeners > 0) and heard_or_late
 
 
 def _hint(request: Request, seen: Seen, now: float) -> str:
-    """What the user can do, said early: nobody has to wait for the timeout to read it."""
+    """What the user can do, before the timeout."""
     if now < seen.began_at + PATIENCE_S:
         return ""
     if seen.first_sent_at is None and seen.listeners == 0:
@@ -69,7 +73,7 @@ def _reason(request: Request, seen: Seen, now: float) -> str:
     if silent_s > SILENT_AFTER_S:
         return f"{request.name} fell silent {silent_s:.0f} s ago: is its daemon still running?"
     obstacle = _first(request.obstacles(seen))
-    state = words.described(seen.latest())
+    state = words.described(seen.states[-1].message)
     return _said(obstacle._replace(text=f"{obstacle.text} (last state: {state})"))
 
 

@@ -2,7 +2,7 @@
 
 import argparse
 
-from bridges.commands.plants import add_simulation, obey
+from bridges.commands.plants import add_simulation, names, obey
 
 MODES = ("off", "stuck", "slow", "garbage", "wrong", "ok")
 
@@ -10,9 +10,10 @@ MODES = ("off", "stuck", "slow", "garbage", "wrong", "ok")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `fail`."""
     add_simulation(parser)
-    parser.add_argument(
+    part = parser.add_argument(
         "part", metavar="PART", help="a signal of the file, or a part such as car, unit or server"
     )
+    part.completer = names("fail")  # type: ignore[attr-defined]  # argcomplete's way
     parser.add_argument("mode", choices=MODES, help="how it fails; ok mends it")
 
 

@@ -1,4 +1,4 @@
-"""What `watch` and `send` share: options that name a graph, joining it, listening and leaving."""
+"""What `watch` and `send` share: the options that name a graph, joining it, and listening."""
 
 import argparse
 import shlex
@@ -10,12 +10,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any
+from typing import Generic, TypeVar
 
 import msgspec
 
-from bridges.core.fields import Rmf
 from bridges.rmf import words
+from bridges.rmf.definitions import Message
+from bridges.rmf.renamed import Renamed
+from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Transport, TransportError
 
@@ -38,7 +40,7 @@ def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--transport",
         choices=TRANSPORTS,
-        help="ros2 is rclpy, dds and zenoh need no ROS; auto takes the first that is here (default)",
+        help="ros2 needs rclpy, dds and zenoh need no ROS; auto (default) takes the first one here",
     )
     parser.add_argument(
         "--localhost",
@@ -58,11 +60,12 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
     from bridges.rmf.choose import open_transport
 
     rmf = overridden(_configured(args.config), args)
-    return open_transport(rmf, node_name, localhost=args.localhost, ros_args=args.ros_args)
+    joined = open_transport(rmf, node_name, localhost=args.localhost, ros_args=args.ros_args)
+    return Renamed(joined, rmf.topics) if rmf.topics else joined
 
 
 def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
-    """A YAML's `rmf:` section, with what the command line says instead."""
+    """A YAML's `rmf:` section, changed by the options of the command line."""
     if args.domain_id is not None:
         rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
     if args.transport is not None:
@@ -97,7 +100,7 @@ def interruptible() -> Iterator[None]:
 
 
 def complain(command: str, text: object) -> None:
-    """One line to standard error, under the command's name, without control characters."""
+    """Write one line to standard error: the command's name and the text, control characters escaped."""
     sys.stderr.write(words.printable(f"rmf-bridge {command}: {text}") + "\n")
 
 
@@ -135,11 +138,14 @@ def command_line(args: argparse.Namespace) -> CommandLine:
     return CommandLine(tuple(args.typed), tuple(options))
 
 
+M_co = TypeVar("M_co", bound=Message, covariant=True)
+
+
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Heard(Generic[M_co]):
     """A message and when it arrived (monotonic s)."""
 
-    message: Any
+    message: M_co
     at: float
 
 
@@ -152,15 +158,15 @@ class Inbox:
         *topics: AnyTopic,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._waiting: SimpleQueue[Heard] = SimpleQueue()
+        self._waiting: SimpleQueue[Heard[Message]] = SimpleQueue()
         self._clock = clock
         for topic in topics:
             transport.subscribe(topic, self._received)
 
-    def _received(self, message: Any) -> None:
+    def _received(self, message: Message) -> None:
         self._waiting.put(Heard(message, self._clock()))
 
-    def listen(self, timeout_s: float) -> list[Heard]:
+    def listen(self, timeout_s: float) -> list[Heard[Message]]:
         """Everything that has arrived, in order; waits up to `timeout_s` for the first."""
         heard = []
         try:

@@ -1,15 +1,20 @@
 """Speaks to the plants of a running simulation by their control sockets (`hal_fakes/control.py`)."""
 
 import argparse
+import json
 import shlex
 import socket
 import sys
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from bridges.serve.places import as_told, by_hand
 
 EX_UNAVAILABLE = 69
 ANSWER_S = 5.0
+Completer = Callable[..., list[str]]
+"""As argcomplete calls it: with the prefix and what was typed so far."""
 
 
 def add_simulation(parser: argparse.ArgumentParser) -> None:
@@ -19,12 +24,33 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--runtime-dir", metavar="DIR", help="the simulation's runtime directory")
 
 
+def names(verb: str) -> Completer:
+    """Completes what can `press` or `fail`, from the running simulation; nothing where none runs."""
+
+    def complete(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
+        found = set[str]()
+        with suppress(OSError, ValueError):
+            for path in _sockets(parsed_args):
+                for device, known in json.loads(_ask(path, ["names"])).items():
+                    if parsed_args.device in (None, device):
+                        found |= set(known[verb])
+        return sorted(found)
+
+    return complete
+
+
+def _sockets(args: argparse.Namespace) -> list[Path]:
+    return sorted(_folder(args).glob("plant*.sock"))
+
+
+def _folder(args: argparse.Namespace) -> Path:
+    return (as_told(args.runtime_dir) or by_hand(args.file.absolute())).runtime
+
+
 def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
     """Send one command. 0; 1 if the simulation refuses it; 69 if there is none."""
-    folder = (as_told(args.runtime_dir) or by_hand(args.file.absolute())).runtime
-    sockets = sorted(folder.glob("plant*.sock"))
     try:
-        answers = [_ask(path, [verb, *_device(args), *words]) for path in sockets]
+        answers = [_ask(path, [verb, *_device(args), *words]) for path in _sockets(args)]
     except OSError as error:
         print(f"the simulation of {args.file} does not answer: {error}", file=sys.stderr)
         return EX_UNAVAILABLE
@@ -32,7 +58,7 @@ def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
         return 0
     if not answers:
         print(
-            f"no simulation of {args.file} runs: there is no plant.sock in {folder}."
+            f"no simulation of {args.file} runs: there is no plant.sock in {_folder(args)}."
             f" Start one with rmf-bridge run {args.file} --simulate",
             file=sys.stderr,
         )

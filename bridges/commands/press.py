@@ -2,15 +2,16 @@
 
 import argparse
 
-from bridges.commands.plants import add_simulation, obey
+from bridges.commands.plants import add_simulation, names, obey
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `press`."""
     add_simulation(parser)
-    parser.add_argument(
+    signal = parser.add_argument(
         "signal", metavar="SIGNAL", help="a wrong one is answered with what there is"
     )
+    signal.completer = names("press")  # type: ignore[attr-defined]  # argcomplete's way
     parser.add_argument("how", nargs="?", choices=("on", "off"), default="on", help="default: on")
 
 

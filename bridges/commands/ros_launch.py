@@ -1,13 +1,12 @@
-"""What `ros2 launch rmf_bridges <kind>.launch.py config:=FILE` starts: the daemon, as a ROS node.
+"""Starts the daemon as a ROS node: `ros2 launch rmf_bridges <kind>.launch.py config:=FILE`.
 
 After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/serve/guard.py`). Only
 the launch files in `ros/launch/`, one for each kind, import this module; it needs ROS's `launch`.
 """
 
 from pathlib import Path
-from typing import Any
 
-from launch import LaunchDescription
+from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
@@ -33,7 +32,7 @@ def daemon(kind: str) -> LaunchDescription:
     )
 
 
-def _actions(kind: str, context: Any) -> list[Any]:
+def _actions(kind: str, context: LaunchContext) -> list[Node]:
     file = str(Path(LaunchConfiguration("config").perform(context)).absolute())
     simulate = LaunchConfiguration("simulate").perform(context) == "true"
     _check(kind, file)
@@ -52,7 +51,7 @@ def _check(kind: str, file: str) -> None:
         )
 
 
-def _rmf_bridge(*arguments: str) -> Any:
+def _rmf_bridge(*arguments: str) -> Node:
     return Node(
         package="rmf_bridges", executable="rmf-bridge", arguments=arguments, output="screen"
     )

@@ -9,7 +9,7 @@ import sys
 import time
 from contextlib import closing, suppress
 from dataclasses import replace
-from typing import Any, TextIO
+from typing import TextIO
 from uuid import uuid4
 
 from bridges.commands.exchange import step
@@ -147,7 +147,8 @@ def _lift_request(args: argparse.Namespace) -> Request:
     if args.end:
         if args.granted_only:
             args.usage("--granted-only needs a FLOOR")
-        return LiftEnd(args.name, args.session, direct=args.direct, line=line)
+        fall = getattr(args, "falls_back", False), getattr(args, "car_empty", False)
+        return LiftEnd(args.name, args.session, *fall, direct=args.direct, line=line)
     if not args.session:
         args.usage("whose session is it? --session FLEET/ROBOT, or any name")
     return LiftRide(
@@ -197,11 +198,18 @@ class _Exchange:
     def __init__(
         self, transport: Transport, request: Request, timeout_s: float, out: TextIO
     ) -> None:
-        self.request, self.out = request, out
-        self.publisher: Publisher[Any] = transport.publisher(request.topic)
-        self.inbox = Inbox(transport, request.states, topics.DOOR_SUPERVISOR_HEARTBEAT)
+        self.request, self.out, self.transport = request, out, transport
+        self.publishers: dict[str, Publisher[d.Message]] = {}
+        self.publisher = self._publisher(request.topic)
+        self.inbox = Inbox(transport, request.states, *request.answers, topics.DIAGNOSTICS)
+        self.supervisor = (
+            None
+            if request.supervisor is None
+            else transport.subscribe(request.supervisor, lambda message: None)
+        )
         self.seen = Seen(began_at=time.monotonic(), timeout_s=timeout_s)
         self.said: set[str] = set()
+        self.asked: set[str] = set()
         self.described = ""
 
     def look(self) -> int | None:
@@ -209,7 +217,7 @@ class _Exchange:
         for heard in self.inbox.listen(LOOK_EVERY_S):
             self._take(heard)
         now = time.monotonic()
-        self.seen = replace(self.seen, listeners=self.publisher.matched())
+        self.seen = replace(self.seen, listeners=self._listeners())
         todo = step(self.request, self.seen, now)
         if todo.outcome is not None:
             return self._finish(todo.outcome)
@@ -217,31 +225,41 @@ class _Exchange:
             self.said.add(todo.hint)
             complain("send", todo.hint)
         if todo.send is not None:
-            self._send(todo.send, now)
+            self._send(todo.send, now, self.request.own if todo.direct else self.request.topic)
         return None
 
-    def _take(self, heard: Heard) -> None:
-        if isinstance(heard.message, d.SupervisorHeartbeat):
-            self.seen = replace(self.seen, heartbeat=heard)
+    def _publisher(self, topic: topics.AnyTopic) -> Publisher[d.Message]:
+        if topic.name not in self.publishers:
+            self.publishers[topic.name] = self.transport.publisher(topic)
+        return self.publishers[topic.name]
+
+    def _listeners(self) -> int:
+        """How many hear us; none while nobody is there who would pass it on."""
+        if self.supervisor is not None and not self.supervisor.matched():
+            return 0
+        return self.publisher.matched()
+
+    def _take(self, heard: Heard[d.Message]) -> None:
+        if isinstance(heard.message, d.DiagnosticArray):
+            boarded = _boarded(heard.message, self.request.name)
+            self.seen = replace(self.seen, boarded=boarded or self.seen.boarded)
             return
-        name = words.device(heard.message)
-        self.seen = replace(self.seen, names=self.seen.names | {name})
-        if not self.request.about(heard.message):
+        before, self.seen = self.seen, self.seen.hears(heard, self.request.about)
+        if self.seen.states == before.states:
             return
-        self.seen = replace(self.seen, states=(*self.seen.states, heard))
-        text = words.described(heard.message)
+        text = words.described(self.seen.states[-1].message)
         if text != self.described:
             self.described = text
             self._line(heard.at, "state", text)
 
-    def _send(self, message: words.Requested, now: float) -> None:
+    def _send(self, message: words.Requested, now: float, topic: topics.AnyTopic) -> None:
         if isinstance(message, d.LiftRequest | d.DoorRequest):
             message = replace(message, request_time=stamp(time.time()))
-        if self.seen.first_sent_at is None:
-            self._line(now, "request", f"{words.request(message)} on {self.request.topic.name}")
-        first = now if self.seen.first_sent_at is None else self.seen.first_sent_at
-        self.seen = replace(self.seen, first_sent_at=first, last_sent_at=now)
-        self.publisher.publish(message)
+        if topic.name not in self.asked:
+            self.asked.add(topic.name)
+            self._line(now, "request", f"{words.request(message)} on {topic.name}")
+        self.seen = self.seen.sends(now)
+        self._publisher(topic).publish(message)
 
     def _finish(self, outcome: Done | Failed) -> int:
         if isinstance(outcome, Done):
@@ -255,3 +273,12 @@ class _Exchange:
         line = f"{elapsed_s:8.3f} s  {what:<7}  {self.request.name}  {text}"
         self.out.write(words.printable(line) + "\n")
         self.out.flush()
+
+
+def _boarded(message: d.DiagnosticArray, lift: str) -> str:
+    """What a lift's own diagnostics say of a robot inside; "" if they are another's."""
+    for status in message.status:
+        values = {value.key: value.value for value in status.values}
+        if (status.hardware_id, values.get("kind")) == (lift, "lift"):
+            return values.get("boarded", "")
+    return ""

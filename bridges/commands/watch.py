@@ -5,13 +5,16 @@ change. Ctrl-C is the normal end, so it exits 0.
 """
 
 import argparse
+import json
 import shutil
 import sys
 import time
+from collections.abc import Callable
 from contextlib import closing
+from dataclasses import asdict
 from typing import TextIO
 
-from bridges.commands.board import Board, Row, change_line, changes, repaint, table
+from bridges.commands.board import Board, Row, change_line, changes, json_line, repaint, table
 from bridges.commands.graph import (
     Inbox,
     add_graph_arguments,
@@ -19,6 +22,7 @@ from bridges.commands.graph import (
     interruptible,
     open_graph,
 )
+from bridges.commands.paint import coloured
 from bridges.rmf import topics
 from bridges.rmf.transport import Transport, TransportError
 
@@ -37,6 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help="listen for SECONDS (default 3), print the table, exit 0, or 1 if nothing was heard",
     )
+    parser.add_argument(
+        "--json", action="store_true", help="a line of JSON for each change; with --once one list"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -45,8 +52,9 @@ def run(args: argparse.Namespace) -> int:
         with interruptible(), closing(open_graph(args, "rmf_bridge_watch")) as transport:
             inbox = listen_on(transport)
             if args.once is not None:
-                return show_once(inbox, args.once, sys.stdout)
-            show(inbox, sys.stdout, live=sys.stdout.isatty())
+                return show_once(inbox, args.once, sys.stdout, as_json=args.json)
+            live = sys.stdout.isatty() and not args.json
+            show(inbox, sys.stdout, live=live, line=json_line if args.json else change_line)
     except TransportError as error:
         complain("watch", error)
         return 1
@@ -68,8 +76,8 @@ def listen_on(transport: Transport) -> Inbox:
     )
 
 
-def show_once(inbox: Inbox, seconds: float, out: TextIO) -> int:
-    """Listen for `seconds` and print the table. Returns 0, or 1 if nothing was heard."""
+def show_once(inbox: Inbox, seconds: float, out: TextIO, *, as_json: bool = False) -> int:
+    """Listen for `seconds` and print the table, or JSON. Returns 0, or 1 if nothing was heard."""
     board, until = Board(), time.monotonic() + seconds
     while (left_s := until - time.monotonic()) > 0:
         for heard in inbox.listen(left_s):
@@ -78,13 +86,16 @@ def show_once(inbox: Inbox, seconds: float, out: TextIO) -> int:
     if not rows:
         complain("watch", "no lift, door or charger state heard: check the domain and network")
         return 1
-    out.write("\n".join(table(rows)) + "\n")
+    told = json.dumps([asdict(row) for row in rows]) if as_json else "\n".join(table(rows))
+    out.write(told + "\n")
     out.flush()
     return 0
 
 
-def show(inbox: Inbox, out: TextIO, *, live: bool) -> None:
-    """Show the rows until interrupted."""
+def show(
+    inbox: Inbox, out: TextIO, *, live: bool, line: Callable[[Row, float], str] = change_line
+) -> None:
+    """Show the rows until interrupted: redrawn in place, or a line for each change."""
     board, rows, drawn = Board(), list[Row](), 0
     next_at = 0.0
     while True:
@@ -93,10 +104,10 @@ def show(inbox: Inbox, out: TextIO, *, live: bool) -> None:
         now, wall = time.monotonic(), time.time()
         before, rows = rows, board.rows(now, wall)
         if not live:
-            out.writelines(change_line(row, wall) + "\n" for row in changes(before, rows))
+            out.writelines(line(row, wall) + "\n" for row in changes(before, rows))
         elif now >= next_at:
             size = shutil.get_terminal_size()
-            text, drawn = repaint(rows, drawn, size.columns, size.lines)
+            text, drawn = repaint(rows, drawn, size.columns, size.lines, coloured=coloured(out))
             out.write(text)
             next_at = now + REDRAW_AT_MOST_EVERY_S
         out.flush()

@@ -46,7 +46,7 @@ def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "
 
 
 def forget(before: "Settled[T] | None") -> "Settled[T] | None":
-    """After a gap in the readings: the value stays, and the debounce of a candidate starts again."""
+    """After a gap in the readings the value stays, and a candidate's debounce starts again."""
     if before is None or before.steady_at is None:
         return None
     return replace(before, candidate=cast(T, before.value), torn_since=None)

@@ -24,11 +24,11 @@ R = TypeVar("R", bound="Report")
 
 
 Said = tuple[Topic[Message], Message]
-"""A message and where it goes."""
+"""(topic, message to be published on it)."""
 
 
 class Fault(msgspec.Struct, frozen=True):
-    """One thing that is wrong. `code`: a name that an engineer knows. `detail`: which one, and why."""
+    """One thing that is wrong. `code`: a fixed name. `detail`: which part, and why."""
 
     code: str
     detail: str = ""
@@ -50,7 +50,7 @@ class IoFailed(msgspec.Struct, frozen=True):
 
 
 class Suspended(IoFailed, frozen=True):
-    """The process was stopped, or the machine slept. All that was believed of the inputs is stale."""
+    """The process was stopped, or the machine slept. Everything read before is stale."""
 
 
 class WriteFailed(IoFailed, frozen=True):
@@ -59,6 +59,12 @@ class WriteFailed(IoFailed, frozen=True):
 
 class RivalSeen(msgspec.Struct, frozen=True):
     """Another node publishes states under this device's name."""
+
+
+class Attended(msgspec.Struct, frozen=True):
+    """Whether any node publishes the requests that this device obeys."""
+
+    yes: bool
 
 
 class OperatorReset(msgspec.Struct, frozen=True):
@@ -97,12 +103,17 @@ class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     publish: tuple[Said, ...] = ()
 
 
+RELEASED_LATELY = "released a moment ago"
+STARTING = "inputs settle after the start"
+EXPECTED = frozenset({RELEASED_LATELY, STARTING})
+"""Kinds of refusal that belong to every handover and every start: they are counted, and no warning."""
+
 LONGEST_DETAIL = 300
 
 
 class RequestRefused(Exception):
-    """A message that is not obeyed. `kind`: a short fixed name. Refusals are counted by it, and
-    each kind is logged once.
+    """A message that is not obeyed. `kind`: a short fixed name, by which refusals are counted; each
+    kind is logged once.
 
     `detail` may quote the message, which anybody can send: it is cut to LONGEST_DETAIL characters.
     """

@@ -1,4 +1,4 @@
-"""Durations (s) that several kinds share, and when a message to a device's node is due."""
+"""Durations (s) that several kinds share, and when a request to a device is due."""
 
 import math
 from typing import Final

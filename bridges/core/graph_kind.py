@@ -1,4 +1,4 @@
-"""How the daemon sees a kind without hardware: topics in, topics out, and the core between them.
+"""The record of a kind without hardware: topics in, topics out, and the core between them.
 
 A supervisor or coordinator has no driver and no bus. It learns from messages which subjects (lifts,
 doors) there are, and keeps one core memory for each. `bridges/<kind>/__init__.py` holds the `KIND`;
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Union
 
 from bridges.core.decision import Decision, M, OperatorReset, R
-from bridges.core.kind import AnyDeviceKind, E, L, Place, S
+from bridges.core.kind import Answer, AnyDeviceKind, E, L, Place, S
 from bridges.core.table import Table
 from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
@@ -18,9 +18,15 @@ from bridges.rmf.topics import Topic
 
 @dataclass(frozen=True, slots=True)
 class MaySpeak:
-    """Whether the core may publish. It may not during the quiet start or while a rival publishes."""
+    """Whether the core may publish. It may not during the quiet start or while a rival publishes.
+
+    `at_once`: during the quiet start what a restart must not interrupt may be sent: no rival is there.
+    `alone`: no other node publishes on a topic of `yields`.
+    """
 
     yes: bool
+    at_once: bool = False
+    alone: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +45,8 @@ class GraphKind(Generic[S, L, M, E, R]):
     `devices_key`: the YAML's section of its settings. `settings`: the struct that reads it.
     `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
     RequestRefused; `wall` is our clock (s since the epoch).
-    `publishes`: the topics that it sends on. `sole`: those on which only one node may send; while
-    another node does, ours only listens.
+    `publishes`: the topics that it sends on. `sole`: those on which only one node may have a publisher;
+    while another node has one, ours only listens. `yields`: those on which it alone falls silent then.
     `device_name`: which subject a message is about. `shown_by`: the topic on which a subject publishes
     its own states, which proves that it exists (a request may name anything); None if there is only
     one subject. `reserved(settings)`: the subjects that the YAML names.
@@ -52,12 +58,15 @@ class GraphKind(Generic[S, L, M, E, R]):
     `decide`: the core. Its messages have no stamps: `stamped(message, time)` adds them when they are
     sent. `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`:
     may this subject be forgotten?
+    `answer(asked, reason)`: what is said when a request is refused; None for nothing. `asked`: the
+    message if it was refused at once, else the event.
     `on_map(settings)`: which settings name a place on RMF's map (`bridges/core/kind.py`).
 
     For a kind with one message about all its subjects: `together(memories)`, sent each second and
     whenever it has changed. For a kind whose memory must survive a restart: `persist(memories)`, which
     gives the same bytes until something worth keeping changes, and `restore(kept, settings, now)`,
     which raises ValueError for any other bytes. The memory is saved before `together` is sent.
+    `urgent(memory)`: does it hold something that a restart must not interrupt (`MaySpeak.at_once`)?
 
     For a kind with more settings than a few numbers: `tables(settings)`, for `check`, and
     `warnings(settings)`, (path, text) of what is legal but may be a mistake. `speaks_of(settings)`: the
@@ -81,12 +90,15 @@ class GraphKind(Generic[S, L, M, E, R]):
     together: Callable[[Mapping[str, M]], tuple[Topic[Message], Message]] | None = None
     persist: Callable[[Mapping[str, M]], bytes] | None = None
     restore: Callable[[bytes, S, float], Mapping[str, M]] | None = None
+    urgent: Callable[[M], bool] = lambda memory: False
     tables: Callable[[S], Iterable[Table]] = lambda settings: ()
     warnings: Callable[[S], Iterable[tuple[tuple[str, ...], str]]] | None = None
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
     speaks_of: Callable[[S], Iterable[Place]] = lambda settings: ()
+    yields: tuple[Topic[Message], ...] = ()
     shown_by: Topic[Message] | None = None
     reserved: Callable[[S], Collection[str]] = lambda settings: ()
+    answer: Callable[[object, str], Answer | None] = lambda asked, reason: None
     requester: Callable[[E], str] = lambda event: ""
     requesters: Callable[[M], Collection[str]] = lambda memory: ()
 

@@ -1,4 +1,4 @@
-"""What a kind keeps across a restart: JSON with a version. It is read whole, or refused."""
+"""What a kind keeps across a restart: JSON with a version. It is read completely, or refused."""
 
 from typing import Annotated, TypeVar
 

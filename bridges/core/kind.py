@@ -1,4 +1,4 @@
-"""How the daemon sees a kind of device: its topics, and the pure functions of its folder.
+"""The record of a kind of device: its topics, and the pure functions of its folder.
 
 `bridges/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or doors. Each
 `KIND` states its types, so mypy proves that its functions fit together.
@@ -6,7 +6,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar, Union
+from typing import Any, Generic, NamedTuple, TypeVar, Union
 
 from bridges.core.decision import (
     Decision,
@@ -32,8 +32,19 @@ E = TypeVar("E")
 DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: UP007
 """Every event that the core of a device takes."""
 
+FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
+"""What a name on RMF's map can name."""
+
 Place = tuple[tuple[str, ...], str, str]
-"""A setting that names something on RMF's map: its path, what it is (`building_map`), the name."""
+"""A setting that names something on RMF's map: its path, what it is (`FLOOR`, …), the name."""
+
+
+class Answer(NamedTuple):
+    """What is said of a refused request: a message, where it goes, and the same for the status file."""
+
+    topic: Topic[Message]
+    message: Message
+    told: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +61,12 @@ class Kind(Generic[S, L, M, X, E, O, R]):
     `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
     `summary(report)`: key -> value for the log line, the status file and `watch`.
     `published(memory, report)`: the memory after this report has gone out to RMF.
-    `alarm_topics(settings)`: what a device publishes beside its states.
+    `publishes(settings)`: what a device publishes beside its states.
+    `answer(name, asked, reason, report)`: what is said when a request is refused; None for nothing.
+    `asked`: the message if it is malformed, else the event.
     `on_map(settings)`: which of its settings name a place on RMF's map, as (path, what it is, name).
     The device's own name is checked for every kind.
+    `attended_by`: the topic of requests whose publishers the core is told of (`Attended`), if any.
     """
 
     name: str
@@ -67,8 +81,12 @@ class Kind(Generic[S, L, M, X, E, O, R]):
     state_message: Callable[[str, S, R, Time], Message]
     summary: Callable[[R], Mapping[str, str]]
     published: Callable[[M, R], M] = lambda memory, report: memory
-    alarm_topics: Callable[[S], tuple[Topic[Message], ...]] = lambda settings: ()
+    publishes: Callable[[S], tuple[Topic[Message], ...]] = lambda settings: ()
+    answer: Callable[[str, object, str, R], Answer | None] = lambda name, asked, reason, report: (
+        None
+    )
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
+    attended_by: Topic[Message] | None = None
 
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]

@@ -1,12 +1,18 @@
-"""A table that a person holds against a controller: `check` prints it, its sheet has boxes for it."""
+"""A table that a person compares with a controller: `check` prints it, with boxes on its sheet."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of cells, as many as headings."""
+    """Each row has as many cells as there are headings."""
 
     title: str
     headings: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+
+    def filled(self) -> "Table":
+        """The same without the columns that are empty in every row."""
+        kept = [i for i in range(len(self.headings)) if any(row[i] for row in self.rows)]
+        headings, *rows = (tuple(row[i] for i in kept) for row in (self.headings, *self.rows))
+        return Table(self.title, headings, tuple(rows))

@@ -1,5 +1,6 @@
 """Doors: RMF's DoorRequest becomes a relay or register, and the door's inputs become DoorState."""
 
+from bridges.core.decision import Attended
 from bridges.core.kind import Kind
 from bridges.door import core, messages
 from bridges.door.memory import DoorLimits, Memory
@@ -13,7 +14,7 @@ KIND: Kind[
     DoorLimits,
     Memory,
     DoorSample,
-    OpenRequested | CloseRequested,
+    OpenRequested | CloseRequested | Attended,
     DoorOutputs,
     DoorReport,
 ] = Kind(
@@ -27,5 +28,6 @@ KIND: Kind[
     initial=core.initial,
     decide=core.decide,
     state_message=messages.state_message,
+    attended_by=topics.DOOR_REQUESTS,
     summary=messages.summary,
 )

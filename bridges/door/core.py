@@ -5,7 +5,8 @@ Rules:
   `close_grace_s`. An OPEN in that time cancels the CLOSE; a repeated CLOSE does not prolong it. (The
   reason: RMF's supervisor, restarted while a robot stands in the doorway, first sends a CLOSE.)
 - Nothing ever drives the door shut. Silence never releases the hold: RMF is silent while a robot
-  passes.
+  passes. If the site has set `supervisor_lost_s`, the hold ends when for so long no node has been there
+  that publishes door requests.
 - After the hold has ended, and until the door is seen closed, an obstruction switches it on again.
 - In a fire alarm the site's `on_fire` decides. `open` holds the door open, and no CLOSE releases it.
   `release` switches the hold off, clears the latch and refuses OPEN. The state is then UNKNOWN: no
@@ -26,6 +27,7 @@ from collections.abc import Iterator
 from msgspec.structs import replace
 
 from bridges.core.decision import (
+    Attended,
     Decision,
     IoFailed,
     RivalSeen,
@@ -38,6 +40,7 @@ from bridges.door.memory import (
     DoorLimits,
     Memory,
     Senses,
+    lost_at,
     opening_ends_at,
     rivalled,
     too_long_at,
@@ -59,7 +62,7 @@ def decide(
 ) -> Decision[Memory, DoorOutputs, DoorReport]:
     """One scan. `now`: monotonic s, never before that of the last scan. Never raises."""
     memory, refused = _hear(memory, event, now, limits)
-    memory = _let_go(memory, now)
+    memory = _let_go(memory, now, limits)
     memory = _hold(memory, _look(memory, now, limits), now, limits)
     view = _look(memory, now, limits)
     is_on = _pulse_is_on(memory, now, limits.pulse)
@@ -86,6 +89,8 @@ def _hear(memory: Memory, event: Event, now: float, limits: DoorLimits) -> tuple
             return replace(memory, senses=miss(memory.senses), io_failure=reason), ""
         case RivalSeen():
             return replace(memory, rival_at=now), ""
+        case Attended(yes):
+            return replace(memory, unattended_since=None if yes else now), ""
         case OpenRequested():
             return _open(memory, now, limits)
         case CloseRequested():
@@ -97,7 +102,11 @@ def _open(memory: Memory, now: float, limits: DoorLimits) -> tuple[Memory, str]:
     if released_by_fire(_look(memory, now, limits), limits):
         return memory, "the fire alarm has released the door"
     latched_at = now if memory.latched_at is None else memory.latched_at
-    return replace(memory, latched_at=latched_at, close_at=None), ""
+    unattended_since = None if memory.unattended_since is None else now
+    return (
+        replace(memory, latched_at=latched_at, close_at=None, unattended_since=unattended_since),
+        "",
+    )
 
 
 def _close(memory: Memory, now: float, limits: DoorLimits) -> Memory:
@@ -106,8 +115,9 @@ def _close(memory: Memory, now: float, limits: DoorLimits) -> Memory:
     return replace(memory, close_at=now + limits.t.close_grace_s)
 
 
-def _let_go(memory: Memory, now: float) -> Memory:
-    if memory.close_at is None or now < memory.close_at:
+def _let_go(memory: Memory, now: float, limits: DoorLimits) -> Memory:
+    close_at = NEVER if memory.close_at is None else memory.close_at
+    if now < min(close_at, lost_at(memory, limits)):
         return memory
     return replace(memory, latched_at=None, close_at=None)
 
@@ -161,6 +171,7 @@ def _wakes(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterat
     yield travel_ends_at(memory, limits)
     yield opening_ends_at(memory, limits)
     yield too_long_at(memory, limits)
+    yield lost_at(memory, limits)
     if memory.held and limits.pulse is not None:
         phase_s = (now - memory.held_since) % limits.pulse.every_s
         is_on = phase_s < limits.pulse.on_s

@@ -61,7 +61,8 @@ class Memory(msgspec.Struct, frozen=True):
     `latched_at`: since when RMF wants the door open. `close_at`: when a CLOSE releases the hold.
     `held`: the hold is on; `held_since`: when it was last switched on or off. `closing`: the hold has
     ended, and the door has not been seen closed since. `between_since`: since when the door is at
-    neither limit. `shut_since`: since when it is not fully open.
+    neither limit. `shut_since`: since when it is not fully open. `unattended_since`: since when no node
+    publishes door requests.
     """
 
     latched_at: float | None = None
@@ -74,6 +75,7 @@ class Memory(msgspec.Struct, frozen=True):
     shut_since: float | None = None
     rival_at: float | None = None
     io_failure: str = ""
+    unattended_since: float | None = None
 
 
 def rivalled(memory: Memory, now: float) -> bool:
@@ -100,3 +102,10 @@ def too_long_at(memory: Memory, limits: DoorLimits) -> float:
     if memory.latched_at is None or limits.t.max_hold_s is None:
         return NEVER
     return memory.latched_at + limits.t.max_hold_s
+
+
+def lost_at(memory: Memory, limits: DoorLimits) -> float:
+    """When the supervisor has been gone for `supervisor_lost_s`; NEVER if there is no such limit."""
+    if memory.unattended_since is None or limits.t.supervisor_lost_s is None:
+        return NEVER
+    return memory.unattended_since + limits.t.supervisor_lost_s

@@ -1,7 +1,6 @@
 """DoorRequest in, DoorState out. Is a request well formed?"""
 
 from collections.abc import Mapping
-from typing import Any
 
 from bridges.core.decision import RequestRefused
 from bridges.core.names import check_length
@@ -30,7 +29,7 @@ def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | Clos
     )
 
 
-def state_message(name: str, settings: Any, report: DoorReport, stamp: Time) -> DoorState:
+def state_message(name: str, settings: object, report: DoorReport, stamp: Time) -> DoorState:
     """The report as RMF reads it; `stamp` is when the door was last read."""
     return DoorState(door_time=stamp, door_name=name, current_mode=DoorMode(int(report.mode)))
 

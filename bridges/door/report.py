@@ -1,7 +1,6 @@
 """What RMF, the log and the status file are told of a door."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import msgspec
 
@@ -9,6 +8,7 @@ from bridges.core.decision import Fault
 from bridges.door.memory import (
     DoorLimits,
     Memory,
+    lost_at,
     opening_ends_at,
     rivalled,
     too_long_at,
@@ -30,7 +30,7 @@ class DoorReport(msgspec.Struct, frozen=True):
     hold: bool = False
     estimated: bool = False
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """The report without its age."""
         return self.mode, self.faults, self.hold, self.estimated
 
@@ -82,6 +82,9 @@ def _faults(memory: Memory, view: View, now: float, limits: DoorLimits) -> Itera
         yield from _contradictions(memory, view, now, limits)
     if now >= too_long_at(memory, limits):
         yield Fault("DOOR_OPEN_TOO_LONG", f"held for RMF longer than {limits.t.max_hold_s} s")
+    if now >= lost_at(memory, limits):
+        lost_s = limits.t.supervisor_lost_s
+        yield Fault("SUPERVISOR_LOST", f"no node publishes door_requests for {lost_s} s: released")
 
 
 def _silence(memory: Memory, limits: DoorLimits) -> Iterator[Fault]:

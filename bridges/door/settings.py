@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from bridges.core.fields import DeviceSettings, Seconds, Timeout
+from bridges.core.fields import DeviceSettings, Patience, Seconds, Timeout
 
 StaleAfter = Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})]
 PulseSeconds = Annotated[float, Meta(ge=0.05, le=600, extra={"unit": "s"})]
@@ -22,6 +22,8 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     `hazard_clear_s`: how long a fire alarm or an obstruction must be clear before it counts as over.
     `open_delay_s`: with estimated feedback, how long the door takes to open.
     `max_hold_s`: how long RMF may hold the door; after that a fault is shown, and the hold stays.
+    `supervisor_lost_s`: how long no node may publish door requests; after that the hold is released.
+    When absent the door stays held, as a robot may stand in the doorway.
     """
 
     stale_after_s: StaleAfter = 1.0
@@ -31,6 +33,7 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     hazard_clear_s: Seconds = 1.0
     open_delay_s: Seconds | None = None
     max_hold_s: Seconds | None = None
+    supervisor_lost_s: Patience | None = None
 
 
 class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

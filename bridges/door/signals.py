@@ -2,7 +2,7 @@
 
 import msgspec
 
-from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled
+from bridges.core.decision import Attended, IoFailed, OperatorReset, RivalSeen, Sampled
 
 
 class DoorSample(msgspec.Struct, frozen=True):
@@ -45,4 +45,12 @@ class CloseRequested(msgspec.Struct, frozen=True):
     requester_id: str
 
 
-Event = Sampled[DoorSample] | IoFailed | RivalSeen | OperatorReset | OpenRequested | CloseRequested
+Event = (
+    Sampled[DoorSample]
+    | IoFailed
+    | RivalSeen
+    | OperatorReset
+    | Attended
+    | OpenRequested
+    | CloseRequested
+)

@@ -45,5 +45,6 @@ KIND: GraphKind[
     together=report.heartbeat,
     persist=keep.persist,
     restore=keep.restore,
+    urgent=core.urgent,
     speaks_of=speaks_of,
 )

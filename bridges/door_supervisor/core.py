@@ -15,24 +15,26 @@ requests on `adapter_door_requests`; the supervisor sends its own on `door_reque
    the door stays open.
 4. During the quiet start, and while another supervisor publishes, it only listens. After that it sends
    OPEN for a door with holders at once. It sends CLOSE only when a new state of the door calls for it.
+   A door that was held before the restart, and that is not seen CLOSED, is held from the start unless
+   another supervisor is there: its own node may have died too, with a robot in the doorway.
 5. Two messages are at least GAP_S apart, and a message is repeated unchanged after REPEAT_S at the
    earliest.
 The heartbeat (`report.py`) says who holds the doors, and `keep.py` saves that across a restart.
 """
 
-from typing import Any, Final
+from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.core.decision import Decision
+from bridges.core.decision import Decision, Said
 from bridges.core.durations import FORGOTTEN_S, NEVER, due_at
 from bridges.core.freshness import Rules, hear
 from bridges.core.graph_kind import MaySpeak
 from bridges.door_supervisor.memory import Holder, Limits, Memory
 from bridges.door_supervisor.report import DoorHoldReport, report
 from bridges.door_supervisor.signals import CloseRequested, Event, OpenRequested, StateHeard
-from bridges.rmf.definitions import DoorMode, DoorRequest, Message
-from bridges.rmf.topics import DOOR_REQUESTS, Topic
+from bridges.rmf.definitions import DoorMode, DoorRequest
+from bridges.rmf.topics import DOOR_REQUESTS
 
 REQUESTER_ID: Final = "door_supervisor"
 """The requester_id that RMF's own uses (door_supervisor/Node.hpp)."""
@@ -53,10 +55,15 @@ def idle(memory: Memory, now: float) -> bool:
     return not memory.holders and now >= max(heard) + FORGOTTEN_S
 
 
+def urgent(memory: Memory) -> bool:
+    """Must a door be held before the quiet start is over?"""
+    return memory.holds_restored
+
+
 def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
     """Take the event in, and send what is due: at most one message. Never raises."""
     memory, refused = _take(memory, event, now)
-    publish: tuple[tuple[Topic[Any], Message], ...] = ()
+    publish: tuple[Said, ...] = ()
     if now >= _due_at(memory):
         publish = ((DOOR_REQUESTS, _request(memory)),)
         memory = replace(memory, sent=memory.wanted, sent_at=now, prompted=False)
@@ -79,8 +86,9 @@ def _take(memory: Memory, event: Event, now: float) -> tuple[Memory, str]:
             return _hear(memory, event, now)
         case StateHeard(mode):
             return _see(replace(memory, mode=mode, shown_at=now), now), ""
-        case MaySpeak(yes):
-            return replace(memory, may_speak=yes, sent=None, prompted=False), ""
+        case MaySpeak(yes, at_once):
+            memory = replace(memory, may_speak=yes, at_once=at_once)
+            return replace(memory, sent=None, prompted=False), ""
         case _:  # only time has passed
             return memory, ""
 
@@ -128,7 +136,7 @@ def _request(memory: Memory) -> DoorRequest:
 
 def _due_at(memory: Memory) -> float:
     """When the next request is due."""
-    if not memory.may_speak:
+    if not memory.may_send:
         return NEVER
     return due_at(memory.sent_at, new=memory.owed, again=memory.prompted)
 

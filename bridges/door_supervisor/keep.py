@@ -54,6 +54,8 @@ def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
 def _restored(door: str, holders: Mapping[str, int], now: float) -> Memory:
     return Memory(
         door,
-        holders=tuple(Holder(who, now, now, stamp, stamp) for who, stamp in holders.items()),
+        holders=tuple(
+            Holder(who, now, now, stamp, stamp, restored=True) for who, stamp in holders.items()
+        ),
         requesters={who: Requester(stamp, heard_at=now) for who, stamp in holders.items()},
     )

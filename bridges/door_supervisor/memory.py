@@ -33,7 +33,7 @@ class Holder(msgspec.Struct, frozen=True):
     """A requester that holds the door open, `since` when (our clock). `stamp`: of its latest OPEN.
 
     `asked_at`: when that OPEN came. `visit`: the stamp of the first OPEN of its present visit; repeats
-    do not change it.
+    do not change it. `restored`: it held the door before our restart.
     """
 
     requester: str
@@ -41,6 +41,7 @@ class Holder(msgspec.Struct, frozen=True):
     asked_at: float
     stamp: int
     visit: int
+    restored: bool = False
 
     def repeats(self, stamp: int, now: float) -> "Holder":
         """The holder after another OPEN."""
@@ -52,12 +53,14 @@ class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
     `holders`: in the order in which they came. `requesters`: what was lately heard of each. `mode`:
-    the door's last mode, heard at `shown_at`. `sent`: the last request to the door's node since we may
+    the door's last mode, heard at `shown_at`. `at_once`: what was restored need not wait until we may
+    publish. `sent`: the last request to the door's node since we may
     publish. `prompted`: something calls for a repeat of it.
     """
 
     door: str
     may_speak: bool = False
+    at_once: bool = False
     holders: tuple[Holder, ...] = ()
     requesters: Requesters = {}
     mode: DoorModeValue | None = None
@@ -70,6 +73,18 @@ class Memory(msgspec.Struct, frozen=True):
     def wanted(self) -> DoorModeValue:
         """The mode to request of the door's node."""
         return OPEN if self.holders else CLOSED
+
+    @property
+    def may_send(self) -> bool:
+        """May the door's node be asked now? During the quiet start only for restored holders, and only
+        if the door is not closed: a robot may stand in its doorway."""
+        stands_open = self.mode not in (None, CLOSED)
+        return self.may_speak or (self.at_once and stands_open and self.holds_restored)
+
+    @property
+    def holds_restored(self) -> bool:
+        """Is there a holder from before our restart?"""
+        return any(holder.restored for holder in self.holders)
 
     @property
     def owed(self) -> bool:

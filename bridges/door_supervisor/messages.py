@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from bridges.core.decision import RequestRefused
 from bridges.core.freshness import in_ns
-from bridges.core.names import check_length
+from bridges.core.names import check_length, check_listed
 from bridges.door_supervisor.core import REQUESTER_ID
 from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.settings import Settings
@@ -23,7 +23,7 @@ def accept_request(
     0, would mean CLOSE. A request with our own requester_id is one of those that we send to the doors,
     and came back through a renamed topic.
     """
-    _check_door(request.door_name, settings)
+    check_listed("door", request.door_name, settings.doors)
     who = request.requester_id
     if not who:
         raise RequestRefused("no requester", "requester_id is empty")
@@ -42,19 +42,11 @@ def accept_request(
 
 def accept_state(state: DoorState, settings: Settings, wall: float) -> StateHeard:
     """A door's state as an event. Raises RequestRefused."""
-    _check_door(state.door_name, settings)
+    check_listed("door", state.door_name, settings.doors)
     mode = state.current_mode.value
     if mode not in set(DoorModeValue):
         raise RequestRefused("unknown current_mode", str(mode))
     return StateHeard(DoorModeValue(mode))
-
-
-def _check_door(name: str, settings: Settings) -> None:
-    if not name:
-        raise RequestRefused("empty door_name", "a door needs a name")
-    check_length(door_name=name)
-    if settings.doors is not None and name not in settings.doors:
-        raise RequestRefused("not ours", f"{name!r} is none of {', '.join(settings.doors)}")
 
 
 def device_name(message: DoorRequest | DoorState) -> str:

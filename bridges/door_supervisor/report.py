@@ -7,7 +7,6 @@ requests, so the sessions of a restarted fleet adapter stay for ever. Ours is al
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import msgspec
 
@@ -35,7 +34,7 @@ class DoorHoldReport(msgspec.Struct, frozen=True):
     holders: tuple[tuple[str, float], ...] = ()
     faults: tuple[Fault, ...] = ()
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """What is worth a line in the log."""
         return self.mode, tuple(requester for requester, _ in self.holders)
 

@@ -7,6 +7,8 @@ Rules, in the order in which they are applied:
 2. END ends the session at once. AGV mode and the door's hold may stay on for `release_grace_s`. During
    that time only the same session is granted, even in a fire. The reason: a supervisor that restarts
    sends END for a robot that is still inside, and that robot must get out.
+   If RMF's supervisor asks for another session than the one that has the lift, its robot's own
+   requests and END count as well (`bridges/lift/forgotten.py`).
 3. A request sets the destination and the mode. `bridges/lift/drive.py` says what may be energised.
 4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and its
    latch, if an operator must reset it), code blue, earthquake, emergency, out of service, manual mode,
@@ -21,28 +23,29 @@ Rules, in the order in which they are applied:
      close by itself while a robot drives through.
 """
 
-from typing import Any
-
 from msgspec.structs import replace
 
 from bridges.core.decision import (
+    RELEASED_LATELY,
+    STARTING,
     Decision,
     Fault,
     IoFailed,
     OperatorReset,
     RivalSeen,
+    Said,
     Sampled,
     Suspended,
     WriteFailed,
 )
 from bridges.core.durations import NEVER, RIVAL_QUIET_S
-from bridges.lift import drive
+from bridges.lift import drive, forgotten
 from bridges.lift.memory import Grace, LiftLimits, Memory, Session
 from bridges.lift.report import NOT_FRESH, LiftReport, report
 from bridges.lift.sensing import HAZARDS, View, gap, look, take, trust, unsure
-from bridges.lift.signals import Event, Hazard, LiftOutputs, LiftSample, Requested
-from bridges.rmf.definitions import Bool, EmergencySignal, Message
-from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
+from bridges.lift.signals import Event, FromAdapter, Hazard, LiftOutputs, LiftSample, Requested
+from bridges.rmf.definitions import Bool, EmergencySignal
+from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER
 
 NOT_RMFS = frozenset(
     {
@@ -149,6 +152,8 @@ def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple
             return _reset(memory, now, limits), ""
         case Requested():
             return _ask(memory, event, now, limits)
+        case FromAdapter():
+            return _hear_adapter(memory, event, now, limits), ""
     return _end(memory, event.session_id, now, limits)
 
 
@@ -166,17 +171,34 @@ def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) ->
 def _ask(memory: Memory, request: Requested, now: float, limits: LiftLimits) -> tuple[Memory, str]:
     held, grace = memory.session, memory.grace
     if held and held.id != request.session_id:
-        return memory, f"held by another session: {held.id}"
+        session = forgotten.overruled(held, request.session_id, now)
+        return replace(memory, session=session), f"held by another session: {held.id}"
     if held:
-        return replace(memory, session=_refresh(held, request, now)), ""
+        session = replace(_refresh(held, request, now), forgotten=None)
+        return replace(memory, session=session), ""
     if grace and now < grace.until:
         if grace.session.id != request.session_id:
-            return memory, f"released a moment ago: by {grace.session.id}"
+            return memory, f"{RELEASED_LATELY}: by {grace.session.id}"
         return replace(memory, session=_grant(request, now, grace.session.boarded), grace=None), ""
-    why_not = obstacles(memory, look(memory.senses, now, limits), now, limits)
+    view = look(memory.senses, now, limits)
+    why_not = obstacles(memory, view, now, limits)
     if why_not:
-        return memory, why_not[0].code
+        starting = view.settling and not memory.io_fault and why_not[0].code == NOT_FRESH
+        return memory, STARTING if starting else why_not[0].code
     return replace(memory, session=_grant(request, now, boarded=False), grace=None), ""
+
+
+def _hear_adapter(memory: Memory, event: FromAdapter, now: float, limits: LiftLimits) -> Memory:
+    """A robot's own request: it counts for the session that has the lift, and only if forgotten."""
+    held, asked = memory.session, event.asked
+    if held is None or held.id != asked.session_id:
+        return memory
+    session, obeyed = forgotten.heard(held, event)
+    if not obeyed:
+        return replace(memory, session=session)
+    if isinstance(asked, Requested):
+        return replace(memory, session=_refresh(session, asked, now))
+    return _end(memory, asked.session_id, now, limits)[0]
 
 
 def _grant(request: Requested, now: float, boarded: bool) -> Session:
@@ -187,15 +209,17 @@ def _refresh(session: Session, request: Requested, now: float) -> Session:
     """A repeat only shows that RMF is alive; another destination or mode is a new request."""
     if (request.agv, request.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
-    return _grant(request, now, session.boarded)
+    fresh = _grant(request, now, session.boarded)
+    return replace(fresh, forgotten=session.forgotten, own_stamp=session.own_stamp)
 
 
 def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tuple[Memory, str]:
     held = memory.session
-    if held is None:
+    if held is None or not session_id:
         return memory, ""
     if held.id != session_id:
-        return memory, f"held by another session: {held.id}"
+        session = forgotten.remembered(held, session_id)
+        return replace(memory, session=session), f"held by another session: {held.id}"
     grace = None
     if memory.relays.agv.on or held.boarded:
         grace = Grace(held, now + limits.t.release_grace_s)
@@ -219,22 +243,21 @@ def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
 
 
 def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory:
-    """Latch a fire as `fire_reset` says. Forget a rival once it has been silent for RIVAL_QUIET_S."""
+    """Latch a fire as `fire_reset` says, and an alarm until an operator resets. Forget a rival once it
+    has been silent for RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
     manual = limits.fire_reset == "manual"
     rival_at = memory.rival_at
     return replace(
         memory,
         fire_latched=manual and (burning or memory.fire_latched),
-        alarmed=memory.alarmed or burning,
+        alarmed=memory.alarmed or bool(limits.alarm_on & view.hazards),
         rival_at=None if rival_at is None or now >= rival_at + RIVAL_QUIET_S else rival_at,
     )
 
 
-def _alarms(
-    before: bool, memory: Memory, limits: LiftLimits
-) -> tuple[tuple[Topic[Any], Message], ...]:
-    """`true` once when a fire alarm comes; `false` once when an operator resets."""
+def _alarms(before: bool, memory: Memory, limits: LiftLimits) -> tuple[Said, ...]:
+    """`true` once when a hazard of `alarm_on` comes; `false` once when an operator resets."""
     if memory.alarmed == before or limits.alarm == "none":
         return ()
     if limits.alarm == FIRE_ALARM_TRIGGER.name:
@@ -251,9 +274,19 @@ def _faults(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple
         found.append(session.fault)
     if Hazard.OVERLOAD in view.hazards:
         found.append(Fault("OVERLOAD", "waits until the car is lighter"))
-    if session and drive.silent(session, now, limits):
-        found.append(Fault("RMF_SILENT", f"no request from {session.id}"))
+    if session:
+        found += _faults_of_rmf(session, now, limits)
     return (*found, *view.faults)
+
+
+def _faults_of_rmf(session: Session, now: float, limits: LiftLimits) -> list[Fault]:
+    """A supervisor that asks for another session explains why no request comes for this one."""
+    if session.forgotten:
+        fault = forgotten.fault(session, now)
+        return [fault] if fault else []
+    if drive.silent(session, now, limits):
+        return [Fault("RMF_SILENT", f"no request from {session.id}")]
+    return []
 
 
 def _wake_at(
@@ -265,7 +298,7 @@ def _wake_at(
         _unwritten_at(memory, limits),
     ]
     if memory.session:
-        due += drive.next_at(memory.session, limits)
+        due += [*drive.next_at(memory.session, limits), forgotten.named_at(memory.session)]
     if memory.grace:
         due += [drive.let_go_at(memory.grace, limits), memory.grace.until]
     if memory.rival_at is not None:

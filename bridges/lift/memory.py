@@ -22,7 +22,8 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """What the core needs of a lift's settings.
 
     `stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations.
-    `debounce`: signal -> s. `by_call`: a call brings AGV mode.
+    `debounce`: signal -> s. `alarm_on`: the hazards that are told on the topic `alarm`. `by_call`: a
+    call brings AGV mode.
     """
 
     stops: Mapping[str, Stop]
@@ -30,6 +31,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     debounce: Mapping[str, float] = {}
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
+    alarm_on: frozenset[Hazard] = frozenset({Hazard.FIRE})
     by_call: bool = False
 
     @classmethod
@@ -41,6 +43,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
             debounce,
             settings.fire_reset,
             settings.alarm,
+            frozenset(map(Hazard, settings.alarm_on)),
             by_call=settings.agv_mode == "by_call",
         )
 
@@ -94,6 +97,15 @@ class Senses(msgspec.Struct, frozen=True):
     position: Position = Position()
 
 
+class Forgotten(msgspec.Struct, frozen=True):
+    """RMF's supervisor asks for another session instead (`by`), `since` when. `ended`: the forgotten
+    robot's own END was heard once (`bridges/lift/forgotten.py`)."""
+
+    by: str
+    since: float
+    ended: bool = False
+
+
 class Session(msgspec.Struct, frozen=True):
     """Who holds the lift, what was requested, and how far the ride has come.
 
@@ -101,6 +113,8 @@ class Session(msgspec.Struct, frozen=True):
     `agv_seen`: AGV mode has come on for our request. `arrived`: the car has stood at the destination.
     `call_at`: when the present call began. `waiting`, `since`: what we wait for, and since when.
     `tries`: how often that has failed. `retry_at`: outputs stay off until then (inf: latched).
+    `forgotten`: RMF's supervisor asks for another session. `own_stamp`: the newest stamp (ns) of the
+    robot's own requests, as its adapter sent them.
     """
 
     id: str
@@ -116,6 +130,8 @@ class Session(msgspec.Struct, frozen=True):
     tries: int = 0
     retry_at: float | None = None
     fault: Fault | None = None
+    forgotten: Forgotten | None = None
+    own_stamp: int = 0
 
 
 class Grace(msgspec.Struct, frozen=True):

@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 
 from bridges.core.decision import RequestRefused
+from bridges.core.freshness import in_ns
 from bridges.core.names import check_length
 from bridges.lift.report import LiftReport
 from bridges.lift.settings import LiftSettings
-from bridges.lift.signals import Ended, Requested
+from bridges.lift.signals import Ended, FromAdapter, Requested
 from bridges.rmf.definitions import (
     LiftMode,
     LiftRequest,
@@ -16,8 +17,10 @@ from bridges.rmf.definitions import (
     Message,
     Time,
 )
-from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
+from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
 
+OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
+"""What fleet adapters send to RMF's supervisor, heard for the robot that has the lift."""
 AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
 
 
@@ -25,13 +28,14 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
     """The request as an event. Raises RequestRefused if it is malformed or asks for the impossible.
 
     An END_SESSION counts whatever its floor and door are: fleet adapters send "" and 0
-    (rmf_fleet_adapter RobotContext.cpp).
+    (rmf_fleet_adapter RobotContext.cpp). Jazzy's supervisor sends one without a session at each state
+    of a lift that nobody has (lift_supervisor/Node.cpp); it ends nothing.
     """
-    if not request.session_id:
-        raise RequestRefused("empty session_id", "a session needs a name")
     check_length(session_id=request.session_id)
     if request.request_type == LiftRequestType.REQUEST_END_SESSION:
         return Ended(request.session_id)
+    if not request.session_id:
+        raise RequestRefused("empty session_id", "a session needs a name")
     agv = request.request_type == LiftRequestType.REQUEST_AGV_MODE
     if not agv and request.request_type != LiftRequestType.REQUEST_HUMAN_MODE:
         raise RequestRefused("unknown request_type", str(request.request_type))
@@ -43,6 +47,11 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
             "floor not served", f"{request.destination_floor!r} is none of {', '.join(floors)}"
         )
     return Requested(request.session_id, agv, request.destination_floor)
+
+
+def accept_adapters(request: LiftRequest, settings: LiftSettings) -> FromAdapter:
+    """A fleet adapter's request, before RMF's supervisor has decided on it. Raises RequestRefused."""
+    return FromAdapter(accept(request, settings), in_ns(request.request_time))
 
 
 def alarm_topics(settings: LiftSettings) -> tuple[Topic[Message], ...]:
@@ -80,5 +89,6 @@ def summary(report: LiftReport) -> Mapping[str, str]:
         "door": f"{door} (estimated)" if report.estimated else door,
         "motion": report.motion.name.removeprefix("MOTION_").lower(),
         "session": report.session or "-",
+        "boarded": "yes" if report.boarded else "no",
         "destination": report.destination or "-",
     }

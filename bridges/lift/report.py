@@ -1,10 +1,9 @@
 """What RMF is told about a lift: the content of LiftState."""
 
-from typing import Any
-
 import msgspec
 
 from bridges.core.decision import Fault
+from bridges.lift import forgotten
 from bridges.lift.memory import LiftLimits, Memory, Relays, Session
 from bridges.lift.sensing import View
 from bridges.lift.signals import Hazard, LiftOutputs, Motion
@@ -19,7 +18,7 @@ class LiftReport(msgspec.Struct, frozen=True):
     """LiftState without its name, floors and stamp, and what only the status file shows.
 
     `floor`: RMF's name, "" when unknown. `read_at`: monotonic seconds, None before the first reading.
-    `estimated`: no contact proves what `door` shows.
+    `estimated`: no contact proves what `door` shows. `boarded`: a robot may be inside.
     """
 
     read_at: float | None
@@ -31,13 +30,14 @@ class LiftReport(msgspec.Struct, frozen=True):
     session: str
     faults: tuple[Fault, ...] = ()
     estimated: bool = False
+    boarded: bool = False
 
     @property
     def open_at(self) -> str:
         """The floor at which the door is shown open, "" when it is not."""
         return self.floor if self.door is LiftDoor.DOOR_OPEN else ""
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """All but the age and the faults' details, which may change with each reading."""
         shown = (self.floor, self.destination, self.door, self.motion, self.mode, self.session)
         return *shown, self.estimated, tuple(fault.code for fault in self.faults)
@@ -68,6 +68,7 @@ def report(
         session=session.id if session else "",
         faults=faults,
         estimated=estimated,
+        boarded=bool(session and session.boarded),
     )
 
 
@@ -81,14 +82,15 @@ def _may_enter(
     """May an open door be shown as OPEN? A robot that sees OPEN drives through.
 
     Not while the hold is wanted and its relay must rest: the door stands open only for its own dwell
-    time, and would then close on the robot. For a session that has not boarded, only in AGV mode and
-    without a fault.
+    time, and would then close on the robot. For a session that has not boarded, only in AGV mode, while
+    it is served, and without a fault other than that RMF's supervisor has forgotten it.
     """
     if wanted.hold_door is not None and relays.hold.on is None:
         return False
     if session is None or session.boarded:
         return True
-    return mode is LiftMode.MODE_AGV and not faults
+    hinders = any(fault.code != forgotten.CODE for fault in faults)
+    return mode is LiftMode.MODE_AGV and wanted.agv_request and not hinders
 
 
 def _mode(view: View, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:

@@ -19,7 +19,6 @@ Rules:
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import msgspec
 from msgspec.structs import replace
@@ -247,7 +246,7 @@ class Unsettled(msgspec.Struct, frozen=True):
 
 def _unsettled(senses: Senses, limits: LiftLimits) -> Iterator[Unsettled]:
     hold = limits.debounce_s
-    plain: list[tuple[str, Settled[Any] | None]] = [
+    plain: list[tuple[str, Settled[object] | None]] = [
         ("floor", senses.code),
         ("door", senses.doors[0]),
         ("rear_door", senses.doors[1]),
@@ -264,7 +263,7 @@ def _unsettled(senses: Senses, limits: LiftLimits) -> Iterator[Unsettled]:
             yield _wait(h, fear, hold_s, max(hold_s, limits.t.hazard_clear_s))
 
 
-def _wait(name: str, seen: Settled[Any] | None, hold_s: float, most_s: float) -> Unsettled:
+def _wait(name: str, seen: Settled[object] | None, hold_s: float, most_s: float) -> Unsettled:
     if seen is None or seen.torn_since is None:
         return Unsettled(name, AGES_AGO, AGES_AGO)
     torn_at = seen.torn_since + most_s + RESTLESS_S

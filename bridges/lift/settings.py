@@ -7,9 +7,12 @@ import msgspec
 from msgspec import Meta
 
 from bridges.core.fields import DeviceSettings, Name, Period, Seconds, Timeout
-from bridges.core.kind import Place
+from bridges.core.kind import FLOOR, Place
 from bridges.lift.signals import Side, Stop
-from bridges.settings.building_map import FLOOR
+
+AlarmOn = Annotated[
+    list[Literal["fire_alarm", "code_blue", "earthquake", "emergency"]], Meta(min_length=1)
+]
 
 
 class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -69,7 +72,9 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     `limits`: durations and counts that differ from the defaults.
     `fire_reset`: RMF may use the lift again when the alarm clears (`auto`), or only after
     `rmf-bridge reset` (`manual`).
-    `alarm`: the topic on which the fleets are told of a fire. `none` unless the site wants that.
+    `alarm`: the topic on which the fleets are told of an alarm. `none` unless the site wants that.
+    `alarm_on`: the hazards that are such an alarm. All robots then leave the lifts and stop elsewhere,
+    until `rmf-bridge reset`.
     """
 
     floors: list[Name] | dict[Name, Floor]
@@ -77,6 +82,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     limits: Durations = Durations()
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
+    alarm_on: AlarmOn = msgspec.field(default_factory=lambda: ["fire_alarm"])
 
     def stale_after(self) -> float:
         """Its limits' `stale_after_s`."""

@@ -104,4 +104,14 @@ class Ended(msgspec.Struct, frozen=True):
     session_id: str
 
 
-Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Requested | Ended
+class FromAdapter(msgspec.Struct, frozen=True):
+    """A robot's own request, as its fleet adapter sends it to RMF's supervisor. `stamp`: ns."""
+
+    asked: Requested | Ended
+    stamp: int
+
+
+Asked = Requested | Ended | FromAdapter
+"""What requests become."""
+
+Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Asked

@@ -6,7 +6,7 @@ from typing import Final
 
 from bridges.core.decision import RequestRefused
 from bridges.core.freshness import SECOND_NS, in_ns
-from bridges.core.names import check_length
+from bridges.core.names import check_length, check_listed
 from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings
 from bridges.lift_supervisor.signals import Ended, Requested, StateHeard, Target
@@ -27,7 +27,7 @@ def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Req
     Of an END_SESSION only the session counts: fleet adapters send no floor with it
     (rmf_fleet_adapter RobotContext.cpp).
     """
-    _check_lift(request.lift_name, settings)
+    check_listed("lift", request.lift_name, settings.lifts)
     if not request.session_id:
         raise RequestRefused("empty session_id", "a session needs a name")
     check_length(session_id=request.session_id, destination_floor=request.destination_floor)
@@ -47,7 +47,7 @@ def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Req
 
 def accept_state(state: LiftState, settings: Settings, wall: float) -> StateHeard:
     """A lift's state as an event. Raises RequestRefused."""
-    _check_lift(state.lift_name, settings)
+    check_listed("lift", state.lift_name, settings.lifts)
     check_length(
         session_id=state.session_id,
         current_floor=state.current_floor,
@@ -64,14 +64,6 @@ def accept_state(state: LiftState, settings: Settings, wall: float) -> StateHear
         mode=state.current_mode,
         floors=state.available_floors,
     )
-
-
-def _check_lift(name: str, settings: Settings) -> None:
-    if not name:
-        raise RequestRefused("empty lift_name", "a lift needs a name")
-    check_length(lift_name=name)
-    if settings.lifts is not None and name not in settings.lifts:
-        raise RequestRefused("not ours", f"{name!r} is none of {', '.join(settings.lifts)}")
 
 
 def device_name(message: LiftRequest | LiftState) -> str:

@@ -1,7 +1,7 @@
 """What the log and the status file are told of one lift: who has it, who waits, what is wrong."""
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 
@@ -29,7 +29,7 @@ class SupervisorReport(msgspec.Struct, frozen=True):
     waiting: tuple[tuple[str, float], ...] = ()
     faults: tuple[Fault, ...] = ()
 
-    def news(self) -> Any:
+    def news(self) -> object:
         """What is worth a line in the log."""
         return self.shown, self.holder, self.ending, tuple(session for session, _ in self.waiting)
 

@@ -1,30 +1,30 @@
-"""The addresses by which this machine can reach another one, so that a change can be noticed."""
+"""The addresses by which this machine can reach other machines; transports notice when they change."""
 
 import fcntl
 import socket
 import struct
 
 Addresses = frozenset[tuple[int, str]]
-"""An interface's number and its IPv4 address, for each that could reach another machine."""
+"""(interface's number, its IPv4 address) of each interface that could reach another machine."""
 
 GET_FLAGS, GET_ADDRESS = 0x8913, 0x8915
 UP, LOOPBACK, RUNNING = 0x1, 0x8, 0x40
 
 
 def addresses() -> Addresses:
-    """Those of the interfaces that are up and have a link."""
+    """The addresses of all interfaces that are up and have a link, without loopback."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
         found = ((index, _address(asking, name)) for index, name in socket.if_nameindex())
         return frozenset((index, address) for index, address in found if address)
 
 
 def _address(asking: socket.socket, name: str) -> str:
-    """The IPv4 address of an interface that is up and not loopback, else ""."""
+    """The IPv4 address of an interface; "" if it is down, has no link or address, or is loopback."""
     request = struct.pack("256s", name.encode()[:15])
     try:
         flags = struct.unpack_from("H", fcntl.ioctl(asking, GET_FLAGS, request), 16)[0]
         if flags & (UP | RUNNING | LOOPBACK) != UP | RUNNING:
             return ""
         return socket.inet_ntoa(fcntl.ioctl(asking, GET_ADDRESS, request)[20:24])
-    except OSError:  # it has no address, or has gone meanwhile
+    except OSError:  # it has no address, or has just gone
         return ""

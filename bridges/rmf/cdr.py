@@ -1,11 +1,12 @@
-"""Messages as bytes: plain CDR (XCDR1), the form in which ROS 2 puts them on the wire.
+"""Messages as bytes: plain CDR (XCDR1), the encoding that ROS 2 uses on the wire.
 
 Four bytes of header (`00 01 00 00` little endian, `00 00 00 00` big endian), then the fields in
 their order. A number is aligned to its own size, counted from the end of the header; a string is its
 length with the closing NUL as uint32, the UTF-8 bytes and the NUL; a sequence is its length as uint32
 and its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and what rmw_cyclonedds and rmw_fastrtps send.
 
-The steps for each type are made once, from the annotations in `definitions.py`.
+The encoder and decoder of each type and release are built once, from the annotations in
+`definitions.py`. A field that a release lacks is not sent, and is read as its default.
 """
 
 import struct
@@ -14,11 +15,11 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, TypeVar
 
-from bridges.rmf.definitions import field_types
+from bridges.rmf.releases import NEWEST, Release
 
 T = TypeVar("T")
 Value = Any
-"""A field's value: a number, a text, a truth, a tuple of them, or a struct of `definitions.py`."""
+"""A field's value: a number, text or bool, a tuple of these, or a struct of `definitions.py`."""
 Put = Callable[[bytearray, Value], None]
 Get = Callable[[bytes, int], tuple[Value, int]]
 
@@ -30,34 +31,34 @@ BYTES = ("uint8", "byte")
 
 
 class CdrError(ValueError):
-    """These bytes are not a message of this type, or this message cannot be put into bytes."""
+    """These bytes are not a message of this type, or this message cannot be encoded."""
 
 
-def encode(message_type: type, message: object) -> bytes:
+def encode(message_type: type, message: object, release: Release = NEWEST) -> bytes:
     """The message as little endian CDR with its header.
 
-    What no string on the wire can hold (a NUL, half a surrogate pair) goes out as `?`: an odd text
-    from a device must not silence the state that carries it. Raises CdrError for a number out of
+    Characters that no string on the wire can hold (a NUL, half a surrogate pair) become `?`: a strange
+    text from a device must not stop the state that contains it. Raises CdrError for a number out of
     range, or a value of another type.
     """
     out = bytearray(LITTLE_ENDIAN)
     try:
-        _put(message_type)(out, message)
+        _put(message_type, release)(out, message)
     except (struct.error, OverflowError, TypeError, AttributeError, ValueError) as error:
         raise CdrError(f"{message!r} cannot be sent as {message_type.__name__}: {error}") from error
     return bytes(out)
 
 
-def decode(message_type: type[T], sample: bytes) -> T:
+def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T:
     """The message in a sample, of either byte order. Raises CdrError for anything else.
 
-    Up to three bytes may follow the last field: RTPS pads payloads to a multiple of four.
+    Up to three bytes may follow the last field, because RTPS pads payloads to a multiple of four.
     """
     order = _ORDERS.get(sample[:2])
     if order is None:
         raise CdrError(f"not plain CDR: the sample begins with {sample[:4].hex(' ') or 'nothing'}")
     try:
-        message, end = _get(typing.cast(type, message_type), order)(sample, 4)
+        message, end = _get(typing.cast(type, message_type), order, release)(sample, 4)
     except (struct.error, IndexError) as error:
         raise CdrError(f"cut short: {error}") from error
     except UnicodeDecodeError as error:
@@ -71,8 +72,8 @@ _ORDERS = {LITTLE_ENDIAN[:2]: "<", BIG_ENDIAN[:2]: ">"}
 
 
 @cache
-def _put(kind: type) -> Put:
-    """How a value of this type is appended."""
+def _put(kind: type, release: Release) -> Put:
+    """The function that appends a value of this type."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
         return _put_byte if name in BYTES else _putting_number(CODES[name])
@@ -81,8 +82,9 @@ def _put(kind: type) -> Put:
     if kind is bool:
         return _put_bool
     if typing.get_origin(kind) is tuple:
-        return _putting_sequence(_put(typing.get_args(kind)[0]))
-    return _putting_struct([(name, _put(member)) for name, member in field_types(kind).items()])
+        return _putting_sequence(_put(typing.get_args(kind)[0], release))
+    fields = release.fields(kind)
+    return _putting_struct([(name, _put(member, release)) for name, member in fields.items()])
 
 
 def _put_byte(out: bytearray, value: int) -> None:
@@ -91,7 +93,7 @@ def _put_byte(out: bytearray, value: int) -> None:
 
 def _put_bool(out: bytearray, value: bool) -> None:
     if value is not True and value is not False:
-        raise CdrError(f"{value!r} is not a truth value")
+        raise CdrError(f"{value!r} is not a bool")
     out.append(value)
 
 
@@ -134,8 +136,8 @@ def _putting_struct(members: list[tuple[str, Put]]) -> Put:
 
 
 @cache
-def _get(kind: type, order: str) -> Get:
-    """How a value of this type is read at a position: the value, and where the next one begins."""
+def _get(kind: type, order: str, release: Release) -> Get:
+    """The function that reads a value of this type at a position: it returns the value and its end."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
         return _get_byte if name in BYTES else _getting_number(order + CODES[name])
@@ -144,8 +146,9 @@ def _get(kind: type, order: str) -> Get:
     if kind is bool:
         return _get_bool
     if typing.get_origin(kind) is tuple:
-        return _getting_sequence(_get(typing.get_args(kind)[0], order), order)
-    return _getting_struct(kind, [_get(member, order) for member in field_types(kind).values()])
+        return _getting_sequence(_get(typing.get_args(kind)[0], order, release), order)
+    fields = release.fields(kind)
+    return _getting_struct(kind, {name: _get(f, order, release) for name, f in fields.items()})
 
 
 def _get_byte(sample: bytes, at: int) -> tuple[int, int]:
@@ -154,7 +157,7 @@ def _get_byte(sample: bytes, at: int) -> tuple[int, int]:
 
 def _get_bool(sample: bytes, at: int) -> tuple[bool, int]:
     if sample[at] > 1:
-        raise CdrError(f"{sample[at]} is not a truth value")
+        raise CdrError(f"{sample[at]} is not a bool")
     return sample[at] == 1, at + 1
 
 
@@ -187,8 +190,8 @@ def _getting_sequence(get_element: Get, order: str) -> Get:
 
     def get(sample: bytes, at: int) -> tuple[tuple[Value, ...], int]:
         length, at = get_length(sample, at)
-        if length > len(sample) - at:  # each element takes a byte at least
-            raise CdrError(f"a sequence of {length} in {len(sample)} bytes")
+        if length > len(sample) - at:  # each element takes at least one byte
+            raise CdrError(f"a sequence of {length} elements in {len(sample)} bytes")
         elements = []
         for _ in range(length):
             element, at = get_element(sample, at)
@@ -198,12 +201,11 @@ def _getting_sequence(get_element: Get, order: str) -> Get:
     return get
 
 
-def _getting_struct(kind: type, members: list[Get]) -> Get:
+def _getting_struct(kind: type, members: dict[str, Get]) -> Get:
     def get(sample: bytes, at: int) -> tuple[object, int]:
-        values = []
-        for get_member in members:
-            value, at = get_member(sample, at)
-            values.append(value)
-        return kind(*values), at
+        values = {}
+        for name, get_member in members.items():
+            values[name], at = get_member(sample, at)
+        return kind(**values), at
 
     return get

@@ -1,6 +1,6 @@
 """Which transport a daemon uses, in which ROS domain, on which network.
 
-The YAML decides. What it leaves open, ROS's environment variables decide, as for any ROS node. Each
+The YAML decides. Where it says nothing, ROS's environment variables do, as for any ROS node. Each
 transport has a file beside this one: `ros2.py`, `dds.py`, `zenoh.py`.
 """
 
@@ -11,23 +11,26 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 
-from bridges.core.fields import Rmf
 from bridges.log import pairs
+from bridges.rmf.cyclone import static_peers
 from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.releases import RELEASES, Release
+from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport, TransportError
 
 log = logging.getLogger(__name__)
 
 NO_CYCLONEDDS = (
     "transport dds needs the Python package cyclonedds 11.0.1, and {}. On x86-64 `pip install"
-    " cyclonedds==11.0.1` fetches it. For arm64 there is none: put zenoh-bridge-ros2dds beside RMF and"
-    " write `transport: zenoh` with `keys: ros2dds`, or install ROS 2 and write `transport: ros2`"
+    " cyclonedds==11.0.1` installs it. For arm64 pip has no such package: put zenoh-bridge-ros2dds"
+    " beside RMF and write `transport: zenoh` with `keys: ros2dds`, or install ROS 2 and write"
+    " `transport: ros2`"
 )
 NO_ROS = (
     "transport ros2 needs ROS 2 with RMF's messages, and {}. On Ubuntu 24.04 `sudo apt install"
     " ros-jazzy-rclpy {}`; the virtual environment needs --system-site-packages and ROS's own"
     " Python, and the shell ROS's setup file (`. /opt/ros/jazzy/setup.bash`; for a service"
-    " `ros_setup:` below `rmf:`). `transport: dds` needs none of that and speaks to the same nodes"
+    " `ros_setup:` below `rmf:`). `transport: dds` needs none of this and reaches the same nodes"
 )
 
 
@@ -37,26 +40,28 @@ def open_transport(
     """Join the RMF graph as `node_name`. Raises TransportError with what to do about it.
 
     `localhost` keeps all traffic on this machine, whatever the YAML and the environment say.
-    `ros_args`: `--ros-args` and what stood behind it on the command line.
+    `ros_args`: `--ros-args` and the arguments after it on the command line.
     """
     domain = domain_id(rmf, os.environ)
-    loopback = localhost or stays_on_loopback(rmf, os.environ)
-    network = "localhost" if loopback else "subnet"
     speaks, reason = _choice(rmf)
+    peers = [] if speaks == "zenoh" else static_peers(os.environ)
+    loopback = localhost or stays_on_loopback(rmf, os.environ, peers)
+    network = "localhost" if loopback else "subnet"
+    release = RELEASES.get(rmf.release)
     log.info(pairs("transport", speaks=speaks, domain_id=domain, network=network, reason=reason))
-    node_name = re.sub(r"\W", "_", node_name, flags=re.ASCII)  # ROS knows no other characters
+    node_name = re.sub(r"\W", "_", node_name, flags=re.ASCII)  # ROS allows no other characters
     if speaks == "ros2":
         return _open_ros2(node_name, domain, loopback=loopback, ros_args=ros_args)
     if set(ros_args) - {"--ros-args", "--"}:
         raise TransportError(
-            f"{' '.join(ros_args)}: only rclpy understands this. Write `transport: ros2`, or give"
-            " names by `topics:` in the YAML"
+            f"{' '.join(ros_args)}: only transport ros2 understands this. Write `transport: ros2`, or"
+            " rename topics with `topics:` in the YAML"
         )
     if speaks == "dds":
-        return _open_dds(node_name, domain, loopback=loopback)
+        return _open_dds(node_name, domain, loopback=loopback, release=release)
     from bridges.rmf.zenoh import ZenohTransport
 
-    return ZenohTransport(node_name, domain, loopback=loopback, settings=rmf.zenoh)
+    return ZenohTransport(node_name, domain, loopback=loopback, settings=rmf.zenoh, release=release)
 
 
 def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
@@ -69,29 +74,34 @@ def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
     return int(text)
 
 
-def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str]) -> bool:
+def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str] = ()) -> bool:
     """Whether the YAML, ROS_LOCALHOST_ONLY or ROS_AUTOMATIC_DISCOVERY_RANGE asks for it.
 
-    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable.
+    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable, and LOCALHOST
+    reaches static `peers` all the same.
     """
     if rmf.network == "localhost" or environ.get("ROS_LOCALHOST_ONLY") == "1":
         return True
     text = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "") or "SUBNET"
     if text not in ("SUBNET", "SYSTEM_DEFAULT", "LOCALHOST"):
         raise TransportError(
-            f"ROS_AUTOMATIC_DISCOVERY_RANGE is {text!r}: with it this node would find nobody, or it"
-            " is not known. Use SUBNET or LOCALHOST"
+            f"ROS_AUTOMATIC_DISCOVERY_RANGE is {text!r}: use SUBNET or LOCALHOST. With OFF"
+            " this node would find no other; other values are unknown"
         )
-    return text == "LOCALHOST"
+    return text == "LOCALHOST" and not peers
 
 
 def _choice(rmf: Rmf) -> tuple[str, str]:
-    """The transport, and why it is this one."""
+    """The transport, and why it was chosen."""
     if rmf.transport in ("dds", "zenoh"):
         return rmf.transport, "configured"
     missing = missing_of_ros()
     if rmf.transport == "auto":
-        return _best_without(missing) if missing else ("ros2", "rclpy and RMF's messages are here")
+        return (
+            _best_without(missing)
+            if missing
+            else ("ros2", "rclpy and RMF's messages are installed")
+        )
     if missing:
         packages = " ".join(_apt_name(package) for package in sorted(set(PACKAGES.values())))
         raise TransportError(NO_ROS.format(missing, packages))
@@ -99,7 +109,7 @@ def _choice(rmf: Rmf) -> tuple[str, str]:
 
 
 def _best_without(ros: str) -> tuple[str, str]:
-    """What `auto` takes without rclpy; `ros`: what is missing of ROS."""
+    """What `auto` chooses without ROS. `ros`: what is missing of ROS."""
     missing = missing_of_dds()
     return ("zenoh", f"{ros}; {missing}") if missing else ("dds", ros)
 
@@ -121,7 +131,7 @@ def missing_of_ros() -> str:
         return f"rclpy does not import: {error}"
     for package in sorted(set(PACKAGES.values())):
         if importlib.util.find_spec(package) is None:
-            return f"the ROS package {package} is not here"
+            return f"the ROS package {package} is not installed"
     return ""
 
 
@@ -137,9 +147,9 @@ def _open_ros2(
     return Ros2Transport(node_name, domain, loopback=loopback, ros_args=ros_args)
 
 
-def _open_dds(node_name: str, domain: int, *, loopback: bool) -> Transport:
+def _open_dds(node_name: str, domain: int, *, loopback: bool, release: Release | None) -> Transport:
     if missing := missing_of_dds():
         raise TransportError(NO_CYCLONEDDS.format(missing))
     from bridges.rmf.dds import DdsTransport
 
-    return DdsTransport(node_name, domain, loopback=loopback)
+    return DdsTransport(node_name, domain, loopback=loopback, release=release)

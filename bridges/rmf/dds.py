@@ -3,11 +3,11 @@
 Names, types and QoS are those that rmw_cyclonedds and rmw_fastrtps use: topic `rt/<name>`, type
 `<package>::msg::dds_::<Type>_`, plain CDR, the type hash in the endpoint's user data.
 
-One thread reads for all subscriptions. A sample that is not a message does not stop it: the sample is
-dropped, counted, and logged once for its topic. (Cyclone's C library refuses samples that do not fit
-the type before they come here, and says so on stderr.) If reading itself fails, the node joins again.
+One thread reads for all subscriptions. It drops and counts an invalid sample, and logs the first one of
+each topic. (Cyclone's C library already refuses samples that do not fit their type, and says so on
+stderr.) If reading itself fails, the node joins again.
 
-cyclonedds is imported here, in dds_ends.py, idl.py and graph.py, and these only by choose.py.
+Only this file, dds_ends.py, idl.py and graph.py import cyclonedds, and only choose.py imports them.
 """
 
 import ctypes
@@ -16,8 +16,7 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Final, TypeVar
 from weakref import WeakValueDictionary
 
@@ -30,18 +29,18 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.log import pairs
-from bridges.rmf import network, notices
-from bridges.rmf.dds_ends import AnyPublisher, AnySubscription, DdsPublisher, DdsSubscription
-from bridges.rmf.definitions import Message
+from bridges.rmf import addresses, cyclone, notices
+from bridges.rmf.dds_ends import DdsPublisher, DdsSubscription
+from bridges.rmf.dds_peers import DdsPeers
 from bridges.rmf.graph import NodeOnGraph
 from bridges.rmf.idl import sample_type
-from bridges.rmf.loopback import LOOPBACK
-from bridges.rmf.topics import Topic
-from bridges.rmf.transport import TransportError
+from bridges.rmf.releases import Release
+from bridges.rmf.threaded import Threaded
+from bridges.rmf.topics import AnyTopic, Topic
+from bridges.rmf.transport import M, TransportError, any_type
 
 log = logging.getLogger(__name__)
 
-M = TypeVar("M", bound=Message)
 E = TypeVar("E", bound=core.Entity)
 
 CANNOT_JOIN: Final = (
@@ -50,52 +49,55 @@ CANNOT_JOIN: Final = (
 )
 LOOK_EVERY_S: Final = 1.0
 LOOK_EVERY_NS: Final = 1_000_000_000
-"""How often to look whether the network has changed."""
+"""How often to look whether the network has changed. Cyclone looks for an interface only once, when a
+node joins: with only `lo` up it stays there forever, and it never notices a changed address."""
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
 ERRORS: Final = 1 | 2
-"""Cyclone's fatal errors and errors. Its warnings are a line for each malformed datagram, which anybody
-can send; its binding has no call for the mask, and its configuration does not reach them."""
+"""What Cyclone may log: errors, also fatal ones. It would warn of each malformed datagram, and anybody
+can send those. Neither its Python binding nor its configuration can turn these warnings off."""
 
 _domains: WeakValueDictionary[tuple[int, str], Domain] = WeakValueDictionary()
 _domains_lock = threading.Lock()
 
 
-class DdsTransport:
+class DdsTransport(Threaded):
     """One node: a participant, its reader thread, its publishers and subscriptions.
 
-    `loopback`: stay on this machine whatever CYCLONEDDS_URI says. Otherwise, when the machine's
-    addresses have changed, it leaves the graph and joins anew, with the same ends; what a publisher
-    retains goes out again. Raises TransportError when the domain cannot be joined.
+    `loopback`: stay on this machine, whatever CYCLONEDDS_URI says. Otherwise, when the machine's
+    addresses change, the node leaves the graph and joins again with the same ends, and publishers send
+    again what they retain. `release`: None to follow RMF's. Raises TransportError when the domain
+    cannot be joined.
     """
 
     speaks = "dds"
 
-    def __init__(self, node_name: str, domain_id: int, *, loopback: bool) -> None:
-        self.name = node_name
-        self.dropped: dict[str, int] = {}
-        self._lock = threading.Lock()
-        self._closed = False
+    refusals = (DDSException,)
+
+    def __init__(
+        self, node_name: str, domain_id: int, *, loopback: bool, release: Release | None = None
+    ) -> None:
+        super().__init__(node_name, release)
         self._failed = False
         self._entities: list[core.Entity] = []
         self._topics: dict[str, DdsTopic] = {}
-        self._ends: tuple[AnyPublisher | AnySubscription, ...] = ()
-        self._subscriptions: tuple[AnySubscription, ...] = ()
+        self._ends: tuple[DdsPublisher | DdsSubscription, ...] = ()
+        self._subscriptions: tuple[DdsSubscription, ...] = ()
         self._domain_id = domain_id
         self._loopback = loopback
         self._stop = threading.Event()
         self._joined = False
         self._look_at = -math.inf
-        self._addresses: network.Addresses = frozenset()
+        self._addresses: addresses.Addresses = frozenset()
+        self._dds_peers = DdsPeers(self._peers)
         try:
             with self._reporting(f"{CANNOT_JOIN} {domain_id}"):
                 self._join()
         except TransportError:
             self._delete_entities()
             raise
-        self._thread = threading.Thread(target=self._read, name=f"{node_name}-dds", daemon=True)
-        self._thread.start()
+        self._start(self._read, "dds")
 
-    def publisher(self, topic: Topic[M]) -> "DdsPublisher[M]":
+    def publisher(self, topic: AnyTopic) -> DdsPublisher:
         """Declare a publisher with `topic.publish` QoS."""
         publisher = DdsPublisher(topic, self._thread, self._withdraw)
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
@@ -106,9 +108,11 @@ class DdsTransport:
 
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
-    ) -> "DdsSubscription[M]":
+    ) -> DdsSubscription:
         """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
-        subscription = DdsSubscription(topic, received, self.dropped, others_only=others_only)
+        subscription = DdsSubscription(
+            topic, any_type(received), self.dropped, others_only=others_only
+        )
         with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
             if self._joined:
                 self._attach(subscription)
@@ -116,17 +120,8 @@ class DdsTransport:
             self._subscriptions += (subscription,)
         return subscription
 
-    @property
-    def lives(self) -> bool:
-        """Is its thread reading? True without a network too."""
-        return not self._closed and self._thread.is_alive()
-
-    def wall(self) -> float:
-        """The wall clock (s since the epoch)."""
-        return time.time()
-
     def close(self) -> None:
-        """Leave the graph at once. Each entity is deleted by name: none waits for a collector."""
+        """Leave the graph at once. Deletes each entity, without waiting for the garbage collector."""
         with self._lock:
             if self._closed:
                 return
@@ -134,30 +129,31 @@ class DdsTransport:
             self._stop.set()
             if self._joined:
                 self._leaving.set(True)
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
+        self._join_thread()
         self._delete_entities()
 
     def _join(self) -> None:
-        self._addresses = network.addresses()
-        wanted = LOOPBACK if self._loopback else network.configuration(os.environ)
+        self._addresses = addresses.addresses()
+        wanted = cyclone.LOOPBACK if self._loopback else cyclone.configuration(os.environ)
         self._domain = _shared_domain(self._domain_id, wanted)
         userdata = Qos(Policy.Userdata(b"enclave=/;"))
         self._participant = self._keep(DomainParticipant(self._domain_id, qos=userdata))
         self._waitset = self._keep(core.WaitSet(self._participant))
         self._leaving = self._keep(core.GuardCondition(self._participant))
         self._waitset.attach(self._leaving)
+        for reader in self._dds_peers.join(self._participant):
+            self._waitset.attach(self._keep(core.ReadCondition(self._keep(reader), ANY_SAMPLE)))
         self._node = NodeOnGraph(self._participant, self.name)
         self._entities += [self._node.topic, self._node.writer]
         self._joined = True
 
     def _follow_network(self) -> None:
-        """Join again if the machine's addresses have changed since we joined."""
+        """Join again if the machine's addresses have changed since the last time."""
         now = time.monotonic()
         if now < self._look_at or (self._loopback and self._joined):
             return
         self._look_at = now + LOOK_EVERY_S
-        found = network.addresses()
+        found = addresses.addresses()
         if found != self._addresses:
             log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
             self._join_anew()
@@ -181,16 +177,20 @@ class DdsTransport:
                 if was_joined:
                     log.warning(pairs("not_joined", node=self.name, reason=error))
 
-    def _topic(self, topic: Topic[M]) -> DdsTopic:
+    def _topic(self, topic: AnyTopic) -> DdsTopic:
         name = f"rt/{topic.name}"
         if name not in self._topics:
-            kind = sample_type(topic.type)
+            kind = sample_type(topic.type, self.release)
             self._topics[name] = self._keep(DdsTopic(self._participant, name, kind))
         return self._topics[name]
 
-    def _attach(self, end: AnyPublisher | AnySubscription) -> None:
-        """Give an end its place in DDS."""
-        entity = self._keep(end.create(self._participant, self._topic(end.topic)))
+    def _attach(self, end: DdsPublisher | DdsSubscription) -> None:
+        """Make the DDS entities of an end, if the release has its message."""
+        self._peers.ours(end.topic, publishes=isinstance(end, DdsPublisher))
+        if not self.release.has(end.topic.type):
+            end.drop()
+            return
+        entity = self._keep(end.create(self._participant, self._topic(end.topic), self.release))
         entity.set_status_mask(end.watched)
         self._waitset.attach(entity)
         if isinstance(end, DdsPublisher):
@@ -216,13 +216,23 @@ class DdsTransport:
             self._stop.wait(LOOK_EVERY_S)
             return
         self._waitset.wait(dds_infinity if self._loopback else LOOK_EVERY_NS)
+        if self._dds_peers.look():
+            self._follow_release()
         taken = [subscription.take() for subscription in self._subscriptions]
         if not any(taken):
             for end in self._ends:
-                end.log_misfits()
+                end.log_misfits(self._peers)
+
+    def _follow_release(self) -> None:
+        """Join again if RMF is of another release in which a message of ours differs."""
+        before = self.release
+        if self._peers.settle() and any(self._peers.differs(e.topic, before) for e in self._ends):
+            self._join_anew()
+        else:
+            self._peers.name_misfits()
 
     def _recover(self, error: Exception) -> None:
-        """Reading failed unexpectedly: log it once, and join again after a while."""
+        """After an unexpected exception: log it once, and join again after a pause."""
         if self._closed:
             return
         if not self._failed:
@@ -231,8 +241,8 @@ class DdsTransport:
         self._stop.wait(LOOK_EVERY_S)
         self._join_anew()
 
-    def _withdraw(self, publisher: AnyPublisher, writer: DataWriter) -> None:
-        """Take one writer off the graph; after close there is none left to take."""
+    def _withdraw(self, publisher: DdsPublisher, writer: DataWriter) -> None:
+        """Take one writer off the graph; after close that has happened already."""
         with self._lock:
             if self._closed or publisher not in self._ends:
                 return
@@ -250,22 +260,12 @@ class DdsTransport:
 
     def _delete_entities(self) -> None:
         while self._entities:
-            self._entities.pop().__del__()  # deletes the C entity, and a second time nothing
+            self._entities.pop().__del__()  # deletes the C entity; a second call does nothing
         self._domain = None
-
-    @contextmanager
-    def _reporting(self, text: str) -> Iterator[None]:
-        if self._closed:
-            raise TransportError(f"{text}: {self.name} has left the graph")
-        try:
-            yield
-        except DDSException as error:
-            raise TransportError(f"{text}: {error}") from error
 
 
 def _shared_domain(domain_id: int, configuration: str) -> Domain:
-    """The domain of this process with this configuration. All participants share it: Cyclone allows
-    only one."""
+    """This process's domain with this configuration. Cyclone allows only one: participants share it."""
     key = domain_id, configuration
     with _domains_lock:
         domain = _domains.get(key)

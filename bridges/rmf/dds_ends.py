@@ -1,12 +1,12 @@
-"""The ends of the `dds` transport: what a publisher and a subscription are in DDS.
+"""The ends of the `dds` transport: its publishers and subscriptions.
 
-An end outlives its writer or reader: when the transport joins anew, it is given another one.
+An end outlives its writer or reader: when the transport joins again, the end gets a new one.
 """
 
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Final, Generic, TypeVar
+from typing import Final, Protocol
 
 from cyclonedds.core import DDSException, DDSStatus
 from cyclonedds.domain import DomainParticipant
@@ -18,60 +18,67 @@ from cyclonedds.topic import Topic as DdsTopic
 from bridges.rmf import notices, topics
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
-from bridges.rmf.idl import SampleType, sample_type
+from bridges.rmf.idl import Sample, sample_type
+from bridges.rmf.peers import Peers
+from bridges.rmf.releases import Release
 from bridges.rmf.rihs01 import type_hash
-from bridges.rmf.topics import Topic
-from bridges.rmf.transport import TransportError
-
-M = TypeVar("M", bound=Message)
+from bridges.rmf.topics import AnyTopic
+from bridges.rmf.transport import Receive, TransportError
 
 WRITE_BLOCKS_NS: Final = 20_000_000
-"""A writer that waits for a peer holds Python's lock meanwhile: keep it below one scan."""
+"""A writer that waits for a peer holds Python's lock: keep this shorter than a scan."""
 AT_ONCE: Final = 100
-"""How many samples are taken from one subscription before it is the others' turn."""
+"""The most samples taken from one subscription before the others have their turn."""
 POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation", 24: "type"}
 
 
-class DdsPublisher(Generic[M]):
-    """One topic's sending end. `withdraw`: takes it off the graph."""
+class DdsPublisher:
+    """The publisher of one topic. `withdraw(publisher, writer)`: takes it off the graph."""
 
     def __init__(
         self,
-        topic: Topic[M],
+        topic: AnyTopic,
         reader_thread: threading.Thread,
-        withdraw: Callable[["AnyPublisher", DataWriter], None],
+        withdraw: Callable[["DdsPublisher", DataWriter], None],
     ) -> None:
         self.topic = topic
         self._withdraw = withdraw
         self._writer: DataWriter = None
         self._reader_thread = reader_thread
-        self._sample = sample_type(topic.type)
         depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
-        self._retained: deque[SampleType] = deque(maxlen=depth)
+        self._retained: deque[Message] = deque(maxlen=depth)
+        self._sample: type[Sample] | None = None
 
     watched = DDSStatus.OfferedIncompatibleQos
 
-    def create(self, participant: DomainParticipant, topic: DdsTopic) -> DataWriter:
-        """The writer, in place of any that was."""
-        qos = _writer_qos(self.topic.publish, self.topic.type)
+    def create(
+        self, participant: DomainParticipant, topic: DdsTopic, release: Release
+    ) -> DataWriter:
+        """Make its writer; it replaces an earlier one."""
+        qos = _writer_qos(self.topic.publish, type_hash(self.topic.type, release))
+        self._sample = sample_type(self.topic.type, release)
         self._writer = DataWriter(participant, topic, qos=qos)
         return self._writer
 
-    def send_retained(self) -> None:
-        """Give late joiners what the writer before this one kept for them."""
-        for sample in list(self._retained):
-            self._writer.write(sample)
+    def drop(self) -> None:
+        """The writer has gone with its participant."""
+        self._writer = None
 
-    def publish(self, message: M) -> None:
-        """Send; blocks for 20 ms at most. Raises TransportError when it was not sent."""
+    def send_retained(self) -> None:
+        """Send again what the earlier writer retained for late joiners."""
+        for message in list(self._retained):
+            self._write(message)
+
+    def publish(self, message: Message) -> None:
+        """Send; blocks for 20 ms at most. Raises TransportError if it was not sent."""
         if self._writer is None:
-            raise TransportError(f"topic {self.topic.name}: not sent: there is no network")
+            why = "there is no network, or RMF's release lacks the message"
+            raise TransportError(f"topic {self.topic.name}: not sent: {why}")
         if not self._reader_thread.is_alive():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        sample = self._sample(message)
-        self._retained.append(sample)
+        self._retained.append(message)
         try:
-            self._writer.write(sample)
+            self._write(message)
         except DDSException as error:
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
@@ -86,20 +93,26 @@ class DdsPublisher(Generic[M]):
         """Take this end off the graph."""
         self._withdraw(self, self._writer)
 
-    def log_misfits(self) -> None:
+    def _write(self, message: Message) -> None:
+        assert self._sample is not None
+        self._writer.write(self._sample(message))
+
+    def log_misfits(self, peers: Peers) -> None:
         """Log each new subscription of this topic whose QoS does not match."""
+        if self._writer is None:
+            return
         status = self._writer.get_offered_incompatible_qos_status()
         if status.total_count_change:
-            _log_misfit(self.topic, notices.NOT_SERVED, status)
+            _log_misfit(self.topic, notices.NOT_SERVED, status, peers)
 
 
-class DdsSubscription(Generic[M]):
-    """One topic's receiving end. `dropped`: counts samples that are no messages, by topic."""
+class DdsSubscription:
+    """The subscription of one topic. `dropped`: counts invalid samples, by topic name."""
 
     def __init__(
         self,
-        topic: Topic[M],
-        received: Callable[[M], None],
+        topic: AnyTopic,
+        received: Receive,
         dropped: dict[str, int],
         *,
         others_only: bool,
@@ -112,11 +125,18 @@ class DdsSubscription(Generic[M]):
 
     watched = DDSStatus.RequestedIncompatibleQos
 
-    def create(self, participant: DomainParticipant, topic: DdsTopic) -> DataReader:
-        """The reader, in place of any that was."""
-        qos = _reader_qos(self.topic.subscribe, self.topic.type, others_only=self._others_only)
+    def create(
+        self, participant: DomainParticipant, topic: DdsTopic, release: Release
+    ) -> DataReader:
+        """Make its reader; it replaces an earlier one."""
+        hashed = type_hash(self.topic.type, release)
+        qos = _reader_qos(self.topic.subscribe, hashed, others_only=self._others_only)
         self._reader = DataReader(participant, topic, qos=qos)
         return self._reader
+
+    def drop(self) -> None:
+        """The reader has gone with its participant."""
+        self._reader = None
 
     def matched(self) -> int:
         """How many publishers are heard; 0 after close."""
@@ -126,7 +146,9 @@ class DdsSubscription(Generic[M]):
             return 0
 
     def take(self) -> bool:
-        """Hand on what has arrived; False when nothing had."""
+        """Deliver what has arrived; False if nothing had."""
+        if self._reader is None:
+            return False
         for taken in range(AT_ONCE):
             try:
                 samples = self._reader.take(1)
@@ -139,41 +161,48 @@ class DdsSubscription(Generic[M]):
                 notices.hand_on(self._dropped, self.topic, self._received, samples[0].message)
         return True
 
-    def log_misfits(self) -> None:
+    def log_misfits(self, peers: Peers) -> None:
         """Log each new publisher of this topic whose QoS does not match."""
+        if self._reader is None:
+            return
         status = self._reader.get_requested_incompatible_qos_status()
         if status.total_count_change:
-            _log_misfit(self.topic, notices.NOT_HEARD, status)
+            _log_misfit(self.topic, notices.NOT_HEARD, status, peers)
 
 
-AnyPublisher = DdsPublisher[Any]
-AnySubscription = DdsSubscription[Any]
+class _Misfits(Protocol):
+    """Cyclone's status of an end that has met peers whose QoS does not fit."""
+
+    last_policy_id: int
 
 
-def _log_misfit(topic: Topic[M], text: str, status: SampleType) -> None:
+def _log_misfit(topic: AnyTopic, text: str, status: _Misfits, peers: Peers) -> None:
     policy = POLICIES.get(status.last_policy_id, f"QoS policy {status.last_policy_id}")
-    notices.misfit(topic, text, policy)
+    if policy == "type":
+        peers.name(topic, published=text == notices.NOT_HEARD)
+    else:
+        notices.misfit(topic, text, policy)
 
 
-def _writer_qos(qos: topics.Qos, message_type: type) -> Qos:
+def _writer_qos(qos: topics.Qos, hashed: str) -> Qos:
     if qos.durability == "volatile":
-        return Qos(Policy.Durability.Volatile, *_policies(qos, message_type))
+        return Qos(Policy.Durability.Volatile, *_policies(qos, hashed))
     # What a late joiner gets is the durability service's history, which is 1 deep by default.
     retained = Policy.DurabilityService(0, Policy.History.KeepLast(qos.depth), -1, -1, -1)
-    return Qos(Policy.Durability.TransientLocal, retained, *_policies(qos, message_type))
+    return Qos(Policy.Durability.TransientLocal, retained, *_policies(qos, hashed))
 
 
-def _reader_qos(qos: topics.Qos, message_type: type, *, others_only: bool) -> Qos:
+def _reader_qos(qos: topics.Qos, hashed: str, *, others_only: bool) -> Qos:
     durability = Policy.Durability
     wanted = durability.Volatile if qos.durability == "volatile" else durability.TransientLocal
     ignored = Policy.IgnoreLocal.Participant if others_only else Policy.IgnoreLocal.Nothing
-    return Qos(wanted, ignored, *_policies(qos, message_type))
+    return Qos(wanted, ignored, *_policies(qos, hashed))
 
 
-def _policies(qos: topics.Qos, message_type: type) -> list[object]:
+def _policies(qos: topics.Qos, hashed: str) -> list[object]:
     return [
         Policy.Reliability.Reliable(WRITE_BLOCKS_NS),
         Policy.History.KeepLast(qos.depth),
         Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
-        Policy.Userdata(f"typehash={type_hash(message_type)};".encode()),
+        Policy.Userdata(f"typehash={hashed};".encode()),
     ]

@@ -1,7 +1,8 @@
-"""RMF's messages, as the `.msg` files define them: fields in their order, types and constants.
+"""RMF's messages, as the `.msg` files define them: fields in their order, and their types.
 
-This is the only table of them. The transports make their own types from it (field by field,
-from the annotations), and the RIHS01 type hashes are computed from it.
+This is the only table of them, with the constants of `constants.py`. The transports make their own
+types from it (field by field, from the annotations), and the RIHS01 type hashes are computed from it.
+It holds what any release of RMF has; `releases.py` says which of it a release lacks.
 
 Source: rmf_internal_msgs 3d4df02 (4.1.0), builtin_interfaces, std_msgs and diagnostic_msgs of ROS 2
 Jazzy.
@@ -9,8 +10,19 @@ A `T[]` of ROS is a tuple here, so that a message is a value: hashable, comparab
 """
 
 from dataclasses import dataclass, fields
-from enum import IntEnum
 from typing import Annotated, Final, cast
+
+from bridges.rmf.constants import AlertTier as AlertTier
+from bridges.rmf.constants import ChargerStateValue as ChargerStateValue
+from bridges.rmf.constants import ChargingMode as ChargingMode
+from bridges.rmf.constants import DiagnosticLevel as DiagnosticLevel
+from bridges.rmf.constants import DoorModeValue as DoorModeValue
+from bridges.rmf.constants import LiftDoor as LiftDoor
+from bridges.rmf.constants import LiftMode as LiftMode
+from bridges.rmf.constants import LiftMotion as LiftMotion
+from bridges.rmf.constants import LiftRequestDoor as LiftRequestDoor
+from bridges.rmf.constants import LiftRequestType as LiftRequestType
+from bridges.rmf.constants import RobotModeValue as RobotModeValue
 
 uint8 = Annotated[int, "uint8"]
 byte = Annotated[int, "byte"]
@@ -39,49 +51,6 @@ class Duration:
 # --- rmf_lift_msgs -----------------------------------------------------------------------------
 
 
-class LiftRequestType(IntEnum):
-    """LiftRequest.request_type. Not LiftState's numbers: there HUMAN is 1 and AGV is 2."""
-
-    REQUEST_END_SESSION = 0
-    REQUEST_AGV_MODE = 1
-    REQUEST_HUMAN_MODE = 2
-
-
-class LiftRequestDoor(IntEnum):
-    """LiftRequest.door_state."""
-
-    DOOR_CLOSED = 0
-    DOOR_OPEN = 2
-
-
-class LiftDoor(IntEnum):
-    """LiftState.door_state."""
-
-    DOOR_CLOSED = 0
-    DOOR_MOVING = 1
-    DOOR_OPEN = 2
-
-
-class LiftMotion(IntEnum):
-    """LiftState.motion_state."""
-
-    MOTION_STOPPED = 0
-    MOTION_UP = 1
-    MOTION_DOWN = 2
-    MOTION_UNKNOWN = 3
-
-
-class LiftMode(IntEnum):
-    """LiftState.current_mode and available_modes."""
-
-    MODE_UNKNOWN = 0
-    MODE_HUMAN = 1
-    MODE_AGV = 2
-    MODE_FIRE = 3
-    MODE_OFFLINE = 4
-    MODE_EMERGENCY = 5
-
-
 @dataclass(frozen=True, slots=True)
 class LiftRequest:
     lift_name: str = ""
@@ -107,16 +76,6 @@ class LiftState:
 
 
 # --- rmf_door_msgs -----------------------------------------------------------------------------
-
-
-class DoorModeValue(IntEnum):
-    """DoorMode.value."""
-
-    MODE_CLOSED = 0
-    MODE_MOVING = 1
-    MODE_OPEN = 2
-    MODE_OFFLINE = 3
-    MODE_UNKNOWN = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,16 +118,6 @@ class SupervisorHeartbeat:
 # --- rmf_charger_msgs --------------------------------------------------------------------------
 
 
-class ChargerStateValue(IntEnum):
-    """ChargerState.state. There is no 0: a default-constructed message is invalid."""
-
-    CHARGER_IDLE = 1
-    CHARGER_ASSIGNED = 2
-    CHARGER_CHARGING = 3
-    CHARGER_RELEASED = 4
-    CHARGER_ERROR = 200
-
-
 @dataclass(frozen=True, slots=True)
 class ChargerRequest:
     charger_name: str = ""
@@ -197,30 +146,6 @@ class ChargerState:
 
 
 # --- rmf_fleet_msgs ----------------------------------------------------------------------------
-
-
-class RobotModeValue(IntEnum):
-    """RobotMode.mode."""
-
-    MODE_IDLE = 0
-    MODE_CHARGING = 1
-    MODE_MOVING = 2
-    MODE_PAUSED = 3
-    MODE_WAITING = 4
-    MODE_EMERGENCY = 5
-    MODE_GOING_HOME = 6
-    MODE_DOCKING = 7
-    MODE_ADAPTER_ERROR = 8
-    MODE_CLEANING = 9
-    MODE_PERFORMING_ACTION = 10
-    MODE_ACTION_COMPLETED = 11
-
-
-class ChargingMode(IntEnum):
-    """ChargingAssignment.mode: charge at the waypoint, or wait there for a charger."""
-
-    MODE_CHARGE = 0
-    MODE_WAIT = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,14 +209,6 @@ class EmergencySignal:
 # --- rmf_task_msgs, std_msgs -------------------------------------------------------------------
 
 
-class AlertTier(IntEnum):
-    """Alert.tier."""
-
-    TIER_INFO = 0
-    TIER_WARNING = 1
-    TIER_ERROR = 2
-
-
 @dataclass(frozen=True, slots=True)
 class AlertParameter:
     name: str = ""
@@ -325,15 +242,6 @@ class Header:
 
 
 # --- diagnostic_msgs ---------------------------------------------------------------------------
-
-
-class DiagnosticLevel(IntEnum):
-    """DiagnosticStatus.level."""
-
-    OK = 0
-    WARN = 1
-    ERROR = 2
-    STALE = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -371,6 +279,7 @@ Message = (
     | Alert
     | Bool
     | EmergencySignal
+    | DiagnosticStatus
     | DiagnosticArray
 )
 

@@ -1,7 +1,7 @@
-"""What makes our endpoints a named node on the ROS graph: the topic `ros_discovery_info`.
+"""Makes our endpoints a named node on the ROS graph, by the topic `ros_discovery_info`.
 
-DDS knows participants, readers and writers; nodes are ROS's own. Each ROS participant says on this
-topic, retained for late joiners, which node owns which of its readers and writers. Without it
+DDS has participants, readers and writers, but no nodes. On this topic each ROS participant publishes
+which node owns which of its readers and writers, retained for late joiners. Without that
 `ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
 Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publish them.
 """
@@ -46,7 +46,7 @@ class ParticipantEntitiesInfo(IdlStruct, typename=PACKAGE + "ParticipantEntities
 
 
 class NodeOnGraph:
-    """The one node of a participant, announced afresh whenever it has a new endpoint."""
+    """The one node of a participant; published again whenever its endpoints change."""
 
     def __init__(self, participant: DomainParticipant, node_name: str) -> None:
         self._node = NodeEntitiesInfo("/", node_name, [], [])
@@ -56,17 +56,17 @@ class NodeOnGraph:
         self.writer.write(self._info)
 
     def add_reader(self, reader: DataReader) -> None:
-        """Say that this reader is the node's."""
+        """Publish that this reader belongs to the node."""
         self._node.reader_gid_seq.append(_gid(reader))
         self.writer.write(self._info)
 
     def add_writer(self, writer: DataWriter) -> None:
-        """Say that this writer is the node's."""
+        """Publish that this writer belongs to the node."""
         self._node.writer_gid_seq.append(_gid(writer))
         self.writer.write(self._info)
 
     def drop_writer(self, writer: DataWriter) -> None:
-        """Say that this writer is no longer there."""
+        """Publish that this writer has gone."""
         self._node.writer_gid_seq.remove(_gid(writer))
         self.writer.write(self._info)
 

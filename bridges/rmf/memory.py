@@ -1,30 +1,28 @@
-"""The `memory` transport: nodes of one process, for tests in virtual time. No thread, and no
-clock but the wall's.
+"""The `memory` transport: nodes of one process, for tests in virtual time. It has no thread, and reads
+only the wall clock.
 
 A message is delivered before `publish` returns, in the order in which the subscriptions were made.
-Who hears whom follows DDS: same name, same type, and a subscription that wants retained messages
-hears nobody who does not retain any.
+Ends match as in DDS: same name, same type, and a subscription that wants retained messages only hears
+publishers that retain them.
 """
 
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
 
 from bridges.rmf import cdr, notices
 from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
-from bridges.rmf.transport import TransportError
-
-M = TypeVar("M", bound=Message)
+from bridges.rmf.releases import NEWEST, Release
+from bridges.rmf.topics import AnyTopic, Topic
+from bridges.rmf.transport import M, Receive, TransportError, any_type
 
 
 class MemoryNetwork:
     """The network of one test: the publishers and subscriptions of all its nodes."""
 
     def __init__(self) -> None:
-        self.publishers: list[_Publisher[Any]] = []
-        self.subscriptions: list[_Subscription[Any]] = []
+        self.publishers: list[_Publisher] = []
+        self.subscriptions: list[_Subscription] = []
 
 
 class MemoryTransport:
@@ -32,13 +30,14 @@ class MemoryTransport:
 
     speaks = "memory"
 
-    def __init__(self, network: MemoryNetwork, node_name: str) -> None:
+    def __init__(self, network: MemoryNetwork, node_name: str, release: Release = NEWEST) -> None:
         self.name = node_name
         self.dropped: dict[str, int] = {}
+        self.release = release
         self._network = network
         self._closed = False
 
-    def publisher(self, topic: Topic[M]) -> "_Publisher[M]":
+    def publisher(self, topic: AnyTopic) -> "_Publisher":
         """Declare a publisher with `topic.publish` QoS."""
         self._require_open()
         publisher = _Publisher(self, self._network, topic)
@@ -47,10 +46,10 @@ class MemoryTransport:
 
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
-    ) -> "_Subscription[M]":
-        """Declare a subscription with `topic.subscribe` QoS; what is retained comes at once."""
+    ) -> "_Subscription":
+        """Declare a subscription with `topic.subscribe` QoS. Retained messages arrive at once."""
         self._require_open()
-        subscription = _Subscription(self, self._network, topic, received, others_only)
+        subscription = _Subscription(self, self._network, topic, any_type(received), others_only)
         self._network.subscriptions.append(subscription)
         subscription.catch_up()
         return subscription
@@ -60,12 +59,16 @@ class MemoryTransport:
         """Until it is closed."""
         return not self._closed
 
+    def faults(self) -> list[tuple[str, str]]:
+        """None: all nodes are of one process and one release."""
+        return []
+
     def wall(self) -> float:
         """The wall clock (s since the epoch)."""
         return time.time()
 
     def close(self) -> None:
-        """Leave the network, with all that was retained here."""
+        """Leave the network; what this node has retained is gone."""
         self._closed = True
         network = self._network
         network.publishers = [end for end in network.publishers if end.node is not self]
@@ -76,18 +79,18 @@ class MemoryTransport:
             raise TransportError(f"{self.name} has left the graph")
 
 
-class _Publisher(Generic[M]):
-    def __init__(self, node: MemoryTransport, network: MemoryNetwork, topic: Topic[M]) -> None:
+class _Publisher:
+    def __init__(self, node: MemoryTransport, network: MemoryNetwork, topic: AnyTopic) -> None:
         self.node = node
         self.topic = topic
-        self.retained: deque[M] = deque(maxlen=topic.publish.depth)
+        self.retained: deque[Message] = deque(maxlen=topic.publish.depth)
         self._network = network
 
-    def publish(self, message: M) -> None:
-        """Deliver at once. Raises CdrError for what could not be sent by wire either."""
+    def publish(self, message: Message) -> None:
+        """Deliver at once. Raises CdrError for a message that no wire could carry."""
         if self not in self._network.publishers:
             raise TransportError(f"topic {self.topic.name}: the node has left the graph")
-        cdr.encode(self.topic.type, message)
+        cdr.encode(self.topic.type, message, self.node.release)
         if self.topic.publish.durability == "transient_local":
             self.retained.append(message)
         for subscription in self._network.subscriptions:
@@ -105,13 +108,13 @@ class _Publisher(Generic[M]):
             self._network.publishers.remove(self)
 
 
-class _Subscription(Generic[M]):
+class _Subscription:
     def __init__(
         self,
         node: MemoryTransport,
         network: MemoryNetwork,
-        topic: Topic[M],
-        received: Callable[[M], None],
+        topic: AnyTopic,
+        received: Receive,
         others_only: bool,
     ) -> None:
         self.node = node
@@ -120,7 +123,7 @@ class _Subscription(Generic[M]):
         self._topic = topic
         self._others_only = others_only
 
-    def hears(self, publisher: _Publisher[Any]) -> bool:
+    def hears(self, publisher: _Publisher) -> bool:
         """Whether DDS would match the two."""
         theirs, ours = publisher.topic, self._topic
         return (
@@ -130,7 +133,7 @@ class _Subscription(Generic[M]):
             and not (self._others_only and publisher.node is self.node)
         )
 
-    def hand_on(self, message: M) -> None:
+    def hand_on(self, message: Message) -> None:
         """Deliver a message. As on a wire, a subscriber's exception does not reach the publisher."""
         notices.hand_on(self.node.dropped, self._topic, self.received, message)
 

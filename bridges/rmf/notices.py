@@ -1,17 +1,14 @@
-"""What a transport logs about its peers: the same text on every wire, once for each cause."""
+"""What transports log about samples and peers: the same texts on every wire, once for each cause."""
 
 import logging
-from collections.abc import Callable
-from typing import TypeVar
 
 from bridges.log import pairs
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
-from bridges.rmf.topics import AnyTopic, Topic
+from bridges.rmf.topics import AnyTopic
+from bridges.rmf.transport import Receive
 
 log = logging.getLogger(__name__)
-
-M = TypeVar("M", bound=Message)
 
 FAILURES = 5
 """After so many failed reads in a row a transport ends its thread, and with it the daemon."""
@@ -20,16 +17,14 @@ NOT_SERVED = "a subscription is not served"
 
 
 def drop(dropped: dict[str, int], topic: AnyTopic, error: CdrError) -> None:
-    """Count a sample that is no message, and log the first of its topic."""
+    """Count an invalid sample, and log the first of its topic."""
     dropped[topic.name] = dropped.get(topic.name, 0) + 1
     if dropped[topic.name] == 1:
         log.warning(pairs("sample_dropped", topic=topic.name, reason=error, further="only counted"))
 
 
-def hand_on(
-    dropped: dict[str, int], topic: Topic[M], received: Callable[[M], None], message: M
-) -> None:
-    """Give a message to its subscriber. An exception there costs this message, never the thread."""
+def hand_on(dropped: dict[str, int], topic: AnyTopic, received: Receive, message: Message) -> None:
+    """Deliver a message to its subscriber. An exception there drops the message, not the thread."""
     try:
         received(message)
     except Exception as error:
@@ -41,5 +36,5 @@ def hand_on(
 
 
 def misfit(topic: AnyTopic, text: str, policy: str) -> None:
-    """Say which policy keeps a peer apart from our end of a topic."""
+    """Log which QoS policy keeps a peer from matching our end of a topic."""
     log.warning(pairs("misfit", topic=topic.name, reason=f"{text}: its {policy} does not fit ours"))

@@ -1,17 +1,20 @@
 """The RIHS01 type hash (ROS REP-2016) of each message, computed from `definitions.py`.
 
-A ROS 2 node announces the hash of its message definition beside each endpoint, and warns about a
-peer that has none or another one. The hash is the SHA-256 of the type's description as JSON: its
-fields, and after them the descriptions of all types it is made of, sorted by name. It covers names
-and types of fields, not constants and not comments.
+A ROS 2 node announces the hash of its message definition with each endpoint, and warns about a peer
+without a hash or with another one. The hash is the SHA-256 of the type's description as JSON: its
+fields, then the descriptions of all nested types, sorted by name. It covers the names and types of
+fields, but neither constants nor comments.
 Source: ros2/rosidl, rosidl_generator_type_description, and type_description_interfaces/FieldType.
 """
 
 import hashlib
 import json
 import typing
+from collections.abc import Hashable
+from functools import cache
 
-from bridges.rmf.definitions import PACKAGES, field_types
+from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.releases import NEWEST, RELEASES, Release
 
 NESTED = 1
 TYPE_IDS = {
@@ -27,26 +30,47 @@ TYPE_IDS = {
 UNBOUNDED_SEQUENCE = 144
 
 
-def type_hash(message_type: type) -> str:
+def type_hash(message_type: type, release: Release = NEWEST) -> str:
     """`RIHS01_` and 64 hexadecimal digits."""
-    referenced = sorted(_nested_in(message_type), key=_type_name)
+    return _hash(message_type, release)
+
+
+@cache
+def _hash(message_type: Hashable, release: Release) -> str:
+    assert isinstance(message_type, type)
+    referenced = sorted(_nested_in(message_type, release), key=type_name)
     description = {
-        "type_description": _description(message_type),
-        "referenced_type_descriptions": [_description(nested) for nested in referenced],
+        "type_description": _description(message_type, release),
+        "referenced_type_descriptions": [_description(nested, release) for nested in referenced],
     }
     return "RIHS01_" + hashlib.sha256(json.dumps(description).encode()).hexdigest()
 
 
-def _type_name(message_type: type) -> str:
+def releases_of(hashed: str) -> list[Release]:
+    """The releases that have a message with this hash."""
+    return _by_hash().get(hashed, [])
+
+
+@cache
+def _by_hash() -> dict[str, list[Release]]:
+    found: dict[str, list[Release]] = {}
+    for release in RELEASES.values():
+        for message_type in release.messages():
+            found.setdefault(type_hash(message_type, release), []).append(release)
+    return found
+
+
+def type_name(message_type: type) -> str:
+    """As ROS writes it: package/msg/Name."""
     return f"{PACKAGES[message_type]}/msg/{message_type.__name__}"
 
 
-def _description(message_type: type) -> dict[str, object]:
+def _description(message_type: type, release: Release) -> dict[str, object]:
     return {
-        "type_name": _type_name(message_type),
+        "type_name": type_name(message_type),
         "fields": [
             {"name": name, "type": _field_type(kind)}
-            for name, kind in field_types(message_type).items()
+            for name, kind in release.fields(message_type).items()
         ],
     }
 
@@ -59,17 +83,17 @@ def _field_type(kind: type) -> dict[str, object]:
         "type_id": (NESTED if nested else TYPE_IDS[element]) + sequence * UNBOUNDED_SEQUENCE,
         "capacity": 0,
         "string_capacity": 0,
-        "nested_type_name": _type_name(element) if nested else "",
+        "nested_type_name": type_name(element) if nested else "",
     }
 
 
 def _element(kind: type) -> type:
-    """What a sequence holds, or the type itself; a number by its ROS name."""
+    """The type of a sequence's elements, or the type itself; a number type as its ROS name."""
     if typing.get_origin(kind) is tuple:
         kind = typing.get_args(kind)[0]
     return typing.get_args(kind)[1] if typing.get_origin(kind) is typing.Annotated else kind
 
 
-def _nested_in(message_type: type) -> set[type]:
-    direct = {_element(kind) for kind in field_types(message_type).values()} & PACKAGES.keys()
-    return direct.union(*(_nested_in(nested) for nested in direct))
+def _nested_in(message_type: type, release: Release) -> set[type]:
+    direct = {_element(kind) for kind in release.fields(message_type).values()} & PACKAGES.keys()
+    return direct.union(*(_nested_in(nested, release) for nested in direct))

@@ -1,13 +1,14 @@
 """The `ros2` transport: an ordinary ROS 2 node, by rclpy, on whichever RMW is installed.
 
-Samples are taken and published as bytes, and `cdr.py` reads and writes them: a message means the same
-as on `dds`, a sample that is no message is dropped and counted as there, and rclpy converts nothing.
-rclpy's executor runs in one thread of ours, and what it calls only hands the message on.
+Samples pass through rclpy as bytes, and `cdr.py` encodes and decodes them, as on `dds`. An invalid
+sample is dropped and counted, as there. rclpy's executor runs in a thread of this transport; its
+callbacks only deliver the message.
 
-Source: rclpy 7.1 (ROS 2 Jazzy); its public API, with RCLError and InvalidHandle as RuntimeErrors.
-rclpy is imported here alone, the message packages in ros_types.py, and both only by choose.py.
+Source: rclpy 7.1 (ROS 2 Jazzy), its public API; RCLError and InvalidHandle are RuntimeErrors. Only
+this file imports rclpy, only ros_types.py the message packages, and only choose.py imports this one.
 """
 
+import atexit
 import logging
 import os
 import threading
@@ -15,7 +16,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Final, Generic, TypeVar
+from typing import Final, Protocol
 
 from rclpy.context import Context
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -31,16 +32,15 @@ from rclpy.qos import (
 )
 
 from bridges.log import pairs
-from bridges.rmf import cdr, notices, topics
+from bridges.rmf import cdr, notices, ros_peers, topics
+from bridges.rmf.cyclone import LOOPBACK
 from bridges.rmf.definitions import Message
-from bridges.rmf.loopback import LOOPBACK
-from bridges.rmf.ros_types import ros_type
-from bridges.rmf.topics import Topic
-from bridges.rmf.transport import TransportError
+from bridges.rmf.ros_types import installed, ros_type
+from bridges.rmf.threaded import Threaded
+from bridges.rmf.topics import AnyTopic, Topic
+from bridges.rmf.transport import M, Receive, TransportError, any_type
 
 log = logging.getLogger(__name__)
-
-M = TypeVar("M", bound=Message)
 
 ON_LOOPBACK: Final = {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -48,27 +48,29 @@ ON_LOOPBACK: Final = {
     "ROS_STATIC_PEERS": None,
     "CYCLONEDDS_URI": LOOPBACK,
 }
-"""What an RMW reads when it joins: it finds nobody but this machine's nodes. Cyclone, told so in
-its own words as well, does not even leave the loopback interface."""
+"""The variables that an RMW reads when it joins. With these it only finds this machine's nodes, and
+Cyclone stays on the loopback interface."""
 UNHEARD: Final = 256
-"""Own messages that may be on their way back to us: more than twice any topic's depth."""
+"""The most own messages that may be on their way back to us: over twice any topic's depth."""
 
 AGAIN_S: Final = 1.0
-"""After a failure of rclpy's own, its executor is asked again."""
+"""How long (s) to wait after an exception of rclpy before its executor runs again."""
 YIELD_S: Final = 50e-6
-"""After a callback rclpy's executor keeps Python's lock for a while. This pause lets the thread that
-the message has woken run first."""
+"""rclpy's executor holds Python's lock for a while after a callback. This pause (s) lets the thread
+that the message has woken run first."""
 
 
-class Ros2Transport:
+class Ros2Transport(Threaded):
     """One rclpy node, its context and its executor's thread.
 
-    `ros_args`: what stood behind `--ros-args` on the command line: name, namespace, remappings and
-    parameters (`use_sim_time`). `loopback`: stay on this machine whatever the environment says.
+    `ros_args`: the arguments after `--ros-args` on the command line: name, namespace, remappings and
+    parameters (`use_sim_time`). `loopback`: stay on this machine, whatever the environment says.
     Raises TransportError when the graph cannot be joined.
     """
 
     speaks = "ros2"
+
+    refusals = (RuntimeError, NameValidationException)
 
     def __init__(
         self,
@@ -78,13 +80,11 @@ class Ros2Transport:
         loopback: bool,
         ros_args: Sequence[str] = (),
     ) -> None:
-        self.name = node_name
-        self.dropped: dict[str, int] = {}
-        self._lock = threading.Lock()
-        self._closed = False
+        super().__init__(node_name, installed())
         self._pause = threading.Event()
-        self._publishers: list[_Publisher[Any]] = []
-        self._deaf: list[_Subscription[Any]] = []
+        self._publishers: list[_Publisher] = []
+        self._deaf: list[_Subscription] = []
+        self._subscribed: list[AnyTopic] = []
         self._context = Context()
         try:
             with _environment(ON_LOOPBACK if loopback else {}):
@@ -92,12 +92,13 @@ class Ros2Transport:
         except (RuntimeError, NameValidationException) as error:
             self._context.try_shutdown()
             raise TransportError(f"cannot join ROS domain {domain_id}: {error}") from error
-        self._thread = threading.Thread(target=self._spin, name=f"{self.name}-ros2", daemon=True)
-        self._thread.start()
+        self._start(self._spin, "ros2")
+        # An executor's thread that outlives the interpreter aborts it, as where a start is refused.
+        atexit.register(self.close)
 
-    def publisher(self, topic: Topic[M]) -> "_Publisher[M]":
-        """Declare a publisher with `topic.publish` QoS. Raises TransportError, as for a ROS package
-        that is not installed."""
+    def publisher(self, topic: AnyTopic) -> "_Publisher":
+        """Declare a publisher with `topic.publish` QoS. Raises TransportError, also for a missing ROS
+        package."""
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             publisher = _Publisher(self, topic)
             self._publishers.append(publisher)
@@ -105,13 +106,23 @@ class Ros2Transport:
 
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
-    ) -> "_Subscription[M]":
+    ) -> "_Subscription":
         """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
         with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
-            subscription = _Subscription(self, topic, received, others_only=others_only)
+            subscription = _Subscription(self, topic, any_type(received), others_only=others_only)
+            self._subscribed.append(topic)
             if others_only:
                 self._deaf.append(subscription)
         return subscription
+
+    def faults(self) -> list[tuple[str, str]]:
+        """What keeps it apart from others; from any thread."""
+        if not self.lives:
+            return []
+        published = [(end.topic, True) for end in list(self._publishers)]
+        subscribed = [(topic, False) for topic in list(self._subscribed)]
+        ros_peers.look(self.node, self._peers, [*published, *subscribed])
+        return self._peers.faults()
 
     def wall(self) -> float:
         """ROS's time (s since the epoch): the wall clock, or `/clock` where use_sim_time is set."""
@@ -123,42 +134,37 @@ class Ros2Transport:
             if self._closed:
                 return
             self._closed = True
+        atexit.unregister(self.close)
         self._pause.set()
         self._leaving.trigger()
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
+        self._join_thread()
         self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()
 
-    @property
-    def lives(self) -> bool:
-        """Is it on the graph, and is its thread running?"""
-        return not self._closed and self._thread.is_alive()
-
-    def heard_back(self, topic: Topic[Any]) -> "list[_Subscription[Any]]":
+    def heard_back(self, topic: AnyTopic) -> "list[_Subscription]":
         """The subscriptions of this node that must not hear what it publishes on the topic."""
         return [end for end in self._deaf if end.would_hear(topic)]
 
-    def own_publishers(self, subscription: "_Subscription[Any]") -> int:
-        """How many of our own publishers a subscription must not hear."""
+    def own_publishers(self, subscription: "_Subscription") -> int:
+        """How many of this node's own publishers a subscription must not hear."""
         return sum(subscription.would_hear(end.topic) for end in self._publishers)
 
-    def withdraw(self, publisher: "_Publisher[Any]") -> None:
-        """Take one publisher off the graph; after close there is none left to take."""
+    def withdraw(self, publisher: "_Publisher") -> None:
+        """Take one publisher off the graph; after close that has happened already."""
         with self._lock:
             if not self._closed and publisher in self._publishers:
                 self._publishers.remove(publisher)
                 self.node.destroy_publisher(publisher.end)
 
     def _join(self, domain_id: int, ros_args: Sequence[str]) -> None:
-        # Logging is ours: rclpy's would open a file below $HOME, which a service has not.
+        # Without rclpy's logging: it would open a file below $HOME, and a service has none.
         self._context.init(args=list(ros_args), initialize_logging=False, domain_id=domain_id)
-        self.node: Any = Node(
+        self.node = Node(
             self.name,
             context=self._context,
             enable_rosout=False,
-            start_parameter_services=False,  # nobody turns the clock of a running daemon
+            start_parameter_services=False,  # nobody changes the clock of a running daemon
         )
         self.name = self.node.get_name()
         self._executor = SingleThreadedExecutor(context=self._context)
@@ -167,7 +173,7 @@ class Ros2Transport:
 
     def _spin(self) -> None:
         """Run the executor. An exception of rclpy ends the thread only if it keeps coming, or if the
-        context is gone."""
+        context has been shut down."""
         failures = 0
         while not self._closed and self._context.ok() and failures < notices.FAILURES:
             try:
@@ -179,22 +185,13 @@ class Ros2Transport:
                     log.exception(pairs("reader_failed", node=self.name, reason=error))
                 self._pause.wait(AGAIN_S)
 
-    @contextmanager
-    def _reporting(self, text: str) -> Iterator[None]:
-        if self._closed:
-            raise TransportError(f"{text}: {self.name} has left the graph")
-        try:
-            yield
-        except (RuntimeError, NameValidationException) as error:
-            raise TransportError(f"{text}: {error}") from error
 
-
-class _Publisher(Generic[M]):
-    def __init__(self, transport: Ros2Transport, topic: Topic[M]) -> None:
+class _Publisher:
+    def __init__(self, transport: Ros2Transport, topic: AnyTopic) -> None:
         self.topic = topic
         self._transport = transport
         self.end = transport.node.create_publisher(
-            ros_type(topic.type),
+            ros_type(topic.type, transport.release),
             topic.name,
             _profile(topic.publish),
             event_callbacks=PublisherEventCallbacks(
@@ -202,20 +199,21 @@ class _Publisher(Generic[M]):
             ),
         )
 
-    def publish(self, message: M) -> None:
-        """Send. Raises TransportError when it was not sent, CdrError for what no sample can hold."""
+    def publish(self, message: Message) -> None:
+        """Send. Raises TransportError if it was not sent, CdrError if no sample can hold it."""
         if not self._transport.lives:
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        sample = cdr.encode(self.topic.type, message)
+        release = self._transport.release
+        sample = cdr.encode(self.topic.type, message, release)
         for subscription in self._transport.heard_back(self.topic):
-            subscription.said.append(cdr.decode(self.topic.type, sample))
+            subscription.said.append(cdr.decode(self.topic.type, sample, release))
         try:
             self.end.publish(sample)
         except RuntimeError as error:
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
     def matched(self) -> int:
-        """How many subscriptions are reached, without our own that must not hear us; 0 after close."""
+        """How many subscriptions are reached, without own ones that it must skip; 0 after close."""
         try:
             count = int(self.end.get_subscription_count())
         except RuntimeError:
@@ -227,27 +225,27 @@ class _Publisher(Generic[M]):
         self._transport.withdraw(self)
 
 
-class _Subscription(Generic[M]):
-    """`said`: what this node has published here and not heard back yet, if it wants others only.
+class _Subscription:
+    """`said`: with `others_only`, what this node has published here and not heard back yet.
 
-    rclpy (Jazzy) cannot ask for that, and does not tell whose a sample is.
+    rclpy (Jazzy) has no such option, and does not say who sent a sample.
     """
 
     def __init__(
         self,
         transport: Ros2Transport,
-        topic: Topic[M],
-        received: Callable[[M], None],
+        topic: AnyTopic,
+        received: Receive,
         *,
         others_only: bool,
     ) -> None:
         self.topic = topic
-        self.said: deque[M] = deque(maxlen=UNHEARD)
+        self.said: deque[Message] = deque(maxlen=UNHEARD)
         self._transport = transport
         self._received = received
         self._others_only = others_only
         self._end = transport.node.create_subscription(
-            ros_type(topic.type),
+            ros_type(topic.type, transport.release),
             topic.name,
             self._take,
             _profile(topic.subscribe),
@@ -257,7 +255,7 @@ class _Subscription(Generic[M]):
             ),
         )
 
-    def would_hear(self, published: Topic[Any]) -> bool:
+    def would_hear(self, published: AnyTopic) -> bool:
         """Whether DDS would match this end with a publisher of that topic."""
         durabilities = (self.topic.subscribe.durability, published.publish.durability)
         return (published.name, published.type) == (self.topic.name, self.topic.type) and (
@@ -275,7 +273,7 @@ class _Subscription(Generic[M]):
 
     def _take(self, sample: bytes) -> None:
         try:
-            message = cdr.decode(self.topic.type, sample)
+            message = cdr.decode(self.topic.type, sample, self._transport.release)
         except cdr.CdrError as error:
             notices.drop(self._transport.dropped, self.topic, error)
             return
@@ -286,7 +284,7 @@ class _Subscription(Generic[M]):
         time.sleep(YIELD_S)
 
 
-def _profile(qos: topics.Qos) -> Any:
+def _profile(qos: topics.Qos) -> QoSProfile:
     durability = {
         "volatile": DurabilityPolicy.VOLATILE,
         "transient_local": DurabilityPolicy.TRANSIENT_LOCAL,
@@ -299,8 +297,14 @@ def _profile(qos: topics.Qos) -> Any:
     )
 
 
-def _misfit(topic: Topic[Any], text: str) -> Callable[[Any], None]:
-    def tell(event: Any) -> None:
+class _Misfit(Protocol):
+    """rclpy's event for a peer whose QoS does not fit an end."""
+
+    last_policy_kind: object
+
+
+def _misfit(topic: AnyTopic, text: str) -> Callable[[_Misfit], None]:
+    def tell(event: _Misfit) -> None:
         policy = qos_policy_name_from_kind(event.last_policy_kind).lower()
         notices.misfit(topic, text, policy)
 
@@ -309,7 +313,7 @@ def _misfit(topic: Topic[Any], text: str) -> Callable[[Any], None]:
 
 @contextmanager
 def _environment(wanted: Mapping[str, str | None]) -> Iterator[None]:
-    """These variables for a while; None: without it."""
+    """Set these variables for the length of the block; None removes one."""
     before = {name: os.environ.get(name) for name in wanted}
     _set(wanted)
     try:

@@ -27,7 +27,7 @@ RETAINED = Qos("transient_local", 100)
 
 @dataclass(frozen=True, slots=True)
 class Topic(Generic[M_co]):
-    """A topic as ROS names it (no `rt/`), and the QoS of the end that we hold."""
+    """A topic under its ROS name (without `rt/`), and the QoS of our publisher and subscription."""
 
     name: str
     type: type[M_co]
@@ -35,12 +35,16 @@ class Topic(Generic[M_co]):
     subscribe: Qos = VOLATILE
 
     def named(self, name: str) -> "Topic[M_co]":
-        """The same topic under the name that a site has given it."""
+        """The same topic under another name."""
         return replace(self, name=name)
+
+    def live(self) -> "Topic[M_co]":
+        """The same topic for who wants nothing that was retained."""
+        return replace(self, subscribe=VOLATILE)
 
 
 AnyTopic = Topic[d.Message]
-"""A topic of whichever type."""
+"""A topic of any message type."""
 
 
 LIFT_STATES = Topic("lift_states", d.LiftState)
@@ -56,11 +60,15 @@ DOOR_SUPERVISOR_HEARTBEAT = Topic("door_supervisor_heartbeat", d.SupervisorHeart
 CHARGER_STATES = Topic("charger_states", d.ChargerState)
 CHARGER_REQUESTS = Topic("charger_requests", d.ChargerRequest)
 CHARGER_CANCELS = Topic("charger_cancels", d.ChargerCancel)
-# Where wishes for any charger go; RMF has no name for it.
+# Ours: RMF has no message that answers a request.
+CHARGER_REFUSALS = Topic("charger_refusals", d.DiagnosticStatus)
+# Requests to the charger coordinator; RMF has no such topics.
 ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
 ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
+# Nothing is sent on it. Its publisher shows that a coordinator serves the graph: a second one waits.
+CHARGER_COORDINATOR = Topic("charger_coordinator", d.Bool)
 FLEET_STATES = Topic("fleet_states", d.FleetState)
-# rmf_charging_schedule publishes it retained, and a fleet adapter that starts later wants it.
+# rmf_charging_schedule retains it, for fleet adapters that start later.
 CHARGING_ASSIGNMENTS = Topic(
     "charging_assignments", d.ChargingAssignments, publish=RETAINED, subscribe=RETAINED
 )

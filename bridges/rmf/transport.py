@@ -1,16 +1,29 @@
-"""What a transport does, whichever wire it speaks: `ros2`, `dds`, `zenoh`, `memory`.
+"""The interface of every transport: `ros2`, `dds`, `zenoh`, `memory`.
 
-One file each beside this one; `bridges/rmf/choose.py` opens the one that the YAML names.
+Each has a file beside this one; `bridges/rmf/choose.py` opens the one that the YAML names.
 """
 
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, cast
 
 from bridges.rmf.definitions import Message
+from bridges.rmf.releases import Release
 from bridges.rmf.topics import Topic
 
 M = TypeVar("M", bound=Message)
 M_contra = TypeVar("M_contra", bound=Message, contravariant=True)
+
+
+Receive = Callable[[Message], None]
+"""Takes a message of any type."""
+
+
+def any_type(received: Callable[[M], None]) -> Receive:
+    """The callback of one subscription, as a transport stores it beside those of other types.
+
+    A transport only gives it messages that were decoded as its own topic's type.
+    """
+    return cast(Receive, received)
 
 
 class TransportError(Exception):
@@ -24,17 +37,17 @@ class Publisher(Protocol[M_contra]):
         """Send; never blocks longer than 20 ms. Raises TransportError when the wire is gone."""
 
     def matched(self) -> int:
-        """How many subscriptions, of any process, receive what is sent here."""
+        """How many subscriptions receive what is sent here, in any process; 0 after close."""
 
     def close(self) -> None:
-        """Take this end off the graph at once; the node stays. May be called twice."""
+        """Take this publisher off the graph at once; the node stays. May be called twice."""
 
 
 class Subscription(Protocol):
     """The receiving end of one topic."""
 
     def matched(self) -> int:
-        """How many publishers, of any process, are heard here."""
+        """How many publishers are heard here, in any process; 0 after close."""
 
 
 class Transport(Protocol):
@@ -49,6 +62,13 @@ class Transport(Protocol):
     speaks: str
     dropped: dict[str, int]
 
+    @property
+    def release(self) -> Release:
+        """The release of RMF's messages that it speaks now."""
+
+    def faults(self) -> list[tuple[str, str]]:
+        """(code, detail) of what keeps this node apart from others now; from any thread."""
+
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Declare a publisher with `topic.publish` QoS."""
 
@@ -62,7 +82,7 @@ class Transport(Protocol):
 
     @property
     def lives(self) -> bool:
-        """It hears what comes. Without a network, a router or a peer it lives all the same."""
+        """Whether its thread runs. It also does without a network, a router or a peer."""
 
     def wall(self) -> float:
         """RMF's time, for stamps (s since the epoch): the wall clock, unless ROS simulates time."""

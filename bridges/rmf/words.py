@@ -1,8 +1,8 @@
-"""RMF's messages in one line of words each: what `watch`, `send` and the demo print.
+"""RMF's messages as one line of text: what `watch`, `send` and the demo print.
 
-The words are RMF's constants without their prefix, in small letters but for a lift's mode (DOOR_OPEN
-is `open`, MODE_AGV `AGV`); a number that RMF does not define is shown as the number. Names come from
-the network: nothing unprintable gets through.
+The words are RMF's constants without their prefix, in lower case except for a lift's mode: DOOR_OPEN is
+`open`, MODE_AGV is `AGV`. A number that RMF does not define is shown as a number. Names come from the
+network, so control characters are escaped.
 """
 
 from enum import IntEnum
@@ -15,7 +15,7 @@ Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel
 
 
 def printable(text: str) -> str:
-    """The text with every control character spelt out, so that no name can move the cursor."""
+    """The text on one line, with control characters escaped, so that no name can move the cursor."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -50,7 +50,7 @@ def stamped_at(state: Stated) -> float:
 
 
 def condition(state: Stated) -> str:
-    """What a device says of itself: `car at L1, door open, mode AGV`, `moving`, `error: too hot`."""
+    """The state without its holder: `car at L1, door open, mode AGV`, `moving`, `error: too hot`."""
     match state:
         case d.LiftState():
             return _lift_condition(state)
@@ -61,7 +61,7 @@ def condition(state: Stated) -> str:
 
 
 def plain(enum: type[IntEnum], value: int) -> str:
-    """`DOOR_OPEN` as `open`: for a person, who needs no constant."""
+    """`DOOR_OPEN` as `open`; a number without a constant as `7?`."""
     return word(enum, value).lower()
 
 
@@ -90,7 +90,7 @@ def _charger_condition(state: d.ChargerState) -> str:
 
 
 def holder(state: Stated) -> str:
-    """Who has the device: a lift's session, a charger's robot and request; "" for nobody."""
+    """Who holds the device: a lift's session, or a charger's robot and request; "" for nobody."""
     match state:
         case d.LiftState():
             return printable(state.session_id)
@@ -104,14 +104,14 @@ def holder(state: Stated) -> str:
 
 
 def described(state: Stated) -> str:
-    """`car at L1, door open, mode AGV, held by fleet/robot`; `idle`."""
+    """A state and its holder: `car at L1, door open, mode AGV, held by fleet/robot`; `idle`."""
     who = holder(state)
     has = "for" if isinstance(state, d.ChargerState) else "held by"
     return condition(state) + (f", {has} {who}" if who else "")
 
 
 def request(message: Requested) -> str:
-    """What is asked: `mode AGV, car to L3, door open, for fleet/robot`."""
+    """What is requested: `mode AGV, car to L3, door open, for fleet/robot`."""
     match message:
         case d.LiftRequest():
             return _lift_request(message)

@@ -1,93 +1,101 @@
 """The `zenoh` transport: a session that looks like a ROS node on rmw_zenoh, or like a
 zenoh-bridge-ros2dds with one node behind it.
 
-zenoh brings itself back: it goes on looking for its routers, and declares everything again when one
-answers. We open a new session only when this machine's addresses have changed, which the old one
-would notice when its links run out of patience.
+zenoh reconnects by itself: it keeps looking for its routers, and declares everything again when one
+answers. This transport opens a new session only when the machine's addresses have changed: the old
+session would notice that only when its links time out.
 
-Source: eclipse-zenoh 1.10 (Python API), and what zenoh_keys.py and zenoh_ends.py name.
-zenoh is imported here and there alone, and only by choose.py.
+Source: eclipse-zenoh 1.10 (Python API), and the sources in zenoh_keys.py and zenoh_ends.py. Only
+these files import zenoh, and only choose.py imports this one.
 """
 
 import atexit
-import ctypes
-import json
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from functools import partial
 from itertools import count
 from queue import Empty, SimpleQueue
-from typing import Any, Final, TypeVar
+from typing import Final
 
 import zenoh
 from zenoh.handlers import Callback
 
-from bridges.core.fields import Zenoh
 from bridges.log import pairs
 from bridges.rmf import addresses, notices, zenoh_config
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
-from bridges.rmf.transport import TransportError
-from bridges.rmf.zenoh_ends import ZenohPublisher, ZenohSubscription
+from bridges.rmf.releases import Release
+from bridges.rmf.settings import Zenoh
+from bridges.rmf.threaded import Threaded
+from bridges.rmf.topics import AnyTopic, Topic
+from bridges.rmf.transport import M, TransportError, any_type
+from bridges.rmf.zenoh_ends import Order, ZenohEnd, ZenohPublisher, ZenohSubscription
 from bridges.rmf.zenoh_keys import WAYS, Keys
+from bridges.rmf.zenoh_peers import ZenohPeers
+from bridges.rmf.zenoh_session import closed, opened, trim_memory
 
-M = TypeVar("M", bound=Message)
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S: Final = 1.0
-NOBODY: Final = "no router answers, or it refuses us: what we say reaches nobody until one does"
-ROUTER: Final = (
-    "a router has come to this machine's own nodes, and what is simulated must reach none"
+NO_ROUTER: Final = (
+    "no router answers, or it refuses this node: RMF hears nothing until one accepts it"
 )
-Ends = tuple[ZenohPublisher[Any] | ZenohSubscription[Any], ...]
+ROUTER: Final = "a router has connected to this machine's nodes, and would forward simulated states"
 
 
-class ZenohTransport:
+class ZenohTransport(Threaded):
     """One node: a session, its publishers and subscriptions, and the thread that hands on messages.
 
     `loopback`: stay on this machine, without a router, whatever `settings` say. Raises TransportError
-    when no session can be opened; that nobody answers yet is no error.
+    when no session can be opened. It is no error that no other node answers yet.
     """
 
     speaks = "zenoh"
 
+    refusals = (zenoh.ZError,)
+
     def __init__(
-        self, node_name: str, domain_id: int, *, loopback: bool, settings: Zenoh | None = None
+        self,
+        node_name: str,
+        domain_id: int,
+        *,
+        loopback: bool,
+        settings: Zenoh | None = None,
+        release: Release | None = None,
     ) -> None:
-        self.name = node_name
-        self.dropped: dict[str, int] = {}
+        super().__init__(node_name, release)
         self._settings = settings or Zenoh()
         self._domain_id = domain_id
         self._loopback = loopback
-        self._lock = threading.Lock()
-        self._closed = False
         self._failed = False
-        self._ends: Ends = ()
+        self._ends: tuple[ZenohEnd, ...] = ()
         self._deaf: set[str] = set()
-        self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._watcher = ZenohPeers(self._peers, lambda: self._orders.put(self._follow_release))
+        self._orders: SimpleQueue[Order] = SimpleQueue()
         self._session: zenoh.Session | None = None
         self._linked: bool | None = None
         self._met_router = False
         self._look_at = time.monotonic() + LOOK_EVERY_S
         self._wants_router = not loopback and zenoh_config.mode(self._settings) == "client"
-        self._trouble = ""
+        self._why_unlinked = ""
         self._closing: list[threading.Thread] = []
         self._neighbours: dict[str, zenoh.WhatAmI] = {}
         self._join()
         if self._session is None and not self._wants_router:
-            raise TransportError(f"cannot open a zenoh session: {self._trouble}")
-        # At the end of the interpreter an open session aborts it.
+            raise TransportError(f"cannot open a zenoh session: {self._why_unlinked}")
+        # A session that is still open aborts the interpreter when it exits.
         atexit.register(self.close)
-        self._thread = threading.Thread(target=self._listen, name=f"{node_name}-zenoh", daemon=True)
-        self._thread.start()
+        self._start(self._listen, "zenoh")
 
-    def publisher(self, topic: Topic[M]) -> ZenohPublisher[M]:
+    def publisher(self, topic: AnyTopic) -> ZenohPublisher:
         """Declare a publisher with `topic.publish` QoS."""
         publisher = ZenohPublisher(
-            topic, self._orders.put, self._withdraw, lambda: self.lives, self._deaf
+            topic,
+            self._orders.put,
+            self._withdraw,
+            lambda: self.lives,
+            self._deaf,
+            self._watcher.tell,
         )
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             self._attach(publisher)
@@ -96,29 +104,21 @@ class ZenohTransport:
 
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
-    ) -> ZenohSubscription[M]:
+    ) -> ZenohSubscription:
         """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
         subscription = ZenohSubscription(
             topic,
-            received,
+            any_type(received),
             self._orders.put,
             self.dropped,
             others_only=others_only,
             attached=self._settings.keys == "rmw_zenoh",
+            tell=self._watcher.tell,
         )
         with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
             self._attach(subscription)
             self._ends += (subscription,)
         return subscription
-
-    def wall(self) -> float:
-        """The wall clock (s since the epoch)."""
-        return time.time()
-
-    @property
-    def lives(self) -> bool:
-        """Is its thread running? True without a router too."""
-        return not self._closed and self._thread.is_alive()
 
     def close(self) -> None:
         """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
@@ -128,8 +128,7 @@ class ZenohTransport:
             self._closed = True
         atexit.unregister(self.close)
         self._orders.put(_nothing)
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
+        self._join_thread()
         with self._lock:
             self._leave()
         for closing in self._closing:
@@ -138,19 +137,21 @@ class ZenohTransport:
     # --- the session ---------------------------------------------------------------------------
 
     def _join(self) -> None:
-        """Open a session, if one can be opened: a client has none before its router answers."""
+        """Open a session if possible. A client has none before its router answers."""
         self._addresses = addresses.addresses()
         if self._loopback:
             ways = zenoh_config.on_loopback(self._domain_id)
         else:
             ways = [zenoh_config.on_the_site(self._settings)]
         try:
-            session = _opened(ways)
+            session = opened(ways)
         except zenoh.ZError as error:
-            self._trouble = str(error).partition(" at /")[0]  # it names a line of its source
+            self._why_unlinked = str(error).partition(" at /")[
+                0
+            ]  # a place in zenoh's source follows
             return
         way, name = WAYS[self._settings.keys], str(session.zid())
-        self._keys: Keys = way(self._domain_id, name, self.name)
+        self._keys: Keys = way(self._domain_id, name, self.name, self.release)
         self._numbers = count(1)
         self._presence = session.liveliness().declare_token(self._keys.presence())
         self._neighbours = {}
@@ -158,11 +159,13 @@ class ZenohTransport:
             Callback(partial(self._neighbour, self._neighbours), indirect=False), history=True
         )
         self._session = session
-        _give_back()
+        self._witnesses = self._watcher.watch(session, self._keys)
+        trim_memory()
 
-    def _attach(self, end: ZenohPublisher[Any] | ZenohSubscription[Any]) -> None:
-        """Give an end its place in the session, when there is one."""
-        if self._session is None:
+    def _attach(self, end: ZenohEnd) -> None:
+        """Give an end its place in the session, if there is one and the release has its message."""
+        self._peers.ours(end.topic, publishes=isinstance(end, ZenohPublisher))
+        if self._session is None or not self.release.has(end.topic.type):
             return
         number = next(self._numbers)
         if isinstance(end, ZenohSubscription) and end.others_only:
@@ -170,32 +173,35 @@ class ZenohTransport:
         end.create(self._session, self._keys, number)
 
     def _neighbour(self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent) -> None:
-        """A router or peer is there, or has gone. On zenoh's thread, which holds what asking the
-        session about its neighbours would wait for: so we keep count of them."""
+        """A router or peer has connected or gone. Called on zenoh's thread.
+
+        To ask the session for its neighbours here would wait for a lock that this thread holds. So they
+        are counted.
+        """
         if event.kind == zenoh.SampleKind.PUT:
             neighbours[str(event.transport.zid)] = event.transport.whatami
         else:
             neighbours.pop(str(event.transport.zid), None)
         self._orders.put(self._look)
 
-    def _withdraw(self, publisher: ZenohPublisher[Any]) -> None:
+    def _withdraw(self, publisher: ZenohPublisher) -> None:
         with self._lock:
             if publisher in self._ends:
                 self._ends = tuple(end for end in self._ends if end is not publisher)
                 publisher.leave()
 
     def _leave(self) -> None:
-        """Give up the session. It is closed beside us: by a link that is dead that takes 10 s.
+        """Leave the session. Another thread closes it: on a dead link that takes 10 s.
 
-        What was declared in it is kept until then: to forget it sooner may block us.
+        What was declared in it is kept until then, because to drop it sooner may block this thread.
         """
         session, self._session = self._session, None
-        held = [end.give_up() for end in self._ends]
+        held: list[object] = [end.give_up() for end in self._ends]
         self._deaf.clear()
         self._neighbours = {}
         if session:
-            held += [self._presence, self._events]
-            closing = threading.Thread(target=_close, args=(session, held), daemon=True)
+            held += [self._presence, self._events, self._witnesses]
+            closing = threading.Thread(target=closed, args=(session, held), daemon=True)
             closing.start()
             self._closing.append(closing)
 
@@ -209,9 +215,24 @@ class ZenohTransport:
                 self._join()
                 for end in self._ends:
                     self._attach(end)
-            except (TransportError, zenoh.ZError) as error:  # a secret that has gone, say
-                self._trouble = str(error)
+            except (TransportError, zenoh.ZError) as error:  # for example, a secret is missing now
+                self._why_unlinked = str(error)
                 self._leave()
+
+    def _follow_release(self) -> None:
+        """Give the ends whose message differs in RMF's release a new place."""
+        before = self.release
+        if not self._peers.settle():
+            self._peers.name_misfits()
+            return
+        with self._lock:
+            if self._closed or self._session is None:
+                return
+            self._keys.release = self.release
+            for end in self._ends:
+                if self._peers.differs(end.topic, before):
+                    end.leave()
+                    self._attach(end)
 
     # --- our thread ----------------------------------------------------------------------------
 
@@ -231,7 +252,7 @@ class ZenohTransport:
                 self._recover(error)
 
     def _recover(self, error: Exception) -> None:
-        """Something failed unexpectedly: log it once, and open a new session."""
+        """After an unexpected exception: log it once, and open a new session."""
         if not self._failed:
             log.exception(pairs("reader_failed", node=self.name, reason=error))
         self._failed = True
@@ -240,25 +261,26 @@ class ZenohTransport:
             self._join_anew()
 
     def _follow_network(self) -> None:
-        """Join again if the machine's addresses have changed since we joined."""
+        """Join again if the machine's addresses have changed since the last time."""
         now = time.monotonic()
         if self._loopback or now < self._look_at:
             return
         self._look_at = now + LOOK_EVERY_S
         self._look()
         found = addresses.addresses()
-        if found != self._addresses and self._reaches_out():
+        if found != self._addresses and self._leaves_machine():
             log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
             self._join_anew()
         elif self._session is None:
             self._join_anew()
 
-    def _reaches_out(self) -> bool:
+    def _leaves_machine(self) -> bool:
+        """Whether any endpoint is on another machine."""
         endpoints = (*self._settings.connect, *self._settings.listen)
         return not all(map(zenoh_config.is_local, endpoints))
 
     def _look(self) -> None:
-        """Log once that no router or peer answers, and once that one does again."""
+        """Log once when no router or peer answers, and once when one answers again."""
         neighbours = list(self._neighbours.values())
         routers = zenoh.WhatAmI.ROUTER in neighbours
         if self._loopback:
@@ -275,44 +297,8 @@ class ZenohTransport:
         if linked:
             log.info(pairs("linked", node=self.name, connect=where))
         else:
-            log.warning(
-                pairs("not_linked", node=self.name, connect=where, reason=self._trouble or NOBODY)
-            )
-
-    @contextmanager
-    def _reporting(self, text: str) -> Iterator[None]:
-        if self._closed:
-            raise TransportError(f"{text}: {self.name} has left the graph")
-        try:
-            yield
-        except zenoh.ZError as error:
-            raise TransportError(f"{text}: {error}") from error
-
-
-def _opened(ways: list[dict[str, Any]]) -> zenoh.Session:
-    """A session by the first of these configurations that serves. Raises ZError when none does."""
-    wanted, *further = ways
-    config = zenoh.Config()
-    for key, value in wanted.items():
-        config.insert_json5(key, json.dumps(value))
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError:
-        if further:
-            return _opened(further)
-        raise
-
-
-def _close(session: zenoh.Session, held: list[Any]) -> None:
-    with suppress(zenoh.ZError):  # by a dead link nobody hears the farewell
-        session.close()  # type: ignore[no-untyped-call]
-    held.clear()
-
-
-def _give_back() -> None:
-    """Return freed memory to the machine: opening a session leaves 2.5 MB of it in this process."""
-    with suppress(AttributeError):  # a C library other than glibc has no such call
-        ctypes.CDLL(None).malloc_trim(0)
+            reason = self._why_unlinked or NO_ROUTER
+            log.warning(pairs("not_linked", node=self.name, connect=where, reason=reason))
 
 
 def _nothing() -> None:

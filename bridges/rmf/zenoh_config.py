@@ -1,27 +1,30 @@
-"""What a zenoh session is told when it opens: as rmw_zenoh configures its own, from the YAML, and
-for a node that stays on this machine.
+"""The configuration of a zenoh session: as in rmw_zenoh, with the YAML's settings, or for a node that
+stays on this machine.
 
 Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's DEFAULT_CONFIG.json5.
 """
 
 import re
-from typing import Any, Final
+from typing import Final
 
-from bridges import regular_file, secret_file
-from bridges.core.fields import Zenoh, ZenohTls
+from bridges import user_files
+from bridges.rmf.settings import Zenoh, ZenohTls
 from bridges.rmf.transport import TransportError
 
+Configuration = dict[str, object]
+"""A key of zenoh's configuration -> its value, as JSON holds it."""
+
 LOOPBACK_PORT: Final = 17400
-"""The port of domain 0 on this machine; one more for each domain. No router's (7447), not among
-those that Linux hands out (from 32768)."""
+"""The port on which nodes of domain 0 on this machine meet; domain N uses the Nth port after it. It is
+not a router's (7447), and not one that Linux assigns by itself (from 32768)."""
 RETRY: Final = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 
-COMMON: Final[dict[str, Any]] = {
+COMMON: Final[Configuration] = {
     "scouting/multicast/enabled": False,
-    "scouting/delay": 1,  # ms: nobody is looked for, so there is nobody to wait for
+    "scouting/delay": 1,  # ms: scouting is off, so there is nothing to wait for
     "timestamping/enabled": True,  # retained messages are ordered by it
-    # A message that comes while retained ones are fetched waits for them. A node that hangs must not
-    # hold a fire alarm for longer than this (ms); rmw_zenoh itself would wait for ever.
+    # A new message waits while retained ones are queried. A node that hangs must not delay a fire alarm
+    # for longer than this (ms); rmw_zenoh would wait forever.
     "queries_default_timeout": 3000,
     "transport/shared_memory/enabled": False,
     "connect/timeout_ms": -1,
@@ -36,11 +39,12 @@ def is_local(endpoint: str) -> bool:
     return _LOCAL.fullmatch(endpoint) is not None
 
 
-def on_loopback(domain_id: int) -> list[dict[str, Any]]:
-    """Nodes of one domain on this machine find each other without a router, and never one.
+def on_loopback(domain_id: int) -> list[Configuration]:
+    """Configurations for a node that only meets nodes of its domain on this machine, and no router.
 
-    To be tried in turn: whoever comes first holds the domain's port, and tells those who come later
-    of each other; those look for it for ever, so that another holder is found as well.
+    To be tried in this order. The first node listens on the domain's port, and introduces later nodes
+    to each other. Later nodes keep trying to connect to that port, so they also find a node that
+    takes it over.
     """
     meeting = f"tcp/127.0.0.1:{LOOPBACK_PORT + domain_id}"
     common = COMMON | {
@@ -54,38 +58,42 @@ def on_loopback(domain_id: int) -> list[dict[str, Any]]:
     ]
 
 
-def on_the_site(zenoh: Zenoh) -> dict[str, Any]:
-    """As the YAML says. Raises TransportError for a file that is not there, or not secret."""
+def on_the_site(zenoh: Zenoh) -> Configuration:
+    """The configuration that the YAML asks for. Raises TransportError for a file that is missing, or a
+    secret that others can read."""
     wanted = COMMON | {"mode": mode(zenoh), "connect/endpoints": list(zenoh.connect)}
     if wanted["mode"] == "peer":
         wanted["listen/endpoints"] = list(zenoh.listen)
         wanted["listen/exit_on_failure"] = True
     else:
-        wanted["connect/timeout_ms"] = 0  # opening a client's session would wait for a router
+        wanted["connect/timeout_ms"] = 0  # do not wait for a router when a client's session opens
     try:
         return wanted | _tls(zenoh.tls) | _user(zenoh)
-    except secret_file.SecretError as error:
+    except user_files.SecretError as error:
         raise TransportError(str(error)) from None
 
 
 def mode(zenoh: Zenoh) -> str:
-    """`peer` or `client`. A router forwards no messages between peers, as they connect directly. If no
-    peer can reach us we must be its client. With several routers too: a peer connects to all of them,
-    and each message would arrive once through each."""
+    """`peer` or `client`.
+
+    A router forwards no messages between peers, because peers connect directly. So a node that peers
+    cannot reach must be a client. With several routers it must be one too: a peer connects to all of
+    them, and would receive each message once from each.
+    """
     if zenoh.mode != "auto":
         return zenoh.mode
     near = is_local(zenoh.connect[0]) or not all(map(is_local, zenoh.listen))
     return "peer" if near and len(zenoh.connect) == 1 else "client"
 
 
-def _tls(tls: ZenohTls | None) -> dict[str, Any]:
+def _tls(tls: ZenohTls | None) -> Configuration:
     if tls is None:
         return {}
-    wanted: dict[str, Any] = {}
+    wanted: Configuration = {}
     if tls.ca:
         wanted["root_ca_certificate"] = _readable("ca", tls.ca)
     if tls.certificate and tls.private_key:
-        secret_file.content("private_key", tls.private_key)
+        user_files.secret("private_key", tls.private_key)
         certificate = _readable("certificate", tls.certificate)
         for side in ("connect", "listen"):
             wanted[f"{side}_certificate"] = certificate
@@ -96,16 +104,16 @@ def _tls(tls: ZenohTls | None) -> dict[str, Any]:
 
 def _readable(name: str, file: str) -> str:
     try:
-        regular_file.read(file, 0)
+        user_files.read(file, 0)
         return file
     except OSError as error:
         raise TransportError(f"{name} {file} cannot be read: {error.strerror}") from None
 
 
-def _user(zenoh: Zenoh) -> dict[str, Any]:
+def _user(zenoh: Zenoh) -> Configuration:
     if zenoh.user is None or zenoh.password_file is None:
         return {}
-    password = secret_file.one_line("password_file", zenoh.password_file, "password")
+    password = user_files.secret_line("password_file", zenoh.password_file, "password")
     return {
         "transport/auth/usrpwd/user": zenoh.user,
         "transport/auth/usrpwd/password": password,

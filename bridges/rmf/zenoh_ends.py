@@ -1,18 +1,20 @@
-"""The ends of the `zenoh` transport: what a publisher and a subscription are in zenoh.
+"""The ends of the `zenoh` transport: its publishers and subscriptions.
 
-As rmw_zenoh makes them (jazzy: rmw_publisher_data.cpp, rmw_subscription_data.cpp): who retains
-messages is an advanced publisher with a cache as deep as the history; who wants them is an advanced
-subscriber, which asks each such cache when either side is new, and asks again for what it has missed.
+They are made as in rmw_zenoh (jazzy: rmw_publisher_data.cpp, rmw_subscription_data.cpp). A publisher
+that retains messages is an advanced publisher, with a cache as deep as its history. A subscription
+that wants retained messages is an advanced subscriber. It queries each cache when either of the two is
+new, and again for samples that it has missed.
 
-An end outlives its session: when the transport joins anew, it is given its place in the new one.
-What zenoh calls on its own threads only puts something down for ours.
+An end outlives its session: when the transport joins again, the end gets a place in the new session.
+Callbacks on zenoh's threads only leave work for the transport's thread.
 """
 
 import time
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Final, Generic, TypeVar
+from typing import Final, Protocol
 
 import zenoh
 from zenoh import CongestionControl, Locality, Reliability, Sample, SampleKind, ext
@@ -21,133 +23,92 @@ from zenoh.handlers import Callback
 from bridges.rmf import cdr, notices, zenoh_keys
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
-from bridges.rmf.transport import TransportError
-from bridges.rmf.zenoh_keys import Keys, Kind
-
-M = TypeVar("M", bound=Message)
+from bridges.rmf.releases import NEWEST
+from bridges.rmf.topics import AnyTopic
+from bridges.rmf.transport import Receive, TransportError
+from bridges.rmf.zenoh_keys import Keys
+from bridges.rmf.zenoh_place import Place, Tell
 
 HEARTBEAT_S: Final = 0.5
-"""As rmw_zenoh: after a retained message, its number is told once more, so that a loss shows."""
+"""As in rmw_zenoh: so long after a retained message its number is sent again. So subscribers notice a
+loss."""
 LONGEST: Final = 1 << 20
-"""Bytes of a sample that may wait for our thread: far above any message of RMF, and a hundred of them
-fit into a small Pi."""
+"""The longest sample (bytes) that may wait for our thread. RMF's messages are far shorter; a hundred
+samples of this length fit into a small Pi's memory."""
 AT_ONCE: Final = 100
-"""Samples taken from one subscription before the others have their turn."""
+"""The most samples taken from one subscription before the others have their turn."""
+
+Order = Callable[[], None]
+"""Work for the transport's thread."""
 
 
-class Place:
-    """An end's place in one session: its token, and the tokens of those on the other side.
+class Declared(Protocol):
+    """A publisher or subscriber in a zenoh session."""
 
-    `stranger(token, policy)`: called on zenoh's thread for a peer that does not fit.
-    """
+    def undeclare(self) -> object:
+        """Take it off the graph."""
+
+
+class ZenohEnd(ABC):
+    """What publishers and subscriptions share. `do(order)`: runs it on the transport's thread. `tell`:
+    as `Place`."""
 
     def __init__(
-        self,
-        session: zenoh.Session,
-        keys: Keys,
-        kind: Kind,
-        topic: Topic[Any],
-        number: int,
-        stranger: Callable[[str, str], None],
+        self, topic: AnyTopic, notice: str, do: Callable[[Order], None], tell: Tell
     ) -> None:
-        self.key = keys.data(topic)
-        self.token = keys.token(kind, topic, number)
-        self.gid = zenoh_keys.gid(self.token)
-        self.peers: dict[str, zenoh_keys.End] = {}
-        self.unheard: set[bytes] = set()
-        self._keys = keys
-        self._kind = kind
-        self._topic = topic
-        self._stranger = stranger
-        retained = topic.publish if kind == "MP" else topic.subscribe
-        self._transient_local = retained.durability == "transient_local"
-        self._live = session.liveliness()
-        self._watching = self._live.declare_subscriber(
-            keys.others("MS" if kind == "MP" else "MP", topic),
-            Callback(self._look, indirect=False),
-            history=True,
-        )
-        self._alive: zenoh.LivelinessToken | None = None
-
-    def appear(self) -> None:
-        """Let the others know, now that the end sends or hears."""
-        self._alive = self._live.declare_token(self.token)
-
-    def leave(self) -> None:
-        """Take the token back."""
-        if self._alive:
-            self._alive.undeclare()  # type: ignore[no-untyped-call]
-        self._watching.undeclare()  # type: ignore[no-untyped-call]
-
-    def _look(self, sample: Sample) -> None:
-        """A token has come or gone; on zenoh's thread."""
-        token = str(sample.key_expr)
-        if sample.kind == SampleKind.DELETE:
-            self.peers.pop(token, None)
-            self.unheard.discard(zenoh_keys.gid(token))
-        elif (end := self._keys.end(token)) is None:
-            return
-        elif policy := self._misfit(end):
-            self.unheard.add(zenoh_keys.gid(token))
-            self._stranger(token, policy)
-        else:
-            self.peers[token] = end
-
-    def _misfit(self, theirs: zenoh_keys.End) -> str:
-        """Which policy keeps the two apart, as DDS has it; "" for none."""
-        if theirs.type != self._keys.type(self._topic):
-            return "type"
-        wants, keeps = theirs.transient_local, self._transient_local
-        if self._kind == "MS":
-            wants, keeps = keeps, wants
-        return "durability" if wants and not keeps else ""
-
-
-class _End:
-    """What both ends have. `do`: has something done on the transport's thread."""
-
-    def __init__(self, topic: Topic[Any], text: str, do: Callable[[Callable[[], None]], None]):
+        self.topic = topic
         self.place: Place | None = None
-        self._end: Any = None
-        self._notice = (topic, text)
-        self._named: set[str] = set()
+        self._end: Declared | None = None
+        self._notice = notice
+        self._noticed: set[str] = set()
         self._do = do
+        self._tell = tell
+        self._release = NEWEST
+
+    @abstractmethod
+    def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
+        """Take a place in a session. `number`: unique within it."""
 
     def leave(self) -> None:
-        """Give up the place in a session that goes on."""
+        """Leave a session that stays open."""
         place, self.place = self.place, None
-        if place:
+        end, self._end = self._end, None
+        if place and end:
             place.leave()
-            self._end.undeclare()
+            end.undeclare()
 
     def give_up(self) -> object:
-        """Give up the place in a session that ends: what was declared in it."""
+        """Leave a session that is about to be closed. Returns what was declared in it."""
         held = self.place, self._end
         self.place = self._end = None
         return held
 
-    def name_stranger(self, token: str, policy: str) -> None:
-        """Name a peer that does not fit, once."""
-        if token not in self._named:
-            self._named.add(token)
-            self._do(partial(notices.misfit, *self._notice, policy))
+    def log_misfit(self, token: str, policy: str) -> None:
+        """Log a peer that does not fit, once."""
+        if token not in self._noticed:
+            self._noticed.add(token)
+            self._do(partial(notices.misfit, self.topic, self._notice, policy))
 
 
-class ZenohPublisher(_End, Generic[M]):
-    """One topic's sending end. `withdraw`: takes it off the graph. `lives`: the transport is there
-    and its thread hears. `deaf`: tokens of our own subscriptions that do not want to hear us."""
+class ZenohPublisher(ZenohEnd):
+    """The publisher of one topic.
+
+    `withdraw(publisher)`: takes it off the graph. `lives()`: the transport is open and its thread
+    runs. `deaf`: tokens of this node's own subscriptions that must not hear it.
+    """
+
+    _end: zenoh.Publisher | ext.AdvancedPublisher | None
 
     def __init__(
         self,
-        topic: Topic[M],
-        do: Callable[[Callable[[], None]], None],
-        withdraw: Callable[["ZenohPublisher[Any]"], None],
+        topic: AnyTopic,
+        do: Callable[[Order], None],
+        withdraw: Callable[["ZenohPublisher"], None],
         lives: Callable[[], bool],
         deaf: set[str],
+        tell: Tell,
     ) -> None:
-        super().__init__(topic, notices.NOT_SERVED, do)
-        self.topic = topic
+        super().__init__(topic, notices.NOT_SERVED, do, tell)
         self._withdraw = withdraw
         self._lives = lives
         self._deaf = deaf
@@ -156,21 +117,22 @@ class ZenohPublisher(_End, Generic[M]):
         self._retained: deque[bytes] = deque(maxlen=depth)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Take a place in a session; what was retained goes out again for late joiners."""
-        place = Place(session, keys, "MP", self.topic, number, self.name_stranger)
-        self._end = self._declared(session, place.key)
+        """Take a place in a session, and send what was retained again for late joiners."""
+        place = Place(session, keys, "MP", self.topic, number, self.log_misfit, self._tell)
+        self._release = keys.release
+        self._end = end = self._declared(session, place.key)
         place.appear()
         self.place, self._sent = place, 0
         for sample in list(self._retained):
-            self._put(self._end, place, sample)
+            self._put(end, place, sample)
 
-    def publish(self, message: M) -> None:
-        """Send. Raises TransportError when it was not sent, CdrError for what no sample can hold."""
+    def publish(self, message: Message) -> None:
+        """Send. Raises TransportError if it was not sent, CdrError if no sample can hold it."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        sample = cdr.encode(self.topic.type, message)
+        sample = cdr.encode(self.topic.type, message, self._release)
         self._retained.append(sample)
-        place, end = self.place, self._end  # another thread may give them up meanwhile
+        place, end = self.place, self._end  # another thread may clear them at any time
         if place is None or end is None:
             raise TransportError(f"topic {self.topic.name}: not sent: this end has no session")
         try:
@@ -187,8 +149,10 @@ class ZenohPublisher(_End, Generic[M]):
         """Take this end off the graph."""
         self._withdraw(self)
 
-    def _declared(self, session: zenoh.Session, key: str) -> Any:
-        # DROP waits for 1 ms at most for room in the queue to a peer.
+    def _declared(
+        self, session: zenoh.Session, key: str
+    ) -> zenoh.Publisher | ext.AdvancedPublisher:
+        # With DROP, zenoh waits for 1 ms at most for room in the queue to a peer.
         congestion, reliable = CongestionControl.DROP, Reliability.RELIABLE
         if not self._retained.maxlen:
             return session.declare_publisher(
@@ -206,29 +170,33 @@ class ZenohPublisher(_End, Generic[M]):
             publisher_detection=True,
         )
 
-    def _put(self, end: Any, place: Place, sample: bytes) -> None:
+    def _put(
+        self, end: zenoh.Publisher | ext.AdvancedPublisher, place: Place, sample: bytes
+    ) -> None:
         self._sent += 1
         attached = zenoh_keys.attachment(self._sent, time.time_ns(), place.gid)
         end.put(sample, attachment=attached)
 
 
-class ZenohSubscription(_End, Generic[M]):
-    """One topic's receiving end. `ring`: tells the transport's thread that something has come.
-    `attached`: a sample without an attachment is none of a ROS node. `dropped`: counts samples that
-    are no messages, by topic."""
+class ZenohSubscription(ZenohEnd):
+    """The subscription of one topic.
+
+    `dropped`: counts invalid samples, by topic name. `others_only`: does not hear this node's own
+    publishers. `attached`: only samples with the attachment of a ROS node are valid.
+    """
 
     def __init__(
         self,
-        topic: Topic[M],
-        received: Callable[[M], None],
-        do: Callable[[Callable[[], None]], None],
+        topic: AnyTopic,
+        received: Receive,
+        do: Callable[[Order], None],
         dropped: dict[str, int],
         *,
         others_only: bool,
         attached: bool,
+        tell: Tell,
     ) -> None:
-        super().__init__(topic, notices.NOT_HEARD, do)
-        self.topic = topic
+        super().__init__(topic, notices.NOT_HEARD, do, tell)
         self.others_only = others_only
         self._rung = False
         self._own_session = ""
@@ -239,7 +207,8 @@ class ZenohSubscription(_End, Generic[M]):
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
         """Take a place in a session."""
-        place = Place(session, keys, "MS", self.topic, number, self.name_stranger)
+        place = Place(session, keys, "MS", self.topic, number, self.log_misfit, self._tell)
+        self._release = keys.release
         self.place, self._own_session = place, keys.session
         origin = Locality.REMOTE if self.others_only else Locality.ANY
         on_sample = Callback(self._arrived, indirect=False)
@@ -265,7 +234,7 @@ class ZenohSubscription(_End, Generic[M]):
         return sum(not self.others_only or peer.session != self._own_session for peer in peers)
 
     def take(self) -> None:
-        """Hand on what has arrived; what is more than the others' turn allows waits for the next."""
+        """Deliver what has arrived, at most AT_ONCE samples; the rest waits for the next turn."""
         self._rung = False
         for _ in range(min(AT_ONCE, len(self._waiting))):
             try:
@@ -284,13 +253,13 @@ class ZenohSubscription(_End, Generic[M]):
             self._do(self.take)
 
     def _arrived(self, sample: Sample) -> None:
-        """On zenoh's thread. When too much waits, the oldest goes: the history is KEEP_LAST."""
+        """Called on zenoh's thread. A full queue drops its oldest sample, as KEEP_LAST does."""
         size = len(sample.payload)
         self._waiting.append(CdrError(f"{size} bytes long") if size > LONGEST else sample)
         self._ring()
 
-    def _message(self, sample: Sample | CdrError) -> M | None:
-        """The message in a sample; None from a publisher that we do not hear."""
+    def _message(self, sample: Sample | CdrError) -> Message | None:
+        """The message in a sample; None if its publisher must not be heard. Raises CdrError."""
         if isinstance(sample, CdrError):
             raise sample
         place = self.place
@@ -304,4 +273,4 @@ class ZenohSubscription(_End, Generic[M]):
             raise CdrError("without the attachment of a ROS node")
         if sender in place.unheard:
             return None
-        return cdr.decode(self.topic.type, bytes(sample.payload))
+        return cdr.decode(self.topic.type, bytes(sample.payload), self._release)

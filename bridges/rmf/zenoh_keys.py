@@ -1,138 +1,174 @@
 """How ROS's topics and nodes are named on zenoh: data keys, liveliness tokens, attachments. Pure.
 
-Two ways, which do not understand each other: rmw_zenoh's, where each context of ROS is a zenoh session
-(ros2/rmw_zenoh, jazzy: docs/design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and
-attachment_helpers.cpp), and zenoh-bridge-ros2dds's, which routes a DDS domain
-(eclipse-zenoh/zenoh-plugin-ros2dds: liveliness_mgt.rs, ros2_utils.rs).
+There are two ways to name them, and nodes of one do not hear those of the other:
+- rmw_zenoh's, where each ROS context is a zenoh session. Source: ros2/rmw_zenoh, jazzy,
+  docs/design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and attachment_helpers.cpp.
+- zenoh-bridge-ros2dds's, which routes a DDS domain. Source: eclipse-zenoh/zenoh-plugin-ros2dds,
+  liveliness_mgt.rs and ros2_utils.rs.
 
-A token is a key that lives as long as its session: by it the others know of a node and its ends.
+A liveliness token is a key that exists as long as its session. Tokens tell other nodes that a node, a
+publisher or a subscription is there. An end is a publisher or a subscription.
 """
 
+import re
 import struct
 from dataclasses import dataclass
-from typing import Any, Final, Literal, Protocol
+from typing import Final, Literal, Protocol
 
 import xxhash
 
 from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.peers import WITNESSES, Announced
+from bridges.rmf.releases import NEWEST, Release
 from bridges.rmf.rihs01 import type_hash
-from bridges.rmf.topics import Qos, Topic
+from bridges.rmf.topics import AnyTopic, Qos
 
 Kind = Literal["MP", "MS"]
 """A publisher or a subscription: rmw_zenoh's Message Publisher and Message Subscription."""
 NODE_ID: Final = 0
 _HEAD: Final = struct.Struct("<qqB")
 GID_LENGTH: Final = 16
+HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 
 
 @dataclass(frozen=True, slots=True)
-class End:
-    """What a token says of a publisher or subscription: its session, its type with the hash, and
-    whether it retains messages or wants what is retained."""
+class Peer:
+    """What a token says of an end.
+
+    `type`: the message type, with the hash where the token has one. `transient_local`: a publisher
+    retains its messages; a subscription wants retained ones. `announced`: its topic, type and hash.
+    """
 
     session: str
     type: str
     transient_local: bool
+    announced: Announced
 
 
 class Keys(Protocol):
-    """One of the two ways, for one node."""
+    """The names of one node's ends, in one of the two ways. `session`: the zenoh session's id."""
 
     session: str
+    release: Release
 
     def presence(self) -> str:
         """The token of the node itself."""
 
-    def data(self, topic: Topic[Any]) -> str:
+    def data(self, topic: AnyTopic) -> str:
         """The key under which a topic's samples travel."""
 
-    def type(self, topic: Topic[Any]) -> str:
-        """The topic's type as `End.type` names it."""
+    def type(self, topic: AnyTopic) -> str:
+        """The topic's type as `Peer.type` names it."""
 
-    def token(self, kind: Kind, topic: Topic[Any], number: int) -> str:
-        """The token of one end; `number` is its own within the session."""
+    def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
+        """The token of an end. `number`: unique within the session."""
 
-    def others(self, kind: Kind, topic: Topic[Any]) -> str:
-        """Matches the token of each end of this kind on a topic."""
+    def others(self, kind: Kind, topic: AnyTopic) -> str:
+        """A key expression that matches the tokens of all ends of this kind on a topic."""
 
-    def end(self, token: str) -> End | None:
-        """The end that a token describes; None for any other token."""
+    def witnesses(self) -> list[str]:
+        """Key expressions that match the tokens which tell RMF's release (`peers.py`)."""
+
+    def peer(self, token: str) -> Peer | None:
+        """What a token says of its end; None for the token of anything else."""
 
 
 class RmwZenoh:
-    """rmw_zenoh's keys for a node in a ROS domain. A slash within a part of a token is `%`."""
+    """rmw_zenoh's keys for a node in a ROS domain. In a token, `%` replaces a name's slashes."""
 
-    def __init__(self, domain_id: int, session: str, node_name: str) -> None:
-        self.session = session
+    def __init__(
+        self, domain_id: int, session: str, node_name: str, release: Release = NEWEST
+    ) -> None:
+        self.session, self.release = session, release
         self._domain = domain_id
         self._node = f"%/%/{node_name}"  # enclave "/", namespace "/"
 
     def presence(self) -> str:
         return f"@ros2_lv/{self._domain}/{self.session}/{NODE_ID}/{NODE_ID}/NN/{self._node}"
 
-    def data(self, topic: Topic[Any]) -> str:
+    def data(self, topic: AnyTopic) -> str:
         return f"{self._domain}/{topic.name.strip('/')}/{self.type(topic)}"
 
-    def type(self, topic: Topic[Any]) -> str:
+    def type(self, topic: AnyTopic) -> str:
         name = f"{PACKAGES[topic.type]}::msg::dds_::{topic.type.__name__}_"
-        return f"{name}/{type_hash(topic.type)}"
+        return f"{name}/{type_hash(topic.type, self.release)}"
 
-    def token(self, kind: Kind, topic: Topic[Any], number: int) -> str:
+    def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
         qos = _qos(topic, kind)
         ids = f"{self._domain}/{self.session}/{NODE_ID}/{number}/{kind}"
         retained = "1" if qos.durability == "transient_local" else ""
-        # Only what differs from rmw_zenoh's own defaults is written: reliable, volatile, keep last 42.
+        # Only what differs from rmw_zenoh's defaults is written: reliable, volatile, keep last 42.
         depth = "" if qos.depth == 42 else qos.depth
         return (
             f"@ros2_lv/{ids}/{self._node}/{_name(topic, '%')}/{self.type(topic)}"
             f"/:{retained}:,{depth}:,:,:,,"
         )
 
-    def others(self, kind: Kind, topic: Topic[Any]) -> str:
+    def others(self, kind: Kind, topic: AnyTopic) -> str:
         return f"@ros2_lv/{self._domain}/*/*/*/{kind}/*/*/*/{_name(topic, '%')}/**"
 
-    def end(self, token: str) -> End | None:
+    def witnesses(self) -> list[str]:
+        return [
+            f"@ros2_lv/{self._domain}/*/*/*/{_kind(publishes)}/*/*/*/*/{package}::msg::dds_::{name}_/**"
+            for package, name, publishes in _witnesses()
+        ]
+
+    def peer(self, token: str) -> Peer | None:
         parts = token.split("/")
         qos = parts[12].split(":") if len(parts) > 12 else []
         if len(qos) < 6:
             return None
-        return End(parts[2], "/".join(parts[10:12]), qos[1] == "1")
+        kind = parts[10].replace("::msg::dds_::", "/msg/").removesuffix("_")
+        topic = parts[9].strip("%").replace("%", "/")
+        announced = Announced(topic, kind, parts[11], parts[5] == "MP")
+        return Peer(parts[2], "/".join(parts[10:12]), qos[1] == "1", announced)
 
 
 class Ros2Dds:
-    """zenoh-bridge-ros2dds's keys. A slash within a part of a token is `§`.
+    """zenoh-bridge-ros2dds's keys. In a token, `§` replaces a name's slashes.
 
-    A key holds neither domain nor type: the bridge stands for one domain, and a token says the type.
+    Keys hold no domain, because a bridge serves only one, and no type, because the token states it.
     """
 
-    def __init__(self, domain_id: int, session: str, node_name: str) -> None:
-        self.session = session
+    def __init__(
+        self, domain_id: int, session: str, node_name: str, release: Release = NEWEST
+    ) -> None:
+        self.session, self.release = session, release
 
     def presence(self) -> str:
         return f"@/{self.session}/@ros2_lv"
 
-    def data(self, topic: Topic[Any]) -> str:
+    def data(self, topic: AnyTopic) -> str:
         return topic.name.strip("/")
 
-    def type(self, topic: Topic[Any]) -> str:
+    def type(self, topic: AnyTopic) -> str:
         return f"{PACKAGES[topic.type]}§msg§{topic.type.__name__}"
 
-    def token(self, kind: Kind, topic: Topic[Any], number: int) -> str:
+    def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
         qos = _qos(topic, kind)
         retained = int(qos.durability == "transient_local")
-        # No key fields; reliable; durability; keep last; the user data of the DDS end made for us.
-        text = f":1:{retained}:0,{qos.depth}:typehash={type_hash(topic.type)};"
+        # No key fields; reliable; durability; keep last; user data of the bridge's DDS end.
+        text = f":1:{retained}:0,{qos.depth}:typehash={type_hash(topic.type, self.release)};"
         return f"@/{self.session}/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/{self.type(topic)}/{text}"
 
-    def others(self, kind: Kind, topic: Topic[Any]) -> str:
+    def others(self, kind: Kind, topic: AnyTopic) -> str:
         return f"@/*/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/*/*"
 
-    def end(self, token: str) -> End | None:
+    def witnesses(self) -> list[str]:
+        return [
+            f"@/*/@ros2_lv/{_kind(publishes)}/*/{package}§msg§{name}/*"
+            for package, name, publishes in _witnesses()
+        ]
+
+    def peer(self, token: str) -> Peer | None:
         parts = token.split("/")
         qos = parts[6].split(":") if len(parts) > 6 else []
         if len(qos) < 4:
             return None
-        return End(parts[1], parts[5], qos[2] == "1")
+        found = HASH.search(parts[6])
+        topic, kind = parts[4].replace("§", "/"), parts[5].replace("§", "/")
+        announced = Announced(topic, kind, found[1] if found else "", parts[3] == "MP")
+        return Peer(parts[1], parts[5], qos[2] == "1", announced)
 
 
 WAYS: Final[dict[str, type[RmwZenoh] | type[Ros2Dds]]] = {
@@ -142,25 +178,35 @@ WAYS: Final[dict[str, type[RmwZenoh] | type[Ros2Dds]]] = {
 
 
 def gid(token: str) -> bytes:
-    """The 16 bytes that name an end to ROS: the token's XXH3-128, its lower half first."""
+    """The 16 bytes that identify an end in ROS: the XXH3-128 of its token, lower half first."""
     return xxhash.xxh3_128_digest(token.encode())[::-1]
 
 
 def attachment(number: int, wall_ns: int, sender: bytes) -> bytes:
-    """What goes along with a sample: its number (from 1), when it was sent, and its sender's gid."""
+    """The attachment of a sample. `number`: counts an end's samples from 1. `wall_ns`: when it was sent
+    (ns since the epoch). `sender`: the gid of the sending end."""
     return _HEAD.pack(number, wall_ns, GID_LENGTH) + sender
 
 
 def sender(attached: bytes) -> bytes | None:
-    """The gid in an attachment; None if it is not a ROS node's attachment."""
+    """The gid of the sending end; None if this is not the attachment of a ROS node."""
     if len(attached) != _HEAD.size + GID_LENGTH or attached[_HEAD.size - 1] != GID_LENGTH:
         return None
     return attached[_HEAD.size :]
 
 
-def _qos(topic: Topic[Any], kind: Kind) -> Qos:
+def _kind(publishes: bool) -> Kind:
+    return "MP" if publishes else "MS"
+
+
+def _witnesses() -> list[tuple[str, str, bool]]:
+    split = ((*name.partition("/msg/"), publishes) for name, publishes in sorted(WITNESSES))
+    return [(package, name, publishes) for package, _, name, publishes in split]
+
+
+def _qos(topic: AnyTopic, kind: Kind) -> Qos:
     return topic.publish if kind == "MP" else topic.subscribe
 
 
-def _name(topic: Topic[Any], slash: str) -> str:
+def _name(topic: AnyTopic, slash: str) -> str:
     return f"/{topic.name.strip('/')}".replace("/", slash)

@@ -1,8 +1,8 @@
-"""What a driver raises that nobody foresaw: it costs one device, and no other.
+"""Contains a driver's unexpected exceptions: they affect one device, and no other.
 
-Its outputs are switched off, the traceback is logged once, and it is claimed anew after a pause that
-grows from 0.5 to 30 s. What cannot be verified off within OFF_WITHIN_S ends the daemon: `outputs-off`,
-from a fresh process, has its turn then.
+Its outputs are switched off, the traceback is logged once, and the device is opened again after
+a pause that grows from 0.5 to 30 s. If its outputs are not verified off within OFF_WITHIN_S, the daemon
+ends, and `outputs-off` tries from a new process.
 """
 
 import logging
@@ -66,7 +66,7 @@ class Contained(Generic[X, O]):
         self._written, self._unsafe_since = False, None
 
     def close(self) -> None:
-        """Let go."""
+        """Outputs off, and the points released."""
         try:
             self._driver.close()
         except Exception as error:  # noqa: BLE001 - logged by _broke

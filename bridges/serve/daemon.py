@@ -115,6 +115,7 @@ class Daemon:
                 self._predecessor.tick(time.monotonic())
             if told_ready and time.monotonic() >= tell_at:
                 tell_at = time.monotonic() + STATUS_EVERY_S - period_s / 2
+                self._convenience("graph", self._service.look)
                 self._convenience("status", self._tell)
 
     def _require_life(self) -> None:
@@ -158,18 +159,25 @@ class Daemon:
         about = {"version": __version__, "node": self._transport.name, "pid": os.getpid()}
         return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
 
+    def _apart(self) -> list[dict[str, str]]:
+        """What keeps this node apart from others."""
+        return [{"code": code, "detail": detail} for code, detail in self._transport.faults()]
+
     def _tell(self) -> None:
         """Write the status file and publish diagnostics."""
+        service = self._service.status()
         daemon = {
             "simulated": self._simulated,
             "file": str(self._config.path.absolute()),
             "kind": self._config.kind,
             **self._about(),
             "transport": self._transport.speaks,
+            "release": self._transport.release.name,
             "domain_id": self._domain_id,
             "samples_dropped": dict(self._transport.dropped),
             "predecessor_not_off": self._left(),
-            **self._service.status(),
+            **service,
+            "faults": [*service.get("faults", []), *self._apart()],
         }
         devices = self._service.devices()
         self._runtime.write_status(msgspec.json.encode({**daemon, "devices": devices}))

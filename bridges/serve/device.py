@@ -23,11 +23,12 @@ from bridges.core.decision import (
     X,
 )
 from bridges.core.durations import AGES_AGO
-from bridges.core.kind import DeviceEvent, E, Kind, L, S
+from bridges.core.kind import Answer, DeviceEvent, E, Kind, L, S
 from bridges.log import pairs, plain
 from bridges.rmf.definitions import Message
 from bridges.rmf.stamps import ClockError
 from bridges.rmf.topics import Topic
+from bridges.serve.answers import Answers
 from bridges.serve.clock import Clock, Pace
 from bridges.serve.contained import Contained
 from bridges.serve.refusals import Refusals
@@ -67,6 +68,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         )
         self.subject = Subject(name, memory, core, publish, self._refusals, clock)
         self._pace = Pace()
+        self._answers = Answers()
         self._open = False
         self._has_read = False
         self._io_fault = ""
@@ -92,10 +94,11 @@ class Node(Generic[S, L, M, X, E, O, R]):
             return self._kind.requests[topic](message, self._settings)
         except RequestRefused as refusal:
             self._refusals.add(refusal.kind, refusal.detail, device=self.name)
+            self._answers.add(message, str(refusal))
             return None
 
     def was_suspended(self, for_s: float) -> None:
-        """Nothing was scanned for so long (s): whatever was believed may be past."""
+        """Nothing was scanned for so long (s): everything read before may be outdated."""
         self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
 
     def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:
@@ -109,6 +112,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._decide(event)
         self._write()
         self._tell()
+        self._answer()
         self._log()
 
     def make_safe(self) -> bool:
@@ -135,7 +139,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
         if decision is None:
             return {}
         outputs = plain(decision.outputs)
-        return {**self.subject.status(), "outputs": outputs, "refused": self.refused}
+        shown = {**self.subject.status(), "outputs": outputs, "refused": self.refused}
+        return {**shown, **self._answers.shown()}
 
     def _read(self) -> Sampled[X] | IoFailed:
         try:
@@ -158,7 +163,10 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._decide(WriteFailed(self._failed(error)))
 
     def _decide(self, event: DeviceEvent[X, E]) -> None:
-        outputs = self.subject.decide(event).outputs
+        decision = self.subject.decide(event)
+        if decision.refused:
+            self._answers.add(event, decision.refused)
+        outputs = decision.outputs
         self._logged_outputs = outputs if self._logged_outputs is None else self._logged_outputs
 
     def _tell(self) -> None:
@@ -172,6 +180,16 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._pace.told(news, now)
             subject.memory = self._kind.published(subject.memory, report)
         self.wake_at = min(subject.wake_at, self._pace.due_at(news))
+
+    def _answer(self) -> None:
+        """Tell who asked in vain why, and who has the device."""
+        self._answers.say(self._clock.monotonic(), self._answered, self._publish)
+        self.wake_at = min(self.wake_at, self._answers.due_at)
+
+    def _answered(self, asked: object, reason: str) -> Answer | None:
+        decision = self.subject.decision
+        assert decision is not None
+        return self._kind.answer(self.name, asked, reason, decision.report)
 
     def _send(self, report: R) -> None:
         try:

@@ -41,7 +41,7 @@ class Unknown(Exception):
     """This user cannot see whether a daemon runs. The text says what to do."""
 
 
-class Holder(msgspec.Struct, frozen=True):
+class LockHolder(msgspec.Struct, frozen=True):
     """Who holds a lock: its process id, the YAML's path, and whether it serves."""
 
     pid: int
@@ -52,7 +52,7 @@ class Holder(msgspec.Struct, frozen=True):
         return f"process {self.pid}, for {self.file}" if self.pid else "a running process"
 
 
-NOBODY_KNOWN = Holder(0, "", False)
+NOBODY_KNOWN = LockHolder(0, "", False)
 """The lock is held, but its holder could not write its name into it."""
 
 
@@ -73,7 +73,7 @@ def _is_about(places: Places, file: Path) -> bool:
     return named(file) in found
 
 
-def holder(places: Places) -> Holder | None:
+def holder(places: Places) -> LockHolder | None:
     """The process that holds the lock now; None if there is none. Raises Unknown."""
     for folder in places.folders:
         try:
@@ -91,7 +91,7 @@ def holder(places: Places) -> Holder | None:
     return None
 
 
-def _written(path: Path) -> Holder:
+def _written(path: Path) -> LockHolder:
     """The holder that the lock file names. Raises Unknown."""
     try:
         lock = _open(path, os.O_RDONLY)
@@ -100,7 +100,7 @@ def _written(path: Path) -> Holder:
     except OSError as error:
         raise Unknown(_what_to_do(path.parent, error)) from None
     try:
-        return msgspec.json.decode(os.read(lock, 65536), type=Holder)
+        return msgspec.json.decode(os.read(lock, 65536), type=LockHolder)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
         return NOBODY_KNOWN
     finally:
@@ -188,7 +188,7 @@ class RuntimeDirectory:
         self.places = places
         self.path = places.runtime
         self.records = Records(places, file)
-        self._holder = Holder(os.getpid(), named(file), serves)
+        self._holder = LockHolder(os.getpid(), named(file), serves)
         self._locks: dict[Path, int] = {}
         self._record: Record | None = None
         self._once = Once()

@@ -9,15 +9,14 @@ import ipaddress
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Final
 
-from bridges.core.fields import Rmf, Zenoh
+from bridges.rmf.settings import Rmf, Zenoh
 from bridges.rmf.zenoh_config import mode
+from bridges.serve.places import GROUPS
 from bridges.settings.config import Config
 from drivers.hal import Needs
 
 FITS: Final = "RMF_BRIDGE_FITS"
 """The environment variable that says which needs the unit meets; `nothing` in the unit alone."""
-GROUPS: Final = ("gpio", "dialout")
-"""The groups that a drop-in may give."""
 ROUND_S: Final = 1.25
 LEAST_S: Final = 3.0
 WITHOUT_OUTPUTS_S: Final = 10.0

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any, Generic
 
 from bridges.core.decision import Fault, M, OperatorReset, R, RequestRefused
+from bridges.core.durations import NEVER
 from bridges.core.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
 from bridges.core.kind import E, L, S
 from bridges.log import pairs
@@ -17,6 +18,7 @@ from bridges.rmf.definitions import Message
 from bridges.rmf.stamps import ClockError, stamp
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Subscription, Transport
+from bridges.serve.answers import Answers
 from bridges.serve.clock import Clock
 from bridges.serve.inbox import Inbox
 from bridges.serve.keeper import Keeper, Kept
@@ -71,6 +73,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         self.name = f"graph-{kind.name}"
         self.inbox: Inbox[tuple[Topic[Message], E]] = Inbox()
         self.presence = Presence(kind.name, kind.quiet_s(settings))
+        on = ", ".join(topic.name for topic in kind.yields)
+        self.alone = Presence(f"{kind.name} on {on}", 0.0) if on else None
         self.subjects: dict[str, Subject[M, GraphEvent[E], None, R]] = {}
         self._kind = kind
         self._settings = settings
@@ -80,9 +84,11 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._named = named
         self._outlet = Outlet(transport, named)
         self._refusals = Refusals()
+        self._answers = Answers()
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
         self._reset = False
+        self._may = MaySpeak(False, alone=self.alone is None)
         self._hears: dict[str, Subscription] = {}
         self._unsaid: list[tuple[Topic[Message], Message]] = []
         self._shown: set[str] = set()
@@ -94,6 +100,8 @@ class GraphNode(Generic[S, L, M, E, R]):
     def subscribe(self) -> None:
         """Subscribe to every topic. Retained messages arrive at once."""
         self.presence.listen(self._transport, map(self._named, self._kind.sole))
+        if self.alone:
+            self.alone.listen(self._transport, map(self._named, self._kind.yields))
         for topic in self._kind.requests:
             others_only = topic in self._kind.publishes
             hear = self._to_inbox(topic)
@@ -120,7 +128,9 @@ class GraphNode(Generic[S, L, M, E, R]):
     def wake_at(self) -> float:
         """When the next round is due if no message arrives (monotonic s)."""
         due = (subject.wake_at for subject in self.subjects.values())
-        return min(self.presence.look_at, self._keeper.wake_at, *due)
+        looks = [look.look_at for look in (self.presence, self.alone) if look]
+        answers_at = self._answers.due_at if self.presence.may_speak else NEVER
+        return min(*looks, self._keeper.wake_at, answers_at, *due)
 
     def round(self) -> None:
         """Take the messages that arrived, wake the subjects that are due, publish."""
@@ -136,6 +146,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         now = self._clock.monotonic()
         self._keeper.keep(self._real(memories), now)
         self._say()
+        if self.presence.may_speak:
+            self._answers.say(now, self._kind.answer, self._publish)
         self._keeper.tell(memories, now, self.presence.may_speak)
 
     def end(self) -> bool:
@@ -153,8 +165,9 @@ class GraphNode(Generic[S, L, M, E, R]):
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
             "refused": self.refused,
+            **self._answers.shown(),
             "faults": [{"code": f.code, "detail": f.detail} for f in self._keeper.faults],
-            "heard_by": self._outlet.heard_by(),
+            "heard_by": self._heard_by(),
             "hears": {name: end.matched() for name, end in self._hears.items()},
         }
 
@@ -166,19 +179,21 @@ class GraphNode(Generic[S, L, M, E, R]):
         """A callback for the transport's thread. Only what is accepted waits: it is not endless."""
 
         def put(message: Message) -> None:
-            with self._counting(topic.name):
+            with self._counting(topic.name, message):
                 event = self._kind.requests[topic](message, self._settings, self._clock.wall())
                 self.inbox.put(self._kind.device_name(message), (topic, event))
 
         return put
 
     @contextmanager
-    def _counting(self, about: str) -> Iterator[None]:
+    def _counting(self, about: str, message: object = None) -> Iterator[None]:
         """What is not obeyed, or fails for a defect of ours: a core that fails has changed nothing."""
         try:
             yield
         except RequestRefused as refusal:
             self._refusals.add(refusal.kind, refusal.detail)
+            if message is not None:
+                self._answers.add(message, str(refusal))
         except Exception as error:
             if not self._refusals.counts().get(DEFECT):
                 log.exception(pairs("defect", kind=self._kind.name, about=about, reason=error))
@@ -186,13 +201,35 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _look_around(self) -> None:
         """Declare our publishers when we may speak, and withdraw them when not."""
-        if not self.presence.look(self._clock.monotonic()):
+        for look in filter(None, (self.presence, self.alone)):
+            look.look(self._clock.monotonic())
+        may = self._may_speak()
+        if may == self._may:
             return
-        if self.presence.may_speak:
-            self._outlet.open(self._kind.publishes)
+        self._may = may
+        if may.yes or may.at_once:
+            silent = () if may.alone else self._kind.yields
+            topics = dict.fromkeys((*self._kind.publishes, *self._kind.sole))
+            self._outlet.close(silent)
+            self._outlet.open(topic for topic in topics if topic not in silent)
         else:
             self._outlet.close()
-        self._decide_all(MaySpeak(self.presence.may_speak))
+        self._decide_all(may)
+
+    def _may_speak(self) -> MaySpeak:
+        alone = self.alone is None or self.alone.may_speak
+        return MaySpeak(self.presence.may_speak, self._must_at_once(), alone)
+
+    def _must_at_once(self) -> bool:
+        """Is there something that cannot wait for the end of the quiet start, and no rival?"""
+        if self.presence.may_speak or self.presence.rivals:
+            return False
+        return any(self._kind.urgent(subject.memory) for subject in self.subjects.values())
+
+    def _heard_by(self) -> dict[str, int]:
+        """By the topic: how many other nodes listen to what is sent."""
+        names = {topic.name for topic in self._kind.publishes}
+        return {name: n for name, n in self._outlet.heard_by().items() if name in names}
 
     def _wake(self) -> None:
         now = self._clock.monotonic()
@@ -251,12 +288,15 @@ class GraphNode(Generic[S, L, M, E, R]):
         subject = Subject(name, memory, self._core, self._will_say, refusals, clock)
         self.subjects[name] = subject
         self._requesters += self._remembered(subject)
-        self._decide(subject, MaySpeak(self.presence.may_speak))
+        self._decide(subject, self._may)
         return subject
 
     def _decide(self, subject: Subject[M, GraphEvent[E], None, R], event: GraphEvent[E]) -> None:
         before = self._remembered(subject)
-        subject.log(subject.decide(event).report)
+        decision = subject.decide(event)
+        if decision.refused:
+            self._answers.add(event, decision.refused)
+        subject.log(decision.report)
         self._requesters += self._remembered(subject) - before
 
     def _decide_all(self, event: GraphEvent[E]) -> None:

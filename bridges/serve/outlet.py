@@ -1,10 +1,12 @@
 """A node's publishers, by topic."""
 
 import logging
+import threading
 from collections.abc import Callable, Iterable
 
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
+from bridges.rmf.instead import INSTEAD, converted
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Transport, TransportError
 
@@ -15,31 +17,58 @@ Named = Callable[[Topic[Message]], Topic[Message]]
 
 
 class Outlet:
-    """Publishers that are declared and withdrawn together."""
+    """Publishers that are declared while their node may speak.
+
+    Where RMF's release lacks a topic's message, `bridges/rmf/instead.py` says what is sent. An alarm
+    and its end take the same way, whatever is learnt of the release between.
+    """
 
     def __init__(self, transport: Transport, named: Named) -> None:
         self._transport = transport
         self._named = named
         self._ends: dict[str, Publisher[Message]] = {}
+        self._instead: set[str] = set()
+        self._lock = threading.Lock()
 
     def open(self, topics: Iterable[Topic[Message]]) -> None:
-        """Declare them. Raises TransportError."""
+        """Declare those that are not declared yet and that RMF's release has. Raises TransportError."""
         for topic in topics:
-            self._ends[topic.name] = self._transport.publisher(self._named(topic))
+            if self._transport.release.has(topic.type):
+                self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> None:
         """Publish. A failure is logged: the next message may get through."""
+        way, wanted = self._way(topic, message)
+        if wanted is None:
+            return
         try:
-            self._ends[topic.name].publish(message)
+            self._end(way).publish(wanted)
         except TransportError as error:
             log.error(pairs("not_published", topic=topic.name, reason=error))
+
+    def _way(
+        self, topic: Topic[Message], message: Message
+    ) -> tuple[Topic[Message], Message | None]:
+        """Where a message goes, and as what: None for one that only the log takes."""
+        if self._transport.release.has(topic.type) and topic.name not in self._instead:
+            return topic, message
+        if topic.name in INSTEAD:
+            self._instead.add(topic.name)
+        return INSTEAD.get(topic.name, topic), converted(message)
+
+    def _end(self, topic: Topic[Message]) -> Publisher[Message]:
+        with self._lock:
+            if topic.name not in self._ends:
+                self._ends[topic.name] = self._transport.publisher(self._named(topic))
+            return self._ends[topic.name]
 
     def heard_by(self) -> dict[str, int]:
         """The number of subscriptions that receive each topic, by the topic's name."""
         return {name: end.matched() for name, end in self._ends.copy().items()}
 
-    def close(self) -> None:
-        """Withdraw every publisher."""
-        for end in self._ends.values():
-            end.close()
-        self._ends.clear()
+    def close(self, topics: Iterable[Topic[Message]] | None = None) -> None:
+        """Withdraw these publishers; every one if none is named."""
+        names = list(self._ends) if topics is None else [topic.name for topic in topics]
+        for end in [self._ends.pop(name, None) for name in names]:
+            if end is not None:
+                end.close()

@@ -22,7 +22,7 @@ USERS_RUN = Path("/run/user")
 TMP = Path("/tmp")
 SERVICE_USER = "rmf-bridge"
 GROUPS = ("gpio", "dialout")
-"""The groups that the unit gives this user beside its own."""
+"""The groups that a drop-in may give this user beside its own (`drop_in.py`)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,15 +39,15 @@ class Presence:
         """Count the publishers of these topics from now on."""
         self._ends += [transport.subscribe(topic, _ignore, others_only=True) for topic in sole]
 
-    def look(self, now: float) -> bool:
-        """Look, if it is due. True if `may_speak` has changed."""
+    def look(self, now: float) -> None:
+        """Look, if it is due."""
         if now < self.look_at:
-            return False
+            return
         self._count(now)
         alone_since = NEVER if self._alone_since is None else self._alone_since
         speak_at = alone_since + self._quiet_s + self._spread_s
         self.look_at = min(at for at in (now + LOOK_EVERY_S, speak_at) if at > now)
-        return self._set(now >= speak_at)
+        self._set(now >= speak_at)
 
     def _count(self, now: float) -> None:
         before, self.rivals = self.rivals, sum(end.matched() for end in self._ends)
@@ -60,16 +60,15 @@ class Presence:
         elif before and not self.rivals:
             log.info(pairs("other_node_gone", kind=self._kind))
 
-    def _set(self, yes: bool) -> bool:
+    def _set(self, yes: bool) -> None:
         """Two nodes that began at once both fall silent; by chance one returns before the other."""
         if yes == self.may_speak:
-            return False
+            return
         self.may_speak = yes
         if yes:
             log.info(pairs("active", kind=self._kind))
         else:
             self._spread_s = random.uniform(SPREAD_LEAST_S, SPREAD_MOST_S)
-        return True
 
 
 def _ignore(message: Message) -> None:

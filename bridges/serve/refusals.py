@@ -4,6 +4,7 @@ import logging
 import threading
 from collections import Counter
 
+from bridges.core.decision import EXPECTED
 from bridges.log import pairs
 
 log = logging.getLogger(__name__)
@@ -22,7 +23,8 @@ class Refusals:
             self._counts[kind] += 1
             first = self._counts[kind] == 1
         if first:
-            log.warning(pairs("refused", **whose, kind=kind, detail=detail))
+            level = logging.INFO if kind in EXPECTED else logging.WARNING
+            log.log(level, pairs("refused", **whose, kind=kind, detail=detail))
 
     def counts(self) -> dict[str, int]:
         """Reason -> count."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Protocol
 
-from bridges.core.decision import OperatorReset
+from bridges.core.decision import Attended, OperatorReset
 from bridges.core.graph_kind import GraphKind
 from bridges.core.kind import AnyDeviceKind
 from bridges.core.names import LONGEST_NAME
@@ -47,6 +47,9 @@ class Service(Protocol):
 
     def reset(self) -> None:
         """An operator says that latched faults may clear."""
+
+    def look(self) -> None:
+        """Look who is on the graph; called each second."""
 
     def status(self) -> Status:
         """For the status file: the service as a whole."""
@@ -90,6 +93,9 @@ class GraphService:
         self.status = node.status
         self.devices = node.devices
 
+    def look(self) -> None:
+        """Its node looks by itself."""
+
 
 class Devices:
     """Lifts, doors or chargers: a loop with a thread for each bus, and a node for each device."""
@@ -114,6 +120,7 @@ class Devices:
         self._outlet = Outlet(transport, named)
         self._outlet.open(self._topics())
         self._hears: dict[str, Subscription] = {}
+        self._attended: bool | None = None
         self._loops = [self._loop(name, open_bus) for name in config.buses]
         self.loops = [Serving(loop, clock) for loop in self._loops]
         self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
@@ -131,6 +138,18 @@ class Devices:
         for device, (_, loop) in self._placed.items():
             loop.inbox.put(device, OperatorReset())
 
+    def look(self) -> None:
+        """Tell each device when the nodes that may send it requests have come or gone."""
+        topic = self._kind.attended_by
+        if topic is None:
+            return
+        attended = self._hears[topic.name].matched() > 0
+        if attended == self._attended:
+            return
+        self._attended = attended
+        for device, (_, loop) in self._placed.items():
+            loop.inbox.put(device, Attended(attended))
+
     def status(self) -> Status:
         """For the status file."""
         return {
@@ -145,8 +164,8 @@ class Devices:
         return {name: node.status() for name, (node, _) in self._placed.items()}
 
     def _topics(self) -> list[Topic[Message]]:
-        alarms = {t for d in self._config.devices.values() for t in self._kind.alarm_topics(d)}
-        return [self._kind.states, *alarms]
+        others = {t for d in self._config.devices.values() for t in self._kind.publishes(d)}
+        return [self._kind.states, *others]
 
     def _loop(self, bus_name: str, open_bus: OpenBus) -> Loop:
         settings = self._config.buses[bus_name]

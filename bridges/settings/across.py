@@ -1,7 +1,7 @@
-"""What no file shows alone: one place or name that two files use, domains that differ, names that no
-file has.
+"""Checks files against each other: places or names used twice, domains that differ, unknown names.
 
-Files that are checked together belong to one site, and unless told otherwise run on one machine.
+Files that are checked together belong to one site. Unless the user says otherwise, they run on one
+machine.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -27,21 +27,21 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """That a file uses something that one file alone may use: what it is, and where it says so."""
+    """A file uses something that only one file may use. `what`: its name. `path`: where it says so."""
 
     config: Config
     what: str
     path: Path
 
     def place(self) -> Problem:
-        """Where that stands; without a text."""
+        """The place in the file, as a Problem without text."""
         page = Page(str(self.config.path))
         root = compose(page, self.config.text)
         return page.problem(locate(Spot(root, root, ""), self.path).where(), "")
 
 
 def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
-    """What is wrong or worth a look about these files together."""
+    """Errors and warnings about these files together."""
     claims = [claim for config in configs for claim in _claims(config, one_machine)]
     errors = [*_domains(configs), *taken(configs, one_machine), *_nowhere(configs)]
     gateways = [claim for config in configs for claim in _gateways(config)]
@@ -59,7 +59,7 @@ def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Probl
 
 
 def _twice(claims: Iterable[Claim]) -> Iterator[tuple[Claim, Claim]]:
-    """(the later, the first) of what two files claim; within a file the loader has judged."""
+    """(later, first) for what two files claim; the loader has checked each file by itself."""
     first: dict[str, Claim] = {}
     for claim in claims:
         other = first.setdefault(claim.what, claim)
@@ -86,14 +86,14 @@ def _buses(config: Config) -> Iterator[tuple[str, Where]]:
 
 
 def _lines(config: Config, one_machine: bool) -> Iterator[Claim]:
-    """Ports that one daemon alone can have."""
+    """Ports that only one daemon can open."""
     for name, where in _buses(config):
         if where.clients == "one" and one_machine:
             yield Claim(config, where.text, ("buses", name))
 
 
 def _gateways(config: Config) -> Iterator[Claim]:
-    """Where it depends on the make how many may ask."""
+    """Addresses where the make decides how many clients may connect."""
     for name, where in _buses(config):
         if where.clients is None:
             yield Claim(config, where.text, ("buses", name))
@@ -116,20 +116,24 @@ def _claims(config: Config, one_machine: bool) -> Iterator[Claim]:
 
 
 def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]:
-    """Every point and claim of a device, in its bus's one spelling."""
+    """Every point and claim of a device, in its bus's canonical spelling."""
     canonical = config.bus_type(bus).canonical
     for wire in config.wires(device):
         yield canonical(wire.point), (*wire.path, "point")
+        if wire.flash is not None:
+            yield canonical(wire.flash.point), (*wire.path, "flash")
     yield from config.driver_type(device).claims(config.devices[device])
 
 
 def _shared(pair: tuple[Claim, Claim], claims: Sequence[Claim]) -> Problem:
-    """One gateway in two files; the units that both ask are named."""
+    """The warning for one gateway in two files; it names the units that both ask."""
     claim, other = pair
     both = _units(claim.config, claim.what, claims) & _units(other.config, claim.what, claims)
     units = f" for unit {', '.join(sorted(both))}" if both else ""
     text = f"warning: {claim.what} is asked in {other.config.path} too{units}"
-    return _said(claim, f"{text}: many take one client; best have one file for one gateway")
+    return _said(
+        claim, f"{text}: many gateways take only one client: use one file for each gateway"
+    )
 
 
 def _units(config: Config, gateway: str, claims: Sequence[Claim]) -> set[str]:
@@ -141,8 +145,10 @@ def _domains(configs: Sequence[Config]) -> Iterator[Problem]:
     for config in configs[1:]:
         ours, first = (c.rmf.domain_id or 0 for c in (config, configs[0]))
         if ours != first:
-            text = f"DDS domain {ours}, and {configs[0].path} is in domain {first}"
-            yield _said(Claim(config, "", ("rmf", "domain_id")), f"{text}: neither hears the other")
+            text = f"DDS domain {ours}, but {configs[0].path} is in domain {first}"
+            yield _said(
+                Claim(config, "", ("rmf", "domain_id")), f"{text}: they cannot hear each other"
+            )
 
 
 def _devices(configs: Sequence[Config], kind: str) -> dict[str, Config]:
@@ -150,7 +156,7 @@ def _devices(configs: Sequence[Config], kind: str) -> dict[str, Config]:
 
 
 def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Devices that a kind without hardware names, and that none of the files of their kind has."""
+    """Devices that a kind without hardware names, but no file of their kind has."""
     for claim, kind, name in _spoken(configs):
         known = _devices(configs, kind)
         if known and name not in known:
@@ -158,7 +164,7 @@ def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
 
 
 def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Devices that it does not name, where it names others of their kind."""
+    """Devices that a kind without hardware does not name, though it names others of their kind."""
     spoken = [(kind, name, claim) for claim, kind, name in _spoken(configs)]
     for kind in sorted({kind for kind, _, _ in spoken}):
         names = {name for k, name, _ in spoken if k == kind}

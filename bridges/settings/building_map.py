@@ -1,4 +1,4 @@
-"""The names on RMF's map of a building that our files must match: levels, lifts, doors, waypoints.
+"""The names on RMF's map of a building: levels, lifts, doors, waypoints. Our files must use the same.
 
 Two kinds of file hold it, and either is accepted:
 
@@ -14,29 +14,34 @@ lift.py, building.py), and rmf_ros2's parse_graph.cpp, which reads the graph.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
+from bridges.core.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
 from bridges.settings.nodes import Page, Sort, compose, read
 
 MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)
-"""Some seconds' worth of reading: what is longer is refused at once."""
-
-FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
-"""What a name on the map can name."""
+"""A file of this size takes some seconds to read; longer ones are refused at once."""
 
 Lines = dict[str, int]
 """Name -> the line of its first occurrence."""
+Place = tuple[str, float, float]
+"""Level, x, y."""
 
 
 @dataclass(frozen=True, slots=True)
 class BuildingMap:
-    """The names of one file. `named`: what -> name -> line. `stops`: lift -> the floors it serves."""
+    """The names of one file. `named`: what -> name -> line. `stops`: lift -> the floors it serves.
+
+    `places`: waypoint -> level, x, y (m), of a navigation graph; traffic-editor's file has pixels.
+    """
 
     file: str
     named: Mapping[str, Lines]
     stops: Mapping[str, Lines]
+    places: Mapping[str, Place] = field(default_factory=dict)
 
 
 def load_map(file: str) -> BuildingMap:
@@ -47,7 +52,7 @@ def load_map(file: str) -> BuildingMap:
     reading = _Reading(page)
     reading.all(root)
     page.check()
-    return BuildingMap(file, reading.named, reading.stops)
+    return BuildingMap(file, reading.named, reading.stops, reading.places)
 
 
 class _Reading:
@@ -56,6 +61,7 @@ class _Reading:
     def __init__(self, page: Page) -> None:
         self.named: dict[str, Lines] = {w: {} for w in (FLOOR, LIFT, DOOR, CHARGER, WAYPOINT)}
         self.stops: dict[str, Lines] = {}
+        self.places: dict[str, Place] = {}
         self._page = page
 
     def all(self, root: MappingNode) -> None:
@@ -83,6 +89,10 @@ class _Reading:
         if name is None and len(vertex.value) > 3 and isinstance(vertex.value[3], ScalarNode):
             name = vertex.value[3]
         self._add(WAYPOINT, name)
+        if name is not None and name.value and len(vertex.value) == 3:
+            with suppress(ValueError):
+                x, y = (float(at.value) for at in vertex.value[:2])
+                self.places.setdefault(name.value, (level.value, x, y))
         charger = _param(vertex, "is_charger")
         if charger is not None and charger.value.lower() == "true":
             self._add(CHARGER, name)

@@ -1,11 +1,11 @@
-"""What a device YAML that is right has become; the daemon and `check` know no other."""
+"""A valid device YAML, as the daemon and `check` use it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bridges.core.fields import Rmf
+from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.nodes import Problem
 from drivers.driver_type import AnyDriver
@@ -18,8 +18,8 @@ class Config:
     """A valid file.
 
     `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's
-    or driver's record. `bus_types`: name -> `type:`. `warnings`: legal but doubtful settings.
-    `notes`: settings that a site may want, and should know about.
+    or driver's record, whose type only that record knows. `bus_types`: name -> `type:`. `warnings`:
+    legal settings that may be a mistake. `notes`: settings that a site may want, and should know about.
     `section`: the settings of a kind without devices (`bridges/core/graph_kind.py`), which has no
     driver and no buses.
     """

@@ -1,12 +1,11 @@
-"""An example for each key of the reference: from the shipped files, else its default, else by its type.
+"""An example for each key of the reference: from a shipped file, else its default, else by its type.
 
-A file in `config/` or a profile shows a value that works at a site; so examples cannot grow stale.
+Shipped files are tested, so these examples stay valid.
 """
 
 import functools
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import yaml
@@ -16,12 +15,13 @@ import drivers
 from bridges.settings import names as named
 from bridges.settings.leaves import choices
 from bridges.settings.load import load
+from bridges.settings.shown import is_section
 from drivers.profiles import Profile
 
 CONFIG = Path(drivers.__file__).parents[1] / "config"
 LONGEST = 72
 
-WRITTEN: dict[str, Any] = {
+WRITTEN: dict[str, object] = {
     "topics": {"lift_states": "ward/lift_states"},
     "connect": ["tcp/192.168.1.10:7447"],
     "listen": ["tcp/0.0.0.0:7447"],
@@ -38,18 +38,21 @@ WRITTEN: dict[str, Any] = {
     "accept_unsafe": {"fire_alarm": "the panel supervises its own loop"},
     "station": {"MobileErrors.GridError": "the grid supply is not right"},
     "robot": {"MobileErrors.OverTemperature": "the receiver is too hot"},
+    "at_height": "PadStatus.AtHeight",
+    "range_ok": "PadStatus.RangeOk",
+    "temperatures": {"coil": "MobileTerminals.CoilTemperature"},
     "state_words": {"READY": 0, "CHARGING": 2},
     "doors": ["ward_door"],
     "lifts": ["Lift1"],
 }
-"""For texts that no shipped file has: by their keys, of which each means one thing everywhere."""
+"""Examples for keys that no shipped file has. Each of these keys means the same everywhere."""
 
 Found = dict[tuple[type, str], str]
 
 
 def example(struct: type, field: mi.Field) -> str:
-    """`key: value` as a YAML has it; "" for a section, whose keys have their own."""
-    if _is_section(field.type):
+    """`key: value` as in a YAML; "" for a section, whose keys have examples of their own."""
+    if is_section(field.type):
         return ""
     shown = next(
         (_shown()[c, field.name] for c in struct.__mro__ if (c, field.name) in _shown()), ""
@@ -60,11 +63,16 @@ def example(struct: type, field: mi.Field) -> str:
     return f"{field.encode_name}: {shown}"
 
 
+def device_yamls() -> list[Path]:
+    """The shipped device YAMLs; `fleet_*.yaml` are configurations of RMF's fleet adapters."""
+    return sorted(f for f in CONFIG.glob("*.yaml") if not f.name.startswith("fleet_"))
+
+
 @functools.cache
 def _shown() -> Found:
-    """What shipped files have at each field of each struct: the shortest that is no default."""
+    """The shortest value of each struct's field in the shipped files that is not its default."""
     found: Found = {}
-    for file in sorted(CONFIG.glob("*.yaml")):
+    for file in device_yamls():
         config = load(file)
         tops = [config.rmf, *config.buses.values(), *config.devices.values(), config.section]
         for top in tops:
@@ -105,46 +113,34 @@ def _note(found: Found, struct: type, name: str, text: str) -> None:
 
 
 def _names(base: type) -> tuple[str, ...]:
-    """The fields of a struct; none of what structs are made of."""
+    """The fields of a struct; none for msgspec.Struct and its bases."""
     if not issubclass(base, msgspec.Struct) or base is msgspec.Struct:
         return ()
     return base.__struct_fields__
 
 
 def flow(value: object) -> str:
-    """On one line, as a person writes it."""
+    """A value as YAML on one line."""
     text = yaml.safe_dump(
         value, default_flow_style=True, width=10**6, allow_unicode=True, sort_keys=False
     )
     return text.removesuffix("\n...\n").strip()
 
 
-def _is_section(info: mi.Type) -> bool:
-    if isinstance(info, mi.UnionType):
-        return all(_is_section(t) for t in info.types if not isinstance(t, mi.NoneType))
-    if isinstance(info, mi.Metadata):
-        return _is_section(info.type)
-    if isinstance(info, mi.ListType | mi.VarTupleType):
-        return _is_section(info.item_type)
-    if isinstance(info, mi.DictType):
-        return _is_section(info.value_type)
-    return isinstance(info, mi.StructType)
-
-
 def _is_numbered(info: mi.Type) -> bool:
-    """A mapping whose keys are numbers."""
+    """Whether it is a mapping whose keys are numbers."""
     key = info.key_type if isinstance(info, mi.DictType) else None
     return isinstance(key.type if isinstance(key, mi.Metadata) else key, mi.IntType)
 
 
-def _by_type(field: mi.Field) -> Any:
+def _by_type(field: mi.Field) -> object:
     if isinstance(field.default, str | int | float) and not isinstance(field.default, bool):
         return field.default
     return _any_of(field.type, field)
 
 
-def _any_of(info: mi.Type, field: mi.Field) -> Any:
-    """Some value that may stand there."""
+def _any_of(info: mi.Type, field: mi.Field) -> object:
+    """Some valid value of this type."""
     match info:
         case mi.Metadata(type=part):
             return _any_of(part, field)

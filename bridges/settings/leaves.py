@@ -1,11 +1,11 @@
-"""Converts one YAML scalar to a text, number, boolean or choice, and words the error if it is none.
+"""Converts one YAML scalar to a text, number, boolean or choice, or says why it cannot.
 
-msgspec decides whether the type allows the value. A text must not be readable as anything else in
-YAML, and a number must be written unambiguously (`scalars.py`).
+msgspec decides whether the type allows the value. No version of YAML may read a text as anything else,
+and a number must be written unambiguously (`scalars.py`).
 """
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec.inspect import (
@@ -26,11 +26,12 @@ from msgspec.inspect import (
 )
 from yaml import Node, ScalarNode, SequenceNode
 
-from bridges.settings.nodes import either, is_plain, nearest, shown
+from bridges.settings.nodes import either, is_plain, nearest, short
 from bridges.settings.scalars import TRUTHS, number, reads_as, whole_number
 from bridges.settings.slips import has_unit, number_meant
 
-Extra = Mapping[str, Any]
+Extra = Mapping[str, str]
+"""What a field's `Meta(extra=…)` says: its `unit`, its `pattern` in words, its `check`."""
 
 
 class Wrong(Exception):
@@ -43,7 +44,7 @@ def looks(node: Node) -> str:
         return "a list"
     if not isinstance(node, ScalarNode):
         return "a mapping"
-    written = shown(node.value)
+    written = short(node.value)
     reading = reads_as(node.value) if is_plain(node) else None
     if reading is None:
         return f"the text '{written}'"
@@ -101,7 +102,7 @@ def _rank(wanted: Type) -> int:
     return isinstance(wanted.type if isinstance(wanted, Metadata) else wanted, StrType)
 
 
-def _annotation(wanted: Type) -> Any:
+def _annotation(wanted: Type) -> object:
     """The type that msgspec described, with its bounds, for `convert`."""
     if isinstance(wanted, EnumType):
         return wanted.cls
@@ -135,7 +136,7 @@ _READINGS: dict[type[Type], Callable[[str], object]] = {
 
 def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
     """Why `convert` refused a value; `length`: because of its length."""
-    written = shown(node.value)
+    written = short(node.value)
     if isinstance(wanted, LiteralType | EnumType):
         near = nearest(node.value, choices(wanted))
         meant = f" (did you mean '{near}'?)" if near else ""
@@ -153,18 +154,20 @@ def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
 def _check_text(node: ScalarNode, extra: Extra) -> None:
     text: str = node.value
     reading = reads_as(text) if is_plain(node) and "check" not in extra else None
+    if reading is not None and "number" in extra:
+        raise Wrong(f"is the number {text}: write {extra['number']}")
     if reading is not None:
-        taken = f"is written {shown(text)}, which YAML may read as {reading}"
+        taken = f"is written {short(text)}, which YAML may read as {reading}"
         if looks(node) == f"the number {text}":
             taken = f"is the number {text}"
-        raise Wrong(f'{taken}: if the text is meant, write "{shown(text)}" in quotes')
+        raise Wrong(f'{taken}: if the text is meant, write "{short(text)}" in quotes')
     if any("\ud800" <= c <= "\udfff" for c in text):
         raise Wrong("holds half a character (\\ud800 to \\udfff): write the whole character")
 
 
 def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> Wrong:
-    """The error for a text that is not a plain number or boolean, with the way to write it."""
-    text, asked = shown(node.value), wanted_text(wanted, extra)
+    """The error for a text that is not a plain number or boolean; it says how to write it."""
+    text, asked = short(node.value), wanted_text(wanted, extra)
     whole = isinstance(wanted, IntType)
     if not is_plain(node):
         read = _READINGS[type(wanted)](node.value) is not None

@@ -2,7 +2,7 @@
 
     kind: lift              a folder of bridges/ that holds a KIND
     driver: dry_contact     a file of drivers/<kind>/; a device may name another as its own `driver:`
-    rmf: {...}              bridges.core.fields.Rmf
+    rmf: {...}              bridges.rmf.settings.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
     lifts: {name: {...}}    the kind's own key; what each holds is the driver's `settings`
 
@@ -12,18 +12,17 @@ Structs define what a section may contain (`values.py`); this file and `wiring.p
 several sections. The daemon takes nothing else from the file, and checks nothing again.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
-from msgspec.inspect import LiteralType
 from yaml import MappingNode, Node, ScalarNode
 
-from bridges.core.fields import DeviceSettings, Name, Rmf
+from bridges.core.fields import DeviceSettings, Name
 from bridges.core.graph_kind import AnyGraphKind, AnyKind, GraphKind
 from bridges.rmf import topics
+from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
+from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
 from bridges.settings.nodes import (
     Page,
@@ -31,20 +30,19 @@ from bridges.settings.nodes import (
     SettingsError,
     compose,
     either,
-    nearest,
     read,
     unknown,
 )
 from bridges.settings.plausible import milliseconds, out_of_step
-from bridges.settings.values import BROKEN, Entry, Spot, Values, below, is_none, locate
+from bridges.settings.top import MAPPING, keys_below, top_keys, word
+from bridges.settings.values import BROKEN, Broken, Entry, Spot, Values, below, is_none, locate
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
 from drivers.driver_type import AnyDriver
-from drivers.hal import AnyBus
+from drivers.hal.points import Wire
 
 __all__ = ["Config", "Problem", "SettingsError", "load"]
 
 TOPICS = [topic.name for topic in vars(topics).values() if isinstance(topic, topics.Topic)]
-MAPPING = "a mapping (key: value)"
 
 
 def load(path: Path | str) -> Config:
@@ -62,16 +60,6 @@ def understood(path: Path | str, text: bytes) -> Config:
     return reading.config(Path(path), text)
 
 
-@dataclass(frozen=True, slots=True)
-class _Bus:
-    """A bus as far as it could be read."""
-
-    entry: Entry
-    type: str | None
-    hal: AnyBus | None
-    settings: Any
-
-
 class _Reading:
     """Reads one file section by section; problems go to its page."""
 
@@ -80,15 +68,16 @@ class _Reading:
         self._top = Spot(root, root, "the file")
         self._values = Values(page)
         self._kind: AnyKind | None = None
-        self._section: Any = None
+        self._section: object = None
         self._kind_name = ""
         self._driver: AnyDriver | None = None
         self._driver_name = ""
         self._own_drivers: dict[str, AnyDriver | None] = {}
         self._rmf = Rmf()
-        self._buses: dict[str, _Bus] = {}
-        self._devices: dict[str, Any] = {}
+        self._buses: dict[str, BusRead] = {}
+        self._devices: dict[str, DeviceSettings] = {}
         self._uses: list[Use] = []
+        self._written: dict[str, list[str]] = {}
         self._warnings: list[Problem] = []
         self._notes: list[Problem] = []
 
@@ -114,7 +103,9 @@ class _Reading:
         self._read_kind(below(self._top.node, "kind"))
         if not isinstance(self._kind, GraphKind):
             self._read_driver(below(self._top.node, "driver"))
-        sections = self._values.known(entries, self._top, self._keys(), self._elsewhere())
+        sections = self._values.known(
+            entries, self._top, top_keys(self._kind), keys_below(self._kind, self._driver)
+        )
         if self._kind and self._kind.devices_key in sections:
             self._read_own_drivers(sections[self._kind.devices_key].value)
         if "rmf" in sections:
@@ -126,49 +117,28 @@ class _Reading:
         elif self._kind and self._kind.devices_key in sections:
             self._read_devices(sections[self._kind.devices_key].spot())
         note_conflicts(self._page, self._uses)
-
-    def _keys(self) -> dict[str, str | None]:
-        """The keys of a file of this kind; of every kind while the kind is not known."""
-        keys = {"kind": either(named.kind_names()), "driver": "a driver of that kind"}
-        if isinstance(self._kind, GraphKind):
-            return {"kind": keys["kind"], "rmf": None, self._kind.devices_key: None}
-        sections = {"rmf": None, "buses": MAPPING}
-        if self._kind:
-            keys["driver"] = either(named.driver_names(self._kind_name))
-            return {**keys, **sections, self._kind.devices_key: MAPPING}
-        others = (named.kind_called(name).devices_key for name in named.kind_names())
-        return {**keys, **sections, **dict.fromkeys(others)}
-
-    def _elsewhere(self) -> dict[str, str]:
-        """Keys that belong below the top: key -> what it stands below."""
-        below_top: dict[str, str] = {f.encode_name: "rmf" for f in msgspec.structs.fields(Rmf)}
-        if self._kind and self._driver:
-            place = f"{self._kind.devices_key}: <name>"
-            own = msgspec.structs.fields(self._driver.settings)
-            below_top |= {f.encode_name: place for f in own}
-        elif isinstance(self._kind, GraphKind):
-            own = msgspec.structs.fields(self._kind.settings)
-            below_top |= {f.encode_name: self._kind.devices_key for f in own}
-        return below_top
+        self._collect_kept()
 
     def _read_kind(self, entry: Entry | None) -> None:
-        name = self._word(entry, named.kind_names())
+        name = word(self._values, entry, named.kind_names())
         if name:
             self._kind_name = name
             self._kind = named.kind_called(name)
 
     def _read_driver(self, entry: Entry | None) -> None:
-        name = self._word(entry, named.driver_names(self._kind_name)) if self._kind else None
+        if self._kind is None:
+            return
+        name = word(self._values, entry, named.driver_names(self._kind_name))
         if name:
             self._driver_name = name
             self._driver = named.driver_called(self._kind_name, name)
 
     def _read_own_drivers(self, devices: Node) -> None:
-        """The devices that name a driver of their own; None where there is none of that name."""
+        """Read the drivers that devices name themselves; None for a driver that does not exist."""
         for key, value in devices.value if isinstance(devices, MappingNode) else ():
             own = below(value, "driver")
             if own and isinstance(key, ScalarNode) and not is_none(own.value):
-                name = self._word(own, named.driver_names(self._kind_name))
+                name = word(self._values, own, named.driver_names(self._kind_name))
                 driver = named.driver_called(self._kind_name, name) if name else None
                 self._own_drivers[key.value] = driver
 
@@ -176,8 +146,11 @@ class _Reading:
         return self._own_drivers.get(device, self._driver)
 
     def _read_rmf(self, spot: Spot) -> None:
-        self._rmf = self._values.make(Rmf, spot)
-        for name in () if self._rmf is BROKEN else self._rmf.topics:
+        rmf = self._values.make(Rmf, spot)
+        if rmf is BROKEN:
+            return
+        self._rmf = rmf
+        for name in rmf.topics:
             if name not in TOPICS:
                 key = locate(spot, ("topics", name)).key
                 self._page.note(key, unknown("topic", name, TOPICS))
@@ -198,13 +171,6 @@ class _Reading:
     def _broken(self) -> bool:
         return self._section is BROKEN or bool(self._page.problems)
 
-    def _word(self, entry: Entry | None, words: list[str]) -> str | None:
-        """One of these words; None if the entry is missing or another word."""
-        if entry is None:
-            return None
-        word = self._values.make(LiteralType(tuple(words)), entry.spot())
-        return None if word is BROKEN else str(word)
-
     def _names(self, spot: Spot, of: str) -> list[Entry]:
         """The entries of a section whose keys are names."""
         entries = self._values.entries(spot)
@@ -215,45 +181,12 @@ class _Reading:
         return entries
 
     def _read_buses(self, spot: Spot) -> None:
-        for entry in self._names(spot, "bus"):
-            self._buses[entry.name] = self._bus(entry)
-
-    def _bus(self, entry: Entry) -> _Bus:
         allowed = self._allowed_types()
-        kind = below(entry.value, "type")
-        if not isinstance(entry.value, MappingNode):
-            self._values.entries(entry.spot())
-            return _Bus(entry, None, None, BROKEN)
-        if kind is None:
-            self._note_untyped(entry, allowed)
-            return _Bus(entry, None, None, BROKEN)
-        name = self._bus_type(kind, allowed)
-        if name is None:
-            return _Bus(entry, None, None, BROKEN)
-        hal = named.bus_called(name)
-        settings = self._values.make(hal.settings, entry.spot(), ("type",))
-        for path, text in () if settings is BROKEN else hal.warnings(settings):
-            self._warn(locate(entry.spot(), path).where(), f"bus '{entry.name}': {text}")
-        return _Bus(entry, name, hal, settings)
-
-    def _note_untyped(self, bus: Entry, allowed: list[str]) -> None:
-        """Note that a bus has no `type`, or misspells the key; its other keys mean nothing yet."""
-        entries = {e.name: e for e in self._values.entries(bus.spot())}
-        near = nearest("type", entries)
-        if near is None:
-            self._page.note(bus.key, f"'{bus.name}' needs 'type': {either(allowed)}")
-        else:
-            self._page.note(entries[near].key, unknown("key", near, ["type"]))
-
-    def _bus_type(self, entry: Entry, allowed: list[str]) -> str | None:
-        word = entry.value.value
-        if isinstance(entry.value, ScalarNode) and word in set(named.bus_types()).difference(
-            allowed
-        ):
-            text = f"'type' is '{word}', but the driver '{self._driver_name}' needs a bus of type"
-            self._page.note(entry.value, f"{text} {either(allowed)}")
-            return None
-        return self._word(entry, allowed)
+        for entry in self._names(spot, "bus"):
+            bus = read_bus(entry, allowed, self._driver_name, self._values, self._page)
+            self._buses[entry.name] = bus
+            for path, text in bus.remarks():
+                self._warn(locate(entry.spot(), path).where(), f"bus '{entry.name}': {text}")
 
     def _allowed_types(self) -> list[str]:
         """The bus types that the drivers can use; all of them while a driver is not known."""
@@ -266,7 +199,9 @@ class _Reading:
         for entry, bus in zip(entries, buses, strict=True):
             driver = self._driver_of(entry.name)
             if driver and self._can_stand(entry, bus, driver):
-                self._devices[entry.name] = self._device(entry, bus, driver)
+                settings = self._device(entry, bus, driver)
+                if settings is not BROKEN:
+                    self._devices[entry.name] = settings
         for name in self._buses:
             if entries and name not in buses and None not in buses:
                 text = f"no device uses the bus '{name}': delete it, or name it in a 'bus:'"
@@ -296,7 +231,7 @@ class _Reading:
             self._page.note(entry.value, unknown("bus", name, self._buses))
         return None
 
-    def _device(self, entry: Entry, bus: str | None, driver: AnyDriver) -> Any:
+    def _device(self, entry: Entry, bus: str | None, driver: AnyDriver) -> DeviceSettings | Broken:
         """A device's settings; checks its wires too."""
         spot = Spot(entry.value, entry.key, entry.spot().label)
         hal = self._buses[bus].hal if bus else None
@@ -307,21 +242,29 @@ class _Reading:
         if settings is BROKEN:
             wiring.parts(values.structs, spot)
         else:
-            self._check_signals(settings, spot, wiring, driver)
+            wires = list(driver.wires(settings))
+            self._check_signals(settings, wires, spot, wiring, driver)
             self._check_pace(settings, spot, bus)
-            self._check_reach(wiring, bus)
-        if len(self._page.problems) == before:
-            self._collect_warnings(settings, spot, driver)
-            for node, text in wiring.warnings(driver.wires(settings), spot):
-                self._warn(node, f"{spot.label}: {text}")
-            for path, text in milliseconds(values.structs):
-                self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
+            wiring.reach(self._buses[bus].settings if bus else BROKEN)
+            self._written.setdefault(bus or "", []).extend(wiring.written)
+            if len(self._page.problems) == before:
+                self._collect_warnings(settings, spot, driver)
+                for node, text in wiring.warnings(wires, spot):
+                    self._warn(node, f"{spot.label}: {text}")
+                for path, text in milliseconds(values.structs):
+                    self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
         self._uses += wiring.uses
         return settings
 
-    def _check_signals(self, settings: Any, spot: Spot, wiring: Wiring, driver: AnyDriver) -> None:
+    def _check_signals(
+        self,
+        settings: DeviceSettings,
+        wires: list[Wire],
+        spot: Spot,
+        wiring: Wiring,
+        driver: AnyDriver,
+    ) -> None:
         """Check the wires of a device whose settings are complete and valid."""
-        wires = list(driver.wires(settings))
         wiring.wires(wires, spot)
         wiring.claims(driver.claims(settings), spot)
         signals = [*(wire.signal for wire in wires), *driver.unwired(settings)]
@@ -332,16 +275,7 @@ class _Reading:
         for path, text in () if read is BROKEN else out_of_step(settings, read):
             self._page.note(locate(spot, path).where(), text)
 
-    def _check_reach(self, wiring: Wiring, bus: str | None) -> None:
-        """Points that no bus of these settings can have."""
-        read = self._buses[bus] if bus else None
-        for use in wiring.uses if read and read.hal and read.settings is not BROKEN else ():
-            assert read
-            assert read.hal
-            if reason := read.hal.unreachable(read.settings, use.point):
-                self._page.note(use.node, reason)
-
-    def _collect_warnings(self, settings: Any, spot: Spot, driver: AnyDriver) -> None:
+    def _collect_warnings(self, settings: DeviceSettings, spot: Spot, driver: AnyDriver) -> None:
         """Collect the warnings about a valid device."""
         for signal, reason in settings.accept_unsafe.items():
             key = locate(spot, ("accept_unsafe", signal)).key
@@ -351,6 +285,17 @@ class _Reading:
         for path, text in driver.notes(settings):
             node = locate(spot, path).where()
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
+
+    def _collect_kept(self) -> None:
+        """Collect what is to be said of outputs that outlive this machine, once for each bus."""
+        for name, bus in () if self._page.problems else self._buses.items():
+            assert bus.hal
+            kept = bus.hal.kept(bus.settings, self._written.get(name, ()))
+            for path, text in kept.warnings:
+                self._warn(locate(bus.entry.spot(), path).where(), f"bus '{name}': {text}")
+            for path, text in kept.notes:
+                node = locate(bus.entry.spot(), path).where()
+                self._notes.append(self._page.problem(node, f"note: bus '{name}': {text}"))
 
     def _warn(self, node: Node, text: str) -> None:
         self._warnings.append(self._page.problem(node, f"warning: {text}"))

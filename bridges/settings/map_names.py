@@ -1,18 +1,18 @@
 """Compares the names in a device YAML with those on RMF's map of the building.
 
-RMF finds a lift, floor, door or charger by its name alone. A name that differs causes no error, only a
-robot that waits forever.
+RMF finds a lift, floor, door or charger only by its name. A wrong name causes no error: a robot just
+waits forever.
 """
 
 from collections.abc import Iterator
 from pathlib import Path
 
 from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import Place
+from bridges.core.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT, Place
 from bridges.settings import names as named
-from bridges.settings.building_map import CHARGER, FLOOR, LIFT, WAYPOINT, BuildingMap
+from bridges.settings.building_map import BuildingMap
 from bridges.settings.load import Config
-from bridges.settings.nodes import Page, Problem, compose, nearest, shown
+from bridges.settings.nodes import Page, Problem, compose, nearest, short
 from bridges.settings.values import Spot, locate
 
 
@@ -25,7 +25,7 @@ def places(config: Config) -> list[Place]:
     all_places: list[Place] = []
     for name, settings in config.devices.items():
         top = (kind.devices_key, name)
-        if config.kind in (LIFT, "door", CHARGER):
+        if config.kind in (LIFT, DOOR, CHARGER):
             all_places.append((top, config.kind, name))
         all_places += [((*top, *path), what, n) for path, what, n in kind.on_map(settings)]
     return all_places
@@ -51,33 +51,33 @@ def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
 
 
 def _missing(building: BuildingMap, what: str, name: str, lift: str) -> str:
-    """ "" if the map has the name, else the problem, with a suggestion."""
+    """The problem if the map lacks the name, with a suggestion; "" if it has it."""
     stops = building.stops.get(lift)
     known = building.named[what] if stops is None else stops
     if name in known:
         return ""
     where = Path(building.file).name
     if stops is not None:
-        has = f"the lift '{shown(lift)}' does not stop at '{shown(name)}' on {where}"
+        has = f"the lift '{short(lift)}' does not stop at '{short(name)}' on {where}"
         if name in building.named[FLOOR]:
             return f"{has}, though the level is there (line {building.named[FLOOR][name]})"
     elif what == CHARGER and name in building.named[WAYPOINT]:
         line = building.named[WAYPOINT][name]
         return (
-            f"{where}:{line}: the waypoint '{shown(name)}' is not a charger: set is_charger: true"
+            f"{where}:{line}: the waypoint '{short(name)}' is not a charger: set is_charger: true"
         )
     else:
-        has = f"{where} has no {what} '{shown(name)}'"
+        has = f"{where} has no {what} '{short(name)}'"
     near = nearest(name, known)
     if near is not None:
-        return f"{has}: did you mean '{shown(near)}' (line {known[near]})?"
+        return f"{has}: did you mean '{short(near)}' (line {known[near]})?"
     return f"{has}: {_listed(known)}"
 
 
 def _listed(known: dict[str, int]) -> str:
     if not known:
         return "it has none"
-    some = ", ".join(map(shown, list(known)[:12]))
+    some = ", ".join(map(short, list(known)[:12]))
     return f"it has {some}" + (f" and {len(known) - 12} more" if len(known) > 12 else "")
 
 
@@ -86,6 +86,6 @@ def _not_served(building: BuildingMap, lift: str, ours: set[str]) -> Iterator[st
         if floor not in ours:
             where = Path(building.file).name
             yield (
-                f"on {where} (line {line}) '{shown(lift)}' also stops at '{shown(floor)}': a robot"
+                f"on {where} (line {line}) '{short(lift)}' also stops at '{short(floor)}': a robot"
                 " sent there would always be refused. Add the floor, or remove the stop from the map"
             )

@@ -15,7 +15,8 @@ import yaml
 from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNode, SequenceNode
 from yaml.reader import ReaderError
 
-from bridges import regular_file
+from bridges import user_files
+from bridges.rmf.words import printable
 from bridges.settings import slips
 
 MAX_DEPTH = 32
@@ -79,13 +80,8 @@ class Page:
             raise SettingsError(self.problems)
 
 
-def printable(text: str) -> str:
-    """The text on one line, with invisible characters escaped."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-
-
-def shown(text: str) -> str:
-    """A value for an error text, shortened to 40 characters."""
+def short(text: str) -> str:
+    """A text, shortened to 40 characters for a message."""
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
@@ -104,9 +100,9 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
     """The error text for an unknown name, with the nearest known one and all of them."""
     names = list(dict.fromkeys(known))
     near = nearest(name, names)
-    meant = f"did you mean '{shown(near)}'? " if near else ""
-    there = f"known here: {', '.join(map(shown, names))}" if names else "there is none"
-    return f"unknown {what} '{shown(name)}': {meant}{there}"
+    meant = f"did you mean '{short(near)}'? " if near else ""
+    there = f"known here: {', '.join(map(short, names))}" if names else "there is none"
+    return f"unknown {what} '{short(name)}': {meant}{there}"
 
 
 class _Refused(MarkedYAMLError):
@@ -169,7 +165,7 @@ def _children(node: Node | None) -> Iterator[Node]:
 def read(file: str, sort: Sort = DEVICE) -> bytes:
     """The file's bytes. Raises SettingsError if it is unreadable or too long."""
     try:
-        text = regular_file.read(file, sort.max_bytes).content
+        text = user_files.read(file, sort.max_bytes).content
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SettingsError([Problem(file, 1, 1, f"cannot be read: {reason}")]) from None

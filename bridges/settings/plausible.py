@@ -1,4 +1,4 @@
-"""Valid but implausible settings: durations in milliseconds, readings that are stale on arrival."""
+"""Finds implausible settings: durations in milliseconds, readings that are always stale."""
 
 from collections.abc import Iterable, Iterator
 from typing import Final
@@ -11,7 +11,7 @@ from drivers.hal import Remark
 RENEWED: Final = 3
 """An output that switches off by itself must be renewed once in this many scans."""
 LONG_S: Final = 1000.0
-"""A duration this long was often meant in milliseconds."""
+"""A duration (s) this long was often meant in milliseconds."""
 
 
 def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Iterator[Remark]:
@@ -37,7 +37,7 @@ def _clock(seconds: float) -> str:
 
 
 def out_of_step(device: DeviceSettings, bus: object) -> Iterator[Remark]:
-    """Problems with the pace of the device's bus: readings and commands that come too late."""
+    """Problems with a bus that is too slow for its device: readings and commands that come too late."""
     scan_s = getattr(bus, "scan_s", 0.0)
     yield from _stale_readings(device, scan_s)
     if renewed := device.off_after():

@@ -1,25 +1,27 @@
-"""Generates the configuration reference, as JSON Schema and as a page, from the structs of the YAML.
+"""Generates the configuration reference from the structs of the YAML, as JSON Schema and as a page.
 
-Keys, types, bounds, units and defaults come from the structs; a key's meaning is the part of its
-struct's docstring that begins with the key.
+Keys, types, bounds, units and defaults come from the structs. A key's meaning is the part of its
+struct's docstring that begins with that key.
 """
 
 import inspect
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 from msgspec import inspect as mi
 
 from bridges import __version__
-from bridges.core.fields import Rmf
 from bridges.core.graph_kind import AnyGraphKind, GraphKind
+from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.examples import example, flow
 from bridges.settings.leaves import Extra, choices, wanted_text
 from drivers.driver_type import AnyDriver
+
+Schema = dict[str, object]
+"""A JSON Schema."""
 
 KEYS = r"(?:^|(?<=[.;]\s))((?:`\w+`(?:,\s)?)+): "
 MEANING = re.compile(rf"{KEYS}(.*?)(?={KEYS}|\Z)", re.M | re.S)
@@ -49,11 +51,11 @@ def graph_kinds() -> list[AnyGraphKind]:
     return [kind for kind in kinds if isinstance(kind, GraphKind)]
 
 
-def schema() -> dict[str, Any]:
+def schema() -> Schema:
     """JSON Schema (2020-12) of a device YAML, for editors."""
     buses = {name: named.bus_called(name).settings for name in named.bus_types()}
     graph = [kind.settings for kind in graph_kinds()]
-    types = [Rmf, *buses.values(), *(shape.type.settings for shape in shapes()), *graph]
+    types: list[type] = [Rmf, *buses.values(), *(shape.type.settings for shape in shapes()), *graph]
     refs, components = msgspec.json.schema_components(types, ref_template="#/$defs/{name}")
     by_type = dict(zip(types, refs, strict=True))
     for bus in buses.values():
@@ -70,13 +72,13 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _allow_type(components: dict[str, Any], ref: dict[str, Any]) -> None:
-    """A bus's `type:` is read before its struct, and is not one of its fields."""
-    component = components[ref["$ref"].rsplit("/", 1)[1]]
+def _allow_type(components: dict[str, dict[str, dict[str, object]]], ref: Schema) -> None:
+    """Add `type:` to a bus: it is read before the struct, and is not one of its fields."""
+    component = components[str(ref["$ref"]).rsplit("/", 1)[1]]
     component["properties"].setdefault("type", {"type": "string"})
 
 
-def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[str, Any]:
+def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> Schema:
     """A file with this driver; a device may name another driver of the kind."""
     of_kind = [other for other in shapes() if other.kind == shape.kind]
     kinds_of_bus = [
@@ -105,13 +107,13 @@ def _file(shape: Shape, buses: dict[str, Any], by_type: dict[Any, Any]) -> dict[
     }
 
 
-def _named_by_device(driver: Shape, of_file: Shape) -> dict[str, Any]:
-    """Only the file's own driver need not be named by a device."""
+def _named_by_device(driver: Shape, of_file: Shape) -> Schema:
+    """A device must name its driver, unless it is the file's own."""
     required = [] if driver == of_file else ["driver"]
     return {"required": required, "properties": {"driver": {"const": driver.driver}}}
 
 
-def _graph_file(kind: AnyGraphKind, by_type: dict[Any, Any]) -> dict[str, Any]:
+def _graph_file(kind: AnyGraphKind, by_type: dict[type, Schema]) -> Schema:
     return {
         "type": "object",
         "additionalProperties": False,
@@ -187,7 +189,7 @@ def _example(struct: type, field: mi.Field) -> str:
 
 
 def _docstring(struct: type) -> tuple[str, dict[str, str]]:
-    """What a struct is for, and the meanings of its fields, including inherited ones."""
+    """The purpose of a struct, and the meanings of its fields, including inherited ones."""
     meanings: dict[str, str] = {}
     for base in reversed(struct.__mro__):
         for names, text, _ in MEANING.findall(inspect.cleandoc(base.__dict__.get("__doc__") or "")):

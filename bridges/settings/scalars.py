@@ -1,7 +1,7 @@
-"""How YAML reads a text without quotes, and which numbers and booleans we accept.
+"""How YAML reads a text without quotes, and which numbers and booleans are accepted.
 
 YAML 1.1 (PyYAML), YAML 1.2 and people read `017`, `1:30`, `no` or `1e3` differently. A name that any
-of them would take for something else must be quoted; a number must be one that all read alike.
+of them would read as something else must be quoted. A number must mean the same to all of them.
 """
 
 import math
@@ -39,12 +39,12 @@ def _base_60(text: str) -> float:
 
 
 def is_null(text: str) -> bool:
-    """Whether YAML reads no value at all."""
+    """Whether YAML reads the text as no value."""
     return text in _NULLS
 
 
 def is_null_word(text: str) -> bool:
-    """Whether the text says on purpose that there is no value."""
+    """Whether the text is a word for no value, and not just empty."""
     return text in _NULL_WORDS
 
 

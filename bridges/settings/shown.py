@@ -1,16 +1,15 @@
-"""A struct's plain settings as a person reads them: numbers with units, and what a default would be.
+"""A struct's plain settings as text: numbers with units, and the default where the value differs.
 
-Wires, maps and code tables are left out: their drivers tell them (`drivers/driver_type.py`).
+Wires, maps and code tables are left out: their drivers describe them (`drivers/driver_type.py`).
 """
 
 from collections.abc import Iterator
-from typing import Any
 
 import msgspec
 from msgspec import inspect as mi
 
 Row = tuple[str, str, str]
-"""Its key (with dots), its value with the unit, and what the default is where it is not that."""
+"""(key with dots, value with its unit, the default if the value differs from it)."""
 
 _LEAVES = (str, int, float, bool, type(None))
 
@@ -21,7 +20,7 @@ def plain(struct: object) -> list[Row]:
 
 
 def choices_of(device: object) -> list[Row]:
-    """A device's own numbers and words, and those of its sections that hold nothing else."""
+    """The plain settings of a device, and of its sections that have no sections themselves."""
     return list(_rows(device, (), deep=False))
 
 
@@ -30,9 +29,9 @@ def _rows(struct: object, path: tuple[str, ...], deep: bool) -> Iterator[Row]:
         value = getattr(struct, field.name)
         here = (*path, field.encode_name)
         if isinstance(value, msgspec.Struct):
-            if deep or not any(_holds_struct(f.type) for f in _fields(type(value))):
+            if deep or not any(is_section(f.type) for f in _fields(type(value))):
                 yield from _rows(value, here, deep)
-        elif _is_plain(value) and not _holds_struct(field.type):
+        elif _is_plain(value) and not is_section(field.type):
             unit = _unit(field.type)
             yield ".".join(here), _text(value, unit), _instead(field, value, unit)
 
@@ -43,18 +42,20 @@ def _fields(struct: type) -> tuple[mi.Field, ...]:
     return info.fields
 
 
-def _holds_struct(info: mi.Type) -> bool:
-    """Whether whatever stands there is a section of its own, or is made of such."""
+def is_section(info: mi.Type) -> bool:
+    """Whether a field holds a struct, or a list or mapping of structs."""
     match info:
         case mi.UnionType(types=types):
-            return all(_holds_struct(t) for t in types if not isinstance(t, mi.NoneType))
-        case mi.Metadata(type=part) | mi.ListType(item_type=part) | mi.DictType(value_type=part):
-            return _holds_struct(part)
+            return all(is_section(t) for t in types if not isinstance(t, mi.NoneType))
+        case mi.ListType(item_type=part) | mi.VarTupleType(item_type=part):
+            return is_section(part)
+        case mi.Metadata(type=part) | mi.DictType(value_type=part):
+            return is_section(part)
     return isinstance(info, mi.StructType)
 
 
 def _is_plain(value: object) -> bool:
-    """Whether it is a word, a number, or some of them."""
+    """Whether it is a word or a number, or a list or mapping of these."""
     value = getattr(value, "value", value)
     if isinstance(value, dict):
         value = list(value.values())
@@ -64,7 +65,7 @@ def _is_plain(value: object) -> bool:
 
 
 def _unit(info: mi.Type) -> str:
-    """The unit of a number; "" where it has none."""
+    """The unit of a number; "" if it has none."""
     if isinstance(info, mi.Metadata):
         return (info.extra or {}).get("unit", "") or _unit(info.type)
     if isinstance(info, mi.UnionType):
@@ -72,7 +73,7 @@ def _unit(info: mi.Type) -> str:
     return ""
 
 
-def _text(value: Any, unit: str) -> str:
+def _text(value: object, unit: str) -> str:
     value = getattr(value, "value", value)
     if value is None or value in ([], {}):
         return "-"
@@ -88,7 +89,7 @@ def _text(value: Any, unit: str) -> str:
 
 
 def _instead(field: mi.Field, value: object, unit: str) -> str:
-    """What the default is, where this is another value."""
+    """The default, if the value differs from it."""
     if field.required or field.default in (msgspec.NODEFAULT, None, value):
         return ""
     return f"default: {_text(field.default, unit)}"

@@ -1,6 +1,6 @@
-"""Slips that YAML's own parser does not name: indents, commas, spaces that cannot be seen.
+"""Typing slips that PyYAML does not name: indents, commas, invisible spaces.
 
-`reason` says again what PyYAML says of a file that is no YAML; the others look at one scalar.
+`reason` rephrases PyYAML's error for a file that is not YAML; the other functions look at one scalar.
 """
 
 import re
@@ -36,7 +36,7 @@ _CURLY = ("\u201c", "\u201d", "\u201e", "\u2018", "\u2019", "\u201a", "\u00ab", 
 
 
 def reason(error: MarkedYAMLError, text: str) -> str:
-    """PyYAML's text on one line, with the fix where the cause is a usual one."""
+    """PyYAML's error on one line, with the fix if the cause is a common slip."""
     problem, where = str(error.problem), error.problem_mark or error.context_mark
     lines = text.splitlines()
     since = error.context_mark or where
@@ -59,7 +59,7 @@ def reason(error: MarkedYAMLError, text: str) -> str:
 
 
 def _odd_in(lines: list[str], first: int, last: int) -> str:
-    """Where these lines hold a space that looks like another; "" where they do not."""
+    """Where these lines have a space that is not an ordinary one; "" if they have none."""
     for number, line in enumerate(lines[first : last + 1], first + 1):
         if found := _ODD.search(line.partition(" #")[0]):
             where = f"line {number}, column {found.start() + 1}"
@@ -80,37 +80,37 @@ def _spaces(line: str) -> int:
 
 
 def _follows_no_key(lines: list[str], where: Mark) -> bool:
-    """Whether the line above stands beside this one and is no key."""
+    """Whether the line above has the same indent and is not a key."""
     above, line = lines[max(where.line - 1, 0)], lines[where.line]
     return _spaces(above) == _spaces(line) and ": " not in f"{above} " and where.line > 0
 
 
 def named(character: str) -> str:
-    """A character that cannot be seen, by its name: `a no-break space (U+00A0)`."""
+    """The name of an invisible character: `a no-break space (U+00A0)`."""
     name = unicodedata.name(character, "character that cannot be seen").lower()
     article = "an" if name[0] in "aeiou" else "a"
     return f"{article} {name} (U+{ord(character):04X})"
 
 
 def odd_space(text: str) -> str:
-    """What is wrong with the looks of a text without quotes; "" where nothing is."""
+    """Why a text without quotes does not say what it looks like; "" if it does."""
     if found := _ODD.search(text):
         return (
             f"{named(found[0])}: write an ordinary space, or put the text in quotes if it is meant"
         )
     if text.startswith(_CURLY):
-        return f"{text[0]} is no quote to YAML: write \" or '"
+        return f"YAML does not read {text[0]} as a quote: write \" or '"
     return ""
 
 
 def cleaned(text: str) -> str:
-    """What was probably meant by a text with an odd space or quote."""
+    """The text that was probably meant by one with an odd space or quote."""
     joined = re.sub(f"(?<=[0-9]){_ODD.pattern}(?=[0-9])", "", text)
     return _ODD.sub(" ", joined).strip("".join((" ", *_CURLY)))
 
 
 def number_meant(text: str, whole: bool) -> str:
-    """How to write a number that a person can read and YAML cannot; "" where it is none."""
+    """How to write a number that a person can read but YAML cannot; "" if the text is not a number."""
     digits = "".join(str(unicodedata.digit(c, c)) for c in text)
     plain = re.sub(r"(?<=\d)['\u2019 ](?=\d{3}(\D|$))", "", digits)
     grouped = re.fullmatch(r"[-+]?\d{1,3}([.,]\d{3})+", plain)

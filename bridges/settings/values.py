@@ -6,7 +6,8 @@ The structs, with their bounds and units, remain the only description of a file'
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from enum import Enum
+from typing import Final, TypeVar, overload
 
 from msgspec import inspect
 from msgspec.inspect import (
@@ -22,14 +23,22 @@ from msgspec.inspect import (
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
 from bridges.settings.leaves import Extra, Wrong, leaf, looks, wanted_text
-from bridges.settings.nodes import Page, either, is_plain, nearest, shown, unknown
+from bridges.settings.nodes import Page, either, is_plain, nearest, short, unknown
 from bridges.settings.scalars import is_null, is_null_word
 
 VERBS = ("is", "has", "needs", "must", "says")
-"""A problem that begins with one of these is said of the key that it points to."""
+"""A problem that begins with one of these words gets its key as the subject."""
 
-BROKEN = object()
-"""Stands for a value that could not be made."""
+T = TypeVar("T")
+
+
+class Broken(Enum):
+    """The type of BROKEN, which stands for a value that could not be made."""
+
+    BROKEN = "broken"
+
+
+BROKEN: Final = Broken.BROKEN
 
 _LISTS = (ListType, VarTupleType)
 _MAPPINGS = (DictType, StructType)
@@ -59,7 +68,7 @@ class Entry:
 
     def spot(self, path: tuple[str, ...] = ()) -> Spot:
         """The value, below `path`."""
-        return Spot(self.value, self.key, f"'{shown(self.name)}'", (*path, self.name))
+        return Spot(self.value, self.key, f"'{short(self.name)}'", (*path, self.name))
 
     def where(self) -> Node:
         """The node that an error about the value points to: a scalar itself, else the key."""
@@ -111,8 +120,8 @@ Check = Callable[[str, Spot], str | None]
 class Values:
     """Converts one file's nodes to values, and notes problems on its page.
 
-    `checks`: for texts whose type has `Meta(extra={"check": name})`. Such a text is taken as written;
-    only its check judges it. `structs`: every struct that was made.
+    `checks`: for texts whose type has `Meta(extra={"check": name})`. Such a text is taken as written,
+    and only its check accepts or refuses it. `structs`: every struct that was made.
     """
 
     def __init__(self, page: Page, checks: Mapping[str, Check] | None = None) -> None:
@@ -120,10 +129,16 @@ class Values:
         self._checks = checks or {}
         self.structs: list[tuple[tuple[str, ...], object]] = []
 
-    def make(self, cls: Any, spot: Spot, besides: tuple[str, ...] = ()) -> Any:
+    @overload
+    def make(self, cls: type[T], spot: Spot, besides: tuple[str, ...] = ()) -> T | Broken: ...
+
+    @overload
+    def make(self, cls: object, spot: Spot, besides: tuple[str, ...] = ()) -> object: ...
+
+    def make(self, cls: object, spot: Spot, besides: tuple[str, ...] = ()) -> object:
         """Convert a node to a `cls` (a type, or msgspec's description of one); BROKEN if it fails.
 
-        `besides`: keys of it that are read elsewhere.
+        `besides`: keys that the caller reads itself.
         """
         wanted = cls if isinstance(cls, Type) else inspect.type_info(cls)
         if isinstance(wanted, StructType):
@@ -157,7 +172,7 @@ class Values:
         """The entries that `fields` names: key -> what its value must be, or None if it is optional.
 
         An unknown key that resembles a missing one is taken for it: one slip is one problem.
-        `elsewhere`: key -> below what it belongs, where it is no key of this mapping.
+        `elsewhere`: for keys that do not belong here: key -> the section that it belongs below.
         """
         found = {e.name: e for e in entries}
         near = {nearest(name, fields) for name in found if name not in fields}
@@ -268,10 +283,7 @@ class Values:
         problems = getattr(made, "problems", None)
         for path, text in problems() if problems else ():
             entry = locate(spot, path)
-            if text.partition(" ")[0] in VERBS:
-                subject = f"'{shown(entry.name)}'" if entry.name else spot.label
-                text = f"{subject} {text}"
-            self._page.note(entry.where(), text)
+            self._page.note(entry.where(), _of_subject(path, entry.name, spot.label, text))
 
     def _miscounted(self, wanted: ListType | VarTupleType | DictType, spot: Spot, n: int) -> bool:
         least, most = wanted.min_length or 0, wanted.max_length
@@ -284,7 +296,7 @@ class Values:
         return True
 
     def _double(self, key: Node, first: Node) -> None:
-        name = shown(key.value)
+        name = short(key.value)
         line = first.start_mark.line + 1
         self._page.note(key, f"the key '{name}' is already on line {line}: delete one of the two")
 
@@ -297,7 +309,7 @@ class Values:
 
 
 def sections_of(wanted: StructType) -> dict[str, str]:
-    """The keys of the sections of a struct, that are not its own: key -> its section."""
+    """Keys of a struct's sections: key -> its section; "" for the struct's own keys."""
     own = {field.encode_name for field in wanted.fields}
     inner = [
         (field.encode_name, part)
@@ -311,20 +323,32 @@ def sections_of(wanted: StructType) -> dict[str, str]:
 
 
 def _misplaced(entry: Entry, before: Entry | None, elsewhere: Mapping[str, str]) -> str:
-    """What slip of the keyboard makes an unknown key; "" where none is seen."""
+    """Which typing slip explains an unknown key; "" if none does."""
     empty = before is not None and _is_empty(before.value)
     if before is not None and empty and not _is_empty(entry.value):
         return (
-            f"'{shown(entry.name)}' stands beside '{before.name}', which is empty: indent it below"
+            f"'{short(entry.name)}' stands beside '{before.name}', which is empty: indent it below"
         )
     if before is not None and entry.name.isdecimal() and _is_empty(entry.value):
         written = before.value.value
         if isinstance(before.value, ScalarNode) and written.isdecimal():
             return f"a comma inside a number: write {written}.{entry.name}"
     if section := elsewhere.get(entry.name):
-        return f"'{shown(entry.name)}' does not belong here: it stands below '{section}'"
+        return f"'{short(entry.name)}' does not belong here: it stands below '{section}'"
     return ""
 
 
 def _is_empty(node: Node) -> bool:
     return isinstance(node, ScalarNode) and is_plain(node) and not node.value
+
+
+def _of_subject(path: tuple[str, ...], name: str, label: str, text: str) -> str:
+    """The text with its subject: the key that it is about, where it does not name that itself."""
+    if text.partition(" ")[0] in VERBS:
+        return f"'{short(name)}' {text}" if name else f"{label} {text}"
+    key = name
+    if name.isdecimal():  # an item of a list, or a number of codes
+        key = next((part for part in reversed(path) if not part.isdecimal()), "")
+    if (key or label) in text:
+        return text
+    return f"'{short(key)}': {text}" if key else f"{label}: {text}"

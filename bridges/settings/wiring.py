@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from yaml import Node
 
 from bridges.settings.nodes import Page, unknown
-from bridges.settings.values import Check, Spot, below, locate
+from bridges.settings.values import BROKEN, Check, Spot, below, locate
 from drivers.hal import AnyBus
 from drivers.hal.points import Input, Output, Wire
 
@@ -27,7 +27,10 @@ class Use:
 
 
 class Wiring:
-    """Collects and checks a device's points: first while its settings are read, then as wires."""
+    """Collects and checks a device's points: first while its settings are read, then as wires.
+
+    `written`: the points that the daemon itself must switch off again.
+    """
 
     def __init__(self, page: Page, device: str, bus: str, hal: AnyBus | None) -> None:
         self._page = page
@@ -35,6 +38,7 @@ class Wiring:
         self._bus = bus
         self._hal = hal
         self.uses: list[Use] = []
+        self.written: list[str] = []
         self.checks: dict[str, Check] = {"point": self._point}
 
     def _point(self, text: str, spot: Spot) -> str | None:
@@ -60,6 +64,8 @@ class Wiring:
             stands = [self._stands(wire, key, text, spot) for key, text in places]
             if all(stands):
                 self._judge(wire, spot)
+                if wire.direction == "out" and wire.flash is None and self._hal:
+                    self.written.append(self._hal.canonical(wire.point))
 
     def _stands(self, wire: Wire, key: str, text: str, spot: Spot) -> bool:
         """Record that this wire uses this point; False if the point is invalid."""
@@ -72,16 +78,24 @@ class Wiring:
         return reason is None
 
     def warnings(self, wires: Iterable[Wire], spot: Spot) -> Iterable[tuple[Node, str]]:
-        """What is legal about these wires but worth a look, and where it stands."""
+        """What is legal about these wires but may be a mistake, and the node to point to."""
         for wire in wires:
             for text in self._hal.wire_warnings(wire) if self._hal else ():
                 yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
 
     def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
-        """Record what a device without wires claims for itself: (place, path in its YAML)."""
+        """Record what a device without wires needs for itself: (place, path in its YAML)."""
         for text, path in places:
             user = f"{self._device} {'.'.join(path)}"
             self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
+            self.written.append(text)
+
+    def reach(self, bus: object) -> None:
+        """Note points that no bus of these settings (BROKEN where they are not known) can have."""
+        for use in self.uses if self._hal and bus is not BROKEN else ():
+            assert self._hal
+            if reason := self._hal.unreachable(bus, use.point):
+                self._page.note(use.node, reason)
 
     def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
         """Check the wires of a device whose other settings are invalid, so that it has no table."""

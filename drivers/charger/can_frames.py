@@ -20,8 +20,7 @@ from bridges.settings.nodes import unknown
 from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows, tables
-from drivers.charger.rules import MEANINGS, UNKNOWN, judge, places
-from drivers.charger.state_codes import first_side
+from drivers.charger.rules import Meant, meaning, with_errors
 from drivers.driver_type import DriverType
 from drivers.hal import can
 from drivers.hal.can.broadcasts import Broadcasts, Said
@@ -72,10 +71,35 @@ def _setpoint_problems(settings: Settings) -> Problems:
         yield ("setpoints",), f"needs '{name}', which is sent to the charger while it charges"
     for name in sorted(given - wanted):
         yield ("setpoints", name), unknown("setpoint", name, sorted(wanted))
-    if wanted == given:
+    yield from _beyond(settings.setpoints)
+    if wanted != given:
+        return
+    impossible = list(_impossible(settings, found))
+    yield from impossible
+    if not impossible:
         for sent in found.send:
             for on in (True, False):
                 yield from _encoding_problems(settings, sent, on)
+
+
+def _beyond(setpoints: Mapping[str, float]) -> Problems:
+    """A setpoint above its own limit, as volts above max_volts."""
+    for name, value in setpoints.items():
+        most = setpoints.get(f"max_{name}", value)
+        if value > most:
+            yield ("setpoints", name), f"is {value:g}, above max_{name}, which is {most:g}"
+
+
+def _impossible(settings: Settings, found: FrameMap) -> Problems:
+    """A setpoint that its signal cannot hold."""
+    frames = dbc.load(found.dbc)
+    for sent in found.send:
+        for signal, name in sent.setpoints.items():
+            value, (low, high) = settings.setpoints[name], frames.bounds(sent.frame, signal)
+            if not low <= value <= high:
+                unit = frames.unit(sent.frame, signal)
+                allowed = f"{low:g} to {high:g} {unit}".rstrip()
+                yield ("setpoints", name), f"is {value:g}: {sent.frame}.{signal} takes {allowed}"
 
 
 def _encoding_problems(settings: Settings, sent: Sent, on: bool) -> Problems:
@@ -95,7 +119,7 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
     if any(found.problems()):
         return
     frames = dbc.load(found.dbc)
-    for name in (found.frames()[0], *(sent.frame for sent in found.send)):
+    for name in (*found.state_frames(), *(sent.frame for sent in found.send)):
         yield f"frame {can.named(frames.id(name))}", ("map",) if settings.map else ("profile",)
 
 
@@ -108,7 +132,7 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
         ("bus", can.describe(bus_settings)),
         *rows(found),
         ("end of the daemon", f"power off is sent; unfed it stops after {after}"),
-        *found.state.codes.rows(),
+        *(found.state.codes.rows() if found.state else ()),
     ]
 
 
@@ -144,7 +168,6 @@ class FrameDriver:
         self._setpoints = settings.setpoints
         self._map = frame_map(settings)
         self._dbc = dbc.load(self._map.dbc)
-        self._meanings = self._map.state.codes.meanings()
         self._frames = Broadcasts(bus, _said(self._map, self._dbc))
         self._in_error = False
         self._power: bool | None = None
@@ -160,24 +183,26 @@ class FrameDriver:
         """Read and decode the charger's fresh frames. Raises DriverError."""
         self._seen = False
         values = self._values(self._frames.read())
-        code = int(values.get(self._map.state.at, -1))
-        rule = judge(self._map.rules, lambda at: _heard(values, at))
-        activity, side = MEANINGS[rule.means] if rule else self._meanings.get(code, UNKNOWN)
-        if self._undiagnosed(activity, values):
-            state, *_ = self._map.frames()
+        meant = self._meant(values)
+        if self._undiagnosed(meant.activity, values):
+            state, *_ = self._map.state_frames()
             values = self._values(self._frames.read_after(state, self._map.error_frames()))
-        found = self._errors(values, activity)
-        if rule and rule.text:
-            found = [(side, rule.text), *found]
+        codes = self._map.state.codes if self._map.state else None
+        found = with_errors(meant, self._errors(values, meant.activity), codes)
         self._seen = True
         return ChargerSample(
-            Activity.ERROR if found else activity,
-            code,
-            "; ".join(text for _, text in found),
+            found.activity,
+            found.code,
+            found.text,
             self._measured(values),
-            side=first_side([side, *(whose for whose, _ in found)]),
-            charges=bool(found) and activity is Activity.CHARGING,
+            side=found.side,
+            charges=found.charges,
         )
+
+    def _meant(self, values: Mapping[str, float]) -> Meant:
+        state = self._map.state
+        codes, code = (state.codes, int(values.get(state.at, -1))) if state else (None, None)
+        return meaning(self._map.rules, codes, lambda at: _heard(values, at), code)
 
     def write(self, outputs: ChargerOutputs) -> None:
         """Send each frame that is due, for power on or off. Raises DriverError."""
@@ -238,6 +263,11 @@ class FrameDriver:
         position = "" if activity is Activity.ERROR else self._map.out_of_range
         return self._map.errors.found(lambda at: 0 if at == position else values.get(at))
 
+    def _valid(self, signal: str, value: float) -> bool:
+        """The DBC file's [min|max]: a value outside is no reading."""
+        low, high = self._dbc.bounds(*signal.split("."))
+        return low <= value <= high
+
     def _measured(self, values: dict[str, float]) -> Measured:
         found = self._map
         receiver = values.get(found.receiver or "")
@@ -245,23 +275,30 @@ class FrameDriver:
         return Measured(
             receiver_id=_receiver(receiver),
             in_range=None if out is None else not out,
+            range_ok=_flag(values, found.range_ok),
+            at_height=_flag(values, found.at_height),
             volts=_rounded(values.get(found.volts or "")),
             amps=_rounded(values.get(found.amps or "")),
+            temperatures=tuple(
+                (name, round(values[signal], 3))
+                for name, signal in found.temperatures.items()
+                if signal in values and self._valid(signal, values[signal])
+            ),
         )
 
 
 def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
-    """The frames to receive. A reading needs those of the state, the receiver and the rules."""
-    state, *_ = found.frames()
-    receiver = (found.receiver or "").split(".")[0]
-    ruled = {signal.split(".")[0] for _, signal in places(found.rules)}
+    """The frames to receive. A reading needs those of the state and of the pad."""
+    state = found.state_frames()
+    pad = (found.receiver, found.range_ok, found.at_height)
+    needed = {*state, *(signal.split(".")[0] for signal in pad if signal)}
     return {
         name: Said(
             id=frames.id(name),
             mask=found.masks.get(name, 0x1FFF_FFFF),
             length=frames.length(name),
-            fresh_s=found.state_timeout_s if name == state else found.others_timeout_s,
-            needed=name in {state, receiver, *ruled},
+            fresh_s=found.state_timeout_s if name in state else found.others_timeout_s,
+            needed=name in needed,
         )
         for name in found.frames()
     }
@@ -271,6 +308,11 @@ def _heard(values: Mapping[str, float], signal: str) -> float:
     if signal not in values:
         raise DriverError(f"{signal} is not heard, and a rule looks at it")
     return values[signal]
+
+
+def _flag(values: Mapping[str, float], signal: str | None) -> bool | None:
+    """None where the map has no such signal."""
+    return None if signal is None else bool(values[signal])
 
 
 def _receiver(number: float | None) -> str | None:

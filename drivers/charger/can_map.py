@@ -18,6 +18,7 @@ from drivers.charger.state_codes import Codes
 from drivers.hal.can import named
 from drivers.profiles import Profile
 
+STATE_IS_NEEDED: Final = "needs state (its number, and what that means), or rules"
 Problems = Iterator[tuple[tuple[str, ...], str]]
 Signal = Annotated[
     str,
@@ -76,13 +77,18 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     `dbc`: the DBC file, in drivers/profiles/ or by its absolute path.
     `masks`: frame -> the bits of its id that are compared, for ids that contain a node id.
-    `state`: the charger's state.
-    `state_timeout_s`: the state is stale when its frame has not come for this long.
+    `state`: the charger's state as a number; not needed with `rules`.
+    `state_timeout_s`: the state is stale when its frame, or one that a rule tests, has not come for
+    this long.
     `others_timeout_s`: the same for all other frames.
     `volts`, `amps`: at the battery.
     `receiver`: the receiver's id as a number; 0 is none. Without its frame there is no reading.
     `out_of_range`: not 0 while the robot stands where it cannot be charged. If it is in `errors` too,
     it counts as an error only in an error state: a robot that has not arrived yet is no error.
+    `range_ok`: not 0 while the robot stands where it can be charged, if the charger says so all the
+    time. `at_height`: not 0 while a pad that the charger moves is where it charges. While one of these
+    is 0 there is no power; without their frames there is no reading.
+    `temperatures`: name -> the signal of a temperature (°C), shown in status and diagnostics.
     `rules`: derive the state from other signals; tried before its codes.
     `errors`: signals that mean an error, whatever the state is.
     `send`: the frames that the driver sends.
@@ -90,13 +96,16 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     dbc: Name
     masks: dict[Name, Mask] = msgspec.field(default_factory=dict)
-    state: State
+    state: State | None = None
     state_timeout_s: Fresh
     others_timeout_s: Fresh = 5.0
     volts: Signal | None = None
     amps: Signal | None = None
     receiver: Signal | None = None
     out_of_range: Signal | None = None
+    range_ok: Signal | None = None
+    at_height: Signal | None = None
+    temperatures: dict[Name, Signal] = msgspec.field(default_factory=dict)
     rules: list[Rule] = msgspec.field(default_factory=list)
     errors: Errors = Errors()
     send: Annotated[list[Sent], msgspec.Meta(min_length=1)]
@@ -111,7 +120,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         for path, signal in self.signals():
             frame, _, name = signal.partition(".")
             yield from _lacks(found, path, frame, name or "?")
-        yield from by_rules.problems(self.rules, has_codes=True)
+        for path, text in by_rules.problems(self.rules, self.state is not None):
+            yield (path, text) if path != ("codes",) else (("state",), STATE_IS_NEEDED)
         for name in self.masks:
             yield from _lacks(found, ("masks", name), name)
         for n, sent in enumerate(self.send):
@@ -122,10 +132,13 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def signals(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """Each signal that is read: (where in the map, Frame.Signal)."""
-        yield ("state", "at"), self.state.at
-        for key in ("volts", "amps", "receiver", "out_of_range"):
+        if self.state:
+            yield ("state", "at"), self.state.at
+        for key in ("volts", "amps", "receiver", "out_of_range", "range_ok", "at_height"):
             if signal := getattr(self, key):
                 yield (key,), signal
+        for name, signal in self.temperatures.items():
+            yield ("temperatures", name), signal
         for path, signal in self.errors.places():
             yield ("errors", *path), signal
         for path, signal in by_rules.places(self.rules):
@@ -135,8 +148,14 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """The frames that carry errors."""
         return {signal.split(".")[0] for _, signal in self.errors.places()}
 
+    def state_frames(self) -> list[str]:
+        """The frames that say the state: its number's, and those that rules test."""
+        signals = [self.state.at] if self.state else []
+        signals += [signal for _, signal in by_rules.places(self.rules)]
+        return list(dict.fromkeys(signal.split(".")[0] for signal in signals))
+
     def frames(self) -> list[str]:
-        """The frames that are read, the state's first."""
+        """The frames that are read."""
         return list(dict.fromkeys(signal.split(".")[0] for _, signal in self.signals()))
 
     def wanted_setpoints(self) -> set[str]:
@@ -161,7 +180,8 @@ def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
     for path, signal in found.signals():
         at = named(frames.id(signal.split(".")[0]))
         if path[0] not in ("errors", "rules"):
-            yield path[0], f"{signal} ({at})"
+            what = f"temperature {path[1]}" if path[0] == "temperatures" else path[0]
+            yield what, f"{signal} ({at})"
         elif path[1] in ("station", "robot"):
             text = getattr(found.errors, path[1])[signal]
             yield f"{path[1]}'s error", f"{signal} ({at}): {text}"
@@ -194,8 +214,12 @@ def _sent(frames: dbc.Dbc, sent: Sent, on: bool, setpoints: Mapping[str, float])
 
 
 def _samples(found: FrameMap, frames: dbc.Dbc) -> Iterator[tuple[str, ...]]:
-    """Each signal that is read at a value that shows its scale and byte order."""
+    """Each signal that is read at values that show its scale, its byte order and its meaning."""
+    shown = set()
     for path, at in found.signals():
+        if path[0] == "rules" and at in shown:
+            continue
+        shown.add(at)
         frame, signal = at.split(".")
         for value, means in _values(found, path):
             payload = frames.sample(frame, signal, value)
@@ -206,16 +230,21 @@ def _samples(found: FrameMap, frames: dbc.Dbc) -> Iterator[tuple[str, ...]]:
 
 def _values(found: FrameMap, path: tuple[str, ...]) -> Iterator[tuple[float, str]]:
     """What a signal is shown with, and what that means."""
-    if path[0] == "state":
+    if path[0] == "state" and found.state:
         for code, (activity, side) in found.state.codes.meanings().items():
             yield float(code), f": {side or 'station'}'s error" if side else f": {activity}"
     elif path[0] == "errors" and path[1] in ("station", "robot"):
         yield 1.0, f": {path[1]}'s error"
+    elif path[0] == "errors":
+        number = getattr(found.errors, path[1])[int(path[2])]
+        for side in ("station", "robot"):
+            for value, text in getattr(number, side).items():
+                yield float(1 << value if path[1] == "bits" else value), f": {side}'s error, {text}"
     else:
         yield _SAMPLES.get(path[0], 1.0), ""
 
 
-_SAMPLES: Final = {"volts": 25.8, "amps": 12.9, "receiver": 4711.0}
+_SAMPLES: Final = {"volts": 25.8, "amps": 12.9, "receiver": 4711.0, "temperatures": 20.0}
 
 
 def _physical(frames: dbc.Dbc, frame: str, signal: str, value: float) -> str:

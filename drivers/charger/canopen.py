@@ -88,7 +88,9 @@ def create(name: str, settings: Settings, bus: can.CanBus) -> xnergy.Receiver:
 
 
 class Objects:
-    """`xnergy.Wire` on the objects of one node."""
+    """`xnergy.Wire` on the objects of one node. No objects of its temperatures are published."""
+
+    reads = xnergy.ALWAYS
 
     def __init__(self, settings: Settings, bus: can.CanBus) -> None:
         limit_s = settings.heartbeat_timeout_s if settings.heartbeat == "required" else None

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from bridges import regular_file
+from bridges import user_files
 from drivers import DriverError
 from drivers.profiles import texts
 
@@ -82,6 +82,12 @@ class Dbc:
         """A signal's unit, or ""."""
         return str(self._messages[frame].get_signal_by_name(signal).unit or "")
 
+    def bounds(self, frame: str, signal: str) -> tuple[float, float]:
+        """The least and the greatest value that the file allows for a signal."""
+        found = self._messages[frame].get_signal_by_name(signal)
+        low, high = found.minimum, found.maximum
+        return -math.inf if low is None else low, math.inf if high is None else high
+
     def sample(self, frame: str, signal: str, value: float) -> bytes | None:
         """A frame whose one signal says this and all others 0; None where it has no such frame."""
         from cantools.database.errors import Error
@@ -115,7 +121,7 @@ def _understood(file: Path, text: bytes) -> Dbc:
 
 def _read(file: Path) -> bytes:
     try:
-        text = regular_file.read(file, SIZE_MAX).content
+        text = user_files.read(file, SIZE_MAX).content
     except OSError as error:
         raise ValueError(f"{file} cannot be read: {error.strerror}") from None
     if len(text) > SIZE_MAX:

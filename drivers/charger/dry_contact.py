@@ -4,20 +4,25 @@ They are on the GPIO header or on a Modbus I/O module (coils and discrete inputs
 whenever the daemon does not run, so a charge ends with the daemon.
 """
 
+import itertools
 from collections.abc import Iterator, Mapping
 from typing import Final
 
 import msgspec
 
 from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide
+from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
+from bridges.core.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
+from drivers.tables import lines_on, one_cut, told_of_cuts
 from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
 
 CUT_MUST_READ: Final = {
     "fault": (True, "a fault of the station is not seen"),
     "ready": (False, "a station that is not ready reads ready"),
+    "at_height": (False, "a pad that is down reads at its height, and is energised"),
+    "range_ok": (False, "a robot that stands badly reads in range, and is energised"),
 }
 """Signal -> (the level that a cut wire must read as, what goes wrong if it does not)."""
 ENABLE: Final = "enable"
@@ -30,11 +35,16 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     `charging`: current flows, also while it ramps down.
     `ready`: the station can charge the next robot; without this contact it always counts as ready.
     `fault`: the station is out of order.
+    `at_height`: the pad, which the station moves, is where it charges. Without it there is no power; it
+    is a fault if it is lost while current flows.
+    `range_ok`: the robot stands where it can be charged. Without it there is no power.
     """
 
     charging: Input
     ready: Input | None = None
     fault: Input | None = None
+    at_height: Input | None = None
+    range_ok: Input | None = None
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -69,17 +79,38 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 def wires(settings: Settings) -> list[Wire]:
     """The wiring table, inputs first."""
     relay = settings.outputs.enable.wire(ENABLE, ("outputs", ENABLE))
-    return [*input_wires(settings.inputs), relay]
+    return [*input_wires(settings.inputs, debounce_s=0.0), relay]
 
 
 def _unsafe(settings: Settings) -> Iterator[Unsafe]:
     return unsafe_wires(wires(settings), CUT_MUST_READ)
 
 
+def tables(settings: Settings) -> Iterator[Table]:
+    """What the contacts mean together, what a cut wire makes of it, and how the relay is driven."""
+    table = {wire.signal: wire for wire in wires(settings) if wire.direction == "in"}
+    rows = []
+    for on in itertools.product((False, True), repeat=len(table)):
+        shown = dict(zip(table, on, strict=True))
+        means = _means(shown)
+        cuts = [(signal, _means(cut)) for signal, cut in one_cut(shown, table)]
+        told = told_of_cuts([(signal, reads) for signal, reads in cuts if reads != means])
+        rows.append((lines_on(shown), means, told))
+    yield Table("contacts", ("asserted", "reads as", "reads with one wire cut"), tuple(rows))
+    driven = "on while a robot may charge"
+    yield Table("outputs", ("output", "how long"), ((ENABLE, driven),))
+
+
+def _means(shown: Mapping[str, bool]) -> str:
+    """What the contacts mean: while the relay is off, and while it is on if that differs."""
+    off, on = (str(decode(shown, enabled).activity) for enabled in (False, True))
+    return off if off == on else f"{off} ({on} while enabled)"
+
+
 def warnings(settings: Settings) -> Problems:
     """Valid settings to review before the station goes into service: (path, text)."""
     for wire in wires(settings):
-        if wire.debounce_s is not None:
+        if wire.debounce_s:
             text = "contacts of a charger are not debounced: the next scan corrects a bounce"
             yield (*wire.path, "debounce_s"), f"{text}; leave this out"
         if wire.signal == "charging" and wire.broken_reads() is not True:
@@ -140,7 +171,8 @@ def decode(shown: Mapping[str, bool], enabled: bool) -> ChargerSample:
     elif enabled:
         activity = Activity.HANDSHAKE
     on = [signal for signal, asserted in shown.items() if asserted]
-    return ChargerSample(activity, "+".join(on) or "no contact", text, side=side)
+    pad = Measured(range_ok=shown.get("range_ok"), at_height=shown.get("at_height"))
+    return ChargerSample(activity, "+".join(on) or "no contact", text, pad, side=side)
 
 
 DRIVER = DriverType(
@@ -148,6 +180,7 @@ DRIVER = DriverType(
     buses=("gpio", "modbus"),
     create=create,
     wires=wires,
+    tables=tables,
     warnings=warnings,
     fake="hal_fakes.plants.contact_charger",
 )

@@ -27,10 +27,10 @@ from drivers import json_fields
 from drivers.charger import rules
 from drivers.charger.http_fields import Fields, Word
 from drivers.charger.rules import Errors, Rule, judged
-from drivers.charger.state_codes import Code, Codes, first_side
+from drivers.charger.state_codes import Code, Codes
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, Calls, send, told
+from drivers.http_call import Call, Calls, claim, send, timer_unseen, told
 from drivers.unsafe import unaccepted
 
 POWER: Final = "power"
@@ -120,8 +120,11 @@ def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
 
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """The station's own state, which no other charger can have."""
+    """The station's own state and commands, which no other charger can have."""
     yield f"{settings.fields.state} of {settings.state_path}", ("state_path",)
+    for name in ("start", "stop"):
+        if call := getattr(settings, name):
+            yield claim(call), (name, "path")
 
 
 def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str, str]]:
@@ -162,6 +165,10 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield (), f"{sort}without {' and '.join(missing)}, {what}"
     if not _lacks(settings, "receiver_id") and not settings.receivers:
         yield ("fields",), "receiver_id is read, but without receivers nobody is verified"
+    off_s = settings.switches_off_after_s
+    if settings.start and off_s is not None and timer_unseen(settings.start, off_s):
+        text = f"start sets no timer of {off_s:g} s that can be seen in it: compare the two"
+        yield ("start", "path"), text
     if settings.codes and not settings.codes.error:
         yield ("codes",), "no code means error: each of them will be shown as an unknown state"
 
@@ -205,8 +212,8 @@ class HttpCharger:
         fields = self._settings.fields
         has_codes = self._settings.codes is not None
         code = fields.code(answer, self._settings.state_words) if has_codes else None
-        found = judged(self._settings, lambda at: json_fields.needed(answer, at), code)
-        said, text_side = fields.error(answer)
+        said, side = fields.error(answer)
+        found = judged(self._settings, lambda at: json_fields.needed(answer, at), code, side)
         shown = Activity.ERROR if said else found.activity
         self._activity, self._at_fault = found.does, shown in AT_FAULT
         return ChargerSample(
@@ -214,7 +221,7 @@ class HttpCharger:
             found.code,
             "; ".join(filter(None, (found.text, said))),
             fields.measured(answer),
-            first_side((found.side, text_side)),
+            found.side,
             charges=shown is Activity.ERROR and found.does is Activity.CHARGING,
         )
 

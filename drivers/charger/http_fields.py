@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from bridges.charger.signals import FaultSide, Measured
+from bridges.core.fields import Name
 from drivers import json_fields
 from drivers.charger.state_codes import CODE_MAX
 from drivers.json_fields import Field, Flag
@@ -39,10 +40,14 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     no error (`OK`). For other texts `codes` gives the side, if it can.
     `receiver_id`: the id of the receiver that it sees; null or "" when it sees none.
     `in_range`: whether the robot stands where it can be charged.
+    `range_ok`: likewise, where the station says so all the time: without it there is no power.
+    `at_height`: whether a pad that the station moves is where it charges: without it there is no power,
+    and a fault if it is lost while current flows.
     `volts`: the voltage at the battery.
     `amps`: the current into the battery.
     `battery_percent`: the battery's charge, 0 to 100.
     `time_to_full_s`: the time until the battery is full (s).
+    `temperatures`: name -> a temperature (°C), shown in status and diagnostics.
     """
 
     state: Field = "state"
@@ -50,10 +55,13 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     error_texts: dict[Word, TextMeans] = msgspec.field(default_factory=dict)
     receiver_id: Field | None = None
     in_range: Flag | None = None
+    range_ok: Flag | None = None
+    at_height: Flag | None = None
     volts: Number | None = None
     amps: Number | None = None
     battery_percent: Number | None = None
     time_to_full_s: Number | None = None
+    temperatures: dict[Name, Number] = msgspec.field(default_factory=dict)
 
     def code(self, answer: Answer, words: Mapping[str, int]) -> int | str:
         """The maker's number for its state, or its word if `words` does not list it.
@@ -78,21 +86,27 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     def measured(self, answer: Answer) -> Measured:
         """The receiver and the measurements. A flag of null is no. Raises DriverError."""
+        celsius = ((name, _number(answer, at)) for name, at in self.temperatures.items())
         return Measured(
             receiver_id=self.receiver_id and json_fields.name(answer, self.receiver_id),
-            in_range=json_fields.flag(answer, self.in_range) if self.in_range else None,
+            in_range=_flag(answer, self.in_range),
             volts=_number(answer, self.volts),
             amps=_number(answer, self.amps),
             battery_percent=_number(answer, self.battery_percent, 100, "0 to 100"),
             time_to_full_s=_number(answer, self.time_to_full_s, WEEK_S, "0 s to a week"),
+            range_ok=_flag(answer, self.range_ok),
+            at_height=_flag(answer, self.at_height),
+            temperatures=tuple((name, value) for name, value in celsius if value is not None),
         )
 
     def rows(self, has_codes: bool) -> Iterator[tuple[str, str]]:
         """Rows for `check`; none when every field is where the first station has it."""
         for name in self.__struct_fields__ if self != Fields() else ():
             place = getattr(self, name)
-            if place and name != "error_texts" and (has_codes or name != "state"):
+            if place and not isinstance(place, dict) and (has_codes or name != "state"):
                 yield f"field {name}", _place(place)
+        for name, number in self.temperatures.items():
+            yield f"temperature {name}", _place(number)
         for text, means in self.error_texts.items():
             yield f"text {text}", "no error" if means == "none" else f"{means}'s error"
 
@@ -105,6 +119,10 @@ def _number(
     if number and value is not None and bounds and not 0 <= value <= most:
         raise json_fields.wrong(number.field, value, bounds)
     return value
+
+
+def _flag(answer: Answer, place: Flag | None) -> bool | None:
+    return None if place is None else json_fields.flag(answer, place)
 
 
 def _place(place: str | Number | Flag) -> str:

@@ -21,6 +21,8 @@ PLACES: Final[Mapping[str, str]] = {
     "latched_high": "input register 1",
     "amps": "input register 31",
     "volts": "input register 32",
+    "device_c": "input register 36",
+    "coil_c": "input register 37",
     "state": "input register 51",
     "error_low": "input register 52",
     "error_high": "input register 53",
@@ -65,6 +67,8 @@ def create(name: str, settings: Settings, bus: modbus.ModbusBus) -> xnergy.Recei
 
 class Registers:
     """`xnergy.Wire` on the registers and coils of one unit."""
+
+    reads = (*xnergy.ALWAYS, *xnergy.TEMPERATURES)
 
     def __init__(self, settings: Settings, bus: modbus.ModbusBus) -> None:
         self._points = points(settings)

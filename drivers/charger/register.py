@@ -10,9 +10,11 @@ from typing import Final
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import ChargerOutputs, ChargerSample, Measured
 from bridges.core.fields import Name
+from bridges.core.table import Table
 from drivers import DriverError
 from drivers.charger import rules
-from drivers.charger.register_map import MEASURED, PROFILE, ChargerMap, Number, Problems
+from drivers.charger.register_map import PROFILE, ChargerMap, Number, Problems
+from drivers.charger.register_tables import samples
 from drivers.charger.rules import judged
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
@@ -99,6 +101,11 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
             yield name.replace("_", " "), f"{written[name]}: write {order.write}"
     yield from rules.rows(found.rules, found.errors)
     yield from found.codes.rows() if found.codes else ()
+
+
+def tables(settings: Settings) -> Iterator[Table]:
+    """Each value by a sample, to hold against the station's registers."""
+    yield samples(charger_map(settings), cells(settings))
 
 
 def warnings(settings: Settings) -> Problems:
@@ -202,19 +209,33 @@ def decode(found: ChargerMap, values: Mapping[str, float]) -> ChargerSample:
     """Decode the station's values. Never raises."""
     code = int(values["state"]) if found.codes else None
     said = judged(found, values.__getitem__, code)
-    receiver, in_range = values.get("receiver"), values.get("in_range")
     return ChargerSample(
         said.activity,
         said.code,
         said.text,
         Measured(
-            receiver_id=None if receiver is None else f"{receiver:g}" if receiver else "",
-            in_range=None if in_range is None else bool(in_range),
-            **{name: values[name] for name in MEASURED if name in values},
+            receiver_id=_receiver(values.get("receiver")),
+            in_range=_flag(values.get("in_range")),
+            volts=values.get("volts"),
+            amps=values.get("amps"),
+            battery_percent=values.get("battery_percent"),
+            time_to_full_s=values.get("time_to_full_s"),
+            range_ok=_flag(values.get("range_ok")),
+            at_height=_flag(values.get("at_height")),
+            temperatures=tuple((name, values[at]) for name, at in found.temperatures.items()),
         ),
         said.side,
         said.charges,
     )
+
+
+def _receiver(number: float | None) -> str | None:
+    """ "" for 0, no receiver; None where the map has no such value."""
+    return None if number is None else f"{number:g}" if number else ""
+
+
+def _flag(value: float | None) -> bool | None:
+    return None if value is None else bool(value)
 
 
 DRIVER = DriverType(
@@ -222,6 +243,7 @@ DRIVER = DriverType(
     buses=("modbus",),
     create=create,
     describe=describe,
+    tables=tables,
     claims=claims,
     warnings=warnings,
     fake="hal_fakes.modbus.register_charger",

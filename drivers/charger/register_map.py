@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from bridges.core.fields import Name
+from bridges.settings.nodes import unknown
 from drivers.charger import rules as by_rules
 from drivers.charger.rules import Errors, Rule
 from drivers.charger.state_codes import Codes
@@ -15,6 +16,8 @@ from drivers.profiles import Profile
 Problems = Iterator[tuple[tuple[str, ...], str]]
 Bit = Annotated[int, msgspec.Meta(ge=0, le=31)]
 MEASURED: Final = ("volts", "amps", "battery_percent", "time_to_full_s")
+KNOWN: Final = ("state", "receiver", "in_range", "range_ok", "at_height", *MEASURED)
+"""The values whose names have a meaning of their own."""
 
 
 class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -47,7 +50,8 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         ):
             yield ("at",), "is one bit: leave words, signed and bit out"
         if self.bit is not None and self.bit >= 16 * self.words:
-            yield ("bit",), f"{self.words} registers have bits 0 to {16 * self.words - 1}"
+            have = "two registers have" if self.words == 2 else "a register has"
+            yield ("bit",), f"{have} bits 0 to {16 * self.words - 1}"
         if self.low_first and self.words == 1:
             yield ("low_first",), "is for two registers: words: 2"
 
@@ -120,8 +124,10 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
     `values`: name -> its place. `state` is the number that `codes` lists; `volts`, `amps`,
     `battery_percent` and `time_to_full_s` are shown; `receiver` is the id of the receiver that it sees,
-    0 for none; `in_range` is not 0 while a robot stands where it can be charged. Rules and errors may
-    use any name.
+    0 for none; `in_range` is not 0 while a robot stands where it can be charged. `range_ok` is the same
+    where the station needs no check for it, and `at_height` is not 0 while a pad that it moves is where
+    it charges: while one of these is 0 there is no power. Rules and errors may use any name.
+    `temperatures`: name -> the value that is this temperature (°C), shown in status and diagnostics.
     `codes`: what the numbers of `state` mean; not needed with `rules`.
     `rules`: derive the state from other values; tried before `codes`. Their places are names of
     `values`.
@@ -134,21 +140,28 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     values: Annotated[dict[Name, Number], msgspec.Meta(min_length=1)]
     codes: Codes | None = None
     rules: list[Rule] = msgspec.field(default_factory=list)
+    temperatures: dict[Name, Name] = msgspec.field(default_factory=dict)
     errors: Errors = Errors()
     power: Power | None = None
     clear_error: Order | None = None
     range_check: Order | None = None
 
     def problems(self) -> Problems:
-        """Names that are not in `values`; a map without a state."""
+        """Names that are not in `values`, or that nothing uses; a map without a state."""
         yield from by_rules.problems(self.rules, self.codes is not None)
         if self.codes and "state" not in self.values:
             yield ("values",), "needs 'state', of which codes speaks"
         looked_at = [(("rules", *path), at) for path, at in by_rules.places(self.rules)]
         looked_at += [(("errors", *path), at) for path, at in self.errors.places()]
+        looked_at += [(("temperatures", name), at) for name, at in self.temperatures.items()]
         for path, name in looked_at:
             if name not in self.values:
-                yield path, f"'{name}' is no value of this map: {', '.join(self.values)}"
+                yield path, unknown("value", name, list(self.values))
+        used = {name for _, name in looked_at}
+        for name in self.values:
+            if name not in KNOWN and name not in used:
+                text = unknown("value", name, KNOWN)
+                yield ("values", name), f"{text}; rules and errors do not use it either"
         if self.range_check and "in_range" not in self.values:
             yield ("range_check",), "needs the value in_range: where is its result?"
 

@@ -6,7 +6,7 @@ a CAN frame. Rules are tried before `codes`: the first rule whose tests all hold
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Final, Protocol
+from typing import Annotated, Final, NamedTuple, Protocol
 
 import msgspec
 
@@ -222,25 +222,45 @@ class Judged:
         return self.activity is Activity.ERROR and self.does is Activity.CHARGING
 
 
-def judged(station: "Station", read: Read, code: int | str | None) -> Judged:
-    """The state from rules, codes and errors. `code`: the maker's state, if there are codes.
+def judged(station: "Station", read: Read, code: int | str | None, told: FaultSide = "") -> Judged:
+    """The state from rules, codes and errors.
 
+    `code`: the maker's state, if there are codes. `told`: whose fault it is by the station's own text.
     An entry of `errors` makes it an error, whatever the state is. Raises DriverError.
     """
-    rule = judge(station.rules, read)
+    meant = meaning(station.rules, station.codes, read, code)
+    return with_errors(meant, station.errors.found(read), station.codes, told)
+
+
+class Meant(NamedTuple):
+    """What rules and codes say, its code for texts, and the text of the rule that holds."""
+
+    activity: Activity
+    side: FaultSide
+    code: int | str
+    text: str = ""
+
+
+def meaning(rules: list[Rule], codes: Codes | None, read: Read, code: int | str | None) -> Meant:
+    """The state from rules and codes. Raises DriverError."""
+    rule = judge(rules, read)
     if rule is not None:
-        activity, side = MEANINGS[rule.means]
-        code = f"rule {station.rules.index(rule) + 1}"
-    elif station.codes is not None and code is not None:
-        activity, side = station.codes.meanings().get(code, UNKNOWN)
-    else:
-        activity, side, code = *UNKNOWN, "of no rule"
-    wrong = station.errors.found(read)
-    if rule is not None and rule.text:
-        wrong = [(side, rule.text), *wrong]
-    shown = Activity.ERROR if wrong else activity
-    side = first_side([side, *(whose for whose, _ in wrong)])
-    return Judged(shown, side, "" if code is None else code, said(wrong), activity)
+        return Meant(*MEANINGS[rule.means], f"rule {rules.index(rule) + 1}", rule.text or "")
+    if codes is not None and code is not None:
+        return Meant(*codes.meanings().get(code, UNKNOWN), code)
+    return Meant(*UNKNOWN, "of no rule")
+
+
+def with_errors(
+    meant: Meant, errors: Found, codes: Codes | None = None, told: FaultSide = ""
+) -> Judged:
+    """The state with what is wrong. `told`: the side of an error that is told in words."""
+    wrong: Found = [(meant.side, meant.text), *errors] if meant.text else errors
+    shown = Activity.ERROR if wrong else meant.activity
+    side = first_side([meant.side, told, *(whose for whose, _ in wrong)])
+    if codes is not None:
+        side = side or codes.unnamed_side(meant.code)
+    return Judged(shown, side, meant.code, said(wrong), meant.activity)
 
 
 class Station(Protocol):
@@ -280,7 +300,10 @@ def problems(rules: list[Rule], has_codes: bool) -> Problems:
         yield ("codes",), "needs codes (what the maker's state numbers mean), or rules"
     for n, rule in enumerate(rules[:-1]):
         if not rule.when:
-            yield ("rules", str(n)), "always holds: the rules below it are never asked"
+            yield (
+                ("rules", str(n)),
+                f"rule {n + 1} always holds: the rules below it are never asked",
+            )
             return
     means = {rule.means for rule in rules}
     if rules and not has_codes and not {"idle", "charging"} <= means:

@@ -24,8 +24,9 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     `handshake`: a robot is being recognised, no current yet.
     `stopping`: current still flows, ramping down.
     `released`: disconnected, and not ready for another robot yet.
-    `error`: out of service, manual operation too.
-    `station_error`: likewise, where the maker says that it is the station's own.
+    `error`: out of service, manual operation too; the station's own, if `robot_error` has the others.
+    `station_error`: likewise, where the maker says that it is the station's own; with these, `error`
+    may be either side's.
     `robot_error`: an error of the robot's side: the station itself is well.
     """
 
@@ -55,6 +56,12 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         for side, codes in self._sides().items():
             made |= dict.fromkeys(codes, (Activity.ERROR, side))
         return made
+
+    def unnamed_side(self, code: object) -> FaultSide:
+        """Whose an error of this number is, if nothing else names a side: the station's, where the
+        robot's have numbers of their own."""
+        told_apart = self.robot_error and not self.station_error
+        return "station" if told_apart and code in self.error else ""
 
     def lists(self) -> Mapping[Activity, list[Code]]:
         """Each meaning with its states, the errors of a known side apart."""

@@ -22,7 +22,9 @@ from drivers import DriverError
 
 ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
 IN_ERROR: Final = ("latched_low", "latched_high")
-"""ALWAYS is read in every scan; IN_ERROR also in an error: the error as the receiver latched it."""
+TEMPERATURES: Final[Mapping[str, str]] = {"device_c": "device", "coil_c": "coil"}
+"""ALWAYS is read in every scan; IN_ERROR also in an error: the error as the receiver latched it.
+TEMPERATURES (°C) are read in every scan where the wire has them."""
 ENABLE: Final = "enable"
 CHECK_RANGE: Final = "check_range"
 """The two that are written: ENABLE with 1 or 0, CHECK_RANGE with 1."""
@@ -101,6 +103,9 @@ def sample(words: Words, settled: bool = True) -> ChargerSample:
             in_range=settled and words.get("range") == IN_RANGE,
             volts=_units(words.get("volts")),
             amps=_units(words.get("amps")),
+            temperatures=tuple(
+                (name, _signed(words[word])) for word, name in TEMPERATURES.items() if word in words
+            ),
         ),
         side=found[0][0] if found else "",
         charges=bool(found) and does is Activity.CHARGING,
@@ -139,6 +144,10 @@ def _text(words: Words, found: list[tuple[FaultSide, str]]) -> str:
     if code in CODES and CODES[code][0] is Activity.ERROR:
         return f"{CODES[code][1]} (receiver state {code})"
     return ""
+
+
+def _signed(word: int) -> int:
+    return word - 0x1_0000 if word & 0x8000 else word
 
 
 def _units(word: int | None) -> float | None:
@@ -208,6 +217,10 @@ def _charges(code: int) -> bool:
 class Wire(Protocol):
     """Access to the receiver's numbers on one type of bus."""
 
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The names that are read in every scan."""
+
     def alive(self) -> bool:
         """True if the receiver has restarted since the last call. Raises DriverError if it is gone."""
 
@@ -241,7 +254,7 @@ class Receiver:
         """Read and decode the receiver's numbers. Raises DriverError."""
         if self._wire.alive():
             self._told = replace(self._told, enabled=None)
-        words = self._wire.read(ALWAYS)
+        words = self._wire.read(self._wire.reads)
         if activity(words["state"]) is Activity.ERROR:
             words |= self._wire.read(IN_ERROR)
         self._code = words["state"]
@@ -281,7 +294,7 @@ class Receiver:
 def rows(settings: ChargerSettings, where: Mapping[str, str]) -> list[tuple[str, str]]:
     """Rows for `check`: (what, meaning). `where`: name -> its address as text."""
     return [
-        *((name, f"read {where[name]}") for name in ALWAYS),
+        *((name, f"read {where[name]}") for name in (*ALWAYS, *TEMPERATURES) if name in where),
         *((name, f"the same in an error: {where[name]}") for name in IN_ERROR),
         ("power", f"write {where[ENABLE]}: 1 starts from idle, 0 stops"),
         ("range check", f"write {where[CHECK_RANGE]} before each start"),

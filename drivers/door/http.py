@@ -17,7 +17,7 @@ from drivers import DriverError, json_fields
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, InsistentCalls, send, told
+from drivers.http_call import Call, InsistentCalls, claim, send, timer_unseen, told
 from drivers.json_fields import Flag
 from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted
 
@@ -92,6 +92,13 @@ def _unsafe(settings: Settings) -> Iterator[Unsafe]:
         yield HOLD, ("hold",), text
 
 
+def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """(command, path): a second door with these commands would release this one."""
+    yield claim(settings.hold), ("hold", "path")
+    if settings.release != settings.hold:
+        yield claim(settings.release), ("release", "path")
+
+
 def describe(settings: Settings, bus: http.Settings) -> Iterator[tuple[str, str]]:
     """Rows for `check`: what is read and what is sent."""
     api = http.base(bus.api_base)
@@ -120,6 +127,11 @@ def warnings(settings: Settings) -> Problems:
             "pull the network plug while the door is held, and see that it is released in this time"
         )
         yield ("switches_off_after_s",), text
+        if timer_unseen(settings.hold, settings.switches_off_after_s):
+            text = (
+                f"hold sets no timer of {settings.switches_off_after_s:g} s that can be seen in it"
+            )
+            yield ("hold", "path"), f"{text}: compare the two"
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if settings.held is None:
         yield (), "held is not read: that the door was released is not verified"
@@ -209,6 +221,7 @@ DRIVER = DriverType(
     buses=("http",),
     create=create,
     describe=describe,
+    claims=claims,
     warnings=warnings,
     unwired=lambda settings: (HOLD,),
     fake="hal_fakes.http_door",

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from bridges.core.fields import Name
+from bridges.core.table import Table
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
 from drivers.door.closing import CLOSING
@@ -89,7 +90,6 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
     """Rows for `check`: each part of the map, its place, and what its numbers mean."""
     found = door_map(settings)
     meanings = {
-        "status": _status_text(found.status),
         "position": "0 closed to 100 open",
         "command": f"{found.command.hold} holds open, {found.command.release} releases",
     }
@@ -97,11 +97,22 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
         meanings["position"] += f", {found.position.unknown} unknown"
     if found.obstruction:
         meanings["obstruction"] = f"bit {found.obstruction.bit}"
-    if found.errors:
-        meanings["errors"] = ", ".join(f"bit {b} {t}" for b, t in found.errors.bits.items())
     for part, point in points(settings).items():
-        yield part, f"{point}: {meanings[part]}".removesuffix(": ")
+        yield part, f"{point}: {meanings.get(part, '')}".removesuffix(": ")
     yield CLOSING
+
+
+def tables(settings: Settings) -> Iterator[Table]:
+    """What each number of the status means, and each bit of the errors."""
+    found = door_map(settings)
+    rows = [(meaning, str(number)) for number, meaning in _meanings(found.status)]
+    rows.append(("not known, with a fault", "any other"))
+    yield Table("status numbers", ("means", "number"), tuple(rows))
+    if found.errors:
+        bits = tuple((text, str(bit)) for bit, text in sorted(found.errors.bits.items()))
+        yield Table(
+            "error bits", ("means", "bit"), (*bits, ("an error, by its number", "any other"))
+        )
 
 
 def warnings(settings: Settings) -> Problems:
@@ -211,9 +222,11 @@ def _address(text: str) -> int:
         return 0  # the map reports the misspelt place itself
 
 
-def _status_text(status: Status) -> str:
+def _meanings(status: Status) -> list[tuple[int, str]]:
+    """Each number and what it means, in the order of the numbers."""
     words = [(v, word) for word in ("closed", "moving", "open") for v in getattr(status, word)]
-    return ", ".join(f"{v} {word}" for v, word in sorted([*words, *status.faults.items()]))
+    faults = [(v, f"not known, with the fault: {text}") for v, text in status.faults.items()]
+    return sorted([*words, *faults])
 
 
 DRIVER = DriverType(
@@ -221,6 +234,7 @@ DRIVER = DriverType(
     buses=("modbus",),
     create=create,
     describe=describe,
+    tables=tables,
     claims=claims,
     warnings=warnings,
     fake="hal_fakes.modbus.register_door",

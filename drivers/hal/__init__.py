@@ -6,7 +6,7 @@ off for 0.5 to 30 s, during which calls fail at once. So a dead device costs the
 most one timeout per backoff.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
@@ -14,7 +14,7 @@ import msgspec
 
 from drivers.hal.points import HalError, Wire
 
-__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Needs", "Remark", "Where"]
+__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Kept", "Needs", "Remark", "Where"]
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
@@ -47,6 +47,13 @@ class Needs(NamedTuple):
     group: str = ""
     family: str = ""
     host: str = ""
+
+
+class Kept(NamedTuple):
+    """Remarks on outputs that keep their value when the daemon's machine or the network dies."""
+
+    warnings: Sequence[Remark] = ()
+    notes: Sequence[Remark] = ()
 
 
 class Bus:
@@ -83,6 +90,8 @@ class BusType(Generic[Settings]):
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
     far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it
     cannot leave the daemon's process, as pins cannot.
+    `kept(settings, places)`: which of these places, which the daemon writes, keep their value when its
+    machine or the network dies.
 
     A bus with points also has
     `canonical(point)`: the one spelling of a point; ValueError says what to write instead;
@@ -98,6 +107,7 @@ class BusType(Generic[Settings]):
     where: Callable[[Settings], Where | None] = lambda settings: None
     needs: Callable[[Settings], Needs] = lambda settings: Needs()
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
+    kept: Callable[[Settings, Iterable[str]], Kept] = lambda settings, places: Kept()
     fake: str = ""
     fake_inside: bool = False
     canonical: Callable[[str], str] = str

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
-from bridges import secret_file
+from bridges import user_files
 from bridges.core.fields import AbsolutePath, Name, Period
 from drivers.hal import Bus, BusType, HalError, Needs, Where
 from drivers.hal.backoff import Backoff
@@ -208,8 +208,8 @@ class HttpBus(Bus):
         if file is None:
             return {}
         try:
-            token = secret_file.one_line("token_file", file, "token")
-        except secret_file.SecretError as error:
+            token = user_files.secret_line("token_file", file, "token")
+        except user_files.SecretError as error:
             raise HalError(str(error)) from None
         header = self._settings.token_header
         return {header: token} if header else {"Authorization": f"Bearer {token}"}

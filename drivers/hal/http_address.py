@@ -5,6 +5,8 @@ from typing import Annotated, Final, NamedTuple
 
 import msgspec
 
+from drivers.hal.hosts import misspelt_address
+
 Path = Annotated[
     str,
     msgspec.Meta(
@@ -51,4 +53,6 @@ def base(text: str) -> Base:
     port = int(found["port"] or PORTS[scheme])
     if not 1 <= port <= 65535:
         raise ValueError(f"port {port} does not exist: ports are 1 to 65535")
+    if reason := misspelt_address(found["host"]):
+        raise ValueError(reason)
     return Base(found["host"].strip("[]"), port, found["path"], scheme)

@@ -1,23 +1,21 @@
 """What a lift's codes read as when one of their lines is cut or shorted.
 
-A cut line reads as its wiring makes it read (`Wire.broken_reads`); a shorted line, or one with a stuck
-contact, reads the opposite. A service or motion code that then reads safer than the lift really is, is
-unsafe. A floor code that then reads as another floor gives a warning.
+A service or motion code that then reads safer than the lift really is, is unsafe. A floor code that
+then reads as another floor gives a warning.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from drivers.hal.points import Wire
+from drivers.lift import codes
 from drivers.lift.wiring import FloorCode, LiftWiring, MotionCode, ServiceCode
+from drivers.tables import Lines, breaks
 from drivers.unsafe import Unsafe
 
 SERVES = {"agv_mode": 0, "normal": 1, "overload": 1}
 """How much a state restricts RMF; every state that is not listed takes the lift away from RMF."""
 TAKEN_AWAY = 2
-
-Lines = Mapping[str, bool]
-"""Signal -> asserted, for each line of a code."""
 
 
 class Misread(NamedTuple):
@@ -35,12 +33,10 @@ def misread(
     table: Mapping[str, Wire],
 ) -> Iterator[Misread]:
     """Each misreading by one broken line. `shown`: meaning -> its codes; `read` decodes a code."""
-    for meaning, codes in shown.items():
-        for lines in codes:
-            for line, asserted in lines.items():
-                reads = read({**lines, line: not asserted})
-                cut = table[line].broken_reads()
-                how = "shorted" if cut is asserted else "cut"
+    for meaning, numbers in shown.items():
+        for lines in numbers:
+            for line, how, then in breaks(lines, table):
+                reads = read(then)
                 if reads not in (None, meaning):
                     yield Misread(line, how, meaning, str(reads))
 
@@ -60,8 +56,10 @@ def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsa
 
 def floor_warnings(code: FloorCode, table: Mapping[str, Wire]) -> str:
     """The floors that read as another floor when one line is broken, as a text; "" for none."""
-    levels = dict.fromkeys((*code.codes.values(), *code.lines))
-    shown = {level: [code.show(level)] for level in levels}
+    shown: dict[str, list[Lines]] = {}
+    for _, level, lines in code.shows():
+        if level is not None:
+            shown.setdefault(level, []).append(lines)
     return told(misread(shown, lambda lines: code.read(lines)[0], table))
 
 
@@ -83,15 +81,13 @@ def _shown(name: str, code: ServiceCode | MotionCode) -> dict[str, list[Lines]]:
     shown: dict[str, list[Lines]] = {}
     for number, state in code.codes.items():
         if state != "fault":
-            lines = {f"{name}_bit{i}": bool(number >> i & 1) for i in range(len(code.bits))}
-            shown.setdefault(state, []).append(lines)
+            shown.setdefault(state, []).append(codes.lines(name, number, len(code.bits)))
     return shown
 
 
 def _reader(name: str, code: ServiceCode | MotionCode) -> Callable[[Lines], str | None]:
     def read(lines: Lines) -> str | None:
-        number = sum(lines[f"{name}_bit{i}"] << i for i in range(len(code.bits)))
-        state = code.codes.get(number)
+        state = code.codes.get(codes.shown_number(name, lines, len(code.bits)))
         return None if state == "fault" else state
 
     return read

@@ -1,6 +1,7 @@
 """Checks of a lift's wiring: problems, unsafe choices, warnings and notes."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from functools import partial
 
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Hazard, Side
@@ -21,12 +22,14 @@ from drivers.unsafe import (
 Problem = tuple[tuple[str, ...], str]
 """Where it is (path below the device), and what is wrong and how to fix it."""
 
-ALARMS = (Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY)
+ALARMED = (Hazard.FIRE, Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY)
+"""Those that `alarm_on` may name."""
 
 
 def problems(wiring: LiftWiring) -> Iterator[Problem]:
     """The problems that keep the daemon from starting, unaccepted unsafe choices included."""
     yield from floors(wiring)
+    yield from alarm(wiring)
     yield from _floor_code(wiring.floor_code, wiring.levels())
     yield from _calls(wiring)
     yield from _doors(wiring)
@@ -40,11 +43,12 @@ def warnings(wiring: LiftWiring) -> Iterator[Problem]:
     """Valid wiring that deserves a second look."""
     table = {w.signal: w for w in wires(wiring)}
     told = wiring.inputs.agv_mode is not None or _in_service(wiring, "agv_mode")
-    fire = sees_fire(wiring)
+    fire = sees(wiring, Hazard.FIRE)
     asks, holds = bool(wiring.outputs.agv_mode_request), bool(wiring.outputs.door_open)
     yield from missing(wiring, ("inputs",), told, asks, fire, holds)
+    yield from unseen(wiring, partial(sees, wiring))
     yield from slow_alarms(table[hazard] for hazard in Hazard if hazard in table)
-    for hazard in ALARMS:
+    for hazard in ALARMED[1:]:
         for _, path, text in _cut(table, hazard, True, f"{hazard} reads clear"):
             yield path, text
     for signal in ("moving", "stopped", "up", "down"):
@@ -80,13 +84,36 @@ def missing(
         yield path, "no fire_alarm: a fire recall would not be seen"
 
 
-def notes(settings: LiftSettings, fire: bool) -> Iterator[Problem]:
-    """Choices that the site makes and should know of. `fire`: the lift reports a fire."""
-    if fire and settings.alarm == "none":
+Sees = Callable[[str], bool]
+"""Does the lift report this hazard, by a line or by a code?"""
+
+
+def notes(settings: LiftSettings, sees: Sees) -> Iterator[Problem]:
+    """Choices that the site makes and should know of."""
+    if sees(Hazard.FIRE) and settings.alarm == "none":
         text = (
             "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)"
         )
         yield ("alarm",), text
+    untold = [h for h in ALARMED if sees(h) and h not in settings.alarm_on]
+    if untold and settings.alarm != "none":
+        many = "stops" if len(untold) == 1 else "stop"
+        text = f"{' and '.join(untold)} {many} this lift for robots, and the fleets are not told"
+        yield ("alarm_on",), text
+
+
+def alarm(settings: LiftSettings) -> Iterator[Problem]:
+    """`alarm_on` without a topic to tell it on."""
+    if settings.alarm == "none" and settings.alarm_on != [Hazard.FIRE]:
+        yield ("alarm_on",), "nothing is told with alarm: none; write alarm: emergency_signal"
+
+
+def unseen(settings: LiftSettings, sees: Sees) -> Iterator[Problem]:
+    """Hazards of `alarm_on` that the lift does not report."""
+    for n, hazard in enumerate(settings.alarm_on if settings.alarm != "none" else ()):
+        if not sees(hazard):
+            path = ("alarm_on", str(n)) if settings.alarm_on != [Hazard.FIRE] else ("alarm",)
+            yield path, f"no {hazard}: this lift does not report it, so nobody is told"
 
 
 def by_call(
@@ -257,9 +284,9 @@ def _service(wiring: LiftWiring) -> Iterator[Problem]:
         yield ("inputs", "service", "codes", str(number)), f"{number} does not fit on the bits"
 
 
-def sees_fire(wiring: LiftWiring) -> bool:
-    """Does the lift report a fire, by a line or by its service code?"""
-    return wiring.inputs.fire_alarm is not None or _in_service(wiring, Hazard.FIRE)
+def sees(wiring: LiftWiring, hazard: str) -> bool:
+    """Does the lift report this hazard, by a line or by its service code?"""
+    return getattr(wiring.inputs, hazard) is not None or _in_service(wiring, hazard)
 
 
 def _in_service(wiring: LiftWiring, state: str) -> bool:

@@ -1,6 +1,6 @@
 """Numbers on several lines, least significant first, as lifts show floors: binary, Gray, BCD."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 Encoding = Literal["binary", "gray", "bcd"]
@@ -24,6 +24,16 @@ def encode(encoding: Encoding, number: int, width: int) -> tuple[bool, ...]:
     if number < 0 or pattern >> width:
         raise ValueError(f"{number} does not fit on {width} lines in {encoding}")
     return tuple(bool(pattern >> place & 1) for place in range(width))
+
+
+def shown_number(prefix: str, shown: Mapping[str, bool], width: int) -> int:
+    """The number on the binary lines `<prefix>_bit0`…"""
+    return sum(shown[f"{prefix}_bit{i}"] << i for i in range(width))
+
+
+def lines(prefix: str, number: int, width: int) -> dict[str, bool]:
+    """Signal -> asserted, for a number on the binary lines `<prefix>_bit0`…"""
+    return {f"{prefix}_bit{i}": bool(number >> i & 1) for i in range(width)}
 
 
 def _from_gray(pattern: int) -> int:

@@ -4,6 +4,7 @@ The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 """
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from drivers.driver_type import DriverType
@@ -50,7 +51,7 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
 
 def notes(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
     """Choices that the site makes and should know of: (path below the device, text)."""
-    return lift_checks.notes(settings, lift_checks.sees_fire(settings))
+    return lift_checks.notes(settings, partial(lift_checks.sees, settings))
 
 
 def debounce(settings: Settings) -> Mapping[str, float]:
@@ -133,7 +134,7 @@ def decode(
 def _service(inputs: Inputs, shown: Mapping[str, bool]) -> str | None:
     if inputs.service is None:
         return None
-    return inputs.service.means(_number("service", len(inputs.service.bits), shown))
+    return inputs.service.means(codes.shown_number("service", shown, len(inputs.service.bits)))
 
 
 def _agv(inputs: Inputs, shown: Mapping[str, bool], service: str | None) -> bool | None:
@@ -163,16 +164,10 @@ def _motion(inputs: Inputs, shown: Mapping[str, bool]) -> Motion | None:
     if inputs.up:
         return UP_DOWN[shown["up"], shown["down"]]
     if inputs.motion:
-        number = _number("motion", len(inputs.motion.bits), shown)
+        number = codes.shown_number("motion", shown, len(inputs.motion.bits))
         known = inputs.motion.codes.get(number)
         return Motion(known) if known else Motion.CONTRADICTORY
     return None
-
-
-def _number(prefix: str, width: int, shown: Mapping[str, bool]) -> int:
-    number = codes.decode("binary", [shown[f"{prefix}_bit{i}"] for i in range(width)])
-    assert number is not None  # binary shows any number
-    return number
 
 
 DRIVER = DriverType(

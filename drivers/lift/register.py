@@ -7,14 +7,15 @@ number that the map does not list is a fault; it never means a floor, an open do
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
+from bridges.core.table import Table
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import Lines
 from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
-from drivers.lift import checks
-from drivers.lift.register_map import Flag, FloorField, LiftMap, Number, Problems
+from drivers.lift import checks, register_tables
+from drivers.lift.register_map import Flag, LiftMap, Number, Problems
 from drivers.lift.table import DEBOUNCE_S, HAZARD_DEBOUNCE_S
 
 DOOR: Final = {"open": Door.OPEN, "closed": Door.CLOSED, "moving": Door.BETWEEN}
@@ -35,6 +36,7 @@ class Settings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         """Problems that involve more than one field."""
         levels, commands = self.levels(), self.map.commands
         yield from checks.floors(self)
+        yield from checks.alarm(self)
         landings = set(self.map.floor.codes.values())
         yield from checks.named("code", ("map", "floor", "codes"), landings, levels)
         if commands.call:
@@ -71,6 +73,7 @@ def warnings(settings: Settings) -> Problems:
     fire, told = found.shows(Hazard.FIRE), found.shows("agv_mode")
     asks, holds = bool(commands.agv_mode_request), bool(commands.door_open)
     yield from checks.missing(settings, ("map",), told, asks, fire, holds)
+    yield from checks.unseen(settings, found.shows)
     if not commands.read_back:
         text = "commands cannot be read back: that they are off is not verified"
         yield ("map", "commands", "read_back"), text
@@ -78,7 +81,7 @@ def warnings(settings: Settings) -> Problems:
 
 def notes(settings: Settings) -> Problems:
     """Choices that the site makes and should know of: (path below the device, text)."""
-    return checks.notes(settings, settings.map.shows(Hazard.FIRE))
+    return checks.notes(settings, settings.map.shows)
 
 
 def debounce(settings: Settings) -> Mapping[str, float]:
@@ -96,18 +99,21 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
-    """Rows for `check`: each part of the map, its place, and what its numbers mean."""
+    """Rows for `check`: the place of each part of the map, and of each command."""
     for name, part in settings.map.parts().items():
         yield name, f"{at(settings.unit, part.at)}{_meaning(part)}"
     commands = settings.map.commands
     for signal, _, command in commands.singles():
-        yield (
-            signal,
-            f"{at(settings.unit, command.at)}: {command.ask} asks, {command.release} releases",
-        )
+        yield signal, f"{at(settings.unit, command.at)} is written"
     if commands.call:
-        codes = ", ".join(f"{number} {level}" for number, level in commands.call.codes.items())
-        yield "call", f"{at(settings.unit, commands.call.at)}: {codes}, {commands.call.none} none"
+        yield "call", f"{at(settings.unit, commands.call.at)} is written"
+    if not commands.read_back:
+        yield "commands", "written in every scan, and never read back"
+
+
+def tables(settings: Settings) -> Iterator[Table]:
+    """The floors, what each number means, and what is written."""
+    return register_tables.tables(settings, settings.map)
 
 
 def _meaning(part: Number | Flag) -> str:
@@ -115,11 +121,7 @@ def _meaning(part: Number | Flag) -> str:
     if isinstance(part, Flag):
         bit = "" if part.bit is None else f" bit {part.bit}"
         return f"{bit}: asserted at {int(part.active == 'high')}{text}"
-    bits = f" bits {', '.join(map(str, part.bits))}" if part.bits else ""
-    codes = [f"{number} {meaning}" for number, meaning in sorted(part.codes.items())]
-    if isinstance(part, FloorField):
-        codes += [f"{number} between floors" for number in part.between_floors]
-    return f"{bits}: {', '.join(codes)}{text}"
+    return (f" bits {', '.join(map(str, part.bits))}" if part.bits else "") + text
 
 
 def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterLift":
@@ -233,6 +235,7 @@ DRIVER = DriverType(
     create=create,
     debounce=debounce,
     describe=describe,
+    tables=tables,
     claims=claims,
     warnings=warnings,
     notes=notes,

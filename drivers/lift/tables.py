@@ -1,12 +1,12 @@
 """A lift's codes and outputs as tables: each number with its lines, and what a cut makes of it."""
 
-from collections.abc import Iterator, Mapping
-
-import msgspec
+from collections.abc import Iterator, Mapping, Sequence
 
 from bridges.core.table import Table
+from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Side
 from drivers.hal.points import Wire
+from drivers.lift import codes
 from drivers.lift.table import wires
 from drivers.lift.wiring import FloorCode, LiftWiring
 from drivers.tables import lines_on, one_cut, told_of_cuts
@@ -19,7 +19,7 @@ BETWEEN = "between floors"
 def tables(wiring: LiftWiring) -> Iterator[Table]:
     """The floors from the lowest up, the other codes, and how each output is driven."""
     table = {wire.signal: wire for wire in wires(wiring)}
-    yield _floors(wiring)
+    yield floors(wiring)
     yield _floor_code(wiring, table)
     for name, section in (("service", wiring.inputs.service), ("motion", wiring.inputs.motion)):
         if section is not None:
@@ -27,7 +27,7 @@ def tables(wiring: LiftWiring) -> Iterator[Table]:
     yield _outputs(wiring)
 
 
-def _floors(wiring: LiftWiring) -> Table:
+def floors(wiring: LiftSettings) -> Table:
     """RMF's floors, so that a list that is upside down shows."""
     stops = list(wiring.stops().items())
     rows = [
@@ -44,36 +44,19 @@ def _place(i: int, many: int) -> str:
 
 
 def _floor_code(wiring: LiftWiring, table: Mapping[str, Wire]) -> Table:
-    code = wiring.floor_code
+    code, levels = wiring.floor_code, wiring.levels()
     rows = []
-    for number, level in _numbers(wiring):
-        shown = _shown(code, number, level)
+    for number, level, shown in sorted(code.shows(), key=lambda at: _height(at[1], levels)):
         cuts = [(signal, _landing(code, cut)) for signal, cut in one_cut(shown, table)]
         told = told_of_cuts([(s, r) for s, r in cuts if r != (level or BETWEEN)])
-        rows.append((level or BETWEEN, number, lines_on(shown), told))
+        numbered = "-" if number is None else str(number)
+        rows.append((level or BETWEEN, numbered, lines_on(shown), told))
     return Table(f"floor code ({code.encoding})", ("car at", "code", "lines on", CUT), tuple(rows))
 
 
-def _numbers(wiring: LiftWiring) -> Iterator[tuple[str, str | None]]:
-    """(code as text, landing or None between floors), landings from the lowest up."""
-    code = wiring.floor_code
-    if code.encoding == "one_hot":
-        yield "-", None
-        yield from (("-", level) for level in wiring.levels())
-        return
-    yield from ((str(number), None) for number in code.between_floors)
-    for level in wiring.levels():
-        yield from ((str(n), level) for n, named in code.codes.items() if named == level)
-
-
-def _shown(code: FloorCode, number: str, level: str | None) -> dict[str, bool]:
-    """The lines of this very number: a landing may have several."""
-    if number == "-":
-        return code.show(level)
-    codes = {int(number): level} if level else {}
-    between = [] if level else [int(number)]
-    only = msgspec.structs.replace(code, codes=codes, between_floors=between)
-    return only.show(level)
+def _height(level: str | None, levels: Sequence[str]) -> int:
+    """Between floors first, then the landings from the lowest up."""
+    return -1 if level is None else levels.index(level)
 
 
 def _landing(code: FloorCode, shown: Mapping[str, bool]) -> str:
@@ -81,36 +64,44 @@ def _landing(code: FloorCode, shown: Mapping[str, bool]) -> str:
     return FAULT if why else level or BETWEEN
 
 
-def _code(name: str, width: int, codes: Mapping[int, str], table: Mapping[str, Wire]) -> Table:
+def _code(name: str, width: int, meanings: Mapping[int, str], table: Mapping[str, Wire]) -> Table:
     """A number on plain binary lines: every number that the lines can show."""
+
+    def read(shown: Mapping[str, bool]) -> str:
+        return meanings.get(codes.shown_number(name, shown, width), FAULT)
+
     rows = []
     for number in range(2**width):
-        shown = {f"{name}_bit{i}": bool(number >> i & 1) for i in range(width)}
-        means = codes.get(number, FAULT)
-        cuts = [(s, codes.get(_number(cut), FAULT)) for s, cut in one_cut(shown, table)]
+        shown = codes.lines(name, number, width)
+        means = meanings.get(number, FAULT)
+        cuts = [(s, read(cut)) for s, cut in one_cut(shown, table)]
         told = told_of_cuts([(s, r) for s, r in cuts if r != means])
         rows.append((means, str(number), lines_on(shown), told))
     return Table(f"{name} code", ("means", "code", "lines on", CUT), tuple(rows))
 
 
-def _number(shown: Mapping[str, bool]) -> int:
-    return sum(on << i for i, on in enumerate(shown.values()))
-
-
 def _outputs(wiring: LiftWiring) -> Table:
-    limits = wiring.limits
+    have = [name for name in _DRIVEN if getattr(wiring.outputs, name) is not None]
+    rows = [(name, name) for name in have]
+    rows += [(f"call {level}", _call(wiring, level)) for level in wiring.levels()]
+    told = tuple((output, lines, how_long(wiring, output)) for output, lines in rows)
+    return Table("outputs", ("output", "lines on", "how long"), told)
+
+
+_DRIVEN = {
+    "agv_mode_request": "on while a robot holds the lift, and {grace_s:g} s longer",
+    "door_open": "on while the car stands for a robot",
+    "rear_door_open": "on while the car stands for a robot, at a floor of the rear door",
+}
+
+
+def how_long(settings: LiftSettings, output: str) -> str:
+    """For how long an output is driven; one that is not listed is a call."""
+    limits = settings.limits
+    if output in _DRIVEN:
+        return _DRIVEN[output].format(grace_s=limits.release_grace_s)
     pulse_s = limits.call_pulse_s
-    called = "on until the car is there" if pulse_s is None else f"one pulse of {pulse_s:g} s"
-    holds = f"on while a robot holds the lift, and {limits.release_grace_s:g} s longer"
-    driven = {
-        "agv_mode_request": holds,
-        "door_open": "on while the car stands for a robot",
-        "rear_door_open": "on while the car stands for a robot, at a floor of the rear door",
-    }
-    have = [name for name in driven if getattr(wiring.outputs, name) is not None]
-    rows = [(name, name, driven[name]) for name in have]
-    rows += [(f"call {level}", _call(wiring, level), called) for level in wiring.levels()]
-    return Table("outputs", ("output", "lines on", "how long"), tuple(rows))
+    return "on until the car is there" if pulse_s is None else f"one pulse of {pulse_s:g} s"
 
 
 def _call(wiring: LiftWiring, level: str) -> str:

@@ -10,6 +10,7 @@ from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Hazard
 from drivers.hal.points import Input, Output
 from drivers.lift import codes
+from drivers.lift.codes import Encoding
 
 Number = Annotated[int, msgspec.Meta(ge=0, le=65535)]
 """A number that a controller shows on several lines."""
@@ -175,14 +176,27 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     def show(self, level: str | None) -> dict[str, bool]:
         """Signal -> asserted at a landing (None: between floors). ValueError if it has no code."""
+        for _, shown_level, shown in self.shows():
+            if shown_level == level:
+                return shown
+        raise ValueError(f"no code for {level or 'between floors'}")
+
+    def shows(self) -> Iterator[tuple[int | None, str | None, dict[str, bool]]]:
+        """All that the controller shows: (number, landing or None between floors, its lines).
+
+        `one_hot` has no numbers. Raises ValueError for a number that does not fit on the lines.
+        """
         if self.encoding == "one_hot":
-            return {f"floor_{name}": name == level for name in self.lines}
-        numbers = [n for n, name in self.codes.items() if name == level]
-        if level is None:
-            numbers = self.between_floors
-        if not numbers:
-            raise ValueError(f"no code for {level or 'between floors'}")
-        lines = codes.encode(self.encoding, numbers[0], len(self.bits))
+            for level in (None, *self.lines):
+                yield None, level, {f"floor_{name}": name == level for name in self.lines}
+            return
+        for number in self.between_floors:
+            yield number, None, self._lines(self.encoding, number)
+        for number, level in self.codes.items():
+            yield number, level, self._lines(self.encoding, number)
+
+    def _lines(self, encoding: Encoding, number: int) -> dict[str, bool]:
+        lines = codes.encode(encoding, number, len(self.bits))
         shown = {f"floor_bit{i}": on for i, on in enumerate(lines)}
         if self.parity:
             shown["floor_parity"] = sum(lines) % 2 != (self.parity.total == "odd")
@@ -202,7 +216,7 @@ class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def lines(self, level: str | None) -> dict[str, bool]:
         """Signal -> asserted, for a call to this landing (None: no call)."""
         number = next((n for n, name in self.codes.items() if name == level), 0)
-        return {f"call_bit{i}": bool(number >> i & 1) for i in range(len(self.bits))}
+        return codes.lines("call", number, len(self.bits))
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -1,7 +1,8 @@
 """A charger with its maker's own CAN frames, by the driver's map, with a plant behind it.
 
 It charges while every frame of its map comes on time with the values of `on`. It stops when a frame has
-the values of `off`, or when one stays away for three periods.
+the values of `off`, or when one stays away for three periods. A machine that holds this station
+up holds the daemon up as well, so such a gap counts as one look only.
 
 Failing part `node`, beside those of the plant and the bus: `off` is silent, `stuck` says what it said
 before, `slow` says it every two seconds, `garbage` sends frames of six bytes, `wrong` a state of no
@@ -14,11 +15,13 @@ from typing import Final
 
 import can
 
-from bridges.charger.signals import Activity
+from bridges.charger.signals import Activity, FaultSide
 from drivers.charger import dbc
 from drivers.charger.can_frames import Settings, frame_map
-from drivers.charger.can_map import FrameMap, Sent
+from drivers.charger.can_map import FrameMap, Sent, State
+from drivers.charger.rules import UNKNOWN, Errors
 from hal_fakes.can.side import Send
+from hal_fakes.charger_values import NEAREST, values
 from hal_fakes.fake import Fake
 from hal_fakes.plants.pad import PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
@@ -40,6 +43,7 @@ FLAGS: Final = {
     "too_near": "BadCoilPosition",
 }
 """Which error signal shows what is wrong with the plant; none is published for foreign objects."""
+ROBOTS_FAULTS: Final = frozenset(FLAGS) - {"transmitter_fault", "foreign_object"}
 
 
 class FrameCharger:
@@ -54,25 +58,29 @@ class FrameCharger:
         self._receiver = next(known, RECEIVER)
         self._wanted = {self._dbc.id(sent.frame): sent for sent in self._map.send}
         self._fed_at: dict[str, float] = {}
+        self._looked_at = float("-inf")
+        self._watched_s = 0.0
         self._status_at = float("-inf")
         self._status: list[can.Message] = []
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
         """A frame that feeds it, or that takes its power away."""
+        self._look(now)
         extended = dbc.EXTENDED if message.is_extended_id else 0
         sent = self._wanted.get(message.arbitration_id | extended)
         if sent is None or self.plant.failures.get("node") == "off":
             return
         if self._says(sent, bytes(message.data), on=True):
-            self._fed_at[sent.frame] = now
+            self._fed_at[sent.frame] = self._watched_s
         elif self._says(sent, bytes(message.data), on=False):
             self._fed_at.clear()
-        self.plant.drive("enable", self._fed(now), now)
+        self.plant.drive("enable", self._fed(), now)
 
     def tick(self, now: float, send: Send) -> None:
         """Stop when the frames that keep it charging stay away, and send the status."""
+        self._look(now)
         mode = self.plant.failures.get("node")
-        self.plant.drive("enable", self._fed(now) and mode != "off", now)
+        self.plant.drive("enable", self._fed() and mode != "off", now)
         period_s = SLOW_S if mode == "slow" else STATUS_S
         if mode == "off" or now < self._status_at + period_s:
             return
@@ -82,10 +90,15 @@ class FrameCharger:
         for message in self._status:
             send(_short(message) if mode == "garbage" else message)
 
-    def _fed(self, now: float) -> bool:
+    def _look(self, now: float) -> None:
+        """Add to the time that this station has watched the bus."""
+        self._watched_s += min(now - self._looked_at, STATUS_S)
+        self._looked_at = now
+
+    def _fed(self) -> bool:
         needed = (sent for sent in self._map.send if sent.on is not None)
         return all(
-            now - self._fed_at.get(sent.frame, float("-inf")) < PERIODS * sent.every_s
+            self._watched_s - self._fed_at.get(sent.frame, float("-inf")) < PERIODS * sent.every_s
             for sent in needed
         )
 
@@ -111,38 +124,58 @@ class FrameCharger:
 
     def _values(self, reading: PadReading, wrong: bool) -> dict[str, float]:
         known = self._map
-        values = {known.state.at: float(self._unknown() if wrong else self._code(reading))}
+        shown = {FLAGS[fault] for fault in reading.faults}
+        said: dict[str, float] = {}
+        if known.state:
+            state = self._unknown(known.state) if wrong else self._code(known.state, reading)
+            said[known.state.at] = float(state)
         for signal, value in (
             (known.volts, reading.volts),
             (known.amps, reading.amps),
             (known.receiver, float(self._seen(reading))),
         ):
             if signal:
-                values[signal] = round(value, 1)
-        shown = {FLAGS[fault] for fault in reading.faults}
+                said[signal] = round(value, 1)
         for signal in (*known.errors.station, *known.errors.robot):
-            values[signal] = float(signal.split(".")[1] in shown)
+            said[signal] = float(signal.split(".")[1] in shown)
+        for signal in known.temperatures.values():
+            said[signal] = round(reading.coil_c)
+        for flag, holds in (
+            (known.range_ok, reading.in_range),
+            (known.at_height, reading.at_height),
+        ):
+            if flag:
+                said[flag] = float(holds)
         if known.out_of_range:
-            values[known.out_of_range] = float(reading.robot and not reading.in_range)
-        return values
+            said[known.out_of_range] = float(reading.robot and not reading.in_range)
+        return said | self._by_rules(reading, said, wrong)
+
+    def _by_rules(
+        self, reading: PadReading, natural: Mapping[str, float], wrong: bool
+    ) -> dict[str, float]:
+        """What the signals of rules, error numbers and error flags hold."""
+        known = self._map
+        flags = (*known.errors.station, *known.errors.robot)
+        numbers = Errors(codes=known.errors.codes, bits=known.errors.bits)
+        in_error = reading.activity is Activity.ERROR
+        side: FaultSide = "robot" if in_error and reading.faults & ROBOTS_FAULTS else ""
+        wanted = UNKNOWN if wrong else (reading.activity, side)
+        found = values(known.rules, numbers, wanted, natural)
+        found = values(known.rules, numbers, UNKNOWN, natural) if found is None else found
+        return {at: float(value) for at, value in (found or {}).items() if at not in flags}
 
     def _seen(self, reading: PadReading) -> int:
         """The id of the receiver on the pad; 0 if there is none."""
         return STRANGER if reading.stranger else self._receiver if reading.robot else 0
 
-    def _code(self, reading: PadReading) -> int:
+    def _code(self, state: State, reading: PadReading) -> int:
         """The first code of the plant's activity, or of the nearest one that the map has."""
-        lists = self._map.state.codes.lists()
-        nearest = {
-            Activity.HANDSHAKE: Activity.IDLE,
-            Activity.STOPPING: Activity.CHARGING,
-            Activity.RELEASED: Activity.IDLE,
-        }
-        codes = lists[reading.activity] or lists[nearest.get(reading.activity, Activity.ERROR)]
+        lists = state.codes.lists()
+        codes = lists[reading.activity] or lists[NEAREST.get(reading.activity, Activity.ERROR)]
         return codes[0]
 
-    def _unknown(self) -> int:
-        known = self._map.state.codes.meanings()
+    def _unknown(self, state: State) -> int:
+        known = state.codes.meanings()
         return next(code for code in range(15, -1, -1) if code not in known)
 
 

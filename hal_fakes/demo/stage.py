@@ -8,9 +8,9 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import Final
@@ -38,7 +38,7 @@ class Demo:
     """`files`: a daemon's YAML, by the device that it serves. `dawn`: how everything stands in the
     morning, which `dawns` sees. `live`: the day itself, which raises Wrong when something does not come
     about in time. `problems`: whatever was not as it should be, from the journal alone. `right`: the
-    day in a sentence."""
+    day in a sentence. `outcomes`: what each part of the day has shown, if the summary lists them."""
 
     files: dict[str, Path]
     dawn: str
@@ -46,6 +46,7 @@ class Demo:
     live: Callable[[World], None]
     problems: Callable[[Journal], Sequence[str]]
     right: str
+    outcomes: Mapping[str, str] = field(default_factory=dict)
 
 
 class Stage:
@@ -149,4 +150,9 @@ def summary(demo: Demo, journal: Journal) -> str:
     """What was done, in a few lines."""
     counts = ", ".join(f"{n} {what}" for what, n in sorted(journal.counts().items()))
     legs = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in journal.legs.items())
+    if demo.outcomes:
+        legs = "\n       ".join(
+            f"{name:<17} {seconds:5.1f} s  {demo.outcomes[name]}"
+            for name, seconds in journal.legs.items()
+        )
     return f"\nRIGHT: {demo.right}\n       {counts}\n       {legs}\n"

@@ -138,7 +138,10 @@ class World:
         began_at = time.monotonic()
         if text:
             self.note(f"-- {name}: {text}")
-        yield
+        try:
+            yield
+        except Wrong as wrong:
+            raise Wrong(f"{name}: {wrong}" if text else str(wrong)) from wrong
         self.journal.legs[name] = time.monotonic() - began_at
 
     def until(
@@ -157,6 +160,11 @@ class World:
                 repeat_at += 1.0
                 self.say([repeat])
             self._turn(LOOK_EVERY_S)
+
+    def shows(self, what: str, ready: Callable[[], bool], within_s: float = 10.0) -> None:
+        """Go on when this has come about, and say so. Raises Wrong if it takes too long."""
+        self.until(ready, within_s, what)
+        self.note(f"   so: {what}")
 
     def pause(self, seconds: float) -> None:
         """Let so many seconds pass."""

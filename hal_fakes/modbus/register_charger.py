@@ -65,6 +65,9 @@ class RegisterCharger:
             "time_to_full_s": reading.time_to_full_s or 0.0,
             "receiver": float(reading.receiver or 0),
             "in_range": bool(reading.in_range),
+            "range_ok": reading.range_ok,
+            "at_height": reading.at_height,
+            **dict.fromkeys(self._map.temperatures.values(), reading.celsius),
             "state": self._code(reading.activity),
         }
         natural = {name: value for name, value in measured.items() if name in self._cells}

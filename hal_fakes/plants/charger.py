@@ -2,10 +2,11 @@
 
 To press: `robot` (one stands on the pad), or a robot of the YAML's `receivers` by its name
 (`tiny/AMR02`), or a `stranger`; whoever comes pushes nobody away, and the last one to come is seen.
-`out_of_range`: whoever stands there stands badly. `foreign_object` (something lies on the pad),
+`out_of_range`: whoever stands there stands badly. `pad_down`: the pad, which otherwise rises to
+whoever comes, stays down or sinks. `foreign_object` (something lies on the pad),
 `over_temperature`. A robot comes with its battery 40 % full; the station shakes hands, charges, ramps
 down when it is full, waits, and is idle again until another robot comes. An error stays until it is
-cleared after its cause has gone.
+cleared after its cause has gone, one of the robot's (ROBOTS_FAULTS) until the robot leaves.
 
 To drive: `clear_error`, and where the station can be commanded `power` (without it, it charges nobody)
 and `range_check` (its result is there a moment later; a station that needs none knows at once).
@@ -36,6 +37,9 @@ RANGE_CHECK_S: Final = 0.3
 VOLTS_EMPTY: Final = 44.0
 VOLTS_FULL: Final = 54.0
 AMPS: Final = 12.0
+AMBIENT_C: Final = 25.0
+WARM_C: Final = 48.0
+HOT_C: Final = 97.0
 NEVER: Final = float("inf")
 
 CAUSES: Final = {
@@ -59,6 +63,9 @@ class Reading:
     failures: Mapping[str, FailureMode]
     receiver: str = ""
     in_range: bool | None = None
+    range_ok: bool = False
+    at_height: bool = False
+    celsius: float = AMBIENT_C
     battery: float | None = None
     volts: float = 0.0
     amps: float = 0.0
@@ -84,7 +91,9 @@ class ChargerPlant(Machine):
         parts: Iterable[str] = PARTS,
     ) -> None:
         self._receivers = {robot: receiver for receiver, robot in receivers.items()}
-        buttons = sorted(("out_of_range", *CAUSES, "robot", "stranger", *self._receivers))
+        buttons = sorted(
+            ("out_of_range", "pad_down", *CAUSES, "robot", "stranger", *self._receivers)
+        )
         super().__init__(name, wires, parts, buttons)
         self._pace = pace
         self.activity = Activity.IDLE
@@ -114,6 +123,9 @@ class ChargerPlant(Machine):
             dict(self.failures),
             self._receiver(),
             self._in_range(),
+            self.coupled(),
+            self.risen(),
+            HOT_C if self.pressed["over_temperature"] else WARM_C if flows else AMBIENT_C,
             battery if self._here else None,
             VOLTS_EMPTY + battery * (VOLTS_FULL - VOLTS_EMPTY) if self._here else 0.0,
             AMPS if flows else 0.0,
@@ -133,7 +145,15 @@ class ChargerPlant(Machine):
         """None while a check is under way, or where nobody has asked for one."""
         if self._asked and not self._checked_at <= self.now:
             return None
+        return self.coupled()
+
+    def coupled(self) -> bool:
+        """Does whoever is there stand where it can be charged?"""
         return bool(self._here) and not self.pressed["out_of_range"]
+
+    def risen(self) -> bool:
+        """Is the pad where it charges?"""
+        return bool(self._here) and not self.pressed["pad_down"]
 
     def _battery(self) -> float:
         if self.activity is not Activity.CHARGING or self._until == NEVER:
@@ -178,6 +198,9 @@ class ChargerPlant(Machine):
         """What is due ends, and what the pad and the causes demand begins."""
         if self.now >= self._until:
             self._end()
+        if self.error_text in ROBOTS_FAULTS and not self._here:
+            self.error_text = ""
+            self._enter(Activity.IDLE)
         cause = next((c for c in CAUSES if self.pressed[c]), None)
         busy = self.activity in (*CURRENT_FLOWS, Activity.HANDSHAKE)
         if cause and busy:

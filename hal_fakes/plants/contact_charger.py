@@ -1,7 +1,8 @@
 """A charging station on contacts: an enable relay, and contacts that say what it does.
 
 It is `charger.py`'s station but for its terminal block: `charging` while current flows, `ready` while
-it could charge, `fault` in an error, which ends when its cause has gone.
+it could charge, `fault` in an error, which ends when its cause has gone, `at_height` and `range_ok`
+of the pad.
 """
 
 from collections.abc import Sequence
@@ -40,6 +41,10 @@ class ContactCharger(ChargerPlant):
             return self.activity in CURRENT_FLOWS
         if signal == "fault":
             return self.activity is Activity.ERROR
+        if signal == "at_height":
+            return self.risen()
+        if signal == "range_ok":
+            return self.coupled()
         return self.activity not in NOT_READY if signal == "ready" else super().contact(signal)
 
     def run(self) -> None:

@@ -21,6 +21,7 @@ Parts that fail: `car` (`off`, `stuck`: stands where it is; `slow`; `wrong`: goe
 from dataclasses import dataclass
 
 from bridges.lift.signals import Hazard, Side
+from drivers.lift import codes
 from drivers.lift.dry_contact import Settings, wires
 from drivers.lift.table import input_rows
 from hal_fakes.fake import Fake
@@ -259,9 +260,8 @@ class LiftPlant(Machine):
             return {}
         course = {0: "stopped", 1: "up", -1: "down"}[self.car.course]
         states = (course,) if self.car.standing else (course, "moving")
-        return _bits(
-            "motion", len(code.bits), next(n for n, s in code.codes.items() if s in states)
-        )
+        number = next(n for n, s in code.codes.items() if s in states)
+        return codes.lines("motion", number, len(code.bits))
 
     def _service_lines(self) -> dict[str, bool]:
         code = self._wiring.inputs.service
@@ -271,7 +271,8 @@ class LiftPlant(Machine):
         states += ["agv_mode"] if self.agv else []
         states += ["normal", *(s for s in code.codes.values() if s not in ("agv_mode", "fault"))]
         numbers = {str(state): number for number, state in reversed(code.codes.items())}
-        return _bits("service", len(code.bits), next(numbers[s] for s in states if s in numbers))
+        number = next(numbers[s] for s in states if s in numbers)
+        return codes.lines("service", number, len(code.bits))
 
     def _floor_lines(self) -> dict[str, bool]:
         """A controller that has no code for between floors shows the last one on."""
@@ -304,10 +305,6 @@ def _slowed(seconds: float, failure: FailureMode | None) -> float | None:
     if failure in ("off", "stuck"):
         return None
     return seconds * SLOWNESS if failure == "slow" else seconds
-
-
-def _bits(prefix: str, width: int, number: int) -> dict[str, bool]:
-    return {f"{prefix}_bit{i}": bool(number >> i & 1) for i in range(width)}
 
 
 FAKE = Fake[Settings](plant=lambda name, settings, wires: build(name, settings))

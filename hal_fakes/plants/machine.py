@@ -102,7 +102,7 @@ class Machine(ABC):
         """Make a wire or part fail from now on; None mends it. ValueError names what there is."""
         contact = self._sensors.get(part) or self._relays.get(part)
         if contact is None and part not in self._parts:
-            known = ", ".join(sorted({*self._parts, *self._sensors, *self._relays}))
+            known = ", ".join(self.names()["fail"])
             raise ValueError(f"{self.name} has no part {part!r}; there are {known}")
         if mode not in (None, *FAILURE_MODES):
             raise ValueError(f"no failure {mode!r}; there are {', '.join(FAILURE_MODES)}")
@@ -113,6 +113,11 @@ class Machine(ABC):
         if contact is not None:
             contact.fail(mode, self.now)
         self._settle()
+
+    def names(self) -> dict[str, list[str]]:
+        """What can `press` and what can `fail`."""
+        parts = sorted({*self._parts, *self._sensors, *self._relays})
+        return {"press": list(self.pressed), "fail": parts}
 
     def press(self, signal: str, asserted: bool, now: float) -> None:
         """A person or the building acts. ValueError names what can be pressed."""

@@ -79,6 +79,7 @@ class PadReading:
     gap_mm: float
     offset_mm: float
     in_range: bool
+    at_height: bool
     range_result: str
     enabled: bool
     volts: float
@@ -129,6 +130,7 @@ class PadPlant(Machine):
             gap_mm=CLEARANCE_MM - self.height_mm,
             offset_mm=OFFSET_MM[self.pressed["misparked"]],
             in_range=self.in_range(),
+            at_height=self.height_mm == RISE_MM,
             range_result=self._range,
             enabled=self.enabled,
             volts=EMPTY_V + (FULL_V - EMPTY_V) * self._filled() if self._there() else 0.0,

@@ -54,5 +54,8 @@ class Plant(Protocol):
     def fail(self, part: str, mode: FailureMode | None) -> None:
         """Make a signal or part fail this way; None mends it. ValueError names the known parts."""
 
+    def names(self) -> Mapping[str, list[str]]:
+        """What can `press` and what can `fail`."""
+
     def press(self, signal: str, asserted: bool, now: float) -> None:
         """A person or the building acts: a fire alarm, a key switch, an obstruction."""

@@ -7,7 +7,7 @@ from drivers.charger.modbus import Settings, points
 from drivers.charger.xnergy import CHECK_RANGE, ENABLE, IN_RANGE, TICKS_PER_UNIT
 from drivers.hal.modbus.points import Point
 from hal_fakes.fake import Fake
-from hal_fakes.plants.pad import PadPlant, PadReading
+from hal_fakes.plants.pad import AMBIENT_C, PadPlant, PadReading
 from hal_fakes.plants.plant import Plant
 
 SIGNALS: Final = (ENABLE, CHECK_RANGE)
@@ -45,6 +45,8 @@ def words(reading: PadReading, latched: int = 0) -> dict[str, int]:
         "latched_high": shadow >> 16,
         "volts": round(reading.volts * TICKS_PER_UNIT),
         "amps": round(reading.amps * TICKS_PER_UNIT),
+        "device_c": round(AMBIENT_C),
+        "coil_c": round(reading.coil_c),
         "range": RANGES[reading.range_result],
     }
 

@@ -1,22 +1,33 @@
 """A fleet adapter and its robots, as far as charging goes.
 
-ChargeBattery goes to the robot's dedicated waypoint and waits there for its battery, as the mode
-CHARGING shows; nothing sets that mode back while another task runs. A changed charging assignment
-restarts it. A waypoint that the graph does not have is the end of the adapter. (rmf_ros2 9dedd0f:
-ChargeBattery.cpp, WaitForCharge.cpp, TaskManager::robot_mode, update_charging_assignments.)
+Read in rmf_ros2 9dedd0f (TaskManager.cpp, tasks/ChargeBattery.cpp, phases/WaitForCharge.cpp,
+FleetUpdateHandle.cpp) and seen with Jazzy's:
+1. ChargeBattery goes to the robot's dedicated waypoint and waits there for its battery. An assignment
+   whose waypoint or mode differs from the last one starts it again, and moves no robot without it. A
+   waypoint that the graph does not have is the end of the adapter.
+2. It is a task when RMF finds the battery too low for the way to the dedicated waypoint (the automatic
+   retreat; never while the robot stands there already), or when its planner wants it. That task ends at
+   recharge_soc. It is no task when it is the fleet's `finishing_request: charge`. That one lasts until
+   the next task, however full the battery is. `park` drives to a parking spot, `nothing` stays.
+3. A robot without a task shows the mode IDLE and no task id, also while it charges. WaitForCharge
+   alone sets CHARGING, and nothing sets it back: every later task shows it too.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import CHARGING_ASSIGNMENTS, FLEET_STATES, AnyTopic
 from hal_fakes.rmf import Party, Said
 
 EVERY_S: Final = 1.0
+RECHARGE_PERCENT: Final = 100.0
+RETREAT_PERCENT: Final = 12.0
 Graph = Mapping[str, tuple[str, float, float]]
 """Waypoint -> level, x, y (m)."""
+Finishing = Literal["charge", "park", "nothing"]
+Doing = Literal["", "work", "charge", "idle charge", "idle park"]
 
 
 class AdapterCrashed(Exception):
@@ -25,18 +36,28 @@ class AdapterCrashed(Exception):
 
 @dataclass
 class FleetRobot:
-    """`place`: the waypoint at which it stands; "" on the road. `goes_to`: where its task wants it.
-    `dedicated`: its charger or waiting place. `task_id`: "" when it has none."""
+    """`place`: the waypoint at which it stands; "" on the road. `goes_to`: where it drives.
+    `dedicated`, `waits`: its charging assignment. `doing`: its task, or what it does without one.
+    `task_id`: "" without a task. `mode`: the last that a phase has set. `stuck`: it
+    drives nowhere."""
 
     name: str
     place: str
     dedicated: str
-    battery_percent: float = 40.0
+    battery_percent: float = 100.0
+    waits: bool = False
+    doing: Doing = ""
     task_id: str = ""
     goes_to: str = ""
     arrives_at: float = 0.0
     came_from: str = ""
     mode: d.RobotModeValue = d.RobotModeValue.MODE_IDLE
+    stuck: bool = False
+
+    @property
+    def charges(self) -> bool:
+        """Its ChargeBattery runs, as a task or without one."""
+        return self.doing in ("charge", "idle charge")
 
 
 class Fleet(Party):
@@ -44,28 +65,39 @@ class Fleet(Party):
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS,)
 
-    def __init__(self, name: str, graph: Graph, robots: Mapping[str, str], drive_s: float) -> None:
-        """`robots`: each where it stands. `drive_s`: how long every way takes."""
+    def __init__(
+        self,
+        name: str,
+        graph: Graph,
+        robots: Mapping[str, str],
+        drive_s: float,
+        finishing: Finishing = "nothing",
+    ) -> None:
+        """`robots`: each where it stands, which is a parking spot. `drive_s`: how long every way takes.
+        `finishing`: the fleet's `finishing_request`."""
         self.name = name
         self.graph = graph
         self.drive_s = drive_s
+        self.finishing = finishing
         self.robots = {who: FleetRobot(who, place, place) for who, place in robots.items()}
+        self._spots = dict(robots)
         self._tasks = 0
         self._told_at = -EVERY_S
+        for robot in self.robots.values():
+            self._rest(robot, 0.0)
 
-    def charge(self, who: str, now: float) -> None:
-        """RMF finds its battery low: ChargeBattery begins."""
-        robot = self.robots[who]
-        self._tasks += 1
-        robot.task_id = f"charge-{self._tasks}"
-        self._go(robot, robot.dedicated, now)
+    def charge(self, who: str, now: float, percent: float = 40.0) -> None:
+        """RMF's planner finds its battery low: ChargeBattery begins, as a task."""
+        self.robots[who].battery_percent = percent
+        self._begin(self.robots[who], "charge", now)
 
     def works(self, who: str, place: str, now: float) -> None:
         """Another task takes it away."""
-        robot = self.robots[who]
-        self._tasks += 1
-        robot.task_id = f"work-{self._tasks}"
-        self._go(robot, place, now)
+        self._begin(self.robots[who], "work", now, place)
+
+    def rests(self, who: str, now: float) -> None:
+        """Its task is over, and the fleet's finishing request begins."""
+        self._rest(self.robots[who], now)
 
     def strays(self, who: str, place: str, now: float) -> None:
         """It drives there in the task that it has, whatever that wants."""
@@ -79,13 +111,15 @@ class Fleet(Party):
                     raise AdapterCrashed(assignment.waypoint_name)
                 robot = self.robots.get(assignment.robot_name)
                 if robot is not None:
-                    self._dedicate(robot, assignment.waypoint_name, now)
+                    waits = assignment.mode == d.ChargingMode.MODE_WAIT
+                    self._dedicate(robot, assignment.waypoint_name, waits, now)
         return []
 
     def tick(self, now: float) -> list[Said]:
-        """Robots drive on, batteries that are full end their task, and the state goes out."""
+        """Robots drive on, low ones retreat, full ones end their task, the state goes out."""
         for robot in self.robots.values():
             self._move(robot, now)
+            self._retreat(robot, now)
         if now < self._told_at + EVERY_S:
             return []
         self._told_at = now
@@ -97,15 +131,42 @@ class Fleet(Party):
         ways = [robot.arrives_at for robot in self.robots.values() if robot.goes_to]
         return min([self._told_at + EVERY_S, *ways])
 
-    def _dedicate(self, robot: FleetRobot, waypoint: str, now: float) -> None:
-        if waypoint != robot.dedicated and robot.task_id.startswith("charge"):
+    # ---- tasks
+
+    def _begin(self, robot: FleetRobot, doing: Doing, now: float, place: str = "") -> None:
+        self._tasks += 1
+        robot.doing, robot.task_id = doing, f"{doing}-{self._tasks}"
+        self._go(robot, place or robot.dedicated, now)
+
+    def _rest(self, robot: FleetRobot, now: float) -> None:
+        robot.doing, robot.task_id = "", ""
+        if self.finishing == "charge":
+            robot.doing = "idle charge"
+            self._go(robot, robot.dedicated, now)
+        elif self.finishing == "park":
+            robot.doing = "idle park"
+            self._go(robot, self._spots[robot.name], now)
+
+    def _retreat(self, robot: FleetRobot, now: float) -> None:
+        """consider_retreating_to_charger: not with a task, and not where it is dedicated to."""
+        low = robot.battery_percent < RETREAT_PERCENT
+        if low and not robot.task_id and robot.dedicated not in (robot.place, robot.goes_to):
+            self._begin(robot, "charge", now)
+
+    def _dedicate(self, robot: FleetRobot, waypoint: str, waits: bool, now: float) -> None:
+        changed = (waypoint, waits) != (robot.dedicated, robot.waits)
+        robot.dedicated, robot.waits = waypoint, waits
+        if changed and robot.charges:
             self._go(robot, waypoint, now)
-        robot.dedicated = waypoint
+
+    # ---- on the road
 
     def _go(self, robot: FleetRobot, place: str, now: float) -> None:
         if robot.place == place:
             robot.goes_to = ""
             self._arrived(robot)
+            return
+        if robot.stuck:
             return
         robot.came_from = robot.place or robot.came_from
         robot.place, robot.goes_to, robot.arrives_at = "", place, now + self.drive_s
@@ -114,11 +175,11 @@ class Fleet(Party):
         if robot.goes_to and now >= robot.arrives_at:
             robot.place, robot.goes_to = robot.goes_to, ""
             self._arrived(robot)
-        if robot.task_id.startswith("charge") and robot.battery_percent >= 100.0:
-            robot.task_id, robot.mode = "", d.RobotModeValue.MODE_IDLE
+        if robot.doing == "charge" and robot.battery_percent >= RECHARGE_PERCENT:
+            self._rest(robot, now)
 
     def _arrived(self, robot: FleetRobot) -> None:
-        if robot.task_id.startswith("charge"):
+        if robot.charges:
             robot.mode = d.RobotModeValue.MODE_CHARGING
 
     def _state(self, robot: FleetRobot, now: float) -> d.RobotState:

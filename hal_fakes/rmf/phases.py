@@ -58,8 +58,7 @@ class EndLiftSession(Phase):
 
     def begin(self, robot: Robot, now: float) -> list[Said]:
         """Sends nothing: END_SESSION goes out at the next LiftState that shows our session."""
-        robot.release_lift()
-        return []
+        return robot.release_lift()
 
     def hear(self, robot: Robot, message: d.Message, now: float) -> list[Said]:
         """EndLiftSession.cpp, _init_obs."""

@@ -1,7 +1,8 @@
 """A fleet adapter, for one robot: what its context does by itself, whichever phase is running.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/RobotContext.cpp:1281-1324 and
-1600-1800. The phases are in `phases.py`.
+1600-1800. The phases are in `phases.py`. `jazzy`: by Jazzy's rules where they differ (branch jazzy,
+7eef65a, RobotContext.cpp:1054-1095 and 1329-1419).
 """
 
 from abc import ABC, abstractmethod
@@ -59,8 +60,9 @@ class Robot(Party):
         topics.DOOR_SUPERVISOR_HEARTBEAT,
     )
 
-    def __init__(self, requester_id: str) -> None:
+    def __init__(self, requester_id: str, jazzy: bool = False) -> None:
         self.requester_id = requester_id
+        self.jazzy = jazzy
         self.phase: Phase | None = None
         self.on_task = True
         self.in_car = False
@@ -114,11 +116,25 @@ class Robot(Party):
         at = self.destination
         return self.lift_arrived and at is not None and (at.lift, at.floor) == (lift, floor)
 
-    def release_lift(self) -> None:
-        """Only forgets: END_SESSION goes out when a LiftState shows our session."""
+    def release_lift(self) -> list[Said]:
+        """Forgets; END_SESSION goes out when a LiftState shows our session, of Jazzy's now too."""
+        said = []
+        if self.jazzy and self.destination is not None:
+            said = [self._end(self.destination.lift, self.destination.floor, 0.0)]
         self.destination = None
         self.lift_arrived = False
         self._idle_since = None
+        return said
+
+    def _end(self, lift: str, floor: str, now: float) -> Said:
+        end = d.LiftRequest(
+            lift_name=lift,
+            request_time=stamp(now),
+            session_id=self.requester_id,
+            request_type=d.LiftRequestType.REQUEST_END_SESSION,
+            destination_floor=floor,
+        )
+        return topics.ADAPTER_LIFT_REQUESTS, end
 
     def _publish_destination(self, now: float) -> list[Said]:
         if self.destination is None:
@@ -134,31 +150,28 @@ class Robot(Party):
         return [(topics.ADAPTER_LIFT_REQUESTS, request)]
 
     def _check_lift_state(self, state: d.LiftState, now: float) -> list[Said]:
-        self._release_if_idle(now)
+        said = self._release_if_idle(now)
         if self.destination is not None and self.destination.lift == state.lift_name:
-            return self._publish_destination(now)
-        if state.session_id != self.requester_id:
-            return []
-        end = d.LiftRequest(
-            lift_name=state.lift_name,
-            request_time=stamp(now),
-            session_id=self.requester_id,
-            request_type=d.LiftRequestType.REQUEST_END_SESSION,
-        )
-        return [(topics.ADAPTER_LIFT_REQUESTS, end)]
+            return said + self._publish_destination(now)
+        if state.session_id == self.requester_id:
+            said.append(self._end(state.lift_name, "", 0.0 if self.jazzy else now))
+        return said + (self._publish_destination(now) if self.jazzy else [])
 
-    def _release_if_idle(self, now: float) -> None:
+    def _release_if_idle(self, now: float) -> list[Said]:
         claimed = self.phase is not None and self.phase.claims_lift and not self.phase.done
         if self.destination is None or claimed:
-            return
+            return []
         if self.destination.inside and self.on_task:
-            return
+            return []
         if self.destination.inside and self.in_car:
             self._idle_since = None
+        elif self.jazzy and not self.destination.inside:
+            return self.release_lift()
         elif self._idle_since is None:
             self._idle_since = now
-        elif now - self._idle_since > (10.0 if self.destination.inside else 30.0):
-            self.release_lift()
+        elif self.jazzy or now - self._idle_since > (10.0 if self.destination.inside else 30.0):
+            return self.release_lift()
+        return []
 
     # ---- door
 

@@ -1,7 +1,8 @@
 """rmf_lift_supervisor and rmf_door_supervisor, rule by rule.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/lift_supervisor/Node.cpp and
-door_supervisor/Node.cpp. Neither remembers anything across a restart.
+door_supervisor/Node.cpp. Neither remembers anything across a restart. Where Jazzy's differ (branch
+jazzy, 7eef65a), `jazzy` says so.
 """
 
 from collections.abc import Sequence
@@ -15,12 +16,16 @@ from hal_fakes.rmf import Party, Said, door_request
 
 
 class LiftSupervisor(Party):
-    """rmf_lift_supervisor: one slot for each lift, which holds the last request of its holder."""
+    """rmf_lift_supervisor: one slot for each lift, which holds the last request of its holder.
+
+    Jazzy's repeats its holder's request at every state, and sends END for an empty session too.
+    """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_LIFT_REQUESTS, topics.LIFT_STATES)
 
-    def __init__(self) -> None:
+    def __init__(self, jazzy: bool = False) -> None:
         self.slots: dict[str, d.LiftRequest] = {}
+        self._jazzy = jazzy
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         """Adapter requests are adopted, forwarded or silently dropped; states cause repeats."""
@@ -36,11 +41,12 @@ class LiftSupervisor(Party):
         ends = request.request_type == d.LiftRequestType.REQUEST_END_SESSION
         if held is not None and held.session_id != request.session_id:
             return []
-        if ends and held is None:
+        if ends and held is None and not self._jazzy:
             return []
-        request = replace(request, request_time=stamp(now))
+        if held is not None or not self._jazzy:
+            request = replace(request, request_time=stamp(now))
         if ends:
-            del self.slots[request.lift_name]
+            self.slots.pop(request.lift_name, None)
         else:
             self.slots[request.lift_name] = request
         return [(topics.LIFT_REQUESTS, request)]
@@ -48,11 +54,11 @@ class LiftSupervisor(Party):
     def _stated(self, state: d.LiftState, now: float) -> list[Said]:
         held = self.slots.get(state.lift_name)
         if held is not None:
-            if _satisfies(state, held):
+            if not self._jazzy and _satisfies(state, held):
                 return []
             held = self.slots[state.lift_name] = replace(held, request_time=stamp(now))
             return [(topics.LIFT_REQUESTS, held)]
-        if not state.session_id:
+        if not state.session_id and not self._jazzy:
             return []
         end = d.LiftRequest(
             lift_name=state.lift_name,

@@ -14,7 +14,7 @@ BAD = (Activity.ERROR, Activity.UNKNOWN)
 
 
 def check(step: Step) -> None:
-    """Everything at once; AssertionError says what is broken."""
+    """Check every rule; AssertionError says which is broken."""
     the_message_is_whole(step)
     the_state_is_what_was_read(step)
     power_has_a_reason(step)
@@ -46,7 +46,7 @@ def the_message_is_whole(step: Step) -> None:
 
 
 def the_state_is_what_was_read(step: Step) -> None:
-    """CHARGING while current flows and never else; lost, at fault or doubled is ERROR."""
+    """CHARGING exactly while current flows; ERROR if lost, at fault or served by two nodes."""
     state = step.decision.report.state
     sighted = _sighted(step)
     flows = step.seen is not None and step.seen.activity in FLOWS
@@ -62,7 +62,7 @@ def the_state_is_what_was_read(step: Step) -> None:
 
 
 def power_has_a_reason(step: Step) -> None:
-    """Only for a request that stands, at a station that answers and is well; blindly nothing."""
+    """Power only for a valid request at a station that answers and is well."""
     power, shown = step.decision.outputs.power, step.decision.report
     if power:
         assert step.ledger.granted is not None
@@ -72,6 +72,8 @@ def power_has_a_reason(step: Step) -> None:
         assert not step.ledger.out
         assert step.seen
         assert step.seen.activity not in BAD
+        assert step.seen.measured.at_height is not False
+        assert step.seen.measured.range_ok is not False
         assert shown.state is not State.CHARGER_RELEASED
     if power is None and _sighted(step):
         assert step.seen
@@ -132,7 +134,7 @@ def requests_end_on_good_readings(step: Step) -> None:
 
 
 def commands_are_counted(step: Step) -> None:
-    """At most one more of each; and no clearing while two nodes serve the station."""
+    """A decision adds at most one command of each; none clears while two nodes serve the station."""
     before, outputs = step.before.memory, step.decision.outputs
     assert outputs.clear_errors - before.clear_errors in (0, 1)
     assert outputs.range_checks - before.range_checks in (0, 1)

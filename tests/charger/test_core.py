@@ -244,7 +244,7 @@ def test_a_cancelled_charge_is_not_waited_for_again_when_the_coupling_is_lost() 
     assert story.told[3:] == [(2.0, "RELEASED", "req-1"), (4.0, "IDLE", "")]
 
 
-def test_released_is_shown_its_full_time_from_the_reading_that_shows_it() -> None:
+def test_released_is_shown_for_its_full_time_after_the_reading_that_shows_it() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 1").event(CANCEL_1)
     story.polls("silent 2, idle 3")
     assert story.told[3:] == [(4.0, "RELEASED", "req-1"), (6.0, "IDLE", "")]

@@ -17,9 +17,7 @@ steps = st.lists(st.sampled_from([*MOVES, 0.25, 1.0, 3.0, 10.0, 90.0]), max_size
 
 @settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(st.sampled_from(list(SITES)), steps)
-def test_what_is_true_of_every_state_stays_true_over_long_histories(
-    site: str, history: list[str | float]
-) -> None:
+def test_the_rules_hold_over_long_histories(site: str, history: list[str | float]) -> None:
     world, limits = World(), SITES[site]
     for step in history:
         if isinstance(step, str):

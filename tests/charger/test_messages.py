@@ -134,7 +134,13 @@ def test_the_summary_says_that_a_robot_is_not_verified() -> None:
         "tiny",
         "AMR01",
         verified=True,
-        measured=Measured(receiver_id="17", volts=48.25),
+        measured=Measured(
+            receiver_id="17",
+            at_height=True,
+            range_ok=False,
+            volts=48.25,
+            temperatures=(("coil", 41),),
+        ),
     )
     assert [KIND.summary(report) for report in (idle, lost, seen)] == [
         {"state": "IDLE", "request": "-", "robot": "-", "error": "-"},
@@ -150,6 +156,9 @@ def test_the_summary_says_that_a_robot_is_not_verified() -> None:
             "robot": "tiny/AMR01",
             "error": "-",
             "receiver": "17",
+            "range_ok": "no",
+            "at_height": "yes",
             "volts": "48.25",
+            "coil_celsius": "41",
         },
     ]

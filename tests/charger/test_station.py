@@ -494,7 +494,7 @@ def test_a_restart_while_a_stranger_charges_does_not_leave_it_alone() -> None:
     assert (it.powered, it.told) == ([False], [(0.0, "ERROR", "unknown receiver 4711")])
 
 
-def test_charging_that_begins_under_our_eyes_and_nobody_asked_for_is_stopped() -> None:
+def test_charging_that_begins_while_we_watch_and_that_nobody_asked_for_is_stopped() -> None:
     it = story().sees((A.CHARGING, ONE, 1))
     assert it.powered == [False, False]
     unseen = Story(ChargerLimits(DURATIONS)).polls("idle 1, charging 1")
@@ -530,3 +530,70 @@ def test_each_receiver_belongs_to_the_robot_that_the_yaml_names() -> None:
         "rx-1": "tiny/AMR01",
         "rx-2": "tiny/AMR02",
     }
+
+
+# ---- a pad that the station moves
+
+
+def test_nothing_is_energised_before_the_pad_is_at_its_height_and_the_robot_in_range() -> None:
+    it = story().event(AMR1)
+    for height, ok in ((False, False), (True, False), (False, True), (True, True)):
+        it.sees((A.IDLE, ONE, 1), at_height=height, range_ok=ok)
+    assert it.powered[1:] == [False, False, False, True]
+
+
+def test_without_these_signals_nothing_is_asked_of_the_pad() -> None:
+    assert story().event(AMR1).sees((A.IDLE, ONE, 1)).powered[1:] == [True]
+
+
+def test_a_pad_that_leaves_its_height_under_power_is_a_fault_of_the_station() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 1), (A.CHARGING, ONE, 2), at_height=True)
+    it.sees((A.CHARGING, ONE, 1), at_height=False)
+    assert it.powered[1:] == [True, True, True, False]
+    error = "station: the pad left its height under power"
+    assert it.told[-1] == (4.0, "ERROR", error)
+    it.sees((A.IDLE, ONE, 2), at_height=True)
+    assert it.told[-1] == (5.0, "ERROR", f"out of service after: {error}")
+    it.event(RESET).sees((A.IDLE, NOBODY, 3), at_height=False)
+    assert it.told[-1][1:] == ("IDLE", "")
+    assert True not in it.powered[4:]
+
+
+def test_a_pad_that_sinks_when_no_current_flows_is_no_fault() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 1), (A.CHARGING, ONE, 1), at_height=True)
+    it.sees((A.STOPPING, ONE, 1), (A.IDLE, NOBODY, 4), at_height=False)
+    assert it.powered[1:] == [True, True, False, False, False, False, False]
+    assert [line[1] for line in it.told[1:]] == ["ASSIGNED", "CHARGING", "RELEASED", "IDLE"]
+
+
+def test_a_pad_that_is_down_asks_for_no_check_of_the_range() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 3), at_height=False, in_range=False)
+    assert it.outputs.range_checks == 0
+    assert it.sees((A.IDLE, ONE, 1), at_height=True, in_range=False).outputs.range_checks == 1
+
+
+def test_a_range_that_is_lost_under_power_takes_the_power_away_without_a_fault() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 1), (A.CHARGING, ONE, 1), range_ok=True)
+    it.sees((A.CHARGING, ONE, 1), (A.IDLE, ONE, 1), range_ok=False)
+    assert it.powered[1:] == [True, True, False, False]
+    assert it.told[-1][1:] == ("RELEASED", "req-1")
+    assert it.faults == []
+
+
+def test_a_start_timeout_says_that_the_pad_never_rose() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 62), at_height=False)
+    late = "START_TIMEOUT: tiny/AMR01 did not start to charge in time"
+    assert it.faults == [f"{late}: the pad is not at its height"]
+
+
+def test_a_station_that_can_only_be_observed_shows_a_lost_height_while_it_lasts() -> None:
+    it = Story()
+    for height in (True, False, True):
+        known = Measured(at_height=height)
+        it.event(Sampled(ChargerSample(A.CHARGING, 5, measured=known)))
+    error = "station: the pad left its height under power"
+    assert [line[1:] for line in it.told] == [
+        ("CHARGING", ""),
+        ("ERROR", error),
+        ("CHARGING", ""),
+    ]

@@ -96,7 +96,7 @@ Move = Callable[[World], tuple[World, list[Event]]]
 
 
 def reading(world: World) -> list[Event]:
-    """What a scan brings."""
+    """The event that a scan brings."""
     if not world.readable:
         return [IoFailed("timeout")]
     return [Sampled(world.sample), *([] if world.writable else [WriteFailed("status 500")])]
@@ -144,6 +144,10 @@ MOVES: dict[str, Move] = {
     "nobody says who": _pad(receiver_id=None),
     "in range": _pad(in_range=True),
     "out of range": _pad(in_range=False),
+    "pad down": _pad(at_height=False),
+    "pad at height": _pad(at_height=True),
+    "gap wrong": _pad(range_ok=False),
+    "gap right": _pad(range_ok=True),
     "link lost or back": _toggled("readable"),
     "commands lost or back": _toggled("writable"),
     "rival": _event(RivalSeen()),
@@ -153,7 +157,7 @@ WAITS = (1.0, 5.0, 32.0)
 
 
 def moved(world: World, move: Move, limits: ChargerLimits, seen: Seen) -> World:
-    """After this move."""
+    """The world after this move."""
     world, events = move(world)
     for event in events:
         world = decided(world, event, 0.0, limits, seen)
@@ -212,6 +216,8 @@ def noted(world: World, event: Event, now: float, limits: ChargerLimits, decisio
 
 def _read(ledger: Ledger, sample: ChargerSample, now: float, limits: ChargerLimits) -> Ledger:
     came = ledger.read_at is None or ledger.misses >= limits.t.misses
+    if sample.activity is Activity.CHARGING and sample.measured.at_height is False:
+        sample = replace(sample, activity=Activity.ERROR, side="station")
     bad = sample.activity in (Activity.ERROR, Activity.UNKNOWN)
     flows = sample.activity in (Activity.CHARGING, Activity.STOPPING)
     well = not bad and not flows

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from bridges.charger.report import LOST, Diagnosis, diagnosis
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator import core, keep
+from bridges.charger_coordinator.astray import on_pad
 from bridges.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
@@ -18,7 +19,7 @@ from bridges.charger_coordinator.memory import (
     Memory,
     Site,
 )
-from bridges.charger_coordinator.report import SiteReport, on_pad
+from bridges.charger_coordinator.report import SiteReport
 from bridges.charger_coordinator.signals import Event, FleetSeen, Sighting, StateHeard, Wanted
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf import definitions as d
@@ -206,6 +207,136 @@ def test_an_error_of_neither_side_for_certain_counts_until_another_station_charg
     site_.does(B, RELEASED)
     site_.run(1)
     assert site_.memory.strikes == {}
+
+
+def test_a_failure_is_forgotten_once_the_robot_has_been_charged_for_a_while() -> None:
+    site_ = Alone()
+    site_.wants(ONE, "charger_a")
+    site_.run(1)
+    site_.does(A, ERROR, "over temperature")
+    site_.run(1)
+    site_.wants(ONE, "dock_b")
+    site_.shows[A] = StateHeard(A, IDLE)
+    site_.does(B, CHARGING)
+    site_.run(10)
+    assert site_.memory.strikes == {ONE: (A,)}
+    site_.run(1)
+    assert site_.memory.strikes == {}
+
+
+def test_a_robot_that_fails_at_both_stations_a_moment_after_the_charge_begins_is_faulty() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    for station in (A, B):
+        site_.run(1)
+        for state, error in ((CHARGING, ""), (ERROR, "robot: communication lost")):
+            site_.does(station, state, error)
+            site_.run(2)
+        site_.shows[station] = StateHeard(station, IDLE)
+    assert site_.run(60) == [(11.0, "charger_b: cancel")]
+    assert site_.faults == [
+        "ROBOT_FAULTY: tiny/AMR01 failed at charger_a and at charger_b: not tried again"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("error", "left"),
+    [
+        ("station: over temperature", {}),
+        ("out of service after: station: over temperature", {}),
+        ("over temperature", {}),
+        ("out of service after: over temperature", {}),
+        ("robot: handshake timeout", {ONE: (A,)}),
+        ("Charger unreachable", {ONE: (A,)}),
+        ("unknown receiver RX-9", {ONE: (A,)}),
+    ],
+)
+def test_a_failure_is_forgotten_when_its_station_names_itself_or_is_mended_without_the_robot(
+    error: str, left: dict[Robot, tuple[str, ...]]
+) -> None:
+    site_ = Alone()
+    site_.shows[B] = busy(B)
+    site_.wants(ONE, "charger_a")
+    site_.run(1)
+    site_.does(A, ERROR, "over temperature")
+    site_.run(60)
+    assert site_.memory.strikes == {ONE: (A,)}, "it stands there still: either may be at fault"
+    site_.shows[A] = StateHeard(A, ERROR, "unrequested/charger_a", None, error)
+    site_.wants(ONE)
+    site_.run(12)
+    site_.shows[A] = busy(A)
+    site_.run(1)
+    assert site_.memory.strikes == left
+
+
+def test_a_strayed_robot_that_works_cannot_be_told_and_a_person_is_at_once() -> None:
+    site_ = Alone()
+    site_.hears(Wanted(ONE, "", "op-1", 0.0))
+    site_.run(1)
+    site_.does(A, ASSIGNED)
+    site_.seen[ONE] = Sighting(ONE, False, None, 40.0, "work")
+    site_.run(2)
+    site_.seen[ONE] = Sighting(ONE, False, "dock_b", 40.0, "work")
+    site_.run(2)
+    assert site_.faults == []
+    site_.run(1)
+    assert site_.faults == [
+        "WRONG_STATION: tiny/AMR01 stands at charger_b, it is expected at charger_a"
+    ]
+    assert site_.memory.nudges == {}
+
+
+def test_a_robot_on_its_way_from_a_station_where_it_failed_is_not_astray() -> None:
+    site_ = Alone()
+    site_.wants(ONE, "charger_a")
+    site_.run(1)
+    site_.does(A, ERROR, "station: fan")
+    site_.run(1)
+    site_.does(B, ASSIGNED)
+    site_.run(29)
+    assert site_.memory.nudges == {}
+    site_.run(1)
+    assert [(nudge.count, nudge.at) for nudge in site_.memory.nudges.values()] == [(1, 32.0)]
+
+
+def test_an_idle_robot_that_is_called_and_begins_a_task_is_on_its_way() -> None:
+    site_ = Alone()
+    site_.seen[ONE] = Sighting(ONE, False, "wait_1", 40.0, "")
+    assert site_.run(1) == [(1.0, "charger_a: AMR01")]
+    site_.does(A, ASSIGNED)
+    site_.seen[ONE] = Sighting(ONE, False, None, 40.0, "charge-1")
+    assert site_.run(100) == []
+    site_.seen[ONE] = Sighting(ONE, False, None, 40.0, "work-2")
+    assert site_.run(1) == [(102.0, "charger_a: cancel")]
+
+
+def test_an_idle_robot_that_is_on_the_road_when_it_has_no_station_does_not_wait_for_one() -> None:
+    site_ = Alone()
+    site_.shows = {A: busy(A), B: busy(B)}
+    site_.seen[ONE] = Sighting(ONE, False, "wait_1", 40.0, "")
+    site_.run(1)
+    assert [wish.robot for wish in site_.memory.wishes] == [ONE]
+    site_.seen[ONE] = Sighting(ONE, False, None, 40.0, "")
+    site_.run(1)
+    assert site_.memory.wishes == ()
+
+
+def test_of_a_served_robot_the_mode_is_believed_again_when_it_has_left_or_stays_for_long() -> None:
+    for leaves, again_at in ((True, 9.0), (False, 304.0)):
+        site_ = Alone()
+        site_.wants(ONE, "charger_a", 95.0)
+        site_.run(1)
+        for state in (CHARGING, RELEASED):
+            site_.does(A, state)
+            site_.run(1)
+        site_.shows[A] = StateHeard(A, IDLE)
+        if leaves:
+            site_.seen[ONE] = Sighting(ONE, True, None, 95.0, "work")
+            site_.run(3)
+        site_.sent.clear()
+        site_.seen[ONE] = Sighting(ONE, True, "charger_a", 95.0, "another task")
+        site_.run(400)
+        assert site_.sent[0] == (again_at, "charger_a: AMR01")
 
 
 def test_a_robot_with_one_station_is_tried_there_twice_and_no_more() -> None:

@@ -74,7 +74,9 @@ def test_assignments_by_others_count_if_they_are_to_one_of_our_chargers() -> Non
             d.ChargingAssignment("stranger", "dock_b", 0),
         ),
     )
-    assert messages.accept_assignments(message, SETTINGS, 0.0) == Dedicated(((ONE, "charger_b"),))
+    two, three = Robot("tiny", "AMR02"), Robot("tiny", "AMR03")
+    dedicated = Dedicated(((ONE, "charger_b"), (two, ""), (three, "")))
+    assert messages.accept_assignments(message, SETTINGS, 0.0) == dedicated
 
 
 @pytest.mark.parametrize(
@@ -142,6 +144,21 @@ def test_an_alert_is_sent_once_under_its_id_and_its_time() -> None:
         ("[RX-0002]", "[RX-0001]", "'RX-0001' is tiny/AMR01's already"),
         ("full_percent: 100", "full_percent: 80", "is above full_percent"),
         ("coordinator:\n", "coordinator:\n  speed: 1\n", "speed"),
+        (
+            "waypoint: dock_b",
+            "waypoints: {tiny: dock_x}",
+            "'dock_x' is not in that fleet's waypoints",
+        ),
+        (
+            "waypoint: dock_b",
+            "waypoint: dock_b, waypoints: {big: x}",
+            "no fleet 'big'; there are tiny",
+        ),
+        (
+            "[RX-0002]",
+            "[RX-0002], rcu: charger_a",
+            "'charger_a' is the station 'charger_a''s already",
+        ),
     ],
 )
 def test_a_file_that_would_lead_robots_astray_is_refused_where_it_is_wrong(

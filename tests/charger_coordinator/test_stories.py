@@ -1,11 +1,18 @@
 """The situations that shared chargers meet, whole: fleet adapter, chargers' own cores, coordinator."""
 
+from typing import Any
+
 from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
+from bridges.charger_coordinator import KIND
 from bridges.core.decision import OperatorReset
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
+from bridges.rmf.memory import MemoryTransport
+from bridges.rmf.transport import Publisher
+from bridges.serve.clock import Clock
+from bridges.serve.graph import GraphNode
 from tests.charger_coordinator.yard import Yard
 
 
@@ -43,6 +50,7 @@ def test_an_operator_has_the_robot_on_the_pad_charged_ad_hoc() -> None:
     site = yard()
     robot = site.fleet.robots["AMR01"]
     robot.place = robot.dedicated = "charger_a"
+    robot.doing, robot.task_id, robot.battery_percent = "work", "work-1", 40.0
     site.run(7.0)
     site.wants("AMR01")
     assert site.run(30.0) == [
@@ -93,17 +101,38 @@ def test_a_robot_at_the_wrong_station_is_refused_and_named_and_the_right_one_wai
     site.fleet.charge("AMR01", site.now)
     site.run(8.5)
     site.fleet.robots["AMR01"].goes_to = "dock_b"
-    assert site.run(30.0) == [
+    assert site.run(20.0) == [
         (11.25, "charger_b: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)"),
+        (11.25, "AMR01 -> WAIT wait_1"),
+        (11.5, "charger_b: IDLE"),
+        (12.25, "AMR01 -> CHARGE charger_a"),
+        (18.25, "charger_a: CHARGING AMR01"),
+    ]
+    assert site.faults == []
+
+
+def test_a_robot_that_does_not_leave_the_wrong_station_is_told_twice_and_then_a_person_is() -> None:
+    site = yard()
+    site.fleet.charge("AMR01", site.now)
+    site.run(8.5)
+    robot = site.fleet.robots["AMR01"]
+    robot.goes_to, robot.stuck = "dock_b", True
+    assert site.run(50.0) == [
+        (11.25, "charger_b: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)"),
+        (11.25, "AMR01 -> WAIT wait_1"),
+        (12.25, "AMR01 -> CHARGE charger_a"),
+        (26.25, "AMR01 -> WAIT wait_1"),
+        (27.25, "AMR01 -> CHARGE charger_a"),
         (
-            11.25,
+            41.25,
             "ALERT WRONG_STATION: tiny/AMR01 stands at charger_b, it is expected at charger_a",
         ),
     ]
     assert site.mode("charger_a") == "ASSIGNED"
+    robot.stuck = False
     site.fleet.works("AMR01", "charger_a", site.now)
-    site.fleet.robots["AMR01"].task_id = "charge-1"
-    assert site.run(40.0) == [(30.25, "charger_b: IDLE"), (36.0, "charger_a: CHARGING AMR01")]
+    robot.task_id = "charge-1"
+    assert site.run(60.0) == [(50.25, "charger_b: IDLE"), (56.0, "charger_a: CHARGING AMR01")]
     assert site.faults == []
 
 
@@ -111,8 +140,9 @@ def test_a_robot_at_the_wrong_station_may_stay_once_the_request_has_timed_out() 
     site = yard()
     site.fleet.charge("AMR01", site.now)
     site.run(8.5)
-    site.fleet.robots["AMR01"].goes_to = "dock_b"
-    site.run(12.0)
+    robot = site.fleet.robots["AMR01"]
+    robot.goes_to, robot.stuck = "dock_b", True
+    site.run(42.0)
     assert site.run(70.0) == [
         (67.25, "charger_a: RELEASED AMR01"),
         (67.25, "charger_b <- charge AMR01"),
@@ -234,23 +264,74 @@ def test_a_coordinator_that_has_lost_its_memory_takes_over_what_the_stations_sho
     }
 
 
-def test_beside_a_charging_schedule_nothing_is_sent_and_its_choice_is_remembered() -> None:
+def dedicate(site: Yard, **places: str) -> Publisher[Any]:
+    """RMF's charging schedule begins, and dedicates: a robot that it sends to wait has a wait_… ."""
+    schedule: Publisher[Any] = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
+    modes = {who: int(place.startswith("wait")) for who, place in places.items()}
+    told = tuple(d.ChargingAssignment(who, place, modes[who]) for who, place in places.items())
+    schedule.publish(d.ChargingAssignments("tiny", told))
+    return schedule
+
+
+def test_beside_a_charging_schedule_the_stations_are_asked_that_it_dedicates() -> None:
     site = yard()
-    schedule = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
-    dedicated = d.ChargingAssignment("AMR01", "dock_b", int(d.ChargingMode.MODE_CHARGE))
-    schedule.publish(d.ChargingAssignments("tiny", (dedicated,)))
-    site.fleet.robots["AMR01"].dedicated = "wait_1"
+    schedule = dedicate(site, AMR01="dock_b", AMR02="wait_2")
     site.run(6.0)
-    site.fleet.charge("AMR01", site.now)
-    assert site.run(20.0) == []
-    assert site.node.status()["passive"] is True
+    site.story.clear()
+    for who in ("AMR01", "AMR02"):
+        site.fleet.charge(who, site.now)
+    assert site.run(30.0) == [
+        (10.0, "charger_b: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)"),
+        (12.25, "charger_b <- charge AMR01"),
+        (12.25, "charger_b: ASSIGNED AMR01"),
+        (14.25, "charger_b: CHARGING AMR01"),
+        (26.5, "charger_b: RELEASED AMR01"),
+    ]
+    status = site.node.devices()["site"]
+    assert site.node.status()["passive"] is False
+    assert status["assigns"] == "no: another node publishes charging_assignments"
+    assert status["queue"] == (
+        "tiny/AMR02 by the schedule: the charging schedule has no station for it"
+    )
+    again = dedicate(site, AMR02="charger_a")
+    assert site.run(40.0) == [
+        (30.25, "charger_a <- charge AMR02"),
+        (30.25, "charger_a: ASSIGNED AMR02"),
+        (36.0, "charger_a: CHARGING AMR02"),
+    ]
+    for end in (schedule, again):
+        end.close()
+
+
+def test_when_the_charging_schedule_has_gone_its_choice_is_remembered() -> None:
+    site = yard()
+    schedule = dedicate(site, AMR01="dock_b")
+    site.fleet.robots["AMR01"].dedicated = "wait_1"
+    site.run(20.0)
     schedule.close()
-    told = [what for _, what in site.run(40.0)]
+    site.run(30.0)
+    site.fleet.charge("AMR01", site.now)
+    told = [what for _, what in site.run(60.0)]
     assert told == [
         "charger_b <- charge AMR01",
         "charger_b: ASSIGNED AMR01",
+        "AMR01 -> CHARGE dock_b",
         "charger_b: CHARGING AMR01",
+        "charger_b: RELEASED AMR01",
+        "AMR01 -> WAIT wait_1",
     ]
+
+
+def test_of_two_coordinators_one_serves_and_the_other_only_listens() -> None:
+    site = yard()
+    transport = MemoryTransport(site.network, "other")
+    clock = Clock(lambda: site.now, lambda: 1e6 + site.now)
+    other = GraphNode(KIND, site.settings, transport, clock)
+    other.subscribe()
+    for _ in range(80):
+        site.run(site.now + 0.25)
+        other.round()
+    assert (site.node.status()["passive"], other.status()["passive"]) == (False, True)
 
 
 # ---- what is not reached
@@ -336,4 +417,7 @@ def test_a_request_sent_to_a_charger_directly_makes_that_robots_place() -> None:
     told = [what for _, what in site.run(15.0)]
     assert told == ["AMR02 -> CHARGE dock_b"]
     queue = site.node.devices()["site"]["queue"]
-    assert (site.node.status()["passive"], queue) == (False, "tiny/AMR03")
+    assert (site.node.status()["passive"], queue) == (
+        False,
+        "tiny/AMR03 by the robot: charger_b is kept for tiny/AMR02",
+    )

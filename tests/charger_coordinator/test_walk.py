@@ -104,7 +104,7 @@ class Ledger:
         self.passes()
 
     def copy(self) -> "Ledger":
-        """The same from here on."""
+        """A copy that has the same history, to continue in another way."""
         made = copy(self)
         made.nodes = {name: copy(node) for name, node in self.nodes.items()}
         for node in made.nodes.values():
@@ -129,7 +129,7 @@ class Ledger:
         for name, node in self.nodes.items():
             self.hears(node.shown(name))
         for who, wants in self.wants.items():
-            sighting = Sighting(who, wants, SITE.waits_at[who], 40.0, "task" if wants else "")
+            sighting = Sighting(who, wants, SITE.waits_at[who], 40.0, "task" if wants else "work")
             self.hears(FleetSeen((sighting,)))
         self.hears(Woken())
 
@@ -215,7 +215,7 @@ MOVES: list[Any] = [
 
 
 def after(ledger: Ledger, move: Any) -> Ledger:
-    """The same a move later."""
+    """A copy one move later."""
     ledger = ledger.copy()
     move(ledger)
     ledger.passes()

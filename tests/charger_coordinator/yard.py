@@ -21,7 +21,7 @@ from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import duration
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
-from hal_fakes.rmf.fleet import Fleet
+from hal_fakes.rmf.fleet import Finishing, Fleet
 from tests.serve.virtual_graph import Disk
 
 STEP_S = 0.25
@@ -33,9 +33,20 @@ GRAPH = {
     "wait_3": ("L1", 0.0, 6.0),
     "ward": ("L1", 50.0, 0.0),
 }
-PLACES = {"charger_a": "charger_a", "charger_b": "dock_b"}
+BIG_GRAPH = {
+    "station_1": ("L1", 10.0, 2.0),
+    "station_2": ("L1", 10.0, 6.0),
+    "bay_1": ("L1", 0.0, 10.0),
+    "ward": ("L1", 50.0, 0.0),
+}
+"""The other brand's, in which the same places have other names."""
+PLACES = {
+    "charger_a": {"tiny": "charger_a", "big": "station_1"},
+    "charger_b": {"tiny": "dock_b", "big": "station_2"},
+}
 NO_ERROR: tuple[FaultSide, str] = ("", "")
 RECEIVERS = {f"RX-{i}": Robot("tiny", f"AMR0{i}") for i in (1, 2, 3)}
+BIG = {"RX-9": Robot("big", "B01")}
 
 
 def settings(**changes: Any) -> Settings:
@@ -61,20 +72,39 @@ def settings(**changes: Any) -> Settings:
     return Settings(**(known | changes))
 
 
+def two_brands() -> Settings:
+    """The same two stations, and a fleet of another brand beside the first."""
+    tiny = settings().fleets["tiny"]
+    waypoints = {
+        n: Waypoint(level=a, x=x, y=y) for n, (a, x, y) in BIG_GRAPH.items() if n != "ward"
+    }
+    robot = RobotSettings(
+        stations=["charger_a", "charger_b"], waits_at="bay_1", receivers=["RX-9"], rcu="rcu_b01"
+    )
+    big = FleetSettings(waypoints=waypoints, robots={"B01": robot})
+    stations = {
+        "charger_a": Station(waypoints={"big": "station_1"}),
+        "charger_b": Station(waypoint="dock_b", waypoints={"big": "station_2"}),
+    }
+    return settings(stations=stations, fleets={"tiny": tiny, "big": big})
+
+
 class Charger:
     """A charger's daemon: its own core, and a station under it.
 
-    To break: `broken` (the station's fault once it energises), `refuses` (receivers whose handshake
-    fails), `unplugged` (it does not answer its daemon), `dead` (the daemon itself).
+    To break: `broken` (an error once it energises, of the side `fails`), `refuses` (receivers whose
+    handshake fails), `unplugged` (it does not answer its daemon), `dead` (the daemon itself).
     """
 
     def __init__(self, name: str, knows: bool = True) -> None:
-        receivers = RECEIVERS if knows else {}
+        receivers = RECEIVERS | BIG if knows else {}
         self.name = name
         self.limits = ChargerLimits(Durations(misses=3, released_s=1.0), receivers)
         self.memory = charger.initial(self.limits, 0.0)
         self.pad = ""
         self.percent = 0.0
+        self.full_in_s: float | None = None
+        self.fails: FaultSide = "station"
         self.broken = self.unplugged = self.dead = False
         self.refuses: set[str] = set()
         self.activity = Activity.IDLE
@@ -92,7 +122,9 @@ class Charger:
             return self.decide(IoFailed("no route to host"), now)
         side, text = self.error or NO_ERROR
         full = self.percent if self.activity is Activity.CHARGING else None
-        measured = Measured(receiver_id=self.pad, battery_percent=full)
+        measured = Measured(
+            receiver_id=self.pad, battery_percent=full, time_to_full_s=self.full_in_s
+        )
         return self.decide(Sampled(ChargerSample(self.activity, 0, text, measured, side)), now)
 
     def decide(self, event: Any, now: float) -> d.ChargerState | None:
@@ -124,7 +156,7 @@ class Charger:
 
     def _energise(self) -> None:
         if self.broken:
-            self.error = ("station", "over temperature")
+            self.error = (self.fails, "over temperature")
         elif self.pad in self.refuses:
             self.error = ("robot", "authentication timeout")
         else:
@@ -139,6 +171,7 @@ class Yard:
     knows: bool = True
     fills: float = 5.0
     drive_s: float = 4.0
+    finishing: Finishing = "nothing"
     now: float = 0.0
     story: list[tuple[float, str]] = field(default_factory=list)
 
@@ -147,7 +180,9 @@ class Yard:
         self.rmf = MemoryTransport(self.network, "rmf")
         self.chargers = {name: Charger(name, self.knows) for name in PLACES}
         homes = {f"AMR0{i}": f"wait_{i}" for i in (1, 2, 3)}
-        self.fleet = Fleet("tiny", GRAPH, homes, self.drive_s)
+        self.fleet = Fleet("tiny", GRAPH, homes, self.drive_s, self.finishing)
+        self.big = Fleet("big", BIG_GRAPH, {"B01": "bay_1"}, self.drive_s, self.finishing)
+        self.adapters = [self.fleet, self.big][: len(self.settings.fleets)]
         self.states = self.rmf.publisher(topics.CHARGER_STATES)
         self.fleets: Any = self.rmf.publisher(topics.FLEET_STATES)
         self.wishes = self.rmf.publisher(topics.ADAPTER_CHARGER_REQUESTS)
@@ -179,8 +214,9 @@ class Yard:
         told = len(self.story)
         while self.now < until:
             self.now += STEP_S
-            for _, message in self.fleet.tick(self.now):
-                self.fleets.publish(message)
+            for adapter in self.adapters:
+                for _, message in adapter.tick(self.now):
+                    self.fleets.publish(message)
             for charger_ in self.chargers.values():
                 self._scan(charger_)
             self.node.round()
@@ -210,9 +246,10 @@ class Yard:
     def _scan(self, station: Charger) -> None:
         if station.dead:
             return
-        robots = self.fleet.robots.values()
-        here = next((r for r in robots if r.place == PLACES[station.name]), None)
-        receivers = {who.name: receiver for receiver, who in RECEIVERS.items()}
+        robots = [(a.name, robot) for a in self.adapters for robot in a.robots.values()]
+        places = PLACES[station.name]
+        here = next((robot for fleet, robot in robots if robot.place == places[fleet]), None)
+        receivers = {who.name: receiver for receiver, who in (RECEIVERS | BIG).items()}
         station.pad = receivers[here.name] if here else ""
         if here and station.activity is Activity.CHARGING:
             here.battery_percent = min(100.0, here.battery_percent + self.fills * STEP_S)
@@ -261,7 +298,8 @@ class Yard:
             if self.assigned.get(a.robot_name) != word:
                 self.assigned[a.robot_name] = word
                 self.tell(f"{a.robot_name} -> {word}")
-        self.fleet.hear(message, self.now)
+        for adapter in self.adapters:
+            adapter.hear(message, self.now)
 
     def _alert(self, alert: Any) -> None:
         self.tell(f"ALERT {alert.subtitle}: {alert.message}")

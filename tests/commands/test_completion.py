@@ -9,6 +9,10 @@ import pytest
 
 from bridges import cli
 from bridges.commands.completion import SHELLS
+from hal_fakes.control import Control
+from hal_fakes.plants.lift import LiftPlant
+from hal_fakes.realtime import RealTime
+from tests.hal_fakes.virtual_lift import shipped
 
 
 def completed(line: str, tmp_path: Path) -> list[str]:
@@ -40,6 +44,19 @@ def test_commands_options_and_choices_are_completed(
     line: str, offered: list[str], tmp_path: Path
 ) -> None:
     assert completed(line, tmp_path) == offered
+
+
+def test_the_buttons_of_a_running_simulation_are_completed(tmp_path: Path) -> None:
+    running = RealTime({"Lift1": LiftPlant("Lift1", shipped())})
+    control = Control(tmp_path / "plant.sock", running.plants)
+    try:
+        line = f"rmf-bridge press --runtime-dir {tmp_path} lift.yaml fi"
+        assert completed(line, tmp_path) == ["fire_alarm"]
+        line = f"rmf-bridge fail --runtime-dir {tmp_path} lift.yaml door_o"
+        assert completed(line, tmp_path) == ["door_open", "door_operator"]
+    finally:
+        control.close()
+        running.close()
 
 
 @pytest.mark.parametrize("shell", SHELLS)

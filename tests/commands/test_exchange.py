@@ -3,8 +3,10 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import msgspec
 import pytest
 
+from bridges.charger.refusals import Refusal
 from bridges.commands.exchange import step
 from bridges.commands.graph import CommandLine, Heard
 from bridges.commands.requests import Done, Failed, Request, Seen
@@ -54,7 +56,7 @@ def tell(
     for tick in range(10_000):
         now = round(tick * 0.1, 1)
         while left and left[0][0] <= now:
-            seen = take(seen, request, Heard(left[0][1], left.pop(0)[0]))
+            seen = seen.hears(Heard(left[0][1], left.pop(0)[0]), request.about)
         seen = replace(seen, listeners=listeners if now >= listen_from else 0)
         todo = step(request, seen, now)
         if todo.hint and todo.hint not in told.hints:
@@ -64,17 +66,8 @@ def tell(
             return told
         if todo.send is not None:
             told.sent.append((now, todo.send))
-            first = now if seen.first_sent_at is None else seen.first_sent_at
-            seen = replace(seen, first_sent_at=first, last_sent_at=now)
+            seen = seen.sends(now)
     raise AssertionError("it never ended")
-
-
-def take(seen: Seen, request: Request, heard: Heard) -> Seen:
-    if isinstance(heard.message, d.SupervisorHeartbeat):
-        return replace(seen, heartbeat=heard)
-    name = words.device(heard.message)
-    seen = replace(seen, names=seen.names | {name})
-    return replace(seen, states=(*seen.states, heard)) if request.about(heard.message) else seen
 
 
 def every_second(state: d.Message, until: float = 20.0) -> list[tuple[float, d.Message]]:
@@ -112,7 +105,7 @@ def test_nothing_is_sent_while_nobody_listens_and_a_supervisor_is_missed() -> No
     request = LiftRide("Lift1", "L3", ME, line=CommandLine(typed, ("--localhost",)))
     told = tell(request, every_second(LIFT), listeners=0, timeout_s=5.0)
     missed = (
-        "no lift supervisor runs in this domain: no node subscribes to adapter_lift_requests;"
+        "no lift supervisor runs in this domain: no node publishes lift_requests;"
         " to ask the lift's own daemon:"
         " rmf-bridge send lift Lift1 L3 --session 'my robot' --localhost --direct"
     )
@@ -239,7 +232,7 @@ def test_a_simulation_that_is_not_heard_is_looked_for_on_loopback() -> None:
     ]
 
 
-def test_a_name_that_nobody_has_is_compared_with_those_heard() -> None:
+def test_an_unknown_name_is_compared_with_those_that_are_heard() -> None:
     there = every_second(replace(LIFT, lift_name="lift1")) + every_second(
         replace(LIFT, lift_name="Goods")
     )
@@ -371,6 +364,43 @@ def test_a_charger_that_shows_our_request_has_taken_it(state: int) -> None:
 )
 def test_a_charger_that_does_not_serve_us_says_why(state: d.ChargerState, reason: str) -> None:
     assert tell(CHARGE, every_second(state)).outcome == Failed(reason)
+
+
+REFUSAL = Refusal(
+    request_id="r1",
+    charger="a",
+    robot="fleet/robot",
+    reason="charger occupied",
+    state="CHARGING",
+    held_by="fleet/other",
+    held_request="r0",
+)
+
+
+def test_a_refusal_ends_the_command_at_once_and_says_who_has_the_charger() -> None:
+    busy = replace(CHARGER, state=3, request_id="r0")
+    others = msgspec.structs.replace(REFUSAL, request_id="r7")
+    told = tell(CHARGE, [(0.5, busy), (0.6, others.message()), (0.7, REFUSAL.message())])
+    text = (
+        "a refuses the request: charger occupied: fleet/other has it (request r0);"
+        " to cancel that: rmf-bridge send charger a --cancel r0"
+    )
+    assert (told.outcome, told.at) == (Failed(text), 0.7)
+
+
+def test_a_refusal_that_a_cancel_would_not_help_proposes_none() -> None:
+    unknown = msgspec.structs.replace(REFUSAL, reason="robot has no receiver here")
+    told = tell(CHARGE, [(0.5, CHARGER), (0.7, unknown.message())])
+    text = "a refuses the request: robot has no receiver here: fleet/other has it (request r0)"
+    assert told.outcome == Failed(text)
+
+
+def test_a_refusal_of_a_charger_that_nobody_has_names_its_error() -> None:
+    hot = msgspec.structs.replace(
+        REFUSAL, reason="charger in error", held_by="", held_request="", error="station: hot"
+    )
+    told = tell(CHARGE, [(0.5, CHARGER), (0.7, hot.message())])
+    assert told.outcome == Failed("a refuses the request: charger in error: station: hot")
 
 
 @pytest.mark.parametrize("after", [CHARGER, replace(CHARGER, state=4, request_id="r1")])

@@ -2,6 +2,7 @@
 
 import argparse
 import io
+import json
 import re
 import signal
 import subprocess
@@ -15,6 +16,7 @@ from typing import Any, TypeVar
 import pytest
 from msgspec.structs import replace as replace_struct
 
+from bridges.charger.refusals import Refusal
 from bridges.cli import main
 from bridges.commands import send, watch
 from bridges.commands.graph import add_graph_arguments, overridden
@@ -22,11 +24,12 @@ from bridges.commands.requests import Request
 from bridges.commands.requests.charger import Charge, ChargeCancel
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
-from bridges.core.fields import Rmf
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.choose import open_transport
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.renamed import Renamed
+from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
 from bridges.settings.load import load
@@ -123,6 +126,47 @@ def test_a_request_reaches_the_device_once_and_its_effect_ends_the_command(
     assert len(device.requests) == 1
 
 
+def test_a_refused_request_for_a_charger_ends_with_who_has_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    class Refusing(Device):
+        def _obey(self, request: Any) -> None:
+            refusal = Refusal(
+                request_id=request.request_id,
+                charger="a",
+                robot="fleet/robot",
+                reason="charger occupied",
+                held_by="fleet/other",
+                held_request="r1",
+            )
+            MemoryTransport(self.network, "charger").publisher(topics.CHARGER_REFUSALS).publish(
+                refusal.message()
+            )
+
+    device = Refusing(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, BUSY)
+    wanted = Charge("a", "fleet", "robot", "r2", 30)
+    assert send.send(Told(device), wanted, 60.0, io.StringIO()) == 1
+    assert capsys.readouterr().err == (
+        "rmf-bridge send: a refuses the request: charger occupied: fleet/other has it"
+        " (request r1); to cancel that: rmf-bridge send charger a --cancel r1\n"
+    )
+
+
+def test_send_and_watch_use_the_topic_names_of_the_sites_yaml() -> None:
+    network = MemoryNetwork()
+    singular = {"charger_states": "charger_state", "charger_requests": "charger_request"}
+    ours = Renamed(MemoryTransport(network, "command"), singular)
+    site = MemoryTransport(network, "site")
+    asked: list[Any] = []
+    site.subscribe(topics.CHARGER_REQUESTS.named("charger_request"), asked.append)
+    heard: list[Any] = []
+    ours.subscribe(topics.CHARGER_STATES, heard.append)
+    site.publisher(topics.CHARGER_STATES.named("charger_state")).publish(CHARGER)
+    request = d.ChargerRequest("a", "fleet", "robot", d.Duration(30), "r1")
+    ours.publisher(topics.CHARGER_REQUESTS).publish(request)
+    assert (heard, asked, ours.lives) == ([CHARGER], [request], True)
+
+
 def test_a_request_carries_the_time_at_which_it_was_sent() -> None:
     device = Device(topics.DOOR_STATES, topics.DOOR_REQUESTS, DOOR)
     assert send.send(Told(device), DoorMove("ward", True, ME, direct=True), 10, io.StringIO()) == 0
@@ -160,6 +204,10 @@ def test_once_prints_the_table_or_says_that_nothing_is_there(
     assert out.getvalue().splitlines()[1].split()[:6] == [
         *("lift", "Lift1", "car", "at", "L1,", "door")
     ]
+    told = io.StringIO()
+    assert watch.show_once(watch.listen_on(Told(device)), 0.01, told, as_json=True) == 0
+    (row,) = json.loads(told.getvalue())
+    assert (row["kind"], row["name"], row["held_by"]) == ("lift", "Lift1", HELD.session_id)
     nobody = MemoryTransport(MemoryNetwork(), "alone")
     assert watch.show_once(watch.listen_on(nobody), 0.01, out) == 1
     assert "check the domain and network" in capsys.readouterr().err
@@ -228,7 +276,7 @@ def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
 
 @pytest.fixture(params=sorted({wire(), "zenoh"}))
 def speaks(request: pytest.FixtureRequest) -> Wire:
-    """The transport of both."""
+    """The transport of the daemon and of the command."""
     speaks: Wire = request.param
     return speaks
 
@@ -263,6 +311,7 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(
         states = node.publisher(topics.LIFT_STATES)
         requests: list[d.LiftRequest] = []
         node.subscribe(topics.ADAPTER_LIFT_REQUESTS, requests.append)
+        node.publisher(topics.LIFT_REQUESTS)  # as a supervisor has it
         with command("send lift Lift1 L3 --session fleet/robot", speaks, domain) as process:
             wait_until(lambda: states.matched() > 0, "send listens to lift_states")
             states.publish(LIFT)
@@ -335,7 +384,9 @@ def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
         router.leave()
 
 
-def test_a_file_that_is_none_is_said_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_is_no_yaml_of_ours_is_refused_at_its_place(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "bad.yaml").write_text("kind: nothing\n")
     assert main(["watch", "--config", str(tmp_path / "bad.yaml")]) == 1
     assert "bad.yaml:1:7: " in capsys.readouterr().err

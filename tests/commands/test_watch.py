@@ -1,12 +1,13 @@
 """What `rmf-bridge watch` shows: rows from messages and a time, in virtual time."""
 
 import argparse
+import json
 from dataclasses import replace
 
 import pytest
 
 from bridges.commands import watch
-from bridges.commands.board import Board, Row, change_line, changes, repaint, table
+from bridges.commands.board import Board, Row, change_line, changes, json_line, repaint, table
 from bridges.commands.graph import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import stamp
@@ -120,6 +121,9 @@ def test_faults_have_a_column_when_there_are_any_and_are_a_change() -> None:
     (row,) = changes(first, faulty)
     assert change_line(row, WALL).endswith("age 0.0 s  DOOR_SILENT")
     assert repaint(faulty, 0, columns=80, lines=24)[0].count("\x1b[31m") == 1
+    assert "\x1b[31m" not in repaint(faulty, 0, columns=80, lines=24, coloured=False)[0]
+    line = json.loads(json_line(row, WALL))
+    assert (line["at"], line["name"], line["faults"]) == (WALL, "ward", "DOOR_SILENT")
 
 
 def test_a_pipe_gets_a_line_for_a_change_and_none_for_an_age() -> None:
@@ -269,6 +273,12 @@ def test_the_coordinator_has_a_row_with_its_queue_its_faults_and_whether_it_assi
         faults="STATION_SILENT (b: no ChargerState comes)",
     )
     assert board(told(passive=False)).rows(100.0, WALL) == [row]
-    passive = replace(row, state="passive: another node assigns chargers")
+    passive = replace(row, state="passive: another coordinator works")
     assert board(told(passive=True)).rows(100.0, WALL) == [passive]
+    site["assigns"] = "no: another node publishes charging_assignments"
+    site["schedule"] = "22:00-05:00 tiny to 98 %: under way"
+    beside = (
+        "asks for chargers that another node assigns, schedule 22:00-05:00 tiny to 98 %: under way"
+    )
+    assert board(told(passive=False)).rows(100.0, WALL) == [replace(row, state=beside)]
     assert board(told(passive=False)).rows(104.0, WALL) == []

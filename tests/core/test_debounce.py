@@ -33,7 +33,7 @@ def test_without_debounce_the_first_sample_counts() -> None:
     assert believed([(0.0, True), (0.0, False)], hold_s=0.0) == [True, False]
 
 
-def test_none_is_debounced_like_any_other_value() -> None:
+def test_no_value_is_debounced_like_any_other() -> None:
     samples = [(0.0, None), (0.06, None), (0.1, "up"), (0.16, "up"), (0.2, None), (0.26, None)]
     assert believed(samples) == ["?", None, None, "up", "up", None]
 
@@ -56,7 +56,7 @@ def test_it_says_since_when_no_value_has_lasted() -> None:
     assert torn == [None, None, since, since, since, since, None]
 
 
-def test_after_a_gap_what_was_believed_stands_and_what_was_half_seen_starts_again() -> None:
+def test_after_a_gap_the_believed_value_stays_and_a_half_seen_one_starts_again() -> None:
     steady = Settled(1, 1, 0.0, steady_at=0.1)
     half = settle(steady, 2, 1.0, HOLD_S)
     assert forget(half) == Settled(1, 1, 1.0, steady_at=0.1)

@@ -2,7 +2,11 @@
 
 import math
 
-from bridges.core.freshness import Requester, Rules
+import pytest
+
+from bridges.core.decision import RequestRefused
+from bridges.core.freshness import Requester, Rules, in_ns
+from bridges.rmf.definitions import Time
 
 STAMP = 1_800_000_000.0
 STARTED = Rules(most_s=5.0)
@@ -104,26 +108,26 @@ def test_ends_by_a_clock_that_was_set_back_count_once_repeated() -> None:
     ]
 
 
-def test_an_end_that_counted_by_its_repeats_counts_no_second_time() -> None:
+def test_an_end_that_counted_by_its_repeats_does_not_count_again() -> None:
     requester = Clocked(skew=-3600.0)
     assert [requester.at(t, ends=True) for t in (0.0, 1.0)] == [False, True]
     assert not requester.at(1.1, sent=1.0, ends=True)
 
 
-def test_after_requests_that_counted_by_their_repeats_an_end_by_a_slower_clock_counts() -> None:
+def test_an_end_by_a_slower_clock_counts_after_requests_that_counted_by_their_repeats() -> None:
     requester = Clocked(skew=-3600.0)
     assert [requester.at(0.0), requester.at(1.0)] == [False, True]
     assert requester.at(1.5, sent=0.5, ends=True)
 
 
-def test_echoes_that_come_late_and_out_of_order_never_add_up() -> None:
+def test_late_echoes_out_of_order_are_never_taken_for_a_live_requester() -> None:
     requester = Clocked()
     assert requester.at(60.0)
     echoes = [requester.at(61.0 + number, sent=50.0 - number) for number in range(10)]
     assert echoes == [False] * 10
 
 
-def test_echoes_far_apart_never_add_up() -> None:
+def test_echoes_far_apart_are_never_taken_for_a_live_requester() -> None:
     requester = Clocked()
     assert requester.at(60.0)
     assert [requester.at(t, sent=t / 10) for t in (61.0, 64.1, 67.2)] == [False] * 3
@@ -139,3 +143,16 @@ def test_a_requester_without_stamps_counts_when_it_repeats_itself() -> None:
 
 def test_a_requester_never_heard_has_no_stamps() -> None:
     assert Requester() == Requester(*[-math.inf] * 6)
+
+
+def test_a_requester_that_counts_by_its_repeats_is_remembered_from_then_on() -> None:
+    requester = Clocked(skew=-3600.0)
+    assert [requester.at(100.0), requester.at(101.0)] == [False, True]
+    assert requester.requester.heard_at == 101.0
+
+
+def test_a_stamp_of_no_clock_is_refused_and_a_request_without_stamp_is_not() -> None:
+    assert [in_ns(Time(0, 0)), in_ns(Time(1, 999_999_999))] == [0, 1_999_999_999]
+    for stamp, text in ((Time(-1, 0), "-1 s 0 ns"), (Time(0, 10**9), "0 s 1000000000 ns")):
+        with pytest.raises(RequestRefused, match=f"^impossible request_time: {text}$"):
+            in_ns(stamp)

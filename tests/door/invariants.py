@@ -14,7 +14,7 @@ from tests.door.walk import UNLIKE, Step, World, burns, fresh, reading, sighted
 
 
 def check(step: Step) -> None:
-    """Everything at once; AssertionError says what is broken."""
+    """Check every rule; AssertionError says which is broken."""
     the_hold_has_a_reason(step)
     the_relay_follows_the_hold(step)
     open_is_the_truth(step)
@@ -53,7 +53,7 @@ def the_relay_follows_the_hold(step: Step) -> None:
 
 
 def open_is_the_truth(step: Step) -> None:
-    """OPEN only of a fresh reading of the contact at the open end, or of the time where permitted."""
+    """OPEN only by a fresh reading of the contact at the open end, or by time where permitted."""
     shown, sample = step.decision.report, step.world.sample
     if not _sighted(step):
         assert shown.mode is DoorModeValue.MODE_OFFLINE
@@ -122,6 +122,6 @@ def _signal(step: Step, name: str) -> bool:
 
 
 def _told_otherwise(step: Step, name: str, for_s: float) -> bool:
-    """Have the readings, without a gap, said for so long that it is not asserted?"""
+    """Have the readings shown for so long, without a gap, that it is not asserted?"""
     since = step.ledger.unlike[UNLIKE.index(name)]
     return since is not None and step.now >= since + for_s

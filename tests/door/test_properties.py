@@ -112,7 +112,7 @@ def test_the_hold_is_on_for_a_reason_and_off_without_one(
 
 @settings(derandomize=True, max_examples=examples(400), deadline=None)
 @given(steps=STEPS, limits=LIMITS)
-def test_open_is_said_of_fresh_contacts_only(
+def test_open_is_reported_from_fresh_contacts_only(
     steps: list[tuple[float, Event]], limits: DoorLimits
 ) -> None:
     for now, ledger, decided in history(steps, limits):

@@ -35,7 +35,7 @@ def test_a_close_is_obeyed_when_the_grace_is_over() -> None:
     assert [(at, on) for at, _, on in core.told][-1] == (3.0, False)
 
 
-def test_no_open_waits_for_the_limit() -> None:
+def test_no_open_request_waits_for_the_grace() -> None:
     core = held()
     core.hears(CLOSES)
     core.sees(OPEN, until=3.5)
@@ -43,7 +43,7 @@ def test_no_open_waits_for_the_limit() -> None:
 
 
 @pytest.mark.parametrize("event", [IoFailed("gone"), RivalSeen()])
-def test_what_takes_a_hold_away_does_so_within_the_grace(
+def test_a_lost_reading_or_a_rival_ends_a_hold_within_the_grace(
     event: IoFailed | RivalSeen,
 ) -> None:
     core = held()

@@ -42,7 +42,7 @@ def path(*steps: str | float, limits: DoorLimits = PLAIN) -> World:
 
 
 class Scan:
-    """What one more scan says of a state: its last decision, checked."""
+    """One more scan of a state, checked; what it decided."""
 
     def __init__(self, world: World, limits: DoorLimits) -> None:
         self._steps: list[Step] = []
@@ -57,7 +57,7 @@ class Scan:
         self._steps.append(step)
 
 
-def test_the_stages_of_a_passage_are_what_they_are_called() -> None:
+def test_each_stage_of_a_passage_is_what_its_name_says() -> None:
     scans = {name: Scan(path(*steps), PLAIN) for name, steps in STAGES.items()}
     assert {name: (scan.mode, scan.hold, *scan.codes) for name, scan in scans.items()} == {
         "shut": ("CLOSED", False),
@@ -79,7 +79,7 @@ def test_the_stages_of_a_passage_are_what_they_are_called() -> None:
 
 
 def all_is_true_within(steps: int, roots: list[World], limits: DoorLimits) -> int:
-    """Checks every step and state; how many states."""
+    """Check every step and state; the number of states."""
     found = walker(limits).walk(roots, steps, check)
     for world in found:
         nothing_changes_before_wake_at(world, limits)
@@ -87,18 +87,18 @@ def all_is_true_within(steps: int, roots: list[World], limits: DoorLimits) -> in
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_every_state_within_some_steps_of_the_start(site: str) -> None:
+def test_the_rules_hold_within_some_steps_of_the_start(site: str) -> None:
     limits = SITES[site]
     assert all_is_true_within(depth(2, 3), [start(limits)], limits) > depth(80, 500)
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_every_state_within_some_steps_of_a_stage_of_a_passage(stage: str) -> None:
+def test_the_rules_hold_within_some_steps_of_each_stage_of_a_passage(stage: str) -> None:
     assert all_is_true_within(depth(2, 3), [path(*STAGES[stage])], PLAIN) > depth(100, 500)
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_every_state_within_some_steps_of_all_stages_at_each_kind_of_site(site: str) -> None:
+def test_the_rules_hold_within_some_steps_of_all_stages_at_each_kind_of_site(site: str) -> None:
     limits = SITES[site]
     roots = [path(*steps, limits=limits) for steps in STAGES.values()]
     assert all_is_true_within(depth(1, 2), roots, limits) > depth(80, 800)

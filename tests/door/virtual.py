@@ -88,7 +88,7 @@ class MemoryBus:
 
 
 class MemoryLines:
-    """The points of one device on it."""
+    """The points of one device on the bus."""
 
     def __init__(self, bus: MemoryBus, safe: dict[str, bool]) -> None:
         self._bus = bus

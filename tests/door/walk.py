@@ -204,7 +204,7 @@ def _step(world: World, event: Event, now: float, limits: DoorLimits, seen: Seen
 def noted(
     ledger: Ledger, event: Event, now: float, decision: Decided, limits: DoorLimits
 ) -> Ledger:
-    """The ledger after one decision; of that only the hold, and whether fire has let it go."""
+    """The ledger after one decision. It takes over only the hold, and whether a fire ended it."""
     wanted, ends_at = _asked(ledger, event, now, bool(decision.refused), limits)
     if limits.on_fire == "release" and burns(decision):
         wanted, ends_at = False, None
@@ -253,7 +253,7 @@ def burns(decision: Decided) -> bool:
 def _asked(
     ledger: Ledger, event: Event, now: float, refused: bool, limits: DoorLimits
 ) -> tuple[bool, float | None]:
-    """What RMF wants: until a CLOSE has had its grace."""
+    """Does RMF want the door open? A CLOSE counts after its grace."""
     wanted, ends_at = ledger.wanted, ledger.ends_at
     if ends_at is not None and now >= ends_at and not isinstance(event, OpenRequested):
         wanted, ends_at = False, None
@@ -324,7 +324,7 @@ def _at(at: Any, by: float, oldest_s: float = float("inf")) -> Any:
 
 
 def _held_since(at: float, by: float, limits: DoorLimits) -> float:
-    """The age of the hold, beyond every limit but for its place among the pulses."""
+    """The age of the hold, cut off beyond every limit; its place among the pulses stays."""
     age_s, oldest_s = -(at + by), max(limits.t.travel_s, limits.t.open_timeout_s)
     if age_s <= oldest_s:
         return -age_s
@@ -332,7 +332,7 @@ def _held_since(at: float, by: float, limits: DoorLimits) -> float:
 
 
 def _settled(seen: Settled[Any] | None, by: float) -> Any:
-    """Of a settled contact only that it is; of a half-seen one, since when."""
+    """A settled contact without its time; a half-seen one with it."""
     if seen is None:
         return None
     return Settled(

@@ -33,7 +33,7 @@ class Alone(alone.Alone[Memory, Event, Limits, DoorHoldReport]):
         self.hears(OpenRequested(who, self.stamp(aged)))
 
     def closes(self, who: str = "a", *, aged: float = 0.0) -> None:
-        """Its CLOSE."""
+        """A requester's CLOSE."""
         self.hears(CloseRequested(who, self.stamp(aged)))
 
     def stamp(self, aged: float) -> int:

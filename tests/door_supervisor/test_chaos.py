@@ -93,7 +93,7 @@ class Storm:
             self.wrong.append((self.world.now, tuple(self.let_in)))
 
     def _look(self) -> None:
-        """Who is let in holds the door; but one let in by a heartbeat from an earlier visit."""
+        """A robot that is let in holds the door, unless a heartbeat of its earlier visit let it in."""
         for who, walker in self.walkers.items():
             if not walker.passing:
                 self.let_in.discard(who)
@@ -106,7 +106,7 @@ class Storm:
 
 
 def rates(storm: Storm, topic: Any) -> list[float]:
-    """The gaps between our messages on this topic, of one life each or of two."""
+    """The gaps (s) between our supervisor's messages on this topic, across its restarts too."""
     at = [when for when, who, said, _ in storm.world.sent if (who, said) == ("supervisor", topic)]
     return [b - a for a, b in pairwise(at)]
 
@@ -134,14 +134,14 @@ def test_no_door_closes_on_a_robot_and_no_robot_waits_for_ever(seed: int, fate: 
 
 
 class Forgetful(Disk):
-    """A supervisor's table that does not outlive it; what RMF's own has."""
+    """A table that does not outlive its supervisor, as with RMF's own."""
 
     def read(self) -> bytes | None:
         return None
 
 
 def test_the_test_notices_a_close_on_a_robot() -> None:
-    """Without the table a restart closes the door on those within."""
+    """Without the table, a restart closes the door on robots in the doorway."""
     wrong = 0
     for seed in range(4):
         storm = Storm(seed, lossy, Forgetful())

@@ -196,7 +196,7 @@ def test_each_requester_has_a_clock_of_its_own() -> None:
     assert desk.holders == ["a"]
 
 
-def test_who_sends_no_stamps_is_believed_in_the_order_of_arrival() -> None:
+def test_a_requester_without_stamps_is_believed_in_the_order_of_arrival() -> None:
     desk = Alone()
     words: list[type[OpenRequested | CloseRequested]] = [OpenRequested, OpenRequested]
     words += [CloseRequested, OpenRequested, CloseRequested]
@@ -235,7 +235,9 @@ def test_a_holder_whose_clock_was_set_back_can_leave_again_at_once_when_it_is_be
     assert desk.holders == []
 
 
-def test_late_messages_with_a_break_or_the_same_stamp_never_add_up_to_a_clock_set_back() -> None:
+def test_late_messages_with_a_break_or_the_same_stamp_are_never_taken_for_a_clock_set_back() -> (
+    None
+):
     desk = Alone()
     desk.opens()
     for second in (1, 2, 3, 4, 8, 9, 10, 11):

@@ -153,7 +153,10 @@ def test_after_a_restart_the_holders_are_known_and_older_requests_are_stale() ->
     assert restored == {
         "ward": Memory(
             "ward",
-            holders=(Holder("a", 50.0, 50.0, 7, 7), Holder("b", 50.0, 50.0, 5, 5)),
+            holders=(
+                Holder("a", 50.0, 50.0, 7, 7, restored=True),
+                Holder("b", 50.0, 50.0, 5, 5, restored=True),
+            ),
             requesters={"a": Requester(7, heard_at=50.0), "b": Requester(5, heard_at=50.0)},
         )
     }

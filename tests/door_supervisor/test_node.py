@@ -97,6 +97,7 @@ def test_a_restart_closes_nothing_and_the_next_heartbeat_lists_who_holds() -> No
         graph.until(quarter / 4)
         graph.shows(2)
     assert graph.heard == [
+        *[(at, "OPEN ward") for at in (20.0, 21.0, 22.0)],
         (23.0, "OPEN ward"),
         (23.0, "beat ward:a"),
         (24.0, "OPEN ward"),
@@ -120,7 +121,7 @@ def test_a_table_that_cannot_be_written_is_still_published_and_damaged_entries_a
     assert graph.node.subjects == {}
 
 
-def test_what_cannot_be_kept_is_a_fault_and_tried_again_until_it_is(
+def test_a_table_that_cannot_be_saved_is_a_fault_and_tried_again_until_it_is(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     graph = Graph()
@@ -140,7 +141,7 @@ def test_what_cannot_be_kept_is_a_fault_and_tried_again_until_it_is(
     assert len(lines) == 1
 
 
-def test_nothing_is_said_before_it_is_kept() -> None:
+def test_nothing_is_published_before_it_is_on_disk() -> None:
     graph = Graph()
     graph.until(4.0)
     said: list[str] = []

@@ -117,7 +117,7 @@ def test_rmfs_own_supervisor_would_have_closed_on_it() -> None:
     assert [round(at) for at, _ in site.relay] == [10, 23]
 
 
-def test_with_its_memory_lost_it_closes_nothing_before_the_quiet_start_is_over() -> None:
+def test_a_supervisor_that_lost_its_memory_closes_nothing_before_its_quiet_start_is_over() -> None:
     site = Site([(10.0, 60.0)])
     site.world.run(20.0)
     site.disk.kept = None
@@ -135,7 +135,7 @@ def test_a_supervisor_and_a_door_daemon_that_restart_together_open_again_for_the
     site.door.restart()
     site.restarts(after_s=2.0)
     site.world.run(60.0)
-    assert [(round(at), on) for at, on in site.relay] == [(10, True), (20, False), (25, True)]
+    assert [(round(at), on) for at, on in site.relay] == [(10, True), (20, False), (22, True)]
     assert site.door.door.told[-1][1] == "OPEN"
 
 
@@ -149,7 +149,7 @@ def test_the_session_of_a_restarted_fleet_adapter_is_cleaned_by_the_next_heartbe
     assert site.disk.kept == keep.persist({})
 
 
-def test_beside_rmfs_own_such_a_session_stays_for_ever() -> None:
+def test_with_rmfs_own_supervisor_such_a_session_stays_for_ever() -> None:
     site = Site([(10.0, 60.0)], theirs=True)
     (a,) = site.walkers
     site.world.run(20.5)
@@ -257,3 +257,51 @@ def test_a_door_that_is_heard_no_more_is_forgotten() -> None:
     site.world.run(66.0)
     assert site.ours.subjects == []
     assert site.ours.wake_at() < NEVER
+
+
+def doorway(*, rival: bool = False, quiet_s: float = 3.0) -> Site:
+    """A robot stands in the doorway, silent, when the door's node and our supervisor die together."""
+    site = Site([(10.0, 60.0)], quiet_start_s=quiet_s)
+    site.world.run(25.0)
+    assert site.walkers[0].passing
+    if rival:
+        site.ours.leave()
+        RmfsSupervisor(site.world)
+        site.ours.restart()
+        site.door.restart()
+    else:
+        site.ours.leave()
+        site.door.restart()
+        site.ours.restart()
+    site.world.run(40.0)
+    return site
+
+
+def test_a_robot_in_the_doorway_keeps_its_door_when_the_door_and_our_supervisor_die_together() -> (
+    None
+):
+    site = doorway()
+    off = [at for at, on in site.relay if not on and at >= 25.0]
+    on = [at for at, on in site.relay if on and at >= 25.0]
+    assert [round(at, 1) for at in off] == [25.0]
+    assert on[0] - off[0] < 0.5
+    assert {word for at, word in site.words() if at >= 25.0} == {"OPEN"}
+
+
+def test_beside_a_rival_what_was_restored_waits_as_everything_does() -> None:
+    site = doorway(rival=True)
+    assert {who for at, who, _ in to_door(site.world) if at >= 25.0} == {"rmf_supervisor"}
+
+
+def test_a_door_that_shows_closed_is_not_opened_by_what_was_restored() -> None:
+    site = Site([(10.0, 60.0)])
+    site.world.run(25.0)
+    site.ours.leave()
+    site.door.restart()
+    site.world.run(32.0)
+    assert site.door.door.report.mode == d.DoorModeValue.MODE_CLOSED
+    site.ours.restart()
+    site.world.run(34.9)
+    assert [word for at, word in site.words() if at >= 32.0] == []
+    site.world.run(36.0)
+    assert site.words()[-1][1] == "OPEN"

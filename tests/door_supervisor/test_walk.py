@@ -29,7 +29,7 @@ STEP_S = 0.75
 
 
 class Ledger:
-    """The table by RMF's rule, requests in order; and what must hold at each word."""
+    """The table by RMF's rules, as if requests came in order; and what must hold at each message."""
 
     def __init__(self, *, speaks: bool) -> None:
         self.memory: Memory = core.initial("ward", 0.0)
@@ -43,7 +43,7 @@ class Ledger:
         self.hears(MaySpeak(speaks))
 
     def copy(self) -> "Ledger":
-        """The same from here on."""
+        """A copy that has the same history, to continue in another way."""
         made = copy(self)
         made.holders, made.newest, made.sent = set(self.holders), dict(self.newest), [*self.sent]
         return made
@@ -60,7 +60,7 @@ class Ledger:
         late = [h.requester for h in self.memory.holders if self.now >= h.since + 30.0]
         codes = [fault.code for fault in decided.report.faults]
         assert ("DOOR_HELD_OPEN" in codes) == bool(late)
-        # Whoever asks is told of soon: a word is under way, or the last one was right.
+        # A new holder reaches the node soon: a message is due, or the last one was right.
         if self.speaks and self.holders:
             assert self.memory.sent == OPEN or self.wake_at <= self.now + GAP_S
 
@@ -97,7 +97,7 @@ def stamp(now: float, aged: float = 0.0) -> int:
 
 
 def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
-    """The same with this event, heard now, and a step's time later."""
+    """A copy that hears this event now, a step's time later."""
     ledger = ledger.copy()
     ledger.hears(event(ledger.now))
     ledger.until(ledger.now + STEP_S)
@@ -105,7 +105,7 @@ def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
 
 
 def asked(ledger: Ledger, move: tuple[Any, str]) -> Ledger:
-    """The same after this word of this requester."""
+    """A copy that hears this requester open or close."""
     word, who = move
     return after(ledger, lambda now: word(who, stamp(now)))
 
@@ -162,8 +162,8 @@ def told(history: list[tuple[float, Any]]) -> Ledger:
 
 
 def _would_be_believed(ledger: Ledger, event: Any) -> bool:
-    """Old requests long enough after the last are a clock set back, or of somebody forgotten:
-    stories of their own (test_core)."""
+    """Would this old request count? Long after the last one it means that a clock was set back, or that
+    its requester was forgotten; test_core has stories of both."""
     if not isinstance(event, OpenRequested | CloseRequested) or event.stamp >= ledger.newest.get(
         event.requester, 0
     ):

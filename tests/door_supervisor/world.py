@@ -33,7 +33,7 @@ def holds(disk: Disk, who: str) -> bool:
 
 
 class OurSupervisor(Served):
-    """Ours. `disk`: its state directory."""
+    """The supervisor of this repository. `disk`: its state directory."""
 
     disk: Disk
 
@@ -42,7 +42,7 @@ class OurSupervisor(Served):
 
 
 class RmfsSupervisor(StandIn):
-    """RMF's."""
+    """RMF's own supervisor, by its rules."""
 
     def __init__(self, world: World) -> None:
         super().__init__(world, DoorSupervisor, "rmf_supervisor", topics.DOOR_REQUESTS)
@@ -127,13 +127,13 @@ class Walker:
         self._go_on()
 
     def wake(self) -> None:
-        """Its timers."""
+        """Its timers are due, or the robot's next step."""
         if self.world.now >= self.robot.wake_at() - self.skew:
             say(self.world, self.name, self.robot.tick(self.world.now + self.skew))
         self._go_on()
 
     def wake_at(self) -> float:
-        """A repeat, or its next step."""
+        """When its next repeat is due, or the robot's next step."""
         return min(self.robot.wake_at() - self.skew, self._next_at)
 
     def restart(self) -> None:

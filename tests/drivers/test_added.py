@@ -49,7 +49,12 @@ hatches:
       closed: {{point: unit 1 discrete input 1, active: high}}
     outputs: {{hold_open: {{point: unit 1 coil 0, active: high}}}}
 """
-ON_MODBUS = {"type": "modbus", "tcp": {"host": "192.0.2.1", "port": 502}, "timeout_s": 2}
+ON_MODBUS = {
+    "type": "modbus",
+    "tcp": {"host": "192.0.2.1", "port": 502},
+    "timeout_s": 2,
+    "without_watchdog": {1: "a bench"},
+}
 ON_A_LINE = {"type": "line", "host": "192.0.2.1"}
 
 
@@ -76,7 +81,7 @@ class Site:
 
     def point_at(self, replace: dict[str, Any]) -> None:
         """Write the file, with its bus pointed at this far side."""
-        bus = json.dumps(self._bus | replace)
+        bus = json.dumps(self._bus | replace).replace('"1":', "1:")  # JSON has no numbers as keys
         self.file.write_text(self._text.format(domain=self._domain, bus=bus))
 
     def check(self) -> list[str]:

@@ -32,7 +32,9 @@ def shown(contact: Contact, fed: str, step: float = 1.0) -> str:
         ("wrong", "1100111000"),
     ],
 )
-def test_a_wire_that_fails_from_the_start(mode: FailureMode | None, text: str) -> None:
+def test_a_wire_that_fails_from_the_start_shows_what_its_failure_says(
+    mode: FailureMode | None, text: str
+) -> None:
     assert SLOW_S == 2.0
     contact = Contact(wire(), "seed")
     contact.fail(mode, 0.0)
@@ -42,7 +44,7 @@ def test_a_wire_that_fails_from_the_start(mode: FailureMode | None, text: str) -
 @pytest.mark.parametrize(
     ("mode", "held"), [("off", False), ("stuck", True), ("slow", True), ("wrong", False)]
 )
-def test_a_wire_that_fails_while_it_is_asserted_and_is_mended(
+def test_a_wire_that_fails_while_it_is_asserted_shows_it_again_once_mended(
     mode: FailureMode, held: bool
 ) -> None:
     contact = Contact(wire(), "seed")

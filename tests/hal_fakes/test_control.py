@@ -112,14 +112,14 @@ def test_presses_and_failures_are_made_on_command(world: World) -> None:
         *(
             (
                 line,
-                "error not understood; say: follow | fail DEVICE PART"
+                "error not understood; say: follow | names | fail DEVICE PART"
                 " off|stuck|slow|garbage|wrong|ok | press DEVICE SIGNAL on|off",
             )
             for line in ("", "press Lift1 fire_alarm yes", "follow me", "\x00\xff")
         ),
     ],
 )
-def test_an_impossible_order_is_answered_with_the_reason(
+def test_an_impossible_command_is_answered_with_the_reason(
     world: World, line: str, answer: str
 ) -> None:
     assert world.call().say(line) == answer

@@ -58,7 +58,7 @@ def lift(simulation: Simulation) -> Iterator[SimulatedLift]:
     made.close()
 
 
-def test_a_ride_on_simulated_hardware(lift: SimulatedLift) -> None:
+def test_a_robot_rides_a_lift_on_simulated_hardware(lift: SimulatedLift) -> None:
     lift.driver.write(LiftOutputs(agv_request=True))
     lift.until(lambda seen: seen.agv is True)
     lift.driver.write(LiftOutputs(agv_request=True, call="L3"))
@@ -72,7 +72,7 @@ def test_a_ride_on_simulated_hardware(lift: SimulatedLift) -> None:
     )
 
 
-def test_orders_on_the_control_socket_reach_the_pins(
+def test_commands_on_the_control_socket_reach_the_pins(
     lift: SimulatedLift, simulation: Simulation
 ) -> None:
     caller = Caller(simulation.socket_path("header"))

@@ -22,7 +22,7 @@ Event = tuple[float, str, object]
 
 
 def shipped() -> Settings:
-    """The example of `config/`."""
+    """The shipped example of `config/`."""
     settings = load(SHIPPED).devices["Lift1"]
     assert isinstance(settings, Settings)
     return settings

@@ -2,8 +2,14 @@
 
 from collections.abc import Callable, Sequence
 
+from bridges.lift.messages import OWN_REQUESTS
 from bridges.rmf.definitions import LiftRequest, LiftState, Message
-from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, AnyTopic
+from bridges.rmf.topics import (
+    ADAPTER_LIFT_REQUESTS,
+    LIFT_REQUESTS,
+    LIFT_STATES,
+    AnyTopic,
+)
 from hal_fakes.rmf import Party, Said
 from hal_fakes.rmf.phases import EndLiftSession, RequestLift
 from hal_fakes.rmf.robot import Robot
@@ -72,10 +78,12 @@ class World:
             assert self.story.now < end, f"not within {within} s: {self.story.state}"
             self.run(self.story.now + STEP_S)
 
-    def restart_supervisor(self) -> None:
-        """A new one, which the fleet adapters' retained requests reach first."""
+    def restart_supervisor(self, first: Robot | None = None) -> None:
+        """A new one, which the fleet adapters' retained requests reach first, those of `first` before
+        the others'."""
         self.supervisor = LiftSupervisor()
-        for history in self._history.values():
+        who = first.requester_id if first else ""
+        for _, history in sorted(self._history.items(), key=lambda item: item[0] != who):
             for request in history[-REPLAYED:]:
                 self._deliver(self.supervisor.hear(request, self._now))
         self._arrive()
@@ -107,8 +115,8 @@ class World:
         self._arrive()
 
     def _arrive(self) -> None:
-        requests, self.story.incoming = self.story.incoming, []
-        self.story.request(*requests)
+        arrived, self.story.incoming = self.story.incoming, []
+        self.story.receive(*arrived)
 
     def _deliver(self, said: list[Said]) -> None:
         left = list(said)
@@ -124,10 +132,11 @@ class World:
             return
         if topic == ADAPTER_LIFT_REQUESTS:
             self._history.setdefault(message.session_id, []).append(message)
+            self.story.incoming.append((OWN_REQUESTS, message))
         elif topic == LIFT_REQUESTS:
             self.requested.append(message)
             for delay_s in self.fate(message):
                 if delay_s:
                     self._flying.append((self.story.now + delay_s, message))
                 else:
-                    self.story.incoming.append(message)
+                    self.story.incoming.append((LIFT_REQUESTS, message))

@@ -195,6 +195,7 @@ class Story:
         debounce: dict[str, float] | None = None,
         fire_reset: Any = "auto",
         alarm: Any = "none",
+        alarm_on: Any = ("fire_alarm",),
         agv_mode: Any = "requested",
         kind: AnyDeviceKind = KIND,
         **limits: Any,
@@ -205,6 +206,7 @@ class Story:
             limits=Durations(**limits),
             fire_reset=fire_reset,
             alarm=alarm,
+            alarm_on=list(alarm_on),
             agv_mode=agv_mode,
         )
         self.limits = LiftLimits.of(self.settings, DEBOUNCE if debounce is None else debounce)
@@ -213,7 +215,7 @@ class Story:
         self.told: list[tuple[float, LiftState]] = []
         self.alarms: list[tuple[float, Message]] = []
         self.hear: Callable[[LiftState], None] = lambda state: None
-        self.incoming: list[LiftRequest] = []
+        self.incoming: list[tuple[Topic[Any], LiftRequest]] = []
         self._kind = kind
         self._scan_s = scan_s
         self._scans = 0
@@ -257,8 +259,12 @@ class Story:
         self.request(LiftRequest("Lift1", session_id=session, request_type=int(END)))
 
     def request(self, *requests: LiftRequest) -> None:
-        """These arrive in one scan."""
-        self._scan(*(self.node.event(LIFT_REQUESTS, request) for request in requests))
+        """These requests arrive from the supervisor in one scan."""
+        self.receive(*((LIFT_REQUESTS, request) for request in requests))
+
+    def receive(self, *said: tuple[Topic[Any], LiftRequest]) -> None:
+        """These arrive in one scan, each on its topic."""
+        self._scan(*(self.node.event(topic, request) for topic, request in said))
 
     def rival(self) -> None:
         """Somebody else publishes a state of this lift."""
@@ -312,7 +318,7 @@ class Story:
         self.node.scan([event for event in events if event is not None])
         if self.incoming:
             arrived, self.incoming = self.incoming, []
-            self.request(*arrived)
+            self.receive(*arrived)
 
     def _publish(self, topic: Topic[Any], message: Any) -> None:
         if topic == LIFT_STATES:

@@ -86,18 +86,22 @@ def ride(broken: str, mode: FailureMode, broken_at: float) -> WiredStory:
     return story
 
 
-@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 2))
-def test_a_part_broken_before_the_ride(broken: str, mode: FailureMode) -> None:
+@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 3))
+def test_no_part_broken_before_the_ride_shows_an_open_door_that_is_closed(
+    broken: str, mode: FailureMode
+) -> None:
     ride(broken, mode, broken_at=1.0)
 
 
-@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 2, 1))
-def test_a_part_that_breaks_on_the_way(broken: str, mode: FailureMode) -> None:
+@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 3, 1))
+def test_no_part_that_breaks_on_the_way_shows_an_open_door_that_is_closed(
+    broken: str, mode: FailureMode
+) -> None:
     ride(broken, mode, broken_at=3.0)
 
 
 @pytest.mark.parametrize("signal", [w for w in WIRES if w.startswith("floor")])
-def test_a_broken_floor_line_has_a_name(signal: str) -> None:
+def test_a_broken_floor_line_is_an_illegal_floor_code(signal: str) -> None:
     story = WiredStory()
     story.run(1.0)
     story.fail(signal, "wrong")

@@ -48,7 +48,7 @@ def test_a_call_brings_agv_mode_where_the_car_stands_and_the_hold_keeps_it() -> 
     assert (story.state, story.building.plant.agv) == (f"AGV, open at L1, {A} to L1", True)
 
 
-def test_a_whole_ride_and_agv_mode_ends_with_the_hold() -> None:
+def test_agv_mode_ends_with_the_hold_after_a_whole_ride() -> None:
     story = simulator()
     open_at(story, "L1")
     story.run(story.now + 5.0)
@@ -128,7 +128,7 @@ ROOTS = {
 
 
 @pytest.mark.parametrize("root", ROOTS)
-def test_every_state_within_some_steps_of_a_stage_of_a_ride(root: str) -> None:
+def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> None:
     stage = WALKER.path(start(LIMITS), *ROOTS[root])
     found = WALKER.walk([stage], depth(2, 3), check)
     for world in found:

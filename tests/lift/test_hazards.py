@@ -343,6 +343,31 @@ def test_the_fire_alarm_topic_hears_true_once_and_false_only_after_an_operators_
     assert story.alarms[2:] == [(110.1, on)]
 
 
+def test_a_code_blue_is_told_to_the_fleets_where_the_settings_say_so_until_an_operator_resets() -> (
+    None
+):
+    story = waiting(alarm="emergency_signal", alarm_on=["fire_alarm", "code_blue"])
+    on, off = EmergencySignal((), True), EmergencySignal((), False)
+    story.building.hazard(Hazard.CODE_BLUE)
+    story.run(5.0)
+    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # one alarm, told once
+    story.run(8.0)
+    story.building.hazard()
+    story.run(20.0)
+    assert story.alarms == [(2.1, on)]
+    assert story.state.startswith("AGV")  # the lift itself is back; the fleets wait for a person
+    story.resets()
+    story.run(21.0)
+    assert story.alarms == [(2.1, on), (20.0, off)]
+
+
+def test_a_hazard_that_alarm_on_does_not_name_is_told_to_nobody() -> None:
+    story = waiting(alarm="emergency_signal", alarm_on=["code_blue"])
+    story.building.hazard(Hazard.FIRE, Hazard.EARTHQUAKE, Hazard.OVERLOAD)
+    story.run(5.0)
+    assert story.alarms == []
+
+
 def test_a_fire_at_the_very_first_reading_is_told_to_the_fleets() -> None:
     building = Building(CLOSED_AT_L1)
     building.hazard(Hazard.FIRE)

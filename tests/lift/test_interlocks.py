@@ -35,19 +35,19 @@ def hold(side: Side = Side.FRONT) -> LiftOutputs:
     return LiftOutputs(agv_request=True, hold_door=side)
 
 
-def test_two_calls_are_never_on_together_and_rest_between() -> None:
+def test_two_calls_are_never_on_together_and_their_relays_rest_between() -> None:
     wishes = [(0.0, call("L1")), (1.0, call("L2")), (1.29, call("L2")), (1.3, call("L2"))]
     assert driven(Relays(), wishes, limits(min_off_s=0)) == ["A L1", "A", "A", "A L2"]
 
 
-def test_a_call_and_a_door_command_rest_between() -> None:
+def test_relays_rest_between_a_call_and_a_door_command() -> None:
     wishes = [(0.0, hold()), (1.0, call("L1")), (1.2, call("L1")), (1.3, call("L1")),
               (2.0, hold()), (2.2, hold()), (2.3, hold())]  # fmt: skip
     assert driven(Relays(), wishes, limits(min_off_s=0)) == [
         "A front", "A", "A", "A L1", "A", "A", "A front"]  # fmt: skip
 
 
-def test_two_doors_are_never_commanded_together_and_rest_between() -> None:
+def test_two_doors_are_never_commanded_together_and_their_relays_rest_between() -> None:
     wishes = [(0.0, hold()), (1.0, hold(Side.REAR)), (1.2, hold(Side.REAR)), (1.3, hold(Side.REAR))]
     assert driven(Relays(), wishes, limits(min_off_s=0)) == ["A front", "A", "A", "A rear"]
 
@@ -116,7 +116,7 @@ def test_without_rest_times_a_call_still_goes_off_before_the_next_one_is_on() ->
     ]
 
 
-def test_the_door_is_let_go_before_agv_mode_at_the_end_and_all_at_once_in_a_hazard() -> None:
+def test_at_the_end_the_door_is_let_go_before_agv_mode_and_in_a_hazard_all_at_once() -> None:
     for hazard in (False, True):
         story = Story(Building(AT_L1), release_grace_s=2.0, dead_time_s=0.5)
         story.run(1.0)

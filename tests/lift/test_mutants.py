@@ -5,7 +5,15 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from bridges.core.decision import Fault, IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.core.decision import (
+    Fault,
+    IoFailed,
+    OperatorReset,
+    RivalSeen,
+    Sampled,
+    Suspended,
+    WriteFailed,
+)
 from bridges.lift.core import decide
 from bridges.lift.memory import LiftLimits, Memory
 from bridges.lift.sensing import MOTION_MEMORY_S
@@ -74,6 +82,10 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
         [(0.0, replace(AT_L1, rear_door=Door.BOTH))],
         Fault("DOOR_CONTACTS_CONTRADICT", "rear door reads open and closed"),
     ),
+    "a door whose number means nothing": (
+        [(0.0, replace(AT_L1, door=Door.UNKNOWN))],
+        Fault("DOOR_CODE_ILLEGAL", "the door's number means nothing"),
+    ),
     "up and down at once": (
         [(0.0, replace(AT_L1, motion=Motion.CONTRADICTORY))],
         Fault("MOTION_CONTRADICTORY", "the motion lines cannot all be true"),
@@ -129,7 +141,7 @@ def test_an_event_that_is_not_a_request_is_not_refused(event: Any) -> None:
     assert Told()(0.0, AT_L1, event).decision.refused == ""
 
 
-def test_a_reading_says_nothing_at_the_exact_end_of_its_age() -> None:
+def test_a_reading_no_longer_counts_in_the_instant_in_which_it_is_too_old() -> None:
     burning = replace(AT_L1, door=Door.BOTH, hazards=frozenset({Hazard.EMERGENCY}))
     told = Told(stale_after_s=2.0)(0.0, burning)(2.0, IoFailed("timeout"))
     assert told.faults == (Fault("INPUTS_NOT_FRESH", "timeout"),)
@@ -197,7 +209,7 @@ def test_an_event_that_is_only_noted_is_not_refused() -> None:
     assert (told.decision.refused, told.decision.report.session) == ("", "A")
 
 
-def test_even_a_short_grace_is_kept() -> None:
+def test_even_a_short_grace_lasts_its_time() -> None:
     told = Told(release_grace_s=0.5)(0.0, AT_L1)(0.1, ASKED)(1.0, AT_L1, Ended("A"))
     assert told.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
     assert told(1.5, AT_L1).decision.outputs == LiftOutputs()
@@ -277,3 +289,17 @@ def test_a_reading_in_the_instant_in_which_the_last_one_expires_starts_afresh() 
     assert (shown.mode, shown.floor, told.faults) == (LiftMode.MODE_OFFLINE, "", ())
     told(1.6, AT_L1)
     assert told.decision.report.floor == "L1"
+
+
+def test_after_a_sleep_everything_is_forgotten_but_the_last_landing() -> None:
+    told = Told()(0.0, AT_L1)(1.0, AT_L1)(2.0, Suspended("the machine slept"))
+    assert told.decision.refused == ""
+    assert told.faults == (Fault("INPUTS_NOT_FRESH", "the machine slept"),)
+    position = told.memory.senses.position
+    assert (position.trusted, position.moved_at) == ("L1", 2.0)
+    assert told.memory.senses == type(told.memory.senses)(position=position)
+
+
+def test_an_illegal_door_number_names_the_rear_door() -> None:
+    told = Told()(0.0, replace(AT_L1, rear_door=Door.UNKNOWN))
+    assert told.faults == (Fault("DOOR_CODE_ILLEGAL", "the rear door's number means nothing"),)

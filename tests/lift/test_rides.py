@@ -20,7 +20,7 @@ from tests.lift.story import (
     Story,
 )
 
-SUMMARY = ("mode", "floor", "door", "motion", "session", "destination")
+SUMMARY = ("mode", "floor", "door", "motion", "session", "boarded", "destination")
 IDLE_AT_L1 = [(0.0, "OFFLINE, moving at ?"), (0.1, "HUMAN, closed at L1")]
 
 
@@ -376,7 +376,7 @@ def test_without_a_session_either_open_door_is_shown() -> None:
     ("request_", "kind"),
     [
         (LiftRequest("Lift1", Time(), "", 1, "L1", 2), "empty session_id"),
-        (LiftRequest("Lift1", Time(), "", 0, "L1", 2), "empty session_id"),
+        (LiftRequest("Lift1", Time(), "", 2, "L1", 2), "empty session_id"),
         (LiftRequest("Lift1", Time(), "x" * 257, 1, "L1", 2), "impossible session_id"),
         (LiftRequest("Lift1", Time(), "A", 3, "L1", 2), "unknown request_type"),
         (LiftRequest("Lift1", Time(), "A", 1, "L1", 1), "unknown door_state"),
@@ -400,6 +400,7 @@ def test_a_person_reads_the_state_in_a_few_words() -> None:
         "door": "moving",
         "motion": "unknown",
         "session": "-",
+        "boarded": "no",
         "destination": "-",
     }
     story.run(3.0)
@@ -410,6 +411,7 @@ def test_a_person_reads_the_state_in_a_few_words() -> None:
         "door": "closed (estimated)",
         "motion": "stopped",
         "session": "A",
+        "boarded": "no",
         "destination": "L2",
         "outputs": "agv_request yes",
         "faults": [],

@@ -227,7 +227,7 @@ def test_a_fast_car_may_skip_the_code_of_a_floor_that_it_has_had_time_to_pass() 
     assert (story.faults, story.state) == ([], "AGV, closed at L3, A to L1")
 
 
-def test_the_lines_of_a_lift_that_only_speak_in_agv_mode_are_believed_when_they_do() -> None:
+def test_lines_that_mean_something_in_agv_mode_only_are_believed_in_agv_mode() -> None:
     building = Building(LiftSample(None, Door.BETWEEN, motion=None, agv=False))
     story = Story(building)
     story.run(1.0)
@@ -449,7 +449,7 @@ def test_of_two_doors_only_the_estimated_one_is_marked(front: Door, rear: Door, 
     assert story.node.status()["door"] == shown
 
 
-def test_an_estimated_door_that_is_not_offered_is_a_moving_one() -> None:
+def test_an_estimated_door_that_is_not_offered_is_shown_as_moving() -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_CLOSED, agv=False)))
     story.run(9.0)
     story.asks("A", "L1")

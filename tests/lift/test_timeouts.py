@@ -22,7 +22,7 @@ def lift(level: str, door: Door, *, agv: bool, **limits: object) -> Story:
 
 
 def keep_asking(story: Story, until: float) -> None:
-    """RMF repeats itself."""
+    """RMF repeats its request each second until then."""
     while story.now < until:
         story.asks("A", "L1")
         story.run(min(until, story.now + 5.0))

@@ -34,7 +34,7 @@ ROOTS = {
 }
 
 
-def test_the_stages_of_a_ride_are_what_they_are_called() -> None:
+def test_each_stage_of_a_ride_is_what_its_name_says() -> None:
     def stage(name: str) -> tuple[object, ...]:
         memory = WALKER.path(start(LIMITS), *ROOTS[name]).memory
         session = memory.session
@@ -54,19 +54,19 @@ def test_the_stages_of_a_ride_are_what_they_are_called() -> None:
 
 
 def all_is_true_around(*roots: World) -> int:
-    """Checks every step and state; how many states."""
+    """Check every step and state; the number of states."""
     found = WALKER.walk(roots, DEPTH, check)
     for world in found:
         nothing_changes_before_wake_at(world, LIMITS)
     return len(found)
 
 
-def test_every_state_within_some_steps_of_the_start() -> None:
+def test_the_rules_hold_within_some_steps_of_the_start() -> None:
     assert all_is_true_around(start(LIMITS)) > depth(300, 4000)
 
 
 @pytest.mark.parametrize("root", ROOTS)
-def test_every_state_within_some_steps_of_a_stage_of_a_ride(root: str) -> None:
+def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> None:
     stage = WALKER.path(start(LIMITS), *ROOTS[root])
     assert all_is_true_around(stage) > depth(150, 1000)
 

@@ -14,9 +14,18 @@ from msgspec.structs import replace
 from bridges.core.debounce import Settled
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
 from bridges.lift.core import decide, initial, published
-from bridges.lift.memory import Channel, LiftLimits, Memory
+from bridges.lift.memory import Channel, Forgotten, LiftLimits, Memory
 from bridges.lift.settings import Durations, LiftSettings
-from bridges.lift.signals import Door, Ended, Event, Hazard, LiftSample, Motion, Requested
+from bridges.lift.signals import (
+    Door,
+    Ended,
+    Event,
+    FromAdapter,
+    Hazard,
+    LiftSample,
+    Motion,
+    Requested,
+)
 from tests.walk import Walker
 
 LONG_S = 55.0
@@ -105,6 +114,8 @@ MOVES: dict[str, Move] = {
     "A asks human": _event(Requested("A", False, "L1")),
     "A ends": _event(Ended("A")),
     "B ends": _event(Ended("B")),
+    "A's adapter asks L3": _event(FromAdapter(Requested("A", True, "L3"), stamp=1)),
+    "A's adapter ends": _event(FromAdapter(Ended("A"), stamp=0)),
     "agv on": _inputs(agv=True),
     "agv off": _inputs(agv=False),
     **{f"at {level}": _inputs(level=level, code_fault="") for level in ("L1", "L2", "L3", None)},
@@ -250,7 +261,13 @@ def _session(session: Any, by: float) -> Any:
         call_at=_at(session.call_at, by, "call_at"),
         since=_at(session.since, by, "since") if session.waiting else 0.0,
         retry_at=_at(session.retry_at, by),
+        forgotten=session.forgotten and _forgotten(session.forgotten, by),
+        own_stamp=0,
     )
+
+
+def _forgotten(forgotten: Forgotten, by: float) -> Forgotten:
+    return replace(forgotten, since=max(_at(forgotten.since, by), -4.0))
 
 
 def _channel(channel: Channel[Any], by: float) -> Any:

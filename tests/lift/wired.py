@@ -24,7 +24,7 @@ SHIPPED = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
 
 
 def shipped() -> Settings:
-    """The example of `config/`."""
+    """The shipped example of `config/`."""
     settings = load(SHIPPED).devices["Lift1"]
     assert isinstance(settings, Settings)
     return settings
@@ -126,7 +126,7 @@ class _Registers:
         return self._watchdogs.guard(units)
 
     def insist(self) -> None:
-        """Nothing waits here."""
+        """There is no pause to break off."""
 
 
 class WiredStory(Story):

@@ -35,7 +35,7 @@ class Alone(alone.Alone[Memory, Event, Limits, SupervisorReport]):
         self.hears(Requested(session, Target(kind, floor, door), stamp, self.now - stamp))
 
     def ends(self, session: str, *, aged: float = 0.0) -> None:
-        """Its END."""
+        """An adapter's END."""
         stamp = self.stamped(aged)
         self.hears(Ended(session, stamp, self.now - stamp))
 

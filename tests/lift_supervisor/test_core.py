@@ -40,7 +40,7 @@ def test_each_state_that_does_not_show_the_request_causes_a_repeat_at_1_hz_at_mo
         StateHeard("a", "L1", "L3", 1, 2),
     ],
 )
-def test_any_difference_between_request_and_state_causes_the_repeat(mismatch: StateHeard) -> None:
+def test_any_difference_between_request_and_state_causes_a_repeat(mismatch: StateHeard) -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(1.0)
@@ -202,7 +202,7 @@ def test_an_end_from_a_robot_that_neither_has_nor_wants_the_lift_is_ignored() ->
 
 
 def test_an_end_of_the_session_that_the_lift_shows_is_passed_on_whoever_waits() -> None:
-    """The lift was taken past us; its robot, or an operator, gives it back."""
+    """The lift was taken without us; its robot, or an operator, gives it back."""
     desk = Alone()
     desk.asks("b")
     desk.shows("a", "L2")
@@ -222,7 +222,7 @@ def test_an_end_while_another_session_is_being_ended_waits_for_its_repeat() -> N
     assert desk.report.holder == "a"
 
 
-def test_who_asks_again_after_its_end_is_served_again_in_its_turn() -> None:
+def test_a_robot_that_asks_again_after_its_end_is_served_again_in_its_turn() -> None:
     desk = Alone()
     desk.asks("a")
     desk.asks("b", "L1")
@@ -266,7 +266,9 @@ def test_robots_are_served_in_the_order_of_their_first_requests() -> None:
     assert list(dict.fromkeys(order)) == ["AGV a to-a", "AGV b to-b", "AGV c to-c"]
 
 
-def test_who_waits_in_silence_for_10_s_leaves_the_queue_and_comes_back_at_its_end() -> None:
+def test_a_robot_that_waits_in_silence_for_10_s_leaves_the_queue_and_comes_back_at_its_end() -> (
+    None
+):
     desk = Alone()
     desk.shows("")
     for who in "abc":
@@ -328,7 +330,7 @@ def test_a_lift_whose_states_have_stopped_is_forgotten_unless_somebody_wants_it(
     assert not core.idle(desk.memory, 1000.0)
 
 
-def test_who_ends_while_it_waits_leaves_the_queue() -> None:
+def test_a_robot_that_ends_while_it_waits_leaves_the_queue() -> None:
     desk = Alone()
     desk.asks("a")
     desk.asks("b")

@@ -31,7 +31,7 @@ def test_in_a_hazard_nobody_is_sent_and_no_queue_moves(mode: str) -> None:
     assert desk.sent == [(40.0, "AGV a L3")]
 
 
-def test_a_holders_request_rests_in_a_hazard_and_its_end_does_not() -> None:
+def test_in_a_hazard_a_holders_request_is_held_back_and_its_end_is_not() -> None:
     desk = Alone()
     desk.asks("a")
     for second in range(1, 40):

@@ -36,7 +36,7 @@ def bad_network(rng: random.Random, loss: float) -> Any:
 
 
 def check_rates(requests: list[tuple[float, str]]) -> None:
-    """Nothing within a tenth of a second, nothing unchanged within a second, nothing like a storm."""
+    """No two messages within 0.1 s, none unchanged within 1 s, and few in all."""
     for (at, text), (later, again) in pairwise(requests):
         assert later - at >= (0.999 if text == again else 0.099), (at, text, again)
     for at, _ in requests:
@@ -169,7 +169,7 @@ class Watched:
 
 
 def events_at(now: float) -> list[Any]:
-    """What may happen next."""
+    """The events that may happen next."""
     agv, fire = LiftMode.MODE_AGV, LiftMode.MODE_FIRE
     return [
         Requested("a", Target(1, "L3", 2), now, 0.0),
@@ -210,7 +210,7 @@ def test_every_order_of_events_to_this_depth_keeps_the_rules(
 
 @st.composite
 def histories(draw: st.DrawFn) -> list[tuple[float, int]]:
-    """(s until it, number of the event)."""
+    """A history of events, each as (seconds before it, number of the event)."""
     gap = st.sampled_from([0.0, 0.05, 0.1, 0.5, 1.0, 2.5, 4.0, 11.0])
     return draw(st.lists(st.tuples(gap, st.integers(0, 9)), max_size=60))
 
@@ -249,7 +249,7 @@ def test_from_every_state_a_lift_that_obeys_is_granted_to_a_robot_that_asks(
 
 
 def obeys(session: str, text: str) -> str:
-    """Whose a lift is after this request, that was `session`'s before."""
+    """Which session has the lift after this request, if `session` had it before."""
     kind, who = (*text.split(" "), "", "")[:2]
     if kind == "AGV" and not session:
         return who

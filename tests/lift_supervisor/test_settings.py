@@ -37,7 +37,7 @@ def test_every_setting_reaches_the_core() -> None:
 
 
 @pytest.mark.parametrize("wrong", ["{quiet_start_s: 1}", "{silent_after_s: 0}", "{lift: [x]}"])
-def test_what_cannot_be_right_is_refused(wrong: str) -> None:
+def test_settings_that_cannot_be_right_are_refused(wrong: str) -> None:
     with pytest.raises(msgspec.ValidationError):
         read(wrong)
 

@@ -168,7 +168,7 @@ def test_a_lift_node_that_restarts_in_mid_ride_gets_the_session_again_and_the_ri
 def test_a_supervisor_that_restarts_with_a_robot_in_the_car_moves_no_relay(
     skew: float, our_skew: float
 ) -> None:
-    """Whatever its clock says, and its adapter's."""
+    """This holds whatever its clock and its adapter's say."""
     world = World()
     supervisor = OurSupervisor(world, wall_skew=our_skew)
     lift, robot = LiftNode(world), Rider(world, A, UP, skew=skew)
@@ -182,8 +182,10 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_moves_no_relay(
     assert robot.done
 
 
-def test_rmfs_own_supervisor_ends_such_a_ride_and_asks_for_it_again() -> None:
-    """Why the node holds on for a moment after END, and what ours spares it."""
+def test_rmfs_own_supervisor_restarted_in_the_same_way_ends_the_ride_and_asks_for_it_again() -> (
+    None
+):
+    """This is why the lift's node has a grace after END. Our supervisor never needs it."""
     world = World()
     supervisor = RmfsSupervisor(world)
     lift, robot = LiftNode(world), Rider(world, A, UP)
@@ -230,7 +232,9 @@ def test_an_adapter_that_restarts_gives_back_a_lift_that_it_knows_nothing_of() -
 # --- another supervisor ------------------------------------------------------------------------
 
 
-def test_beside_rmfs_own_it_is_silent_and_takes_over_in_mid_ride_when_that_is_gone() -> None:
+def test_beside_rmfs_own_supervisor_it_is_silent_and_takes_over_in_mid_ride_when_that_is_gone() -> (
+    None
+):
     world = World()
     rmfs = RmfsSupervisor(world)
     ours = OurSupervisor(world)
@@ -246,7 +250,7 @@ def test_beside_rmfs_own_it_is_silent_and_takes_over_in_mid_ride_when_that_is_go
     assert robot.done
 
 
-def test_a_second_of_ours_stands_by_and_takes_over() -> None:
+def test_a_second_supervisor_of_ours_stands_by_and_takes_over() -> None:
     world = World()
     first = OurSupervisor(world, name="first")
     world.run(4.0)

@@ -39,7 +39,7 @@ def sessions(world: World) -> list[tuple[float, str]]:
 
 
 class OurSupervisor(Served):
-    """Ours."""
+    """The supervisor of this repository."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class OurSupervisor(Served):
 
 
 class RmfsSupervisor(StandIn):
-    """RMF's."""
+    """RMF's own supervisor, by its rules."""
 
     def __init__(self, world: World) -> None:
         super().__init__(world, LiftSupervisor, "rmf_supervisor", LIFT_REQUESTS)
@@ -141,7 +141,7 @@ class Rider:
         self._next_at = NEVER if self.done else self.world.now + 2.0
 
     def die(self) -> None:
-        """It says nothing any more."""
+        """It sends nothing any more, and what it retained is gone."""
         self.world.retained.pop(self.name, None)
         self.world.hearers[LIFT_STATES.name].discard(self.name)
         self._next_at = NEVER

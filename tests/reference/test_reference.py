@@ -7,9 +7,10 @@ from jsonschema import Draft202012Validator
 
 from bridges.settings import names as named
 from bridges.settings import reference
+from bridges.settings.examples import device_yamls
 
 ROOT = Path(__file__).parents[2]
-SHIPPED = sorted((ROOT / "config").glob("*.yaml"))
+SHIPPED = device_yamls()
 
 
 @pytest.fixture(scope="module")

@@ -1,16 +1,14 @@
 import gc
-import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from bridges.core.fields import Zenoh
 from bridges.rmf.choose import missing_of_dds
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.transport import Transport
-from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf.domains import domain_of_this_run
+from tests.rmf.joining import Join, joining
 
 if missing_of_dds():
     collect_ignore = [
@@ -21,11 +19,6 @@ if missing_of_dds():
         "test_wires.py",
     ]
 
-Join = Callable[[str], Transport]
-"""Open a node of this name on the graph of this test."""
-
-
-ZENOH = {"zenoh": Zenoh(), "zenoh_ros2dds": Zenoh(keys="ros2dds")}
 DDS = pytest.param("dds", marks=pytest.mark.dds)
 ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
 
@@ -83,21 +76,6 @@ def observer(join_dds: Join) -> Iterator[Any]:
     yield participant
     del participant
     gc.collect()
-
-
-def joining(transport: str, domain: int) -> Join:
-    """What opens nodes of this transport in this domain, on loopback."""
-
-    def join(name: str) -> Transport:
-        if transport.startswith("zenoh"):
-            return ZenohTransport(name, domain, loopback=True, settings=ZENOH[transport])
-        # Imported here: there may be no ROS.
-        module = importlib.import_module(f"bridges.rmf.{transport}")
-        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
-        node: Transport = getattr(module, kind)(name, domain, loopback=True)
-        return node
-
-    return join
 
 
 def _graph(opening: Join) -> Iterator[Join]:

@@ -42,9 +42,12 @@ GOLDEN: Final[Mapping[str, tuple[str, Qos, Qos]]] = {
     "charger_states": ("rmf_charger_msgs/ChargerState", PLAIN, PLAIN),
     "charger_requests": ("rmf_charger_msgs/ChargerRequest", PLAIN, PLAIN),
     "charger_cancels": ("rmf_charger_msgs/ChargerCancel", PLAIN, PLAIN),
+    # Ours: who asked hears why not; nothing is retained, as an old refusal tells nobody anything.
+    "charger_refusals": ("diagnostic_msgs/DiagnosticStatus", PLAIN, PLAIN),
     "adapter_charger_requests": ("rmf_charger_msgs/ChargerRequest", PLAIN, PLAIN),
     "adapter_charger_cancels": ("rmf_charger_msgs/ChargerCancel", PLAIN, PLAIN),
     # Fleet adapter publishes SystemDefaults 100.
+    "charger_coordinator": ("std_msgs/Bool", PLAIN, PLAIN),
     "fleet_states": ("rmf_fleet_msgs/FleetState", PLAIN, PLAIN),
     # Fleet adapter hears reliable transient_local: a volatile publisher never matches.
     "charging_assignments": ("rmf_fleet_msgs/ChargingAssignments", RETAINED, RETAINED),

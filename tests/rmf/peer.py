@@ -17,11 +17,13 @@ from bridges.rmf import topics
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher
 from tests.rmf import zenoh_hostile
-from tests.rmf.conftest import joining
+from tests.rmf.joining import RELEASE, joining
 from tests.waiting import wait_until
 
 TOPICS: dict[str, Topic[Any]] = {
-    name: topic for name, topic in vars(topics).items() if isinstance(topic, Topic)
+    name: topic
+    for name, topic in vars(topics).items()
+    if isinstance(topic, Topic) and RELEASE.has(topic.type)
 }
 
 
@@ -91,7 +93,7 @@ def hostile(domain: int, transport: str) -> None:
     from cyclonedds.qos import Policy, Qos
     from cyclonedds.topic import Topic as DdsTopic
 
-    from bridges.rmf.loopback import LOOPBACK
+    from bridges.rmf.cyclone import LOOPBACK
     from tests.rmf import idl_types
 
     kept = Domain(domain, LOOPBACK)

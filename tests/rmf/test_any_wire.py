@@ -9,7 +9,7 @@ import pytest
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE
 from tests.rmf import peer
-from tests.rmf.conftest import Join
+from tests.rmf.joining import Join
 from tests.waiting import wait_until
 
 

@@ -76,7 +76,7 @@ def test_any_bytes_are_a_message_or_refused(kind: Any, body: bytes, little: bool
     [
         (d.Bool, b"", "not plain CDR: the sample begins with nothing"),
         (d.Bool, b"\0\x07\0\0\x01", "not plain CDR: the sample begins with 00 07 00 00"),
-        (d.Bool, b"\0\x01\0\0\x02", "2 is not a truth value"),
+        (d.Bool, b"\0\x01\0\0\x02", "2 is not a bool"),
         (d.Bool, b"\0\x01\0\0\x01" + b"\0" * 4, "9 bytes, where Bool takes 5"),
         (d.ChargerCancel, b"\0\x01\0\0" + b"\x02\0\0\0\xff\0", "a string is not UTF-8"),
         (d.ChargerCancel, b"\0\x01\0\0" + b"\x00\0\0\0", "does not end with its only NUL"),

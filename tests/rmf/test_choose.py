@@ -10,9 +10,9 @@ from typing import Literal
 import msgspec
 import pytest
 
-from bridges.core.fields import Rmf, Zenoh
 from bridges.rmf.choose import domain_id, open_transport, stays_on_loopback
 from bridges.rmf.definitions import PACKAGES
+from bridges.rmf.settings import Rmf, Zenoh
 from bridges.rmf.transport import TransportError
 from bridges.settings.load import Problem, SettingsError, load
 from tests.rmf.conftest import DDS, ROS2
@@ -63,9 +63,23 @@ def test_the_network_is_the_narrower_of_yaml_and_ros(
     assert stays_on_loopback(rmf, environ) is expected
 
 
+@pytest.mark.parametrize(
+    ("environ", "expected"),
+    [
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, False),
+        ({"ROS_LOCALHOST_ONLY": "1"}, True),
+    ],
+)
+def test_localhost_with_static_peers_reaches_them_as_in_ros(
+    environ: dict[str, str], expected: bool
+) -> None:
+    assert stays_on_loopback(Rmf(), environ, ["10.0.0.5"]) is expected
+    assert stays_on_loopback(Rmf(network="localhost"), environ, ["10.0.0.5"])
+
+
 @pytest.mark.parametrize("text", ["OFF", "localhost", "WORLD"])
 def test_a_range_in_which_nobody_is_found_is_refused(text: str) -> None:
-    with pytest.raises(TransportError, match="Use SUBNET or LOCALHOST"):
+    with pytest.raises(TransportError, match="use SUBNET or LOCALHOST"):
         stays_on_loopback(Rmf(), {"ROS_AUTOMATIC_DISCOVERY_RANGE": text})
 
 
@@ -93,11 +107,11 @@ def test_without_ros_the_error_says_how_to_get_it(no_ros: None) -> None:
         "transport ros2 needs ROS 2 with RMF's messages, and rclpy does not import: "
     )
     assert "sudo apt install ros-jazzy-rclpy ros-jazzy-builtin-interfaces" in text
-    assert "`transport: dds` needs none of that" in text
+    assert "`transport: dds` needs none of this" in text
 
 
 def test_without_rmfs_packages_the_error_names_the_one_that_is_missing(bare_rclpy: None) -> None:
-    with pytest.raises(TransportError, match="the ROS package rmf_charger_msgs is not here"):
+    with pytest.raises(TransportError, match="the ROS package rmf_charger_msgs is not installed"):
         open_transport(Rmf(transport="ros2"), "node", localhost=True)
 
 
@@ -106,7 +120,9 @@ def test_ros_args_are_for_ros_alone(
     no_ros: None, transport: Literal["auto", "dds", "zenoh"]
 ) -> None:
     rmf = Rmf(transport=transport, domain_id=domain_of_this_run())
-    with pytest.raises(TransportError, match="--ros-args -r a:=b: only rclpy understands this"):
+    with pytest.raises(
+        TransportError, match="--ros-args -r a:=b: only transport ros2 understands this"
+    ):
         open_transport(rmf, "node", localhost=True, ros_args=["--ros-args", "-r", "a:=b"])
     open_transport(rmf, "node", localhost=True, ros_args=["--ros-args"]).close()
 
@@ -132,7 +148,7 @@ def test_auto_opens_ros2_where_all_of_it_is_here_and_says_why(
     assert type(node).__name__ == "Ros2Transport"
     assert caplog.messages == [
         f"transport speaks=ros2 domain_id={domain} network=localhost"
-        ' reason="rclpy and RMF\'s messages are here"'
+        ' reason="rclpy and RMF\'s messages are installed"'
     ]
 
 
@@ -191,12 +207,12 @@ def test_the_yamls_zenoh_section_reaches_the_transport(tmp_path: Path) -> None:
         ("{connect: []}", ["'connect' has 0 entries: at least 1 are needed"]),
         ("{connect: [10.0.0.5]}", ["item 1 of 'connect' is '10.0.0.5': write protocol/host:port"]),
         ("{password: x}", ["unknown key 'password'"]),
-        ("{user: lift}", ["user and password_file go together: give both, or none"]),
+        ("{user: lift}", ["'zenoh': user and password_file go together: give both, or none"]),
         ("{tls: {}}", ["no endpoint is encrypted: write connect: [tls/host:port]"]),
         ("{listen: [tls/0.0.0.0:7447]}", ["who listens with TLS needs tls: {certificate: "]),
         (
             "{connect: [tls/rmf:7447], tls: {certificate: /c.pem}}",
-            ["certificate and private_key go together: give both, or none"],
+            ["'tls': certificate and private_key go together: give both, or none"],
         ),
     ],
 )

@@ -13,13 +13,13 @@ from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.rmf import definitions as d
 from bridges.rmf import graph
+from bridges.rmf.cyclone import LOOPBACK
 from bridges.rmf.dds import DdsTransport
-from bridges.rmf.loopback import LOOPBACK
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import TransportError
 from tests.rmf import peer
-from tests.rmf.conftest import Join
 from tests.rmf.domains import domain_of_this_run
+from tests.rmf.joining import Join
 from tests.rmf.observing import PUBLICATION, SUBSCRIPTION, seen
 from tests.waiting import wait_until
 

@@ -1,20 +1,23 @@
-"""`definitions.py` against tables typed from the .msg files, which it must not be made from.
+"""`definitions.py` and `releases.py` against tables typed from the .msg files, release by release.
 
 Read in open-rmf/rmf_internal_msgs at 3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0), every line
 of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg, rmf_task_msgs/msg/Alert and its
 AlertParameter, and in rmf_fleet_msgs/msg EmergencySignal, FleetState, ChargingAssignments and theirs;
 Time, Duration, Bool and Header from ROS 2 Jazzy's builtin_interfaces and std_msgs, and diagnostic_msgs
-from ros2/common_interfaces c0c0bc57f958eb54a142446f0c2a475754367eee.
+from ros2/common_interfaces c0c0bc57f958eb54a142446f0c2a475754367eee. What Jazzy has otherwise: the same
+files at tag 3.3.1, a351d51602383eb09a8138d302827a76241630a5. Kilted: 4.1.0 and branch kilted (3.5.0) at
+c0f72ce5e2129411d2868414b25f6fab1460fcdb, which have the same files.
 """
 
 import typing
-from dataclasses import fields
 from enum import IntEnum
 from typing import Any
 
 import pytest
 
+from bridges.rmf import constants, releases
 from bridges.rmf import definitions as d
+from bridges.rmf.releases import Release
 
 CONSTANTS = {
     d.LiftRequestType: {
@@ -140,13 +143,36 @@ FIELDS = {
 }
 
 
+JAZZY: dict[str, str | None] = {
+    "rmf_fleet_msgs/RobotMode": "uint32 mode, uint64 mode_request_id",
+    "rmf_fleet_msgs/EmergencySignal": None,
+    "rmf_task_msgs/Alert": None,
+    "rmf_task_msgs/AlertParameter": None,
+}
+"""Where Jazzy's files differ from those above; None: there is no such file."""
+NOT_IN_JAZZY = {
+    d.RobotModeValue: {"MODE_PERFORMING_ACTION", "MODE_ACTION_COMPLETED"},
+    d.AlertTier: {"TIER_INFO", "TIER_WARNING", "TIER_ERROR"},
+}
+"""Every other constant of the table above has the same number in Jazzy's files."""
+GOLDEN = {
+    releases.KILTED: FIELDS,
+    releases.JAZZY: {name: text for name, text in {**FIELDS, **JAZZY}.items() if text is not None},
+}
+
+
 def test_there_are_no_constants_beside_those_of_the_table() -> None:
-    enums = {
-        kind
-        for kind in vars(d).values()
-        if isinstance(kind, type) and kind.__module__ == d.__name__
-    }
-    assert {kind for kind in enums if issubclass(kind, IntEnum)} == CONSTANTS.keys()
+    enums = {kind for kind in vars(constants).values() if isinstance(kind, type)} - {IntEnum}
+    assert enums == CONSTANTS.keys()
+    assert enums == {kind for kind in vars(d).values() if isinstance(kind, type)} & enums
+
+
+def test_no_constant_that_jazzy_lacks_is_sent() -> None:
+    """Alert's tiers go with the message, which Jazzy lacks too; the modes are RMF's to send."""
+    assert NOT_IN_JAZZY[d.AlertTier] == CONSTANTS[d.AlertTier].keys()
+    assert not releases.JAZZY.has(d.Alert)
+    ours = set(CONSTANTS[d.RobotModeValue]) - NOT_IN_JAZZY[d.RobotModeValue]
+    assert sorted(d.RobotModeValue[name] for name in ours) == list(range(10))
 
 
 @pytest.mark.parametrize("enum", CONSTANTS, ids=lambda enum: enum.__name__)
@@ -154,12 +180,16 @@ def test_every_constant_has_the_number_of_the_msg_file(enum: Any) -> None:
     assert {constant.name: constant.value for constant in enum} == CONSTANTS[enum]
 
 
-def test_every_message_has_the_fields_of_the_msg_file_in_their_order() -> None:
+@pytest.mark.parametrize("release", GOLDEN, ids=lambda release: release.name)
+def test_every_message_has_the_fields_of_the_releases_msg_file_in_their_order(
+    release: Release,
+) -> None:
     ours = {
-        _ros_name(kind): ", ".join(f"{_ros_name(f.type)} {f.name}" for f in fields(kind))
-        for kind in typing.cast("dict[Any, str]", d.PACKAGES)
+        _ros_name(kind): ", ".join(f"{_ros_name(k)} {n}" for n, k in release.fields(kind).items())
+        for kind in release.messages()
     }
-    assert ours == FIELDS
+    assert ours == GOLDEN[release]
+    assert releases.RELEASES.keys() == {one.name for one in GOLDEN}
 
 
 def _ros_name(kind: Any) -> str:

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.waiting import PATIENCE_S
+
 NODE = """
 import sys
 from bridges import log
@@ -43,11 +45,11 @@ def test_malformed_datagrams_write_no_line_each(domain: int, tmp_path: Path) -> 
                     sender.sendto(packet, ("127.0.0.1", 7400 + 250 * domain + port))
         assert node.stdin
         node.stdin.close()
-        assert node.wait(20) == 0
+        assert node.wait(PATIENCE_S) == 0
     assert log.read_text().splitlines() == []
 
 
-def test_a_library_says_each_of_its_lines_once_and_we_say_all_of_ours(tmp_path: Path) -> None:
+def test_each_line_of_a_library_is_logged_once_and_every_line_of_ours(tmp_path: Path) -> None:
     text = (
         "import logging; from bridges import log; log.start()\n"
         "for n in range(3):\n"

@@ -16,7 +16,7 @@ def test_a_message_is_there_when_publish_returns() -> None:
     assert received == [("first", state), ("second", state)]
 
 
-def test_two_networks_never_meet() -> None:
+def test_nodes_on_two_networks_never_hear_each_other() -> None:
     received: list[d.LiftState] = []
     MemoryTransport(MemoryNetwork(), "here").subscribe(LIFT_STATES, received.append)
     MemoryTransport(MemoryNetwork(), "there").publisher(LIFT_STATES).publish(d.LiftState())

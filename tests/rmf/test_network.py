@@ -5,10 +5,10 @@ from contextlib import suppress
 
 import pytest
 
+from bridges.rmf import addresses, cyclone
 from bridges.rmf import definitions as d
-from bridges.rmf import network
+from bridges.rmf.cyclone import LOOPBACK
 from bridges.rmf.dds import DdsTransport
-from bridges.rmf.loopback import LOOPBACK
 from bridges.rmf.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
 from bridges.rmf.transport import TransportError
 from tests.rmf import peer
@@ -28,6 +28,15 @@ PEERS = '<Peers><Peer address="10.0.0.5"/><Peer address="rmf.local"/></Peers>'
         ({"ROS_STATIC_PEERS": "10.0.0.5;rmf.local"}, AUTO.format(PEERS)),
         ({"ROS_STATIC_PEERS": ";; 10.0.0.5; rmf.local ;"}, AUTO.format(PEERS)),
         ({"ROS_STATIC_PEERS": '"<&'}, AUTO.format("<Peers><Peer address='\"&lt;&amp;'/></Peers>")),
+        (
+            {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": "10.0.0.5"},
+            AUTO.format(
+                '<Peers><Peer address="localhost"/><Peer address="10.0.0.5"/></Peers>'
+            ).replace(
+                "<Discovery>",
+                "<General><AllowMulticast>false</AllowMulticast></General><Discovery>",
+            ),
+        ),
         ({"CYCLONEDDS_URI": "file:///c.xml"}, AUTO.format("") + ",file:///c.xml"),
         (
             {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", "ROS_STATIC_PEERS": "10.0.0.5"},
@@ -36,21 +45,21 @@ PEERS = '<Peers><Peer address="10.0.0.5"/><Peer address="rmf.local"/></Peers>'
     ],
 )
 def test_ross_variables_become_cyclones_configuration(environ: dict[str, str], wanted: str) -> None:
-    assert network.configuration(environ) == wanted
+    assert cyclone.configuration(environ) == wanted
 
 
 class Machine:
-    """Its addresses, as the test wants them."""
+    """The machine's addresses, as the test sets them."""
 
     def __init__(self) -> None:
-        self.addresses: network.Addresses = frozenset({(2, "10.0.0.7")})
+        self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
 
 
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
     """A machine whose nodes go by its addresses, and in truth stay on loopback."""
     made = Machine()
-    monkeypatch.setattr(network, "addresses", lambda: made.addresses)
+    monkeypatch.setattr(addresses, "addresses", lambda: made.addresses)
     monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
     return made
 
@@ -140,4 +149,4 @@ def test_it_can_be_closed_while_there_is_no_network(
 
 
 def test_loopback_and_what_has_no_link_are_no_way_to_another_machine() -> None:
-    assert "127.0.0.1" not in {address for _, address in network.addresses()}
+    assert "127.0.0.1" not in {address for _, address in addresses.addresses()}

@@ -8,10 +8,9 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import Topic
-from tests.rmf import peer
-from tests.rmf.golden_qos import GOLDEN, RETAINED, Qos
+from tests.rmf.golden_qos import GOLDEN, PLAIN, RETAINED, Qos
 
-TOPICS = {topic.name: topic for topic in peer.TOPICS.values()}
+TOPICS = {topic.name: topic for topic in vars(topics).values() if isinstance(topic, Topic)}
 
 
 def typed(qos: topics.Qos) -> Qos:
@@ -29,6 +28,11 @@ def test_the_table_of_topics_is_the_golden_one() -> None:
         for name, topic in TOPICS.items()
     }
     assert ours == GOLDEN
+
+
+def test_a_lifts_node_hears_adapters_without_what_they_retain() -> None:
+    ours = topics.ADAPTER_LIFT_REQUESTS.live()
+    assert (ours.name, typed(ours.subscribe)) == ("adapter_lift_requests", PLAIN)
 
 
 @pytest.mark.parametrize("name", GOLDEN)

@@ -3,7 +3,8 @@ from typing import Any
 import pytest
 
 from bridges.rmf import definitions as d
-from bridges.rmf.rihs01 import type_hash
+from bridges.rmf.releases import JAZZY, KILTED
+from bridges.rmf.rihs01 import releases_of, type_hash
 
 SEEN_ON_JAZZY = {
     d.LiftRequest: "e8f1e0aa4d172703d0d7840c1876448c6c5d75ab58955faf7de7dddc17c096ac",
@@ -44,6 +45,17 @@ BUILT_INTO_JAZZY = {
 }
 """In the `share/<package>/msg/*.json` that a build of common_interfaces 5283bd9 (5.3.5) installs."""
 
+JAZZYS: dict[Any, str | None] = {
+    d.RobotMode: "f918d799fdbf77196b097b077858ebb2efe6685ab543564b69487fe7124638e7",
+    d.RobotState: "d282ea1548666b2b1fba5fc8cf07914886cdee8ac2499487e90eb15fd106de76",
+    d.FleetState: "ab4c31fc97ae2ed5abc92262baac1597a7c91728031f514507ba155ef8d97cf3",
+    d.EmergencySignal: None,
+    d.Alert: None,
+    d.AlertParameter: None,
+}
+"""Where Jazzy differs (None: it has no such message): from the .msg files at tag 3.3.1 (a351d51), by
+rosbags 0.11. Of 3.5.0 (kilted, c0f72ce) it computes the same as of 4.1.0."""
+
 HASHES: dict[Any, str] = {**SEEN_ON_JAZZY, **COMPUTED_BY_ROSBAGS, **BUILT_INTO_JAZZY}
 
 
@@ -54,3 +66,16 @@ def test_there_is_a_hash_to_compare_with_for_every_type() -> None:
 @pytest.mark.parametrize("message_type", HASHES, ids=lambda kind: kind.__name__)
 def test_the_hash_of_a_type_is_the_one_that_ros_computes(message_type: Any) -> None:
     assert type_hash(message_type) == "RIHS01_" + HASHES[message_type]
+
+
+def test_jazzys_hashes_are_those_of_its_own_files_and_all_others_are_the_same() -> None:
+    jazzys: dict[Any, str | None] = {**HASHES, **JAZZYS}
+    wanted = {kind: "RIHS01_" + hashed for kind, hashed in jazzys.items() if hashed is not None}
+    assert {kind: type_hash(kind, JAZZY) for kind in JAZZY.messages()} == wanted
+
+
+def test_a_hash_tells_a_release_where_only_one_has_it() -> None:
+    assert releases_of("RIHS01_" + HASHES[d.FleetState]) == [KILTED]
+    assert releases_of("RIHS01_" + str(JAZZYS[d.FleetState])) == [JAZZY]
+    assert releases_of("RIHS01_" + HASHES[d.LiftState]) == [JAZZY, KILTED]
+    assert releases_of("RIHS01_0") == []

@@ -9,7 +9,7 @@ from hypothesis import given
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import RETAINED, VOLATILE, Topic
 from bridges.rmf.transport import Publisher, Subscription, TransportError
-from tests.rmf.conftest import Join
+from tests.rmf.joining import Join
 from tests.rmf.values import MESSAGE_TYPES, repeatable, values
 from tests.waiting import wait_until
 
@@ -84,7 +84,9 @@ def test_a_volatile_subscription_is_told_nothing_of_the_past(join: Join) -> None
     assert numbers(received) == [2]
 
 
-def test_who_wants_retained_messages_does_not_hear_who_retains_none(join: Join) -> None:
+def test_a_subscription_to_retained_messages_does_not_hear_a_publisher_that_retains_none(
+    join: Join,
+) -> None:
     forgetful = join("speaker").publisher(replace(KEPT, publish=VOLATILE))
     keeper = join("keeper").publisher(KEPT)
     received: list[d.DoorRequest] = []
@@ -110,7 +112,7 @@ def test_another_type_under_the_same_name_is_not_heard(join: Join) -> None:
     assert (stranger.matched(), subscription.matched()) == (0, 1)
 
 
-def test_others_only_leaves_out_what_the_same_node_says(join: Join) -> None:
+def test_others_only_leaves_out_the_nodes_own_messages(join: Join) -> None:
     ours, other = join("ours"), join("other")
     echoed: list[d.DoorRequest] = []
     from_others: list[d.DoorRequest] = []
@@ -142,7 +144,7 @@ def test_matches_are_counted_up_and_down(join: Join) -> None:
     wait_until(lambda: publisher.matched() == 1, "the second is gone")
 
 
-def test_who_leaves_is_gone_for_the_others_and_may_leave_twice(join: Join) -> None:
+def test_a_node_that_leaves_is_gone_for_the_others_and_may_leave_twice(join: Join) -> None:
     speaker, listener = join("speaker"), join("listener")
     received: list[d.DoorRequest] = []
     publisher = speaker.publisher(HEARD)
@@ -205,7 +207,7 @@ def test_a_node_has_the_name_that_it_was_given_and_has_dropped_nothing(join: Joi
     assert (node.name, node.dropped) == ("lift_node", {})
 
 
-def test_a_defect_of_who_listens_costs_one_message_and_the_transport_lives(
+def test_a_defect_of_a_listener_costs_one_message_and_the_transport_lives(
     join: Join, caplog: pytest.LogCaptureFixture
 ) -> None:
     received: list[d.DoorRequest] = []

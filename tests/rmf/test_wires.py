@@ -16,9 +16,10 @@ from bridges.rmf import definitions as d
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from tests.rmf import golden_qos, peer
-from tests.rmf.conftest import ROS2, Join, joining
+from tests.rmf.conftest import ROS2
 from tests.rmf.domains import domain_of_this_run
 from tests.rmf.golden_qos import GOLDEN
+from tests.rmf.joining import RELEASE, Join, joining
 from tests.rmf.observing import PUBLICATION, SUBSCRIPTION, seen
 from tests.rmf.values import repeatable, values
 from tests.waiting import LEASE_S, wait_until
@@ -38,6 +39,7 @@ def echo(request: pytest.FixtureRequest) -> Iterator[None]:
 # --- to another process ------------------------------------------------------------------------
 
 
+@pytest.mark.xdist_group("echo on dds")
 @ALL_TOPICS
 def test_every_message_survives_the_wire_to_another_process_and_back(
     echo: None, join_wire: Join, topic: Topic[Any]
@@ -197,14 +199,16 @@ def test_each_end_has_the_type_the_type_hash_and_the_qos_of_the_golden_table(
     assert [as_ros_shows(end.qos) for end in ends] == golden
     for end in ends:
         assert end.qos[Policy.DataRepresentation] == Policy.DataRepresentation(True, False)
-        assert end.qos[Policy.Userdata].data.decode() == f"typehash={type_hash(topic.type)};"
+        assert (
+            end.qos[Policy.Userdata].data.decode() == f"typehash={type_hash(topic.type, RELEASE)};"
+        )
     if golden[0].durability == "TRANSIENT_LOCAL":
         kept = ends[0].qos[Policy.DurabilityService].history
         assert kept == Policy.History.KeepLast(golden[0].depth)
 
 
 def as_ros_shows(qos: Any) -> golden_qos.Qos:
-    """Of an end's QoS on DDS, what the golden table has."""
+    """An end's QoS on DDS, in the golden table's terms."""
     names = {
         "Reliable": "RELIABLE",
         "Volatile": "VOLATILE",

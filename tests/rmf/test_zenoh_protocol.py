@@ -15,8 +15,8 @@ from bridges.rmf.definitions import LiftState
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf import rmw_zenoh_reader
-from tests.rmf.conftest import ZENOH
 from tests.rmf.domains import domain_of_this_run
+from tests.rmf.joining import ZENOH
 from tests.rmf.zenoh_programs import meeting, reading
 from tests.waiting import wait_until
 
@@ -178,8 +178,8 @@ def test_what_a_publisher_of_rmw_zenoh_retains_is_heard_however_late_it_comes(
     ],
 )
 def test_a_token_that_says_nothing_is_passed_over(token: str) -> None:
-    assert zenoh_keys.RmwZenoh(1, "session", "node").end(token) is None
-    assert zenoh_keys.Ros2Dds(1, "session", "node").end(token) is None
+    assert zenoh_keys.RmwZenoh(1, "session", "node").peer(token) is None
+    assert zenoh_keys.Ros2Dds(1, "session", "node").peer(token) is None
 
 
 # --- zenoh-bridge-ros2dds ------------------------------------------------------------------------

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 import trustme
 
-from bridges.core.fields import Zenoh, ZenohTls
 from bridges.rmf import addresses, zenoh_config
 from bridges.rmf import definitions as d
+from bridges.rmf.settings import Zenoh, ZenohTls
 from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_STATES
 from bridges.rmf.transport import TransportError
 from bridges.rmf.zenoh import ZenohTransport
@@ -151,7 +151,7 @@ def test_with_two_routers_each_message_comes_once_and_one_of_them_is_enough(site
 
 
 class Machine:
-    """Its addresses, as the test wants them."""
+    """The machine's addresses, as the test sets them."""
 
     def __init__(self) -> None:
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
@@ -216,7 +216,7 @@ class Papers:
         self.directory = directory
 
     def file(self, name: str) -> str:
-        """The path of one of them."""
+        """The path of one of the files."""
         return str(self.directory / name)
 
     @staticmethod
@@ -330,12 +330,11 @@ def test_a_node_on_loopback_takes_no_notice_of_the_settings_and_opens_no_other_a
     finally:
         node.close()
     for config in zenoh_config.on_loopback(DOMAIN):
-        endpoints = (
-            [*config["connect/endpoints"], *config["listen/endpoints"]]
-            if ("connect/endpoints" in config)
-            else config["listen/endpoints"]
-        )
-        assert all(map(zenoh_config.is_local, endpoints))
+        for key in ("connect/endpoints", "listen/endpoints"):
+            endpoints = config.get(key, [])
+            assert isinstance(endpoints, list)
+            assert all(map(zenoh_config.is_local, endpoints))
+        assert config["listen/endpoints"]
         assert config["scouting/multicast/enabled"] is False
 
 

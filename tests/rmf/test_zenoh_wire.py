@@ -10,9 +10,9 @@ from bridges.rmf import definitions as d
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf import peer
-from tests.rmf.conftest import ZENOH
+from tests.rmf.joining import RELEASE, ZENOH, joining
 from tests.rmf.values import repeatable, values
-from tests.waiting import wait_until
+from tests.waiting import LEASE_S, wait_until
 
 ALL_TOPICS = pytest.mark.parametrize("topic", peer.TOPICS.values(), ids=peer.TOPICS.keys())
 
@@ -22,7 +22,9 @@ class Here:
 
     def __init__(self, way: str, domain: int) -> None:
         self.way, self.domain = way, domain
-        self.node = ZenohTransport("here", domain, loopback=True, settings=ZENOH[way])
+        self.node = ZenohTransport(
+            "here", domain, loopback=True, settings=ZENOH[way], release=RELEASE
+        )
 
 
 @pytest.fixture(params=ZENOH)
@@ -41,6 +43,7 @@ def echoed(request: pytest.FixtureRequest, module_domain: int) -> Iterator[Zenoh
     made.node.close()
 
 
+@pytest.mark.xdist_group("echo on zenoh")
 @ALL_TOPICS
 def test_every_message_survives_the_wire_to_another_process_and_back(
     echoed: ZenohTransport, topic: Topic[Any]
@@ -97,12 +100,14 @@ def test_a_process_that_leaves_is_gone_at_once_for_the_others(here: Here) -> Non
     subscription = here.node.subscribe(LIFT_STATES.named("pong_lift_states"), print)
     with peer.running("echo", here.domain, here.way):
         wait_until(lambda: publisher.matched() and subscription.matched(), "it is found")
-    wait_until(lambda: not publisher.matched() and not subscription.matched(), "it is gone", 5.0)
+    wait_until(
+        lambda: not publisher.matched() and not subscription.matched(), "it is gone", LEASE_S
+    )
 
 
-def test_those_who_stay_find_who_comes_after_the_first_of_them_has_gone(here: Here) -> None:
+def test_nodes_that_stay_find_a_newcomer_after_the_first_of_them_has_gone(here: Here) -> None:
     states = LIFT_STATES
-    stays = ZenohTransport("stays", here.domain, loopback=True, settings=ZENOH[here.way])
+    stays = joining(here.way, here.domain)("stays")
     try:
         heard: list[d.LiftState] = []
         subscription = stays.subscribe(states, heard.append)
@@ -110,7 +115,7 @@ def test_those_who_stay_find_who_comes_after_the_first_of_them_has_gone(here: He
         wait_until(lambda: publisher.matched() and subscription.matched(), "they meet")
         here.node.close()
         wait_until(lambda: not subscription.matched(), "the first has gone")
-        late = ZenohTransport("late", here.domain, loopback=True, settings=ZENOH[here.way])
+        late = joining(here.way, here.domain)("late")
         try:
             said = late.publisher(states)
             wait_until(

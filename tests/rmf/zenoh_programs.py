@@ -34,7 +34,7 @@ class Told:
         self.lines: list[dict[str, Any]] = []
 
     def values(self, key: str) -> list[Any]:
-        """This value of each line that has it."""
+        """The values of this key, of each line that has it."""
         return [line[key] for line in self.lines if key in line]
 
 
@@ -100,7 +100,7 @@ class Router:
             self._child = None
 
     def die(self) -> None:
-        """Kill it."""
+        """Kill the program."""
         if self._child:
             self._child.kill()
         self.leave()

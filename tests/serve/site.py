@@ -119,7 +119,7 @@ def command(*arguments: str | Path, program: Sequence[str] = BRIDGE) -> list[str
 
 
 def environment(**more: str) -> dict[str, str]:
-    """This one's, as no service."""
+    """This process's environment without a service's variables, and with these."""
     units = ("RMF_", "NOTIFY", "WATCHDOG", "RUNTIME_DIR", "STATE_DIR", "SERVICE_RESULT")
     own = {name: value for name, value in os.environ.items() if not name.startswith(units)}
     return own | more
@@ -146,7 +146,7 @@ class Daemon:
             )
 
     def wait_for(self, text: str) -> None:
-        """Until the log says so."""
+        """Wait until this text is in the log."""
         wait_until(lambda: text in self.log.read_text(), f"{text!r} in {self.log}")
 
     def end(self, number: int) -> int:
@@ -166,7 +166,7 @@ def daemon(
     finally:
         started.process.terminate()
         try:
-            started.process.wait(20)
+            started.process.wait(PATIENCE_S)
         finally:
             started.process.kill()
             started.process.wait()

@@ -41,7 +41,7 @@ def test_a_defect_of_one_driver_switches_its_device_off_and_the_others_serve_on(
     assert {state.door_name for at, state in corridor.states if at > 20} == {"ward", "lab"}
 
 
-def test_it_is_claimed_anew_after_a_pause_that_grows() -> None:
+def test_a_device_with_a_defect_is_claimed_anew_after_a_pause_that_grows() -> None:
     corridor = Corridor()
     corridor.doors["lab"].during = lambda: breaks(KeyError("defect"))
     for i in range(400):
@@ -70,7 +70,7 @@ def test_what_cannot_be_switched_off_within_a_second_ends_the_daemon() -> None:
         corridor.round(1.5)
 
 
-def test_what_nobody_has_switched_on_ends_nothing() -> None:
+def test_a_lost_device_whose_outputs_nobody_has_switched_on_ends_no_daemon() -> None:
     corridor = Corridor()
     corridor.doors["ward"].lost = True
     corridor.doors["ward"].during = lambda: breaks(ValueError("defect"))

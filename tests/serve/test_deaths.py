@@ -29,7 +29,7 @@ from tests.serve.site import (
     environment,
     hold_open,
 )
-from tests.waiting import wait_until
+from tests.waiting import PATIENCE_S, wait_until
 
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 """A unit stands behind this daemon, so that it has no guard."""
@@ -94,7 +94,7 @@ def _alive(pid: int) -> bool:
         return False
 
 
-def test_the_rule_leaves_out_crashes_and_what_ends_nothing_by_default() -> None:
+def test_the_rule_leaves_out_crashes_and_signals_that_end_nothing_by_default() -> None:
     left_alone = {signal.Signals(n).name for n in signal.valid_signals() - ENDING}
     assert left_alone == {
         *("SIGKILL", "SIGSTOP"),
@@ -211,7 +211,7 @@ def test_reset_and_outputs_off_as_typed_find_the_daemon_started_by_hand(
     assert (refused.returncode, "stop it instead" in refused.stderr) == (69, True)
     assert module.relay() == [True]
     run.terminate()
-    assert run.wait(20) == 0
+    assert run.wait(PATIENCE_S) == 0
     log.close()
     ended = _told("reset", module.file, **user)
     assert (ended.returncode, "no daemon serves" in ended.stderr) == (1, True)
@@ -231,7 +231,7 @@ def test_a_reset_during_outputs_off_is_not_sent_and_does_not_end_it(
     told = _told("reset", file, "--runtime-dir", tmp_path / "run")
     assert told.returncode == 1
     off.send_signal(signal.SIGUSR1)
-    assert off.wait(20) == 1
+    assert off.wait(PATIENCE_S) == 1
     hole.close()
 
 

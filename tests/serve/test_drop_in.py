@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 
 from bridges.commands.run import too_slow
-from bridges.serve.drop_in import FITS, GROUPS, fits, misfit, text, watchdog_s
+from bridges.serve.drop_in import FITS, fits, misfit, text, watchdog_s
+from bridges.serve.places import GROUPS
+from bridges.settings.examples import device_yamls
 from bridges.settings.load import Config, load, understood
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -65,7 +67,7 @@ def changed(name: str, *changes: tuple[str, str]) -> Config:
 
 
 def test_each_shipped_file_is_permitted_what_it_needs_and_no_more() -> None:
-    assert {f.stem: permits(load(f)) for f in CONFIG.glob("*.yaml")} == SHIPPED
+    assert {f.stem: permits(load(f)) for f in device_yamls()} == SHIPPED
 
 
 def test_the_whole_text_names_its_file_and_the_needs_that_it_meets() -> None:

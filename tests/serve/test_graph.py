@@ -132,7 +132,7 @@ def test_a_topic_may_have_another_name_on_site() -> None:
     assert [request.session_id for request in heard] == ["fleet/a"]
 
 
-def test_what_is_refused_is_counted_by_name_and_logged_once(
+def test_refusals_are_counted_by_name_and_logged_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     site = Site()
@@ -185,7 +185,7 @@ def test_the_lifts_of_the_yaml_are_never_turned_away(monkeypatch: pytest.MonkeyP
     assert site.node.refused == {"not ours": 1}
 
 
-def test_made_up_sessions_at_made_up_lifts_have_one_bound_and_who_is_known_is_heard_on(
+def test_made_up_sessions_at_made_up_lifts_have_one_bound_and_known_ones_are_still_heard(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(graph_node, "MAX_REQUESTERS", 6)
@@ -225,7 +225,9 @@ def test_the_lifts_of_the_yaml_keep_room_for_sessions(monkeypatch: pytest.Monkey
     assert (len(site.sent), site.node.refused) == (1, {})
 
 
-def test_who_waits_for_a_lift_that_is_gone_for_long_is_forgotten_and_who_has_it_never() -> None:
+def test_a_robot_that_waits_for_a_lift_that_is_long_gone_is_forgotten_and_one_that_has_it_never() -> (
+    None
+):
     site = Site()
     site.until(3.0)
     for lift, session in (("Lift1", "fleet/a"), ("Lift2", "")):
@@ -348,7 +350,7 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
 def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
     join: Callable[[str], Transport],
 ) -> None:
-    """One that is passive for a rival hears of its end, and speaks; to others it is one publisher."""
+    """A node that is passive because of a rival publishes when it has gone; others see one of them."""
     others, ours, rival = join("others"), join("supervisor"), join("rival")
     rival.publisher(LIFT_REQUESTS)
     heard: list[LiftRequest] = []

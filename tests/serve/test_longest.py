@@ -31,7 +31,10 @@ LIFT = d.LiftRequest(
 DOOR = d.DoorRequest(requester_id="r", door_name="ward_door", requested_mode=d.DoorMode(2))
 WISH = d.ChargerRequest("", "tiny", "AMR01", d.Duration(60), "id")
 HEARD: dict[str, dict[Topic[Any], Message]] = {
-    "lift_dry_contact": {topics.LIFT_REQUESTS: LIFT},
+    "lift_dry_contact": {
+        topics.LIFT_REQUESTS: LIFT,
+        topics.ADAPTER_LIFT_REQUESTS.live(): LIFT,
+    },
     "door_modbus": {topics.DOOR_REQUESTS: DOOR},
     "charger_http": {
         topics.CHARGER_REQUESTS: WISH,

@@ -83,7 +83,7 @@ def test_a_second_node_for_the_same_door_takes_both_out_of_service(
             wait_until(lambda: graph.last() is DoorModeValue.MODE_OFFLINE, "the door is OFFLINE")
             first.wait_for("TWO_NODES_FOR_ONE_DEVICE")
             second.wait_for("TWO_NODES_FOR_ONE_DEVICE")
-        wait_until(lambda: module.relay()[-1] is False, "the relay is off")
+            wait_until(lambda: module.relay()[-1] is False, "the relay is off")
 
 
 def test_one_runtime_directory_has_one_daemon(module: Module, tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_systemd_hears_ready_then_finished_scans_then_stopping(
     path = str(tmp_path / "notify")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
         systemd.bind(path)
-        systemd.settimeout(20)
+        systemd.settimeout(PATIENCE_S)
         env = {"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "600000"}
         with daemon(module.file, tmp_path / "run", **env) as running:
             heard = [systemd.recv(64)]

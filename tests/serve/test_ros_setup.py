@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from bridges.core.fields import Rmf
 from bridges.rmf.ros_setup import SOURCED, sourced, sourcing
+from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import TransportError
 from tests.serve.site import daemon
 from tests.waiting import PATIENCE_S
@@ -28,7 +28,7 @@ def test_the_file_is_sourced_once_and_the_command_goes_on_as_it_was(tmp_path: Pa
     assert sourcing(rmf, {SOURCED: "/opt/ros/another/setup.bash"}, ARGV) == command
 
 
-def test_dds_needs_no_setup_file_and_no_file_named_is_none_sourced(tmp_path: Path) -> None:
+def test_dds_needs_no_setup_file_and_none_is_sourced_where_none_is_named(tmp_path: Path) -> None:
     setup = tmp_path / "setup.bash"
     setup.touch()
     assert sourcing(Rmf(transport="dds", ros_setup=str(setup)), {}, ARGV) == []
@@ -40,10 +40,10 @@ def test_a_file_that_is_not_there_ends_ros2_and_is_logged_by_auto(
 ) -> None:
     caplog.set_level(logging.INFO)
     nowhere = "/opt/ros/none/setup.bash"
-    with pytest.raises(TransportError, match=f"ros_setup: {nowhere} is not there"):
+    with pytest.raises(TransportError, match=f"ros_setup: {nowhere} does not exist"):
         sourcing(Rmf(transport="ros2", ros_setup=nowhere), {}, ARGV)
     assert sourcing(Rmf(ros_setup=nowhere), {}, ARGV) == []
-    assert caplog.messages == [f'no_ros_setup file={nowhere} reason="it is not there"']
+    assert caplog.messages == [f'no_ros_setup file={nowhere} reason="it does not exist"']
 
 
 def test_the_daemon_that_has_sourced_it_is_the_process_that_was_started(
@@ -73,4 +73,4 @@ def test_ros2_without_its_setup_file_does_not_start(tmp_path: Path) -> None:
     file.write_text(shipped[:begin] + wanted + shipped[end:])
     with daemon(file, tmp_path / "run", "--simulate") as running:
         assert running.process.wait(PATIENCE_S) == 69
-    assert "ros_setup: /opt/ros/none/setup.bash is not there" in running.log.read_text()
+    assert "ros_setup: /opt/ros/none/setup.bash does not exist" in running.log.read_text()

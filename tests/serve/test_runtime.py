@@ -11,8 +11,8 @@ import pytest
 from bridges.serve import directory, places
 from bridges.serve.directory import (
     AlreadyRunning,
-    Holder,
     KeptFile,
+    LockHolder,
     RuntimeDirectory,
     Unknown,
     find,
@@ -23,7 +23,7 @@ from bridges.serve.places import Places
 from bridges.serve.record import Record
 
 FILE = Path("/etc/rmf-bridges/lift.yaml")
-OURS = Holder(os.getpid(), str(FILE), True)
+OURS = LockHolder(os.getpid(), str(FILE), True)
 CLAIMED = Record(str(FILE), b"kind: lift\n", {"make.yaml": b"for: door_register\n"})
 
 
@@ -238,7 +238,7 @@ def test_a_lock_that_is_a_symbolic_link_or_nonsense_says_nothing(tmp_path: Path)
     (tmp_path / "lock").unlink()
     (tmp_path / "lock").write_text(json.dumps({"pid": "all", "file": 1}))
     assert holder(in_one(tmp_path)) is None
-    assert directory._written(tmp_path / "lock") == Holder(0, "", False)
+    assert directory._written(tmp_path / "lock") == LockHolder(0, "", False)
 
 
 def test_a_directory_that_somebody_else_could_have_made_is_not_believed(tmp_path: Path) -> None:
@@ -255,7 +255,7 @@ def test_a_directory_that_somebody_else_could_have_made_is_not_believed(tmp_path
     assert "can be written by others" in places.distrusted(anybodys / "planted")
 
 
-def test_what_must_outlive_the_daemon_is_replaced_whole(
+def test_a_file_that_must_outlive_the_daemon_is_replaced_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("STATE_DIRECTORY", str(tmp_path / "var" / "doors"))
@@ -270,7 +270,7 @@ def test_what_must_outlive_the_daemon_is_replaced_whole(
     assert state_file(Path("doors.yaml")) == tmp_path / "home/rmf-bridge/doors/kept.json"
 
 
-def test_what_cannot_be_kept_in_the_state_directory_is_kept_in_the_runtime_directory(
+def test_a_record_that_the_state_directory_cannot_take_goes_to_the_runtime_directory(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
@@ -289,7 +289,7 @@ def test_what_cannot_be_kept_in_the_state_directory_is_kept_in_the_runtime_direc
     assert (KeptFile(state, runtime).read(), runtime.exists()) == (b"four", False)
 
 
-def test_where_neither_can_be_written_the_old_one_stands(tmp_path: Path) -> None:
+def test_where_neither_directory_can_be_written_the_old_record_stands(tmp_path: Path) -> None:
     state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
     kept = KeptFile(state, runtime)
     kept.write(b"one")

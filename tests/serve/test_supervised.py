@@ -14,7 +14,7 @@ CONFIG = Path(__file__).parents[2] / "config"
 
 @dataclass
 class Building:
-    """Where they meet, and what they say."""
+    """A supervisor's and a lift's daemon in one domain."""
 
     domain: int
     supervisor: Daemon

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from bridges.core.graph_kind import GraphKind
 from bridges.rmf.definitions import Message
+from bridges.rmf.releases import NEWEST
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Subscription
 from bridges.serve.clock import Clock
@@ -29,7 +30,7 @@ Route = Callable[[str, str], Sequence[float]]
 
 
 class Party(Protocol):
-    """Somebody in the building."""
+    """Somebody who takes part: a node, a robot, a fleet adapter."""
 
     name: str
 
@@ -37,10 +38,10 @@ class Party(Protocol):
         """A message has arrived."""
 
     def wake_at(self) -> float:
-        """When `wake` is due."""
+        """When to call `wake`."""
 
     def wake(self) -> None:
-        """It is."""
+        """The time has come."""
 
 
 def at_once(sender: str, receiver: str) -> Sequence[float]:
@@ -97,7 +98,7 @@ class World:
                     self._arrives_after(0.05, receiver, topic, message)
 
     def run(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
-        """Everything that happens until then, or until it is done."""
+        """Let everything happen until this time, or until it is done."""
         wakes = {name: party.wake_at() for name, party in self.parties.items()}
         while not done():
             at = min(wakes.values(), default=NEVER)
@@ -136,6 +137,7 @@ class WorldTransport:
     """A node's place in the world (`bridges.rmf.transport.Transport`)."""
 
     speaks = "memory"
+    release = NEWEST
 
     def __init__(self, world: World, name: str) -> None:
         self.name = name
@@ -156,6 +158,9 @@ class WorldTransport:
 
     lives = True
 
+    def faults(self) -> list[tuple[str, str]]:
+        return []
+
     def wall(self) -> float:
         return EPOCH + self.world.now
 
@@ -174,7 +179,7 @@ class _End:
         self._node.world.send(self._node.name, self._topic, message)
 
     def matched(self) -> int:
-        """Others' publishers."""
+        """How many publishers other nodes have on the topic."""
         return len(self._node.world.publishers[self._topic.name] - {self._node.name})
 
     def close(self) -> None:
@@ -231,7 +236,7 @@ class Served:
         self.node.round()
 
     def leave(self) -> None:
-        """It is stopped."""
+        """It is stopped and leaves the graph."""
         self.world.remove(self.name)
 
     def hear(self, topic: Topic[Any], message: Any) -> None:
@@ -261,7 +266,7 @@ class Served:
 
 
 class StandIn:
-    """One of RMF's own, stood in for; `new` makes it."""
+    """One of RMF's parties, played by its rules; `new` makes it."""
 
     def __init__(
         self, world: World, new: Callable[[], RmfParty], name: str, publishes: Topic[Any]
@@ -280,7 +285,7 @@ class StandIn:
         self.world.replay(self.name)
 
     def leave(self) -> None:
-        """It is stopped."""
+        """It is stopped and leaves the graph."""
         self.world.remove(self.name)
 
     def hear(self, topic: Topic[Any], message: Any) -> None:
@@ -294,6 +299,6 @@ class StandIn:
 
 
 def say(world: World, who: str, said: Iterable[Said]) -> None:
-    """Publish what one of RMF's says."""
+    """Publish what one of RMF's parties sends."""
     for topic, message in said:
         world.send(who, topic, message)

@@ -13,7 +13,7 @@ kind: door
 driver: dry_contact
 rmf: {domain_id: 3}
 buses:
-  b: {type: modbus, tcp: {host: 192.168.1.50}}
+  b: {type: modbus, tcp: {host: 192.168.1.50}, without_watchdog: {1: a bench}}
 doors:
   ward:
     inputs:
@@ -31,14 +31,14 @@ SECOND = (
 TCP = "tcp: {host: 192.168.1.50}"
 SERIAL = "serial: {port: /dev/serial/by-id/x, baudrate: 9600, parity: none, stopbits: 1}"
 GPIO = (
-    DOOR.replace(f"modbus, {TCP}", "gpio")
+    DOOR.replace(f"modbus, {TCP}, without_watchdog: {{1: a bench}}", "gpio")
     .replace("unit 1 discrete input 0, active: high", '"J8:29", active: high, pull: down')
     .replace("unit 1 discrete input 1, active: high", '"J8:31", active: high, pull: down')
     .replace("unit 1 coil 0", "BCM18")
 )
 GATEWAY = (
-    "b.yaml:5:3: warning: 192.168.1.50:502 is asked in a.yaml too for unit 1: many take one client;"
-    " best have one file for one gateway"
+    "b.yaml:5:3: warning: 192.168.1.50:502 is asked in a.yaml too for unit 1: many gateways take"
+    " only one client: use one file for each gateway"
 )
 
 
@@ -101,17 +101,22 @@ def test_domains_that_differ_are_an_error(capsys: pytest.CaptureFixture[str]) ->
     assert said(capsys, DOOR, second.replace("domain_id: 3", "domain_id: 4")) == (
         78,
         [
-            "b.yaml:3:18: DDS domain 4, and a.yaml is in domain 3: neither hears the other",
+            "b.yaml:3:18: DDS domain 4, but a.yaml is in domain 3: they cannot hear each other",
             "1 error",
         ],
     )
     assert said(capsys, DOOR, second.replace("{domain_id: 3}", "{}")) == (
         78,
-        ["b.yaml:3:1: DDS domain 0, and a.yaml is in domain 3: neither hears the other", "1 error"],
+        [
+            "b.yaml:3:1: DDS domain 0, but a.yaml is in domain 3: they cannot hear each other",
+            "1 error",
+        ],
     )
 
 
-def test_a_supervisor_of_a_door_that_no_file_has(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_supervisor_of_a_door_that_no_file_has_is_an_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     supervisor = "kind: door_supervisor\nrmf: {domain_id: 3}\nsupervisor: {doors: [wart]}\n"
     assert said(capsys, DOOR, supervisor) == (
         78,
@@ -131,11 +136,62 @@ def test_a_second_supervisor_is_an_error(capsys: pytest.CaptureFixture[str]) -> 
     )
 
 
-def test_a_coordinators_station_that_no_charger_has(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_coordinators_station_that_no_charger_has_is_an_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     coordinator = (CONFIG / "charger_coordinator.yaml").read_text()
     code, lines = said(capsys, (CONFIG / "charger_http.yaml").read_text(), coordinator, "-q")
     assert code == 78
     assert [line.partition(": ")[2] for line in lines] == [
         "unknown charger 'charger_b': did you mean 'charger_a'? known here: charger_a",
         "",
+    ]
+
+
+def shipped(name: str, *changes: tuple[str, str]) -> str:
+    """A file of config/ with these changes."""
+    text = (CONFIG / name).read_text()
+    for old, new in changes:
+        text = text.replace(old, new)
+    return text
+
+
+def test_a_command_over_http_is_one_doors_or_chargers_alone(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    other = shipped("door_http.yaml", ("side_door", "back_door"))
+    code, lines = said(capsys, shipped("door_http.yaml"), other, "-q")
+    hold = "GET /rpc/Switch.Set?id=0&on=true&toggle_after=10"
+    release = "GET /rpc/Switch.Set?id=0&on=false"
+    assert (code, [line.partition(" ")[2] for line in lines[:-1]]) == (
+        78,
+        [
+            f"{hold} of http://192.168.1.70 is used in a.yaml too, on line 26",
+            f"{release} of http://192.168.1.70 is used in a.yaml too, on line 27",
+        ],
+    )
+
+
+def test_a_gateways_command_is_one_lifts_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    other = shipped("lift_gateway.yaml", ("Lift1", "Lift2"))
+    code, lines = said(capsys, shipped("lift_gateway.yaml"), other, "-q")
+    assert (code, [line.partition(" ")[2] for line in lines[:-1]]) == (
+        78,
+        [
+            "unit 1 holding register 10 of 192.168.1.60:502 is used in a.yaml too, on line 43",
+            "unit 1 holding register 11 of 192.168.1.60:502 is used in a.yaml too, on line 46",
+        ],
+    )
+
+
+def test_the_coil_of_a_modules_pulse_is_claimed_as_well(capsys: pytest.CaptureFixture[str]) -> None:
+    bus = shipped("door_waveshare.yaml")
+    bus = bus[bus.index("    serial:") : bus.index("doors:")]
+    first = shipped("door_waveshare.yaml", (bus, "    tcp: {host: 192.168.1.50}\n\n"))
+    second = first.replace("ward_door", "lab").replace('coil 0"', 'coil 1"')
+    second = second.replace("input 0", "input 4").replace("input 1", "input 5")
+    code, lines = said(capsys, first, second, "-q")
+    assert code == 78
+    assert [line.partition(": ")[2] for line in lines if "coil" in line] == [
+        "unit 1 coil 512 of 192.168.1.50:502 is used in a.yaml too, on line 26"
     ]

@@ -147,6 +147,7 @@ def test_a_navigation_graph_is_read_down_to_its_names() -> None:
             "waypoint": {"pad_a": 7, "pharmacy": 8},
         },
         {"Lift1": {"L1": 3, "L2": 10}},
+        {"pad_a": ("L1", 1.5, -2.0), "pharmacy": ("L1", 3.0, -4.0)},
     )
 
 
@@ -245,7 +246,7 @@ def test_a_file_that_is_not_a_map_is_refused_at_the_place_that_is_wrong(
     )
 
 
-def test_every_odd_form_is_named_with_its_place() -> None:
+def test_everything_of_the_wrong_form_is_named_with_its_place() -> None:
     text = (
         "levels:\n  L1:\n    vertices: 7\n    doors: {a: 1}\n  L2:\n    vertices: [8, [1, 2]]\n"
         "  [x]: {}\nlifts: [Lift1]\n"

@@ -26,7 +26,7 @@ def test_a_folder_is_one_problem(tmp_path: Path) -> None:
 
 def test_a_pipe_a_device_and_a_socket_are_one_problem_and_no_wait(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    wrong = "1:1: cannot be read: it is no file but a pipe, a socket or a device"
+    wrong = "1:1: cannot be read: it is a pipe, a socket or a device, not a file"
     assert why_not(tmp_path / "pipe") == [wrong]
     assert why_not(Path("/dev/zero")) == [wrong]
     with socket.socket(socket.AF_UNIX) as listening:

@@ -11,7 +11,7 @@ DOOR = """\
 kind: door
 driver: dry_contact
 buses:
-  module: {type: modbus, tcp: {host: 192.168.1.50}}
+  module: {type: modbus, tcp: {host: 192.168.1.50}, without_watchdog: {1: a bench}}
 doors:
   ward:
     inputs:
@@ -40,6 +40,37 @@ def test_the_door_itself_is_right_and_warns_of_nothing(file: Path) -> None:
     assert warnings_of(file, door()) == []
 
 
+KEEPS = (
+    "when this machine or the cable dies: arm the watchdog of the module (module_watchdog), or say why"
+    " that is safe (without_watchdog)"
+)
+BARE = door().replace(", without_watchdog: {1: a bench}", "")
+WATCHED = door(f"{TCP}, module_watchdog: {{units: [1], profile: wago-750}}")
+LAB = BARE[BARE.index("  ward:") :].replace("ward", "lab").replace("unit 1", "unit 7")
+
+
+def test_outputs_that_nothing_drops_are_warned_of_once_for_a_bus(file: Path) -> None:
+    one = f"5:3: warning: bus 'module': unit 1 keeps its outputs {KEEPS}"
+    assert warnings_of(file, BARE) == [one]
+    two = f"5:3: warning: bus 'module': units 1, 7 keep their outputs {KEEPS}"
+    assert warnings_of(file, BARE + LAB) == [two]
+    flashed = BARE.replace("coil 0, active: high", "coil 0, active: high, flash: unit 1 coil 512")
+    assert warnings_of(file, f"{flashed}    pulse: {{on_s: 0.7, every_s: 3}}\n") == []
+
+
+def test_why_a_unit_may_keep_its_outputs_is_noted(file: Path) -> None:
+    file.write_text(door())
+    assert [str(note).removeprefix(f"{file}:") for note in load(file).notes] == [
+        "5:75: note: bus 'module': unit 1 has no module_watchdog: a bench"
+    ]
+    assert warnings_of(file, door().replace("{1: a bench}", "{1: a bench, 3: x}")) == [
+        "5:87: warning: bus 'module': nothing is written to unit 3: delete this"
+    ]
+    assert problems_of(file, WATCHED) == [
+        "5:125: 'without_watchdog': unit 1 has a module_watchdog too: delete one"
+    ]
+
+
 REFUSED = {
     "a bus that is read too seldom": (
         door(f"{TCP}, scan_s: 2", limits="{stale_after_s: 1.5}"),
@@ -64,7 +95,7 @@ REFUSED = {
     ),
     "a rate that no unit has": (
         door(LINE.replace("9600", "9800")),
-        "5:72: 9800 is no rate that units have: 300, 600, 1200, 2400, 4800, 9600, ",
+        "5:72: 'baudrate': 9800 is no rate that units have: 300, 600, 1200, 2400, 4800, 9600, ",
     ),
 }
 
@@ -120,7 +151,7 @@ def test_a_pin_that_the_firmware_uses_is_warned_of_by_name(file: Path, pin: str)
     ]
 
 
-def test_a_pin_that_is_nobodys_is_not(file: Path) -> None:
+def test_a_pin_that_the_firmware_does_not_use_is_not_warned_of(file: Path) -> None:
     assert warnings_of(file, HEADER.replace("PIN", "BCM5")) == []
 
 

@@ -238,7 +238,7 @@ def test_the_same_point_of_two_buses_is_two_points(file: Path) -> None:
 
 
 @pytest.mark.parametrize("other", ["", "    limits: {tires: 1}\n"])
-def test_a_wire_that_cannot_be_is_told_by_the_bus(file: Path, other: str) -> None:
+def test_the_bus_says_what_is_wrong_with_an_impossible_wire(file: Path, other: str) -> None:
     text = changed("    limits: {open_s: 3, tries: 2}\n", other)
     text = changed(
         "{point: A0, active: high, pull: up}", "{point: A9, active: high, pull: up}", text
@@ -265,7 +265,7 @@ def test_a_misspelt_acceptance_is_told_beside_what_the_driver_says(file: Path) -
     text = changed("    limits:", "    accept_unsafe: {hald: by contract}\n    limits:")
     text = changed("tries: 2", "close_s: 9", changed("{1: in, 2: out}", "{1: yard}", text))
     assert problems_of(file, text) == [
-        "14:16: code 1 is no lane: 'yard'",
+        "14:16: 'codes': code 1 is no lane: 'yard'",
         "15:21: unknown signal 'hald': did you mean 'hold'? known here: opened, closed, hold",
         "16:34: 'close_s' may not be longer than 'open_s'",
     ]

@@ -16,8 +16,8 @@ from msgspec.inspect import (
     type_info,
 )
 
-from bridges.core.fields import Rmf
 from bridges.core.graph_kind import GraphKind
+from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.slips import number_meant
 from tests.settings.reading import changed, problems_of
@@ -117,13 +117,13 @@ SLIPS = {
     ),
     "curly quotes": (
         changed("lanes: [in, out]", "lanes: [\u201cin\u201d, out]"),
-        ["8:13: \u201c is no quote to YAML: write \" or '"],
+        ["8:13: YAML does not read \u201c as a quote: write \" or '"],
     ),
 }
 
 
 @pytest.mark.parametrize("what", SLIPS)
-def test_a_slip_is_named(file: Path, what: str) -> None:
+def test_a_slip_of_the_keyboard_is_named(file: Path, what: str) -> None:
     text, told = SLIPS[what]
     assert problems_of(file, text) == told
 

@@ -92,7 +92,7 @@ def test_a_list_or_a_mapping_is_neither_text_nor_number(file: Path, text: str) -
     ]
 
 
-def test_a_list_or_a_mapping_is_taken_by_what_it_is(file: Path) -> None:
+def test_where_a_list_or_a_mapping_may_stand_each_is_read_as_what_it_is(file: Path) -> None:
     as_mapping = changed("[in, out]", "{in: {heights: [2, 3.5]}, out: {side: right}}")
     lanes = config_of(file, as_mapping).devices["north"].lanes
     assert {n: (lane.side.value, lane.heights) for n, lane in lanes.items()} == {
@@ -145,7 +145,7 @@ def test_a_structs_own_problem_is_told_at_the_place_that_it_names(file: Path) ->
     text = changed("{1: in, 2: out}", "{1: in, 2: yard, 0x3: roof}")
     text = changed("tries: 2", "close_s: 9", text)
     assert problems_of(file, text) == [
-        "14:5: code 3 is no lane: 'roof'",
-        "14:23: code 2 is no lane: 'yard'",
+        "14:5: 'codes': code 3 is no lane: 'roof'",
+        "14:23: 'codes': code 2 is no lane: 'yard'",
         "15:34: 'close_s' may not be longer than 'open_s'",
     ]

@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Sequence
 
-from tests.site.day import Site
+from tests.site.day import SUPERVISORS, Site
 from tests.site.growth import growth
 from tests.site.laws import Broken
 
@@ -19,13 +19,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.site", description=__doc__)
     parser.add_argument("--seed", type=int, help="of the day; one is drawn and printed if left out")
     parser.add_argument("--hours", type=float, default=24.0, help="simulated, 0.5 at the least")
+    parser.add_argument("--rmf", choices=SUPERVISORS, help="whose supervisors; else by the seed")
     parser.add_argument("--log", type=int, default=60, help="so many last lines of a failed day")
     options = parser.parse_args(argv)
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     if options.hours < 0.3:
         parser.error("less than 0.3 hours is no day")
-    _print(f"seed {seed}, {options.hours:g} hours")
-    began, site = time.perf_counter(), Site(seed)
+    began, site = time.perf_counter(), Site(seed, options.rmf)
+    _print(f"seed {seed}, {options.hours:g} hours, supervisors: {site.rmf}")
     try:
         site.run(options.hours, told=lambda look: _print(str(look)))
     except Broken as broken:
@@ -46,7 +47,7 @@ def _failed(site: Site, why: str, options: argparse.Namespace) -> int:
         _print(f"{at:12.3f}  {line}")
     _print(f"wrong now: {', '.join(site.ills.all()) or 'nothing'}")
     _print(f"BROKEN {why}")
-    _print(f"again: make soak SEED={site.seed} HOURS={options.hours:g}")
+    _print(f"again: make soak SEED={site.seed} HOURS={options.hours:g} RMF={site.rmf}")
     return 1
 
 

@@ -56,7 +56,7 @@ class Device:
 
 
 def devices(timeline: Timeline) -> dict[str, Device]:
-    """All of them, by name."""
+    """Every lift, door and charger of the site, by name."""
     found = [_lift(timeline, "Lift1", _shipped("lift_dry_contact", "Lift1"), "gpio")]
     found += [_lift(timeline, "Lift2", _convert(lift_dry_contact, _lift2()), "modbus")]
     for name, content, bus in _dry_doors():

@@ -7,21 +7,21 @@ out, so a scan there would decide what the last one did: that is why the day nee
 """
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import AnyGraphKind
 from bridges.rmf.definitions import Message
-from bridges.rmf.topics import LIFT_REQUESTS, Topic
+from bridges.rmf.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
 from bridges.rmf.transport import Publisher
 from bridges.serve.clock import Clock
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
 from bridges.serve.subject import Status
 from hal_fakes.plants.plant import Edge
-from hal_fakes.rmf.supervisors import LiftSupervisor
+from hal_fakes.rmf.supervisors import DoorSupervisor, LiftSupervisor
 from tests.site.building import Device
 from tests.site.network import Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
@@ -61,7 +61,7 @@ class DeviceDaemon:
         """A new one: nothing remembered."""
         device, kind = self.device, self.device.kind
         self._place = Place(self._air, self.name, lambda: None)
-        topics = [kind.states, *kind.alarm_topics(device.settings)]
+        topics = [kind.states, *kind.publishes(device.settings)]
         self._publishers = {topic.name: self._place.publisher(topic) for topic in topics}
         limits = kind.limits(device.settings, device.debounce)
         clock = Clock(
@@ -157,40 +157,74 @@ RIVAL = "rmf_lift_supervisor"
 
 
 class RmfsSupervisor:
-    """The stand-in for RMF's own lift supervisor, beside ours: somebody has started both."""
+    """The stand-in for a supervisor of RMF's own: in the place of ours, or beside it by mistake."""
 
-    name = RIVAL
-
-    def __init__(self, timeline: Timeline, air: Air) -> None:
+    def __init__(
+        self,
+        timeline: Timeline,
+        air: Air,
+        name: str,
+        made: Callable[[], LiftSupervisor | DoorSupervisor],
+        says: Iterable[Topic[Any]],
+    ) -> None:
+        self.name = name
+        self.alive = False
         self._timeline = timeline
         self._air = air
+        self._made = made
+        self._says = list(says)
         self._place: Place
+        air.best_effort.add(name)
 
     def start(self) -> None:
         """It knows nothing, and hears all that is retained."""
         self._place = Place(self._air, self.name, lambda: None)
-        self._party = LiftSupervisor()
-        self._mouth = self._place.publisher(LIFT_REQUESTS)
+        self._party = self._made()
+        self._mouths = {topic.name: self._place.publisher(topic) for topic in self._says}
+        self.alive = True
         for topic in self._party.subscribes:
             self._place.subscribe(topic, self._hear)
 
     def kill(self) -> None:
-        """It is stopped."""
+        """It is stopped and leaves the graph."""
+        self.alive = False
         self._place.close()
 
+    def summary(self) -> Mapping[str, Status]:
+        """It tells nobody what it knows."""
+        return {}
+
     def _hear(self, message: Any) -> None:
-        for _, said in self._party.hear(message, EPOCH + self._timeline.now):
-            self._mouth.publish(said)
+        for topic, said in self._party.hear(message, EPOCH + self._timeline.now):
+            self._mouths[topic.name].publish(said)
+
+
+def rmfs_lift_supervisor(timeline: Timeline, air: Air, *, jazzy: bool = False) -> RmfsSupervisor:
+    """rmf_lift_supervisor."""
+    return RmfsSupervisor(timeline, air, RIVAL, lambda: LiftSupervisor(jazzy), [LIFT_REQUESTS])
+
+
+def rmfs_door_supervisor(timeline: Timeline, air: Air) -> RmfsSupervisor:
+    """rmf_door_supervisor."""
+    says: list[Topic[Any]] = [DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT]
+    return RmfsSupervisor(timeline, air, "rmf_door_supervisor", DoorSupervisor, says)
 
 
 class GraphDaemon:
     """Serves a kind that lives on the graph alone. `wall_skew`: its clock is ahead (s)."""
 
     def __init__(
-        self, timeline: Timeline, air: Air, name: str, kind: AnyGraphKind, wall_skew: float = 0.0
+        self,
+        timeline: Timeline,
+        air: Air,
+        name: str,
+        kind: AnyGraphKind,
+        wall_skew: float = 0.0,
+        settings: Any = None,
     ) -> None:
         self.name = name
         self.kind = kind
+        self._settings = settings or kind.settings()
         self.alive = False
         self._timeline = timeline
         self._air = air
@@ -204,7 +238,7 @@ class GraphDaemon:
         """A new one, which knows what it has kept."""
         self._place = Place(self._air, self.name, self._round)
         kept = self._disk if self.kind.persist else None
-        self.node = GraphNode(self.kind, self.kind.settings(), self._place, self._clock, kept=kept)
+        self.node = GraphNode(self.kind, self._settings, self._place, self._clock, kept=kept)
         self.alive = True
         self.node.subscribe()
         self._round()
@@ -214,6 +248,11 @@ class GraphDaemon:
         self.alive = False
         self._alarm.set(NEVER)
         self._place.close()
+
+    def reset(self) -> None:
+        """`rmf-bridge reset`."""
+        self.node.reset()
+        self._round()
 
     def summary(self) -> Mapping[str, Status]:
         """Each subject's status, as the status file has it."""

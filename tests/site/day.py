@@ -2,36 +2,61 @@
 
 import logging
 import random as the_random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from random import Random
 
+from bridges.charger_coordinator import KIND as COORDINATOR
 from bridges.door_supervisor import KIND as DOOR_SUPERVISOR
 from bridges.lift_supervisor import KIND as LIFT_SUPERVISOR
+from bridges.rmf.releases import JAZZY, KILTED
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.lift import FAILS, LiftPlant
+from tests.site import charging
 from tests.site.building import CHARGERS, DOORS, FLOORS, LIFTS, Device, devices
-from tests.site.daemons import RIVAL, DeviceDaemon, GraphDaemon, RmfsSupervisor
+from tests.site.daemons import (
+    RIVAL,
+    DeviceDaemon,
+    GraphDaemon,
+    RmfsSupervisor,
+    rmfs_door_supervisor,
+    rmfs_lift_supervisor,
+)
 from tests.site.growth import Look, look
 from tests.site.laws import BOUND_S, Laws
 from tests.site.network import CLEAR, Air, Place
 from tests.site.robots import Places, Resident
 from tests.site.timeline import Timeline
-from tests.site.trouble import Ill, Ills, Mortal, Trouble, breakable, pressable
+from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable, pressable
 
 ROBOTS = ("red", "green", "blue", "white", "black")
 WIND_DOWN_S = BOUND_S + 90.0
 """Before the end: nothing goes wrong any more, and every robot ends its tour."""
+ADOPTS_S = 5.0
+"""After its restart RMF's supervisor ends the session that it is shown, and takes up who asks next. If
+that is not the robot in the car, another is let in beside it, which only RMF can mend."""
+SWEEP_S = 45.0
+"""Before the end: by then every robot is at home."""
 LOOK_EVERY_S = 5.0
 HOUR_S = 3600.0
 
 
-class Site:
-    """One seed's day. `run` raises `laws.Broken` when a law is broken."""
+SUPERVISORS = ("ours", "kilted", "jazzy")
+"""Whose supervisors a day has: ours, or RMF's own by the rules of a release."""
 
-    def __init__(self, seed: int) -> None:
+
+class Site:
+    """One seed's day. `run` raises `laws.Broken` when a law is broken.
+
+    `rmf`: one of SUPERVISORS; the seed decides when it is not given. The fleet adapters of a day with
+    ours are of either release.
+    """
+
+    def __init__(self, seed: int, rmf: str | None = None) -> None:
         self.seed = seed
+        self.rmf = rmf or SUPERVISORS[seed % len(SUPERVISORS)]
+        self.jazzy = self.rmf == "jazzy" or (self.rmf == "ours" and seed % 2 == 1)
         self.random = Random(seed)
         self.timeline = timeline = Timeline()
         self.ills = Ills(timeline)
@@ -40,11 +65,14 @@ class Site:
         self.air.watch = self.laws.heard
         self.devices = devices(timeline)
         self.daemons = {n: DeviceDaemon(timeline, self.air, d) for n, d in self.devices.items()}
-        self.supervisors = [
-            GraphDaemon(timeline, self.air, "lift_supervisor", LIFT_SUPERVISOR, wall_skew=1.5),
-            GraphDaemon(timeline, self.air, "lift_standby", LIFT_SUPERVISOR),
-            GraphDaemon(timeline, self.air, "door_supervisor", DOOR_SUPERVISOR),
-        ]
+        self.supervisors = self._rmfs() if self.rmf != "ours" else self._ours()
+        self.air.release = JAZZY if self.jazzy else KILTED
+        self.charging = charging.settings(CHARGERS, ROBOTS)
+        self.coordinator = GraphDaemon(
+            timeline, self.air, "coordinator", COORDINATOR, settings=self.charging
+        )
+        self.coordinated = seed // len(SUPERVISORS) % 2 == 0
+        self.nodes = [*self.supervisors, *([self.coordinator] if self.coordinated else [])]
         self.robots = [self._robot(f"fleet/{name}") for name in ROBOTS]
         self.trouble = Trouble(
             timeline, self.ills, Random(self.random.random()), self._draw, self.laws.note
@@ -53,6 +81,18 @@ class Site:
         self._people = Random(self.random.random())
         self._people_at: dict[str, float] = {}
 
+    def _ours(self) -> list[GraphDaemon | RmfsSupervisor]:
+        timeline, air = self.timeline, self.air
+        return [
+            GraphDaemon(timeline, air, "lift_supervisor", LIFT_SUPERVISOR, wall_skew=1.5),
+            GraphDaemon(timeline, air, "lift_standby", LIFT_SUPERVISOR),
+            GraphDaemon(timeline, air, "door_supervisor", DOOR_SUPERVISOR),
+        ]
+
+    def _rmfs(self) -> list[GraphDaemon | RmfsSupervisor]:
+        lifts = rmfs_lift_supervisor(self.timeline, self.air, jazzy=self.jazzy)
+        return [lifts, rmfs_door_supervisor(self.timeline, self.air)]
+
     def run(self, hours: float, told: Callable[[Look], None] = lambda look: None) -> None:
         """All of it. `told`: each hour's look."""
         end = hours * HOUR_S
@@ -60,6 +100,7 @@ class Site:
         self._open()
         self.trouble.begin(until=end - WIND_DOWN_S)
         self.timeline.at(end - WIND_DOWN_S, self._wind_down)
+        self.timeline.at(end - SWEEP_S, self._sweep)
         with _silent():
             hour = 0
             while (hour := hour + 1) * HOUR_S < end:
@@ -86,7 +127,7 @@ class Site:
             self.timeline.after(self.random.uniform(0.0, 2.0), daemon.start)
             assert name == daemon.name
         self.laws.speakers = self._speakers
-        parties: list[Mortal] = [*self.supervisors, *self.robots]
+        parties: list[Mortal] = [*self.nodes, *self.robots]
         for party in parties:
             self.timeline.after(self.random.uniform(2.0, 6.0), party.start)
         self.timeline.after(LOOK_EVERY_S, self._watch)
@@ -101,7 +142,17 @@ class Site:
         for robot in self.robots:
             if robot.alive and robot.waits_for:
                 self.laws.waits(robot.name, robot.waits_for, robot.since)
+        self._mend_queue()
         self.timeline.after(LOOK_EVERY_S, self._watch)
+
+    def _mend_queue(self) -> None:
+        """A technician who has seen to robots and stations that failed tells the coordinator so."""
+        told = (
+            [s["faults"] for s in self.coordinator.summary().values()] if self.coordinated else []
+        )
+        calm = self.ills.calm_since() + BY_RESET_S < self.timeline.now
+        if self.coordinated and self.coordinator.alive and calm and any(told):
+            self.coordinator.reset()
 
     def _live(self) -> None:
         """People use lifts and doors as well; that is no trouble."""
@@ -119,6 +170,13 @@ class Site:
         for robot in self.robots:
             robot.homing = True
 
+    def _sweep(self) -> None:
+        """RMF's supervisors still hold what robots held whose adapters died: somebody restarts them."""
+        for supervisor in self.supervisors:
+            if isinstance(supervisor, RmfsSupervisor):
+                supervisor.kill()
+                supervisor.start()
+
     def _close(self) -> None:
         for robot in self.robots:
             self.laws.require(robot.at_rest, f"{robot.name} is not home: {robot.waits_for}")
@@ -132,7 +190,7 @@ class Site:
     def _speakers(self, topic: str) -> int:
         """How many there are, but for what a rival has just made of it."""
         speaking = [end.node.name for end in self.air.memory.publishers if end.topic.name == topic]
-        if RIVAL in speaking:
+        if RIVAL in speaking and self.rmf == "ours":
             return 1
         return len(speaking)
 
@@ -203,7 +261,10 @@ class Site:
         self.air.best_effort.add(name)
         places = Places(FLOORS, [*LIFTS], [*DOORS], [*CHARGERS])
         own = Random(self.random.random())
-        return Resident(self.timeline, self._join, self, name, own, places)
+        charge = charging.Charge(name.split("/")[1], self.charging) if self.coordinated else None
+        return Resident(
+            self.timeline, self._join, self, name, own, places, jazzy=self.jazzy, charge=charge
+        )
 
     def _join(self, name: str) -> Place:
         return Place(self.air, name, lambda: None)
@@ -215,9 +276,9 @@ class Site:
             self._lose_bus,
             self._restart,
             self._cut,
-            self._rival,
+            self._rival if self.rmf == "ours" else self._restart_rmfs,
         )
-        (draw,) = random.choices(sorts, (6, 4, 2, 4, 2, 0.5))
+        (draw,) = random.choices(sorts, (6, 4, 2, 4, 2, 0.5 if self.rmf == "ours" else 8))
         return draw(random)
 
     def _device(self, random: Random) -> Device:
@@ -225,21 +286,50 @@ class Site:
 
     def _rival(self, random: Random) -> Ill:
         """RMF's own lift supervisor is started as well, and stopped again."""
-        rival = RmfsSupervisor(self.timeline, self.air)
+        rival = rmfs_lift_supervisor(self.timeline, self.air, jazzy=self.jazzy)
 
         def begin() -> None:
             rival.start()
-            for name in LIFTS:
-                self.ills.begin(name, "rival")
-            for robot in self.robots:
-                self.laws.abandoned(robot.name)
+            self._distrust(LIFTS, "rival")
 
         def end() -> None:
             rival.kill()
-            for name in LIFTS:
-                self.ills.end(name, "rival")
+            self._trust(LIFTS, "rival")
 
         return Ill("rival", rival.name, "rival", begin, end, most_s=40.0)
+
+    def _restart_rmfs(self, random: Random) -> Ill:
+        """One of RMF's supervisors forgets everything, and may then speak for other robots."""
+        supervisor = random.choice([s for s in self.supervisors if isinstance(s, RmfsSupervisor)])
+        devices = LIFTS if supervisor.name == RIVAL else DOORS
+
+        why = f"supervisor {random.random()}"  # two restarts may follow one another closely
+
+        def begin() -> None:
+            supervisor.kill()
+            self._distrust(devices, why)
+
+        def end() -> None:
+            supervisor.start()
+            self._distrust((), "")
+            self.timeline.after(ADOPTS_S, again)
+
+        def again() -> None:
+            self._distrust((), "")
+            self._trust(devices, why)
+
+        return Ill("supervisor", supervisor.name, "daemon", begin, end, least_s=0.2, most_s=20.0)
+
+    def _distrust(self, devices: Sequence[str], why: str) -> None:
+        """What is said for a robot now is not its own wish."""
+        for name in devices:
+            self.ills.begin(name, why)
+        for robot in self.robots:
+            self.laws.abandoned(robot.name)
+
+    def _trust(self, devices: Sequence[str], why: str) -> None:
+        for name in devices:
+            self.ills.end(name, why)
 
     def _break(self, random: Random) -> Ill:
         device = self._device(random)
@@ -303,7 +393,9 @@ class Site:
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:
-        sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.supervisors], [*self.robots]]
+        ours = [node for node in self.nodes if isinstance(node, GraphDaemon)]
+        sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.robots], [*ours]]
+        sorts = [parties for parties in sorts if parties]
         party = random.choice(random.choice(sorts))
         skew_s = random.choice((0.0, 0.0, 0.0, 5.0, -5.0, 3600.0, -3600.0))
 
@@ -322,7 +414,7 @@ class Site:
         return Ill("restart", party.name, "daemon", begin, end, least_s=0.2, most_s=20.0)
 
     def _cut(self, random: Random) -> Ill:
-        parties: list[Mortal] = [*self.daemons.values(), *self.supervisors, *self.robots]
+        parties: list[Mortal] = [*self.daemons.values(), *self.nodes, *self.robots]
         name = random.choice(parties).name
         lasts_s = random.choice((random.uniform(0.5, 9.0), random.uniform(11.0, 60.0)))
 

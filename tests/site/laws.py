@@ -111,7 +111,7 @@ class Laws:
         self.log.append((self._timeline.now, what))
 
     def require(self, holds: bool, law: str) -> None:
-        """It is the law."""
+        """Fail, with what went before, unless the law holds."""
         self.checks += 1
         if not holds:
             raise Broken(f"at {self._timeline.now:.3f} s: {law}")
@@ -119,7 +119,7 @@ class Laws:
     # ---- what is said
 
     def heard(self, speaker: str, topic: topics.Topic[Any], message: Any) -> None:
-        """Somebody publishes."""
+        """Check a message that somebody publishes."""
         match message:
             case d.LiftState():
                 self._lift_state(speaker, message)
@@ -230,7 +230,7 @@ class Laws:
             self._doorway(name)
 
     def _see(self, daemon: DeviceDaemon, at: float) -> None:
-        """Where things are, until then."""
+        """Note where lift or door really are, up to this time."""
         name, plant = daemon.name, daemon.device.plant
         if isinstance(plant, LiftPlant):
             if plant.car.standing and plant.doors[Side.FRONT].opened:
@@ -337,7 +337,7 @@ class Laws:
         self._lifts[lift].crossing[robot] = (floor, self._timeline.now)
 
     def in_doorway(self, robot: str, door: str) -> None:
-        """A robot goes through."""
+        """A robot stands in the doorway."""
         self.note(f"{robot} is in the doorway of {door}")
         self._doorways[door][robot] = self._timeline.now
 
@@ -375,13 +375,13 @@ class Laws:
             self.require(open_now, f"{name} is not open for {robot} in its doorway")
 
     def lift_is_open(self, lift: str, floor: str) -> bool:
-        """In truth, now."""
+        """Is it really open now?"""
         self._daemons[lift].advance()
         self._see(self._daemons[lift], self._timeline.now)
         return self._lifts[lift].open_at.get(floor) == self._timeline.now
 
     def door_is_open(self, door: str) -> bool:
-        """In truth, now."""
+        """Is it really open now?"""
         self._daemons[door].advance()
         self._see(self._daemons[door], self._timeline.now)
         return self._doors[door] == self._timeline.now

@@ -15,6 +15,7 @@ from typing import Any
 
 from bridges.rmf.definitions import Message
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.releases import NEWEST
 from bridges.rmf.topics import DOOR_STATES, LIFT_STATES, Topic
 from tests.site.timeline import NEVER, Timeline
 
@@ -50,6 +51,7 @@ class Air:
         self.best_effort: set[str] = set()
         self.watch: Watch = lambda speaker, topic, message: None
         self.speaker = RETAINED
+        self.release = NEWEST
         self.counts = dict.fromkeys(("sent", "arrived", "lost", "late", "twice"), 0)
         self._random = random
         self._cut: dict[str, float] = {}
@@ -119,7 +121,7 @@ class Place(MemoryTransport):
     """One node's place on the graph. `heard` is called after each sample that it got."""
 
     def __init__(self, air: Air, name: str, heard: Callable[[], None]) -> None:
-        super().__init__(air.memory, name)
+        super().__init__(air.memory, name, air.release)
         self._air = air
         self._heard = heard
 
@@ -133,7 +135,7 @@ class Place(MemoryTransport):
         return super().subscribe(topic, carried, others_only=others_only)
 
     def arrive(self, received: Callable[[Any], None], message: Any) -> None:
-        """It is here, if the node still is."""
+        """Hand the message over, unless the node has left."""
         if not self._closed:
             self._air.counts["arrived"] += 1
             received(message)

@@ -73,6 +73,7 @@ class DdsPlace:
         self._timeline = timeline
         self._closed = False
         self._inner = wire.join(name.replace("/", "_"), domain)
+        self.release = self._inner.release
 
     def publisher(self, topic: Topic[Any]) -> Publisher[Any]:
         return self._inner.publisher(topic)
@@ -88,6 +89,9 @@ class DdsPlace:
     @property
     def lives(self) -> bool:
         return self._inner.lives
+
+    def faults(self) -> list[tuple[str, str]]:
+        return self._inner.faults()
 
     def wall(self) -> float:
         return self._inner.wall()
@@ -159,7 +163,7 @@ class RealSite:
             assert not robot.waits_for or waited_s < PATIENCE_S, f"{robot.name}: {robot.waits_for}"
 
     def until(self, done: Callable[[], bool]) -> None:
-        """Let them live until it is done."""
+        """Let everybody go on until this is so."""
         self.timeline.until(done, self.check)
 
     def done(self, what: str) -> int:
@@ -227,10 +231,10 @@ class RealSite:
         self._across[robot.name] = door
 
     def on_pad(self, robot: Resident, charger: str) -> None:
-        """There is no charger."""
+        """Does not happen: this site has no charger."""
 
     def off_pad(self, robot: Resident, charger: str) -> None:
-        """There is no charger."""
+        """Does not happen: this site has no charger."""
 
     def charged(self, charger: str) -> bool:
         return True

@@ -16,6 +16,7 @@ from bridges.rmf.stamps import duration
 from bridges.rmf.transport import Transport
 from hal_fakes.rmf.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from hal_fakes.rmf.robot import Phase, Robot
+from tests.site.charging import Charge
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 
 FRESH_S = 2.5
@@ -99,6 +100,8 @@ class Resident:
         random: Random,
         places: Places,
         pace: float = 1.0,
+        jazzy: bool = False,
+        charge: Charge | None = None,
     ) -> None:
         self.name = name
         self.floor = random.choice(places.floors)
@@ -119,6 +122,9 @@ class Resident:
         self._random = random
         self._places = places
         self._pace = pace
+        self._jazzy = jazzy
+        self._task = charge
+        self._beat = Alarm(timeline, self._tell)
         self._alarm = Alarm(timeline, self._tick)
         self._until = NEVER
         self._awaits: Phase | None = None
@@ -133,7 +139,7 @@ class Resident:
     def start(self) -> None:
         """A new fleet adapter: it knows where its robot is, and nothing else."""
         self.alive = True
-        self.robot = Robot(self.name)
+        self.robot = Robot(self.name, self._jazzy)
         self.robot.in_car = self.in_car is not None
         self._place = self._join(self.name)
         published = (
@@ -141,10 +147,13 @@ class Resident:
             topics.ADAPTER_DOOR_REQUESTS,
             topics.CHARGER_REQUESTS,
             topics.CHARGER_CANCELS,
+            topics.FLEET_STATES,
         )
         self._publishers = {t.name: self._place.publisher(t) for t in published}
-        for topic in (*self.robot.subscribes, topics.CHARGER_STATES):
+        heard = (*self.robot.subscribes, topics.CHARGER_STATES, topics.CHARGING_ASSIGNMENTS)
+        for topic in heard:
             self._place.subscribe(topic, self._hear)
+        self._tell()
         self._day = self._live()
         self._go_on(True, first=True)
 
@@ -153,6 +162,7 @@ class Resident:
         self.alive = False
         self.disturbed_at = self._timeline.now
         self._alarm.set(NEVER)
+        self._beat.set(NEVER)
         self._until, self._awaits, self.waits_for = NEVER, None, ""
         self._place.close()
         self._day.close()
@@ -170,8 +180,18 @@ class Resident:
         if isinstance(message, d.ChargerState):
             self._stations[message.charger_name] = (self._timeline.now, message)
             return
+        if isinstance(message, d.ChargingAssignments):
+            if self._task:
+                self._task.hear(message)
+            return
         self._say(self.robot.hear(message, self._wall))
         self._look()
+
+    def _tell(self) -> None:
+        """The fleet's state, each second."""
+        if self._task and self.alive:
+            self._say([(topics.FLEET_STATES, self._task.state())])
+            self._beat.set(self._timeline.now + 1.0)
 
     def _tick(self) -> None:
         if self._wall >= self.robot.wake_at() - 1e-6:
@@ -179,7 +199,7 @@ class Resident:
         self._look()
 
     def _look(self) -> None:
-        """Is what the day waits for there?"""
+        """Go on with the day if what it waits for has come."""
         if self._awaits is not None and self._awaits.done:
             self._go_on(True)
         elif self._timeline.now >= self._until:
@@ -188,7 +208,7 @@ class Resident:
             self._set_alarm()
 
     def _go_on(self, done: bool, first: bool = False) -> None:
-        """The next thing of the day."""
+        """Begin the next item of the day."""
         if self._awaits is not None and not done:
             self.robot.phase = None
             self.done["cancelled"] += 1
@@ -220,7 +240,7 @@ class Resident:
             yield from self._ride()
             yield from self._through_door(self._random.choice(self._places.doors))
             if self._places.chargers and self._random.random() < 0.3:
-                yield from self._charge()
+                yield from self._charge_as_told() if self._task else self._charge()
             self.robot.on_task = False
             yield self._pause(1.0, 30.0)
         self.waits_for = ""
@@ -244,6 +264,8 @@ class Resident:
             self._ground.crossed(self)
         if self.pad:
             yield from self._off_pad()
+        if self._task:
+            self._task.ends()
         if self.in_car:
             lift, _, target = self.in_car
             if self._random.random() < 0.5:  # RMF sees our session meanwhile, and ends it
@@ -294,7 +316,54 @@ class Resident:
         self.done["rides"] += 1
         yield self._pause(2.0, 10.0)
 
-    # ---- charging: nothing in RMF asks for it; our own words
+    # ---- charging by RMF's own task, under our coordinator
+
+    def _charge_as_told(self) -> Day:
+        """Stand where it is told to, until it has charged."""
+        assert self._task is not None
+        self.waits_for, self.since = "a charger", self._timeline.now
+        self._task.begins()
+        while not self.homing:
+            where = self._task.dedicated
+            yield self._random.uniform(4.0, 12.0)  # the way there
+            if where in self._places.chargers:
+                if self._is_kept(where) and (yield from self._charge_on(where)):
+                    break
+            else:
+                self._task.place = where
+            while self._task.dedicated == where and not (self._is_kept(where) or self.homing):
+                yield 1.0
+            self._task.place = ""
+        self._task.ends()
+
+    def _is_kept(self, charger: str) -> bool:
+        """Does the station say that it is kept for this robot?"""
+        state = self._station(charger)
+        assigned = state is not None and state.state == d.ChargerStateValue.CHARGER_ASSIGNED
+        return assigned and state is not None and f"fleet/{state.robot_name}" == self.name
+
+    def _charge_on(self, charger: str) -> Generator[Want, bool, bool]:
+        """True if current has flowed; then it is full."""
+        assert self._task is not None
+        yield PAD_S
+        if not self._is_kept(charger):
+            return False
+        self.pad = self._task.place = charger
+        self._ground.on_pad(self, charger)
+        leave_at, flowed = self._timeline.now + self._random.uniform(15.0, 60.0), False
+        while self._timeline.now < leave_at and not self._ground.charged(charger):
+            state = self._station(charger)
+            flowed |= state is not None and state.state == d.ChargerStateValue.CHARGER_CHARGING
+            yield 0.5
+        if flowed:
+            self._task.battery = 100.0
+            yield self._random.uniform(1.0, 10.0)
+        self._task.place = ""
+        yield from self._off_pad()
+        self.done["charges"] += flowed
+        return flowed
+
+    # ---- charging without a coordinator: nothing in RMF asks for it; our own words
 
     def _charge(self) -> Day:
         """Try the stations until one is ours; drive there; charge; leave."""

@@ -25,7 +25,7 @@ class Timeline:
         heapq.heappush(self._due, (max(when, self.now), self._count, what))
 
     def after(self, seconds: float, what: Callable[[], None]) -> None:
-        """Let this happen so much later."""
+        """Have this happen so many seconds from now."""
         self.at(self.now + seconds, what)
 
     def run(self, until: float) -> None:
@@ -47,7 +47,7 @@ class Alarm:
         self._number = 0
 
     def set(self, at: float) -> None:
-        """Ring then, and not as set before."""
+        """Ring at this time, instead of the time set before."""
         if at == self._at:
             return
         self._at = at

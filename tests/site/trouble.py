@@ -101,7 +101,7 @@ class Ills:
         self._obstructed[device] = self._timeline.now
 
     def obstructed_since(self, device: str) -> float:
-        """Since when."""
+        """Since when somebody stands in its doorway; NEVER if nobody does."""
         return self._obstructed.get(device, NEVER)
 
     def calm_since(self) -> float:

@@ -94,7 +94,7 @@ class RegisterFar:
         return self
 
     def check(self) -> None:
-        """The guard's: nothing has tripped."""
+        """For a module's watchdog: it has not tripped."""
 
     def insist(self) -> None:
         """There is no pause to break off."""
@@ -128,7 +128,7 @@ class HttpFar:
         self._station = HttpCharger(plant, settings)
 
     def watchdog(self) -> None:
-        """It charges by itself."""
+        """For a station's own timeout, which this one does not have."""
 
     def get_json(self, path: str) -> dict[str, Any]:
         self._plant.advance(self._timeline.now)

@@ -8,13 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from bridges.serve.drop_in import GROUPS, text
+from bridges.serve.drop_in import text
+from bridges.serve.places import GROUPS
+from bridges.settings.examples import device_yamls
 from bridges.settings.load import load
 
 ROOT = Path(__file__).parents[2]
 FILES = ROOT / "systemd"
 UNIT = FILES / "rmf-bridge@.service"
-CONFIG = sorted((ROOT / "config").glob("*.yaml"))
+CONFIG = device_yamls()
 MOST = 2.0
 """On systemd 252 a file on the network has 1.5, one with GPIO or a serial port 1.7, one with CAN's own
 sockets 1.7: AF_CAN counts as an exotic family, 0.2.

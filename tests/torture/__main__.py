@@ -21,7 +21,7 @@ from tests.torture.table import Table
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Hurt them, print the table."""
+    """Torture real daemons, and print the table."""
     parser = argparse.ArgumentParser(prog="python -m tests.torture", description=__doc__)
     parser.add_argument("--seed", type=int, help="one is drawn and printed if left out")
     parser.add_argument("--kills", type=int, default=200)

@@ -36,7 +36,7 @@ class Door:
         self._asks.start()
 
     def is_on(self) -> bool:
-        """The relay, as the wire has it."""
+        """Is the module's relay on?"""
         return self.module.relay()[-1:] == [True]
 
     def daemon(self, **env: str) -> Daemon:
@@ -51,12 +51,12 @@ class Door:
         return running
 
     def outputs_off(self) -> int:
-        """As the unit does."""
+        """Run outputs-off as the systemd unit does; its exit code."""
         off = command("outputs-off", self.module.file, "--runtime-dir", self.run)
         return subprocess.run(off, env=environment(**SERVICE), capture_output=True).returncode
 
     def states_go_on(self) -> None:
-        """Until RMF has heard two more."""
+        """Wait until RMF has heard two more states."""
         before = len(self.graph.states)
         wait_until(lambda: len(self.graph.states) > before + 1, "states go on", PATIENCE_S)
 

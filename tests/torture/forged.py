@@ -36,7 +36,7 @@ class Liar:
         self._thread.start()
 
     def close(self) -> None:
-        """It says no more."""
+        """Stop sending, and wait for the thread."""
         self._stop.set()
         self._thread.join()
 
@@ -128,7 +128,7 @@ class DatagramLiar(Liar):
 
 
 def forged(directory: Path, rng: random.Random, each_s: float, table: Table) -> None:
-    """Each wire for so long (s)."""
+    """Send forged traffic on one wire after the other, for `each_s` seconds on each."""
     for name, begin in WIRES.items():
         here = directory / name.replace(" ", "_")
         here.mkdir(parents=True)

@@ -5,14 +5,14 @@ from collections import Counter
 
 
 class Table:
-    """Filled from several threads."""
+    """What was injected and what happened, counted by several threads."""
 
     def __init__(self) -> None:
         self._counts: Counter[tuple[str, str]] = Counter()
         self._lock = threading.Lock()
 
     def count(self, injected: str, happened: str, times: int = 1) -> None:
-        """One more of it."""
+        """Count it once, or so many times."""
         with self._lock:
             self._counts[injected, happened] += times
 

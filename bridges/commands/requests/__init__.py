@@ -5,14 +5,19 @@ There is one file for each kind of device; this one has what they share. A reque
 table, most specific first; the last one always applies.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, TypeVar
 
+from bridges.charger.refusals import Refusal, read
 from bridges.commands.graph import CommandLine, Heard
 from bridges.rmf import words
+from bridges.rmf.definitions import DiagnosticStatus, Message, SupervisorHeartbeat
 from bridges.rmf.topics import AnyTopic
+
+State = TypeVar("State", bound=words.Stated)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +26,8 @@ class Seen:
 
     `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
     request, in order. `names`: every device of the kind that was heard. `heartbeat`: the latest of the
-    door supervisor.
+    door supervisor. `boarded`: what the lift's diagnostics say of a robot inside, "yes" or "no"; "" if
+    they were not heard. `refusals`: those of chargers, after our first request.
     """
 
     began_at: float
@@ -29,20 +35,40 @@ class Seen:
     listeners: int = 0
     first_sent_at: float | None = None
     last_sent_at: float | None = None
-    states: tuple[Heard, ...] = ()
+    states: tuple[Heard[words.Stated], ...] = ()
     names: frozenset[str] = frozenset()
-    heartbeat: Heard | None = None
+    heartbeat: Heard[SupervisorHeartbeat] | None = None
+    boarded: str = ""
+    refusals: tuple[Refusal, ...] = ()
 
-    def latest(self) -> Any:
-        """The last state heard, None before the first."""
-        return self.states[-1].message if self.states else None
+    def hears(self, heard: Heard[Message], about: Callable[[words.Stated], bool]) -> "Seen":
+        """Take a message that was heard. `about(state)`: does the state concern the request?"""
+        message = heard.message
+        if isinstance(message, SupervisorHeartbeat):
+            return replace(self, heartbeat=Heard(message, heard.at))
+        if isinstance(message, DiagnosticStatus):
+            refusal = read(message) if self.first_sent_at is not None else None
+            return replace(self, refusals=(*self.refusals, refusal)) if refusal else self
+        if not isinstance(message, words.Stated):
+            return self
+        states = (*self.states, Heard(message, heard.at)) if about(message) else self.states
+        return replace(self, names=self.names | {words.device(message)}, states=states)
 
-    def answer(self) -> Any:
+    def sends(self, now: float) -> "Seen":
+        """The request is sent now."""
+        first = now if self.first_sent_at is None else self.first_sent_at
+        return replace(self, first_sent_at=first, last_sent_at=now)
+
+    def states_of(self, kind: type[State]) -> list[State]:
+        """The states heard, in order. `kind`: their type."""
+        return [heard.message for heard in self.states if isinstance(heard.message, kind)]
+
+    def answer(self, kind: type[State]) -> State | None:
         """The last state if it was heard after our first request, else None."""
         sent_at = self.first_sent_at
         if sent_at is None or not self.states or self.states[-1].at < sent_at:
             return None
-        return self.states[-1].message
+        return self.states_of(kind)[-1]
 
     def requesters(self, door: str) -> list[str] | None:
         """Who holds the door, by a heartbeat heard after our first request; None without one."""
@@ -80,8 +106,11 @@ class Obstacle(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
-    """A request about the device of this `name`: to its daemon if `direct`, else to the supervisor."""
+class Request(ABC):
+    """A request about the device of this `name`: to its daemon if `direct`, else to the supervisor.
+
+    `answers`: topics that are heard beside the states.
+    """
 
     name: str
     direct: bool = field(default=False, kw_only=True)
@@ -92,23 +121,33 @@ class Request:
     own: ClassVar[AnyTopic]
     adapter: ClassVar[AnyTopic | None] = None
     listener: ClassVar[str] = ""
+    answers: ClassVar[tuple[AnyTopic, ...]] = ()
 
     @property
     def topic(self) -> AnyTopic:
         """The daemon's own topic, or the one that fleet adapters use."""
         return self.own if self.direct or self.adapter is None else self.adapter
 
+    @abstractmethod
     def message(self, seen: Seen) -> words.Requested | None:
         """The message to send, without its stamp; None while it cannot be made yet."""
-        raise NotImplementedError
 
+    @abstractmethod
     def outcome(self, seen: Seen) -> Done | Failed | None:
         """The outcome, if the states show one."""
-        raise NotImplementedError
 
+    @abstractmethod
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """Why there is no effect, judged by the last state; the first `present` one counts."""
-        raise NotImplementedError
+
+    @property
+    def supervisor(self) -> AnyTopic | None:
+        """The topic on which the supervisor speaks, if others hear adapters as it does."""
+        return None
+
+    def goes_direct(self, seen: Seen, now: float) -> bool:
+        """Whether it is time to ask the device's own daemon, which the supervisor has not done."""
+        return False
 
     def about(self, state: words.Stated) -> bool:
         """Whether the state is of this device."""
@@ -119,8 +158,10 @@ class Request:
         return bool(seen.states)
 
     def nobody(self) -> Obstacle:
-        """No supervisor or daemon listens to the request."""
+        """No supervisor or daemon subscribes to the request."""
         silence = f"no node subscribes to {self.topic.name}"
+        if self.supervisor is not None:
+            silence = f"no node publishes {self.supervisor.name}"
         if self.topic == self.own:
             listener = self.listener or f"{self.kind} daemon"
             return Obstacle(True, f"no {listener} runs in this domain: {silence}", self._loopback())

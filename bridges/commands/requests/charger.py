@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
+from bridges.charger.refusals import OCCUPIED
 from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
@@ -34,6 +35,7 @@ class Charge(_Charger):
     start_timeout_s: float
 
     own: ClassVar[AnyTopic] = topics.CHARGER_REQUESTS
+    answers: ClassVar[tuple[AnyTopic, ...]] = (topics.CHARGER_REFUSALS,)
 
     def message(self, seen: Seen) -> d.ChargerRequest:
         """The request, always with the same id, so that a repeat is not a new request."""
@@ -41,17 +43,28 @@ class Charge(_Charger):
         limit = duration(self.start_timeout_s)
         return d.ChargerRequest(charger, self.fleet, self.robot, limit, self.request_id)
 
-    def outcome(self, seen: Seen) -> Done | None:
-        """Done when a state with our id shows that the charger serves the robot."""
-        answer = seen.answer()
+    def outcome(self, seen: Seen) -> Done | Failed | None:
+        """Done when a state with our id shows that the charger serves the robot; Failed when the
+        request is refused."""
+        answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING or answer.request_id != self.request_id:
-            return None
+            return self._refused(seen)
         state = words.plain(d.ChargerStateValue, answer.state)
         return Done(f"{self.name} is {state} for request {self.request_id}")
 
+    def _refused(self, seen: Seen) -> Failed | None:
+        refusal = next((r for r in seen.refusals if r.request_id == self.request_id), None)
+        if refusal is None:
+            return None
+        text = f"{refusal.charger or self.name} refuses the request: {refusal.text}"
+        if refusal.reason != OCCUPIED or not refusal.held_request:
+            return Failed(text)
+        cancel = ("send", "charger", refusal.charger, "--cancel", refusal.held_request)
+        return Failed(f"{text}; to cancel that: {self.line.other(*cancel)}")
+
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """An error, or another request."""
-        state: d.ChargerState = seen.latest()
+        state = seen.states_of(d.ChargerState)[-1]
         cancel = self.line.other("send", "charger", self.name, "--cancel", state.request_id)
         return (
             _error(state),
@@ -83,10 +96,10 @@ class ChargeCancel(_Charger):
 
     def outcome(self, seen: Seen) -> Done | Failed | None:
         """Done when the charger is released or shows another id; Failed if it never showed this one."""
-        answer = seen.answer()
+        answer = seen.answer(d.ChargerState)
         if answer is None or self._holds(answer):
             return None
-        if any(self._holds(heard.message) for heard in seen.states):
+        if any(map(self._holds, seen.states_of(d.ChargerState))):
             return Done(f"{self.name} no longer serves request {self.request_id}")
         state = words.described(answer)
         return Failed(f"{self.name} does not serve request '{self.request_id}' (state: {state})")
@@ -126,11 +139,11 @@ class QueuedCharge(Charge):
         """Whether any charger has been heard."""
         return bool(seen.names)
 
-    def outcome(self, seen: Seen) -> Done | None:
-        """Done when a charger serves the robot."""
-        answer = seen.answer()
+    def outcome(self, seen: Seen) -> Done | Failed | None:
+        """Done when a charger serves the robot; Failed when the coordinator refuses the request."""
+        answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING:
-            return None
+            return self._refused(seen)
         state = words.plain(d.ChargerStateValue, answer.state)
         return Done(f"{answer.charger_name} is {state} for {self.who}")
 
@@ -150,7 +163,7 @@ class QueuedCharge(Charge):
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """The charger's error, or no charger assigned."""
         text = f"the {COORDINATOR} has not assigned {self.who} a charger: its log says why"
-        return _error(seen.latest()), Obstacle(True, text)
+        return _error(seen.states_of(d.ChargerState)[-1]), Obstacle(True, text)
 
 
 @dataclass(frozen=True, slots=True)

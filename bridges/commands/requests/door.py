@@ -22,6 +22,7 @@ class DoorMove(Request):
     kind = "door"
     states, own = topics.DOOR_STATES, topics.DOOR_REQUESTS
     adapter = topics.ADAPTER_DOOR_REQUESTS
+    answers = (topics.DOOR_SUPERVISOR_HEARTBEAT,)
 
     @property
     def mode(self) -> d.DoorModeValue:
@@ -38,7 +39,7 @@ class DoorMove(Request):
 
     def outcome(self, seen: Seen) -> Done | None:
         """Done when the door has the mode and, on the adapter topic, the heartbeat agrees."""
-        answer = seen.answer()
+        answer = seen.answer(d.DoorState)
         if answer is None or answer.current_mode.value != self.mode:
             return None
         if not self.direct and not self._heartbeat_agrees(seen):
@@ -51,7 +52,7 @@ class DoorMove(Request):
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """Judged by the mode of the door."""
-        mode, name = seen.latest().current_mode.value, self.name
+        mode, name = seen.states_of(d.DoorState)[-1].current_mode.value, self.name
         others = ", ".join(r for r in seen.requesters(name) or [] if r != self.requester)
         return (
             Obstacle(

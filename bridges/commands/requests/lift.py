@@ -7,7 +7,10 @@ from typing import Final
 from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen, nearest
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
+from bridges.rmf.topics import AnyTopic
 
+OBEYS_WITHIN_S: Final = 5.0
+"""A supervisor that obeys ends a session within a few states."""
 SHUT_OUT: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
 
 
@@ -16,6 +19,11 @@ class _Lift(Request):
     kind = "lift"
     states, own = topics.LIFT_STATES, topics.LIFT_REQUESTS
     adapter = topics.ADAPTER_LIFT_REQUESTS
+
+    @property
+    def supervisor(self) -> AnyTopic | None:
+        """A lift's own daemon hears adapters too: only who speaks to it is a supervisor."""
+        return None if self.direct else self.own
 
     @property
     def _release(self) -> str:
@@ -42,12 +50,12 @@ class LiftRide(_Lift):
 
     def outcome(self, seen: Seen) -> Done | Failed | None:
         """Done when RequestLift's four fields match; an unserved floor fails at once."""
-        latest = seen.latest()
-        if latest and latest.available_floors and self.floor not in latest.available_floors:
-            floors = ", ".join(latest.available_floors)
-            near = nearest(self.floor, latest.available_floors)
+        states = seen.states_of(d.LiftState)
+        served = states[-1].available_floors if states else ()
+        if served and self.floor not in served:
+            floors, near = ", ".join(served), nearest(self.floor, served)
             return Failed(f"{self.name} serves {floors}, not '{self.floor}'{near}")
-        if not self._fulfilled(seen.answer()):
+        if not self._fulfilled(seen.answer(d.LiftState)):
             return None
         where = "" if self.granted_only else f" at {self.floor}, door open,"
         return Done(f"{self.name} is{where} held by {self.session}; to end that: {self._release}")
@@ -60,7 +68,7 @@ class LiftRide(_Lift):
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """The session, the mode, or the floor or door that the car has not reached."""
-        state: d.LiftState = seen.latest()
+        state = seen.states_of(d.LiftState)[-1]
         name, session, mode = self.name, state.session_id, state.current_mode
         word = words.word(d.LiftMode, mode)
         return (
@@ -86,13 +94,19 @@ class LiftRide(_Lift):
 
 @dataclass(frozen=True, slots=True)
 class LiftEnd(_Lift):
-    """End `session`; if it is "", that of the first LiftState heard."""
+    """End `session`; if it is "", that of the first LiftState heard.
+
+    `falls_back`: if the supervisor does not obey within OBEYS_WITHIN_S, the lift's own daemon is asked;
+    where a robot may be inside, only if the operator says that the car is empty (`car_empty`).
+    """
 
     session: str = ""
+    falls_back: bool = False
+    car_empty: bool = False
 
     def _ending(self, seen: Seen) -> str:
-        first: str = seen.states[0].message.session_id if seen.states else ""
-        return self.session or first
+        first = (state.session_id for state in seen.states_of(d.LiftState))
+        return self.session or next(first, "")
 
     def message(self, seen: Seen) -> d.LiftRequest | None:
         """END_SESSION as fleets send it: no floor, door 0."""
@@ -110,14 +124,34 @@ class LiftEnd(_Lift):
         session = self._ending(seen)
         if seen.states and not session:
             return Done(f"{self.name} has no session: nothing to end")
-        answer = seen.answer()
+        answer = seen.answer(d.LiftState)
         if answer is None or answer.session_id == session:
             return None
         return Done(f"{self.name} is no longer held by {session}")
 
+    def goes_direct(self, seen: Seen, now: float) -> bool:
+        """The supervisor, if there is one, has had its time, and nobody is in the car."""
+        asked_at = seen.began_at if seen.first_sent_at is None else seen.first_sent_at
+        late = now >= asked_at + OBEYS_WITHIN_S
+        return self.falls_back and not self.direct and late and self._outside(seen)
+
+    def nobody(self) -> Obstacle:
+        """Without a supervisor too, a robot may be in the car."""
+        found = super(LiftEnd, self).nobody()
+        if self.direct or self.car_empty or not self.falls_back:
+            return found
+        return found._replace(remedy=f"if the car is empty: {self.line.again_with('--car-empty')}")
+
+    def _outside(self, seen: Seen) -> bool:
+        return self.car_empty or seen.boarded == "no"
+
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """The session is still shown."""
-        if self.direct:
+        if self.falls_back and not self._outside(seen):
+            text = f"{self.name} still shows the session, and its robot may be in the car: look into it"
+            there = self.line.again_with("--car-empty")
+            return (Obstacle(True, text, f"if the car is empty: {there}"),)
+        if self.direct or self.falls_back:
             text = f"{self.name} still shows the session: its daemon's log says why"
             return (Obstacle(True, text),)
         text = f"{self.name} still shows the session: the supervisor may have dropped the request"

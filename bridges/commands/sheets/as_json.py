@@ -1,7 +1,6 @@
-"""What is told of files, as JSON: each row of a table is an object, by the table's headings."""
+"""The findings as JSON: each row of a table is an object whose keys are the table's headings."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import msgspec
 
@@ -20,7 +19,7 @@ def document(files: Sequence[Told], errors: int, warnings: int) -> str:
     return msgspec.json.format(msgspec.json.encode(found), indent=2).decode() + "\n"
 
 
-def _file(told: Told) -> dict[str, Any]:
+def _file(told: Told) -> dict[str, object]:
     parts = [
         {"device": part.device, "bus": part.bus, "tables": [*map(_table, part.tables)]}
         for part in told.parts
@@ -28,6 +27,6 @@ def _file(told: Told) -> dict[str, Any]:
     return {**msgspec.structs.asdict(told), "parts": parts}
 
 
-def _table(table: Table) -> dict[str, Any]:
+def _table(table: Table) -> dict[str, object]:
     rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
     return {"title": table.title, "rows": rows}

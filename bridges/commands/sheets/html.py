@@ -1,29 +1,36 @@
-"""The commissioning sheet: an HTML file to print, a page for each controller, to tick and to sign.
+"""The commissioning sheet: an HTML file to print, tick and sign, with a page for each controller.
 
-It needs nothing beside itself. What a YAML says is text here, never markup.
+It needs no other file. Texts from a YAML are escaped, never markup.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 
-from bridges.commands.sheets.told import BusTold, Part, Told
+from bridges.commands.sheets.told import MEANINGS, WIRES, BusTold, Part, Told
 from bridges.core.table import Table
-from bridges.settings.nodes import Problem
 
 STYLE = """
-body { font: 10pt/1.35 sans-serif; margin: 1.5em; color: #000; background: #fff; }
+body { font: 8pt/1.2 sans-serif; margin: 1.5em; color: #000; background: #fff; }
 section { page-break-after: always; break-after: page; }
 section:last-of-type { page-break-after: auto; break-after: auto; }
-h1 { font-size: 15pt; margin: 0 0 .2em; } h2 { font-size: 11pt; margin: 1.1em 0 .3em; }
-p { margin: .2em 0; } .file { font-family: monospace; font-size: 8pt; word-break: break-all; }
-table { border-collapse: collapse; width: 100%; } tr { break-inside: avoid; }
-th, td { border: 1px solid #888; padding: .15em .4em; text-align: left; vertical-align: top; }
-th { background: #eee; } .box { width: 3em; text-align: center; } .seen { width: 12em; }
-.warning { border-left: 4px solid #000; padding-left: .6em; }
-.sign td { height: 2.6em; width: 33%; font-size: 8pt; }
-@page { size: A4; margin: 14mm; } @media print { body { margin: 0; } }
+h1 { font-size: 12pt; margin: 0 0 .2em; } h2 { font-size: 9pt; margin: .7em 0 .2em; }
+h2 { break-after: avoid; }
+p { margin: .2em 0; } .file { font-family: monospace; font-size: 7pt; word-break: break-all; }
+table { border-collapse: collapse; width: calc(100% - 1px); } tr { break-inside: avoid; }
+th, td { border: 1px solid #888; padding: 0 .3em; text-align: left; vertical-align: top; }
+th { background: #eee; } .box { width: 2.2em; text-align: center; } .seen { min-width: 6em; }
+.short { white-space: nowrap; } .warning { border-left: 4px solid #000; padding-left: .6em; }
+.narrow { columns: 2; column-gap: 1.2em; margin-top: .7em; padding-right: 1px; }
+.narrow div { break-inside: avoid; } .narrow h2 { margin-top: 0; }
+.narrow table { margin-bottom: .7em; }
+.trials { break-inside: avoid; } .sign td { height: 2.2em; width: 33%; font-size: 7pt; }
+@page { size: A4; margin: 9mm; } @media print { body { margin: 0; } }
 """
 BOX = '<td class="box">&#9744;</td>'
+SHORT = 24
+"""A cell with so many letters is not broken into lines."""
+NARROW = 60
+"""A table whose rows have so many letters fits in half the page's width."""
 TO_TRY = (
     "every output is off while the unit is off, and after the machine has started",
     "every output is off 10 s after the daemon was killed (kill -9)",
@@ -43,13 +50,17 @@ def page(files: Sequence[Told]) -> str:
 
 def _section(told: Told, part: Part) -> str:
     bus = next((bus for bus in told.buses if bus.name == part.bus), None)
+    tables = [*part.tables[:-1], *([_bus(bus)] if bus else ()), *part.tables[-1:]]
     lines = [
         *_head(told, part),
-        *(_bus(bus) if bus else ()),
-        *_warnings(told.warnings),
-        *(line for table in part.tables for line in _table(table)),
+        *_remarks(told),
+        *(line for table in tables if _is_wide(table) for line in _table(table, seen=True)),
+        '<div class="narrow">',
+        *(line for table in tables if not _is_wide(table) for line in _block(table)),
+        '</div>\n<div class="trials">',
         *_trials(part),
         *_signatures(),
+        "</div>",
     ]
     return "<section>\n" + "\n".join(lines) + "\n</section>\n"
 
@@ -60,34 +71,56 @@ def _head(told: Told, part: Part) -> Iterator[str]:
     yield f'<p class="file">{escape(told.file)}<br>SHA-256 {escape(told.sha256)}</p>'
 
 
-def _bus(bus: BusTold) -> Iterator[str]:
-    yield from _table(
-        Table(f"bus {bus.name} ({bus.type})", ("setting", "value"), tuple(bus.settings.items()))
-    )
+def _bus(bus: BusTold) -> Table:
+    title, rows = f"bus {bus.name} ({bus.type})", tuple(bus.settings.items())
+    return Table(title, ("setting", "value"), rows)
 
 
-def _warnings(warnings: Iterable[Problem]) -> Iterator[str]:
-    """All of the file's: each controller's page is signed by itself."""
-    for warning in warnings:
-        text = f"line {warning.line}: {warning.text.removeprefix('warning: ')}"
+def _is_wide(table: Table) -> bool:
+    """Does it need the page's whole width?"""
+    return table.title in (WIRES, MEANINGS) or max(map(_letters, table.rows), default=0) > NARROW
+
+
+def _letters(row: Sequence[str]) -> int:
+    return sum(map(len, row))
+
+
+def _remarks(told: Told) -> Iterator[str]:
+    """The file's warnings and notes, all of them: each controller's page is signed by itself."""
+    warnings = (f"line {w.line}: {w.text.removeprefix('warning: ')}" for w in told.warnings)
+    for text in (*warnings, *(note.removeprefix(f"{told.file}:") for note in told.notes)):
         yield f'<p class="warning">&#9744; {escape(text)}</p>'
 
 
-def _table(table: Table) -> Iterator[str]:
-    """Each row with a box, and with room for what was seen."""
-    headings = "".join(f"<th>{escape(heading)}</th>" for heading in table.headings)
-    yield f"<h2>{escape(table.title)}</h2>"
-    yield f'<table>\n<tr>{headings}<th class="seen">seen</th><th class="box">right</th></tr>'
-    for row in table.rows:
-        cells = "".join(f"<td>{escape(cell)}</td>" for cell in row)
-        yield f"<tr>{cells}<td></td>{BOX}</tr>"
+def _table(table: Table, seen: bool = False) -> Iterator[str]:
+    """Each row with a box, and with room for what was `seen`."""
+    shown = table.filled()
+    headings = "".join(f"<th>{escape(heading)}</th>" for heading in shown.headings)
+    more = '<th class="seen">seen</th>' if seen else ""
+    yield f"<h2>{escape(shown.title)}</h2>"
+    yield f'<table>\n<thead><tr>{headings}{more}<th class="box">right</th></tr></thead>'
+    for row in shown.rows:
+        yield f"<tr>{''.join(map(_cell, row))}{'<td></td>' if seen else ''}{BOX}</tr>"
     yield "</table>"
 
 
+def _block(table: Table) -> Iterator[str]:
+    """A table that stays in one column of the page."""
+    yield "<div>"
+    yield from _table(table)
+    yield "</div>"
+
+
+def _cell(text: str) -> str:
+    short = ' class="short"' if len(text) <= SHORT else ""
+    return f"<td{short}>{escape(text)}</td>"
+
+
 def _trials(part: Part) -> Iterator[str]:
-    """What no file can say of a controller."""
+    """Trials on the controller itself."""
     if part.bus:
-        yield from _table(Table("to be tried", ("trial",), tuple((trial,) for trial in TO_TRY)))
+        trials = Table("to be tried", ("trial",), tuple((trial,) for trial in TO_TRY))
+        yield from _table(trials, seen=True)
 
 
 def _signatures() -> Iterator[str]:

@@ -1,14 +1,14 @@
-"""What is told of a file, as lines for a terminal."""
+"""The findings about a file, as lines for a terminal."""
 
-import unicodedata
 from collections.abc import Iterator, Sequence
 
+from bridges.commands.columns import aligned
 from bridges.commands.sheets.told import MEANINGS, WIRES, BusTold, Part, Told
 from bridges.core.table import Table
 
 
 def lines(told: Told) -> list[str]:
-    """A file that could be read: what it is, and its wiring or what it talks to; a blank line last."""
+    """A valid file: its kind and driver, its wiring or messages, and a blank line at the end."""
     driver = f", driver {told.driver}" if told.driver else ""
     return [f"{told.file}: {told.kind}{driver}", "", *_body(told), *_notes(told)]
 
@@ -27,16 +27,16 @@ def _bus(bus: BusTold) -> str:
 
 
 def _wiring(parts: Sequence[Part]) -> Iterator[str]:
-    """The wires of all devices of a bus under one heading; then what those say that have none."""
+    """The wires of all devices of a bus in one table; then the meanings of those without wires."""
     for title in (WIRES, MEANINGS):
         found = [(p.device, table) for p in parts for table in p.tables if table.title == title]
         headings = [("device", *table.headings) for _, table in found[:1]]
         rows = [(device, *row) for device, table in found for row in table.rows]
-        yield from aligned([*headings, *rows]) if rows else []
+        yield from _indented([*headings, *rows]) if rows else []
 
 
 def _tables(parts: Sequence[Part]) -> Iterator[str]:
-    """The other tables; what several devices have alike is printed once."""
+    """The other tables. Equal tables of several devices are printed once."""
     alike: dict[Table, list[str]] = {}
     for part in parts:
         for table in part.tables:
@@ -49,24 +49,14 @@ def _tables(parts: Sequence[Part]) -> Iterator[str]:
 
 
 def _table(table: Table) -> list[str]:
-    """Its lines; a column that is empty in every row is left out."""
-    kept = [i for i in range(len(table.headings)) if any(row[i] for row in table.rows)]
-    return aligned([[row[i] for i in kept] for row in (table.headings, *table.rows)])
+    """The lines of a table, without columns that are empty in every row."""
+    filled = table.filled()
+    return _indented([filled.headings, *filled.rows])
+
+
+def _indented(rows: Sequence[Sequence[str]]) -> list[str]:
+    return [f"  {line}" for line in aligned(rows)]
 
 
 def _notes(told: Told) -> list[str]:
     return [*told.notes, ""] if told.notes else []
-
-
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of equal length as lines with their columns under each other."""
-    widths = [max(map(_width, column)) for column in zip(*rows, strict=True)]
-    return [
-        "".join(f"  {c}{' ' * (w - _width(c))}" for c, w in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-
-
-def _width(text: str) -> int:
-    """Columns on a terminal: 走 takes two."""
-    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)

@@ -1,13 +1,13 @@
-"""All that `check` tells of one file, as tables: the text, the JSON and the sheet are made of this."""
+"""The findings of `check` about one file, as tables; text, JSON and sheet are made from them."""
 
 import hashlib
 from collections.abc import Sequence
-from typing import Any
 
 import msgspec
 
 from bridges.core.graph_kind import GraphKind
 from bridges.core.table import Table
+from bridges.rmf import instead
 from bridges.settings import names as named
 from bridges.settings.load import Config
 from bridges.settings.nodes import Problem
@@ -17,15 +17,15 @@ from drivers.hal.points import Wire
 HEADINGS = ("signal", "point", "direction", "active", "pull", "debounce", "at rest", "wire broken")
 BROKEN = {True: "asserted", False: "not asserted", None: "floats"}
 WIRES, MEANINGS = "wires", "meanings"
-"""The tables that say what is on the bus."""
+"""The titles of the tables that say what is on the bus."""
 SETTINGS = ("setting", "value", "not the default")
 
 
 class Part(msgspec.Struct, frozen=True, kw_only=True):
-    """One controller: its wires, or what it is asked and told, and its tables.
+    """One controller: its name, its bus and its tables.
 
-    `device`: its name; a kind's without devices. `bus`: its bus's name, or "". `tables`: how it is
-    wired and what it talks to come first.
+    `device`: its name, or the kind's if the kind has no devices. `bus`: its bus's name, or "".
+    `tables`: its wires, or what is sent to it and read from it, come first.
     """
 
     device: str
@@ -42,10 +42,10 @@ class BusTold(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Told(msgspec.Struct, frozen=True, kw_only=True):
-    """One file: what it says where it is right, and what is wrong with it where it is not.
+    """One file: its contents if it is valid, and its errors and warnings.
 
-    `sha256`: of its bytes, so that a signed sheet says which file it was. `notes`: what else is good
-    to know. Errors and warnings have file, line, column and text.
+    `sha256`: of its bytes, so that a signed sheet identifies the file. `notes`: what else a user should
+    know.
     """
 
     file: str
@@ -60,12 +60,12 @@ class Told(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def wrong(file: str, errors: Sequence[Problem]) -> Told:
-    """A file that cannot be read as one."""
+    """The findings about an invalid file."""
     return Told(file=file, errors=list(errors))
 
 
 def told(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = ()) -> Told:
-    """A file that could be read. `errors`: against RMF's map."""
+    """The findings about a valid file. `errors`: from comparing it with RMF's map."""
     return Told(
         file=str(config.path),
         kind=config.kind,
@@ -73,10 +73,21 @@ def told(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = 
         sha256=hashlib.sha256(config.text).hexdigest(),
         buses=[_bus(config, bus) for bus in config.buses],
         parts=[_graph(config)] if config.section is not None else _devices(config),
-        notes=[*notes, *map(str, config.notes)],
+        notes=[*notes, *map(str, config.notes), *_lacking(config)],
         errors=list(errors),
         warnings=list(config.warnings),
     )
+
+
+def _lacking(config: Config) -> list[str]:
+    """What takes another way where RMF's release lacks its message."""
+    kind = named.kind_called(config.kind)
+    if isinstance(kind, GraphKind):
+        topics = [*kind.publishes]
+    else:
+        topics = [t for device in config.devices.values() for t in kind.publishes(device)]
+    lines = [line for topic in topics for line in instead.told(topic, config.rmf.release)]
+    return list(dict.fromkeys(lines))
 
 
 def _bus(config: Config, name: str) -> BusTold:
@@ -85,7 +96,7 @@ def _bus(config: Config, name: str) -> BusTold:
 
 
 def _graph(config: Config) -> Part:
-    """A kind without devices: what it says of itself, and its settings."""
+    """A kind without devices: its own tables, and its settings."""
     kind = named.kind_called(config.kind)
     assert isinstance(kind, GraphKind)
     tables = [*kind.tables(config.section), _settings(config.section)]
@@ -110,14 +121,14 @@ def _device(config: Config, name: str) -> Part:
     return Part(device=name, bus=bus, tables=[table for table in tables if table.rows])
 
 
-def _settings(settings: Any) -> Table:
-    """Durations and choices; the bus is told already, and accepted wires by a warning."""
+def _settings(settings: object) -> Table:
+    """Durations and choices, without what is shown elsewhere: the bus, and accepted wires."""
     rows = (row for row in choices_of(settings) if row[0] not in ("bus", "driver", "accept_unsafe"))
     return Table("settings", SETTINGS, tuple(rows))
 
 
 def _row(wire: Wire, point: str) -> tuple[str, ...]:
-    """One wire. `point`: as the bus describes it; how the YAML spells it is put beside."""
+    """One wire. `point`: its description by the bus; the YAML's spelling is added to it."""
     spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"
     if wire.flash is not None:
         spelled += f", {wire.flash.on_s:g} s by the module at {wire.flash.point}"
@@ -135,4 +146,6 @@ def _row(wire: Wire, point: str) -> tuple[str, ...]:
 
 
 def _debounce(wire: Wire) -> str:
-    return "default" if wire.debounce_s is None else f"{wire.debounce_s:g} s"
+    if wire.debounce_s is None:
+        return "default"
+    return f"{wire.debounce_s:g} s" if wire.debounce_s else "none"

@@ -90,7 +90,7 @@ class Bench:
             self._decide(self._events.popleft())
         self._decide(Tick())
         try:
-            if self._opened:
+            if self._opened and self.steps:
                 outputs = core.output_of(self.memory, self.steps)
                 self._driver.write(self._off if outputs is None else outputs)
         except DriverError as error:
@@ -117,6 +117,9 @@ class Bench:
         return Read(sample)
 
     def _make_safe(self) -> bool:
+        """Without outputs to try, nothing was commanded, and a charge under way goes on."""
+        if not self.steps:
+            return True
         self._bus.insist()
         try:
             self._driver.make_safe()

@@ -35,6 +35,10 @@ STATES: Final = {0: "starting", 4: "stopped", 5: "operational", 127: "pre-operat
 OPERATIONAL: Final = 5
 
 
+class Aborted(HalError):
+    """The node refused a transfer, so it is there."""
+
+
 class CanOpenNode:
     """One node of a bus. `heartbeat_timeout_s`: None for a node that has no heartbeat.
 
@@ -111,7 +115,7 @@ class CanOpenNode:
         except TimeoutError:
             raise pause.failed(text + self._no_reply()) from None
         except self._client.ABORTED as error:
-            raise HalError(f"{text}refused: {error}") from error
+            raise Aborted(f"{text}refused: {error}") from error
         except self._client.FAILURES as error:
             raise pause.failed(f"{text}no SDO reply to it ({error})") from error
         pause.mended()

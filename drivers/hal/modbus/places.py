@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from bridges.core.fields import Name
+from drivers.hal.hosts import misspelt_address
 
 BAUDRATES: Final = (
     *(300, 600, 1200, 2400, 4800, 9600, 14400, 19200, 28800, 38400, 56000, 57600, 76800, 115200),
@@ -31,6 +32,8 @@ class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             yield ("host",), "write the host alone; its port goes into port"
         elif not re.fullmatch(r"[A-Za-z0-9_.:-]+", self.host):
             yield ("host",), f"{self.host!r} is no host: write its address, such as 192.168.1.50"
+        elif reason := misspelt_address(self.host):
+            yield ("host",), reason
 
 
 class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -16,7 +16,14 @@ from drivers.hal.modbus.points import Point, Table, address
 Word = Annotated[int, msgspec.Meta(ge=0, le=65535)]
 """A register's content."""
 Unit = Annotated[int, msgspec.Meta(ge=0, le=255)]
-Place = Annotated[str, msgspec.Meta(min_length=1, max_length=40)]
+Place = Annotated[
+    str,
+    msgspec.Meta(
+        min_length=1,
+        max_length=40,
+        extra={"number": "its table and its address, which begins at 0 (input register 1)"},
+    ),
+]
 """`holding register 4`, `input register 0x10`, `coil 0` or `discrete input 2`."""
 
 TABLES: Final[dict[str, Table]] = {

@@ -1,13 +1,14 @@
 """`type: modbus` of a device YAML: where the units are, and how long they may take."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Annotated
 
 import msgspec
 
-from bridges.core.fields import Period
-from drivers.hal import Needs, Where, serial_port
+from bridges.core.fields import Name, Period
+from drivers.hal import Kept, Needs, Where, serial_port
 from drivers.hal.modbus.places import Serial, Tcp
+from drivers.hal.modbus.registers import Unit
 from drivers.hal.modbus.watchdog import Watchdog
 
 Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
@@ -29,6 +30,8 @@ class Settings(
     `retries`: how many more tries a request gets after the first.
     `scan_s`: how often every input is read.
     `module_watchdog`: the modules' own watchdog for their outputs.
+    `without_watchdog`: unit -> why its outputs may keep their value when the daemon's machine or the
+    network dies, or how the unit drops them (`its web page: all off after 5 s without a master`).
     """
 
     tcp: Tcp | None = None
@@ -37,6 +40,7 @@ class Settings(
     retries: Annotated[int, msgspec.Meta(ge=0, le=5)] = 1
     scan_s: Period = 0.1
     module_watchdog: Watchdog | None = None
+    without_watchdog: dict[Unit, Name] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """Problems that involve more than one field."""
@@ -44,6 +48,16 @@ class Settings(
             yield (), "needs a connection: write tcp: {host: …} or serial: {port: …}"
         elif self.tcp and self.serial:
             yield ("serial",), "a bus has either tcp or serial: define a second bus for the other"
+        for unit in self.without_watchdog:
+            if unit in self.watched():
+                yield (
+                    ("without_watchdog", str(unit)),
+                    f"unit {unit} has a module_watchdog too: delete one",
+                )
+
+    def watched(self) -> Sequence[int]:
+        """The units whose own watchdog drops their outputs."""
+        return self.module_watchdog.units if self.module_watchdog else ()
 
 
 def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
@@ -52,6 +66,31 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield ("serial", *path), text
     for path, text in settings.module_watchdog.warnings() if settings.module_watchdog else ():
         yield ("module_watchdog", *path), text
+
+
+def kept(settings: Settings, places: Iterable[str]) -> Kept:
+    """The written units whose outputs nothing drops but this daemon."""
+    written = {int(place.split()[1]) for place in places}
+    bare = sorted(written.difference(settings.watched(), settings.without_watchdog))
+    warned = [((), _bare(bare))] if bare else []
+    accepted, idle = [], []
+    for unit, why in settings.without_watchdog.items():
+        path = ("without_watchdog", str(unit))
+        if unit in written:
+            accepted.append((path, f"unit {unit} has no module_watchdog: {why}"))
+        else:
+            idle.append((path, f"nothing is written to unit {unit}: delete this"))
+    return Kept([*warned, *idle], accepted)
+
+
+def _bare(units: Sequence[int]) -> str:
+    which, keep = f"unit {units[0]}", "keeps its outputs"
+    if len(units) > 1:
+        which, keep = f"units {', '.join(map(str, units))}", "keep their outputs"
+    return (
+        f"{which} {keep} when this machine or the cable dies: arm the watchdog of the module"
+        " (module_watchdog), or say why that is safe (without_watchdog)"
+    )
 
 
 def unreachable(settings: Settings, point: str) -> str | None:

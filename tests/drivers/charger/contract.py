@@ -184,3 +184,41 @@ class ChargerContract(Contract[Bench]):
 
 def _is_unknown(sample: ChargerSample) -> bool:
     return sample.activity is Activity.UNKNOWN
+
+
+class MovingPadContract(Contract[Bench]):
+    """A driver that says whether the pad is at its height and whether a robot is in range."""
+
+    celsius: ClassVar[tuple[str, ...]] = ()
+    """The temperatures that it reads."""
+    down: ClassVar[str] = "pad_down"
+    badly: ClassVar[str] = "out_of_range"
+    """What is pressed for a pad that is down, and for a robot that stands badly."""
+
+    def test_height_and_range_are_read_as_they_are(self, bench: Bench) -> None:
+        bench.open()
+        assert self.pad(bench, (False, False))
+        bench.press("robot")
+        assert self.pad(bench, (True, True))
+        bench.press(self.badly)
+        assert self.pad(bench, (True, False))
+        bench.press(self.badly, False)
+        bench.press(self.down)
+        assert self.pad(bench, (False, True))
+
+    def test_temperatures_are_read_by_their_names(self, bench: Bench) -> None:
+        bench.open()
+        found = bench.read().measured.temperatures
+        assert tuple(name for name, _ in found) == self.celsius
+        assert all(20 <= celsius <= 30 for _, celsius in found)
+
+    def pad(self, bench: Bench, wanted: tuple[bool, bool]) -> bool:
+        """Height and range, once they are read so."""
+
+        def shown() -> bool:
+            bench.write(OFF)
+            found = bench.read().measured
+            return (found.at_height, found.range_ok) == wanted
+
+        wait_until(shown, f"height and range are {wanted}")
+        return True

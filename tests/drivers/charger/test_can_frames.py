@@ -19,6 +19,7 @@ from bridges.charger.signals import (
 )
 from bridges.core.decision import Sampled
 from bridges.settings.load import SettingsError, load
+from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_frames import (
     DRIVER,
@@ -111,6 +112,37 @@ def test_published_temperatures_are_scaled() -> None:
     assert found == {"HeatsinkTemperature": 24.5}
     found = frames.decode("StationStatus", bytes.fromhex("0000000000005a00"))
     assert found == {"GridVoltage": 230.4}
+
+
+def test_the_temperatures_of_the_map_are_read_and_one_without_a_reading_is_left_out(
+    charger: Charger,
+) -> None:
+    charger.status()
+    charger.says(0x1FFD0102, "0000000056000000")  # 0x56 is 24.5 degrees
+    charger.says(0x1FFD0103, "00ff000000000000")  # 0xFF is no reading
+    assert charger.driver.read().measured.temperatures == (("heatsink", 24.5),)
+    charger.status()
+    charger.says(0x1FFD0103, "0060000000000000")
+    assert charger.driver.read().measured.temperatures == (("heatsink", 24.5), ("coil", 32.0))
+
+
+def test_height_and_range_are_signals_of_the_map_and_without_them_there_is_no_reading() -> None:
+    charger = Charger()
+    pad = {"range_ok": "MobileErrors.FanSlow", "at_height": "MobileErrors.GridDerating"}
+    found = msgspec.structs.replace(PROFILE.load("wiferion"), **pad)
+    charger.driver = create("c", Settings(map=found, setpoints=SETPOINTS), charger.bus)
+    charger.bus.take()
+    charger.status()
+    with pytest.raises(DriverError, match="MobileErrors"):
+        charger.driver.read()
+    seen = []
+    for payload in ("0000000000000000", "0000000000000001", "0000000000000021"):
+        charger.status()
+        charger.says(0x1FFD0104, payload)
+        measured = charger.driver.read().measured
+        seen.append((measured.at_height, measured.range_ok))
+    assert seen == [(False, False), (False, True), (True, True)]
+    charger.bus.close()
 
 
 @pytest.mark.parametrize(
@@ -233,11 +265,11 @@ def test_a_change_is_sent_at_once(charger: Charger) -> None:
     assert [charger.scan(level) for level in levels] == [FED, [], KEPT_OFF, [], FED]
 
 
-def test_no_level_sends_nothing_before_there_was_one(charger: Charger) -> None:
+def test_without_a_wanted_level_nothing_is_sent_until_there_was_one(charger: Charger) -> None:
     assert [charger.scan(LEFT) for _ in range(20)] == [[]] * 20
 
 
-def test_no_level_goes_on_with_the_last_one(charger: Charger) -> None:
+def test_without_a_wanted_level_the_last_one_is_still_sent(charger: Charger) -> None:
     assert [charger.scan(OFF, 0.5), charger.scan(LEFT, 0.5), charger.scan(LEFT)] == [KEPT_OFF] * 3
 
 
@@ -348,12 +380,18 @@ def test_setpoints_are_those_that_the_map_takes() -> None:
 
 @pytest.mark.parametrize("amps", [-1.0, 4000.0])
 def test_a_setpoint_that_the_frame_cannot_say_is_a_problem(amps: float) -> None:
-    [(path, text)] = problems(setpoints=SETPOINTS | {"amps": amps})
-    assert path == ("setpoints",)
-    assert text.startswith('ChargerControl: Expected signal "RefCurrent" value')
+    assert problems(setpoints=SETPOINTS | {"amps": amps}) == [
+        (("setpoints", "amps"), f"is {amps:g}: ChargerControl.RefCurrent takes 0 to 3276.7 A")
+    ]
 
 
-def test_what_is_fed_cannot_be_kept() -> None:
+def test_volts_above_their_own_maximum_are_a_problem() -> None:
+    assert problems(setpoints=SETPOINTS | {"volts": 29.5}) == [
+        (("setpoints", "volts"), "is 29.5, above max_volts, which is 29.4")
+    ]
+
+
+def test_a_charge_that_must_be_fed_cannot_be_kept_after_the_daemons_end() -> None:
     [(path, _)] = problems(on_death="keep")
     assert path == ("on_death",)
 

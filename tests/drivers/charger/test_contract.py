@@ -42,9 +42,12 @@ class TestAnotherMakeOnHttp(ChargerContract):
     link: ClassVar = "server"
     example: ClassVar = ("charger_http_full.yaml", "charger_b")
 
+    def settings(self) -> Any:
+        return shipped(*self.example)
+
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = shipped(*self.example)
+        settings = self.settings()
         asked = settings.range_check is not None
         plant = ChargerPlant("a", settings.receivers, commanded=True, asked=asked, pace=PACE)
         world = RealTime({"a": plant})
@@ -73,9 +76,12 @@ class RcuBench(Bench):
 class TestAReceiverOnModbus(ChargerContract):
     link: ClassVar = "unit"
 
+    def settings(self) -> Any:
+        return shipped("charger_modbus.yaml", "charger_c")
+
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = shipped("charger_modbus.yaml", "charger_c")
+        settings = self.settings()
         world = RealTime({"a": PadPlant("a", pace=PACE)})
         rcu = ModbusRcu(world.plants["a"], settings)
         with on_modbus(world, [rcu]) as (bus, clock):
@@ -88,9 +94,12 @@ class TestAReceiverOnModbus(ChargerContract):
 class TestAnyMakeOnRegisters(ChargerContract):
     link: ClassVar = "unit"
 
+    def settings(self) -> Any:
+        return shipped("charger_register.yaml", "charger_f")
+
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = shipped("charger_register.yaml", "charger_f")
+        settings = self.settings()
         plant = ChargerPlant("a", commanded=True, asked=True, pace=PACE, parts=PARTS)
         world = RealTime({"a": plant})
         station = RegisterCharger(world.plants["a"], settings)
@@ -111,9 +120,12 @@ class TestContactsAtAModule(ChargerContract):
     measures: ClassVar = False
     foreign_object: ClassVar = "the fault contact"
 
+    def settings(self) -> Any:
+        return shipped("charger_contacts.yaml", "charger_e")
+
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = shipped("charger_contacts.yaml", "charger_e")
+        settings = self.settings()
         table = charger_contacts.wires(settings)
         world = RealTime({"a": ContactCharger("a", table, pace=PACE)})
         wiring = Wiring(world.plants["a"], table, modbus.canonical)

@@ -13,6 +13,7 @@ from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Mea
 from bridges.settings.load import load
 from drivers import DriverError, json_fields
 from drivers.charger.http import Settings, create, describe, warnings
+from drivers.charger.http_fields import Fields
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
 from drivers.http_call import Call
@@ -64,7 +65,7 @@ def test_a_receivers_number_is_its_id() -> None:
 def test_a_robots_error_is_told_from_the_stations_and_an_unknown_word_is_unknown() -> None:
     found = [read(answer(word)) for word in ("FAULT", "PAIRING_FAILED", "UPDATING\n firmware")]
     assert [(sample.activity, sample.code, sample.side) for sample in found] == [
-        (Activity.ERROR, 5, ""),
+        (Activity.ERROR, 5, "station"),
         (Activity.ERROR, 6, "robot"),
         (Activity.UNKNOWN, "UPDATING firmware", ""),
     ]
@@ -225,7 +226,7 @@ def test_a_start_is_repeated_while_the_station_stays_idle_and_a_stop_while_it_go
     ]
 
 
-def test_no_level_sends_nothing_whatever_the_station_does() -> None:
+def test_without_a_wanted_level_nothing_is_sent_whatever_the_station_does() -> None:
     _, scan = driver()
     assert [scan(AS_IT_IS, state) for state in FULL.state_words] == [[]] * 7
 
@@ -349,3 +350,20 @@ def test_a_robot_is_a_fleet_and_a_name() -> None:
     for text in ("AMR01", "/AMR01", "tiny/"):
         with pytest.raises(ValueError, match="write FLEET/ROBOT"):
             robot(text)
+
+
+@pytest.mark.parametrize(
+    ("codes", "said", "side"),
+    [
+        (Codes(idle=[0], charging=[1], error=[5], robot_error=[6]), "", "station"),
+        (Codes(idle=[0], charging=[1], error=[5], robot_error=[6]), "too far", "robot"),
+        (Codes(idle=[0], charging=[1], error=[5], robot_error=[6], station_error=[7]), "", ""),
+        (Codes(idle=[0], charging=[1], error=[5]), "", ""),
+    ],
+)
+def test_an_error_is_the_stations_where_the_robots_have_codes_of_their_own(
+    codes: Codes, said: str, side: str
+) -> None:
+    fields = Fields(error_texts={"too far": "robot"})
+    made = Settings(codes=codes, fields=fields)
+    assert read({"state": 5, "error_msg": said}, made).side == side

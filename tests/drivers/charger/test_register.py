@@ -8,13 +8,21 @@ import pytest
 
 from bridges.charger.signals import Activity, ChargerSample, Measured
 from bridges.settings.load import load
-from drivers.charger.register import Settings, decode
+from drivers.charger.register import Settings, decode, tables
 from drivers.charger.register_map import ChargerMap, Number
 from tests.settings.reading import changed, texts_of
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_register.yaml"
 SETTINGS: Settings = load(EXAMPLE).devices["charger_f"]
-WELL = {"state": 0.0, "fault": 0.0, "flags": 0.0, "volts": 48.5, "amps": 0.0, "in_range": 1.0}
+WELL = {
+    "state": 0.0,
+    "fault": 0.0,
+    "flags": 0.0,
+    "volts": 48.5,
+    "amps": 0.0,
+    "in_range": 1.0,
+    "coil": 31.0,
+}
 
 
 @pytest.mark.parametrize(
@@ -59,15 +67,17 @@ def read(**values: float) -> tuple[Activity, int | str, str, str]:
         ({"fault": 99, "state": 4}, (Activity.ERROR, 4, "error 99", "")),
     ],
 )
-def test_rules_codes_and_errors_say_what_it_does(values: dict[str, float], wanted: object) -> None:
+def test_rules_codes_and_errors_say_what_the_station_does(
+    values: dict[str, float], wanted: object
+) -> None:
     assert read(**values) == wanted
 
 
-def test_what_it_measures_is_told() -> None:
+def test_receiver_range_voltage_and_current_are_read_by_the_map() -> None:
     assert SETTINGS.map
     values = {**WELL, "receiver": 4711.0}
     assert decode(SETTINGS.map, values) == ChargerSample(
-        Activity.IDLE, 0, measured=Measured("4711", True, 48.5, 0.0)
+        Activity.IDLE, 0, measured=Measured("4711", True, 48.5, 0.0, temperatures=(("coil", 31.0),))
     )
     assert decode(SETTINGS.map, {**WELL, "receiver": 0}).measured.receiver_id == ""
 
@@ -77,22 +87,23 @@ WRONG: dict[str, tuple[str, str]] = {
         "stat: {at: input register 0}",
         "'values' needs 'state', of which codes speaks",
     ),
-    "{at: flags, ignore": ("{at: flagz, ignore", "'flagz' is no value of this map"),
+    "{at: flags, ignore": ("{at: flagz, ignore", "unknown value 'flagz': did you mean 'flags'?"),
     "{at: coil 0, start: 1, stop: 0}": (
         "{at: coil 0, start: 1, stop: 1}",
         "'stop' is the value of start",
     ),
     "{at: input register 4, scale: 0.01, signed: true}": (
         "{at: input register 4, bit: 16}",
-        "1 registers have bits 0 to 15",
+        "a register has bits 0 to 15",
     ),
+    "amps: {at:": ("aps: {at:", "unknown value 'aps': did you mean 'amps'?"),
     "in_range: {at: discrete input 0}": (
         "in_range: {at: discrete input 0, words: 2}",
         "'at' is one bit: leave words, signed and bit out",
     ),
     "    unit: 3\n": (
         "    unit: 3\n    receivers: {a: fleet/robot}\n",
-        "the map needs the value rec",
+        "'receivers': the map needs the value rec",
     ),
 }
 
@@ -112,3 +123,31 @@ def test_without_power_it_is_only_observed() -> None:
     made = msgspec.convert(plain, Settings)
     assert not made.can_stop()
     assert isinstance(made.map, ChargerMap)
+
+
+def test_each_value_is_told_by_what_its_registers_hold() -> None:
+    wide = Number(at="input register 9", words=2, low_first=True, scale=0.001)
+    flag = Number(at="input register 2", bit=3)
+    assert SETTINGS.map
+    found = msgspec.structs.replace(
+        SETTINGS.map, values={**SETTINGS.map.values, "volts": wide, "flags": flag}
+    )
+    (table,) = tables(msgspec.structs.replace(SETTINGS, map=found))
+    state, others = "unit 3 input register 0", ", other bits 0"
+    volts = "unit 3 input register 10 and unit 3 input register 9"
+    assert table.rows == (
+        ("state", state, "0x0000", "0: idle"),
+        ("state", state, "0x0001", "1: handshake"),
+        ("state", state, "0x0002", "2: handshake"),
+        ("state", state, "0x0004", "4: charging"),
+        ("state", state, "0x0005", "5: released"),
+        ("state", state, "0x0009", "9: error"),
+        ("fault", "unit 3 input register 1", "0x0001", "1"),
+        ("flags", "unit 3 input register 2", f"0x0000{others}", "0"),
+        ("flags", "unit 3 input register 2", f"0x0008{others}", "1"),
+        ("volts", volts, "0x0000 and 0x64C8", "25.8 V"),
+        ("amps", "unit 3 input register 4", "0x050A", "12.9 A"),
+        ("in_range", "unit 3 discrete input 0", "0", "0"),
+        ("in_range", "unit 3 discrete input 0", "1", "1"),
+        ("coil", "unit 3 input register 5", "0x0001", "1"),
+    )

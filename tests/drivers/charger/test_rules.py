@@ -93,7 +93,7 @@ def test_a_test_holds_for_what_it_says_and_nothing_else() -> None:
     ]
 
 
-def test_numbers_that_are_none_are_errors_with_what_there_is() -> None:
+def test_an_error_value_that_is_no_number_is_an_error_that_shows_it() -> None:
     assert ErrorNumber(at="a").errors("E7") == [("", "error E7")]
     assert ErrorNumber(at="a").errors(0) == []
     assert ErrorBits(at="a").errors(None) == [("", "error flags None")]
@@ -123,8 +123,8 @@ def test_a_renewed_start_is_sent_in_each_scan_and_a_stop_once_it_is_off() -> Non
 WRONG = {
     "    switches_off_after_s: 30 ": (
         "    #",
-        "unsafe: when the network dies nothing switches the power off: have start set the relay's own"
-        " timer, and write that as switches_off_after_s;"
+        "'charger_d': unsafe: when the network dies nothing switches the power off: have start set the"
+        " relay's own timer, and write that as switches_off_after_s;"
         " or accept_unsafe: {power: <why it is safe here>}",
     ),
     "switches_off_after_s: 30 ": (
@@ -144,7 +144,7 @@ WRONG = {
     "{above: 20}": ("{above: 20, below: 20}", "'below' must be greater than above"),
     "{means: charging, when: {apower: {above: 20}}} ": (
         "{means: idle} ",
-        "always holds: the rules below it are never asked",
+        "rule 2 always holds: the rules below it are never asked",
     ),
 }
 

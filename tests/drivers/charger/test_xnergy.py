@@ -146,7 +146,7 @@ def test_a_start_is_written_once_and_from_idle() -> None:
 
 
 @pytest.mark.parametrize("code", [*range(1, 13), 238, 99])
-def test_in_no_other_state_a_start_is_written(code: int) -> None:
+def test_no_start_is_written_in_any_other_state(code: int) -> None:
     assert run(*((float(n), ON, code) for n in range(9))) == []
 
 

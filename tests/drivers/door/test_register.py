@@ -13,7 +13,7 @@ from bridges.core.decision import Sampled
 from bridges.door.signals import DoorSample
 from bridges.rmf.definitions import DoorModeValue
 from bridges.settings.load import SettingsError, load
-from drivers.door.register import PROFILE, Settings, decode, door_map, points
+from drivers.door.register import PROFILE, Settings, decode, door_map, points, tables
 from drivers.door.register_map import DoorMap
 from drivers.hal.modbus.points import Point
 from drivers.profiles.texts import FOLDER
@@ -194,7 +194,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
     path = tmp_path / "door.yaml"
     changes = "    changes: {command: {at: coil 4, hold: 1, release: 0, read_back: false}}\n"
     path.write_text(PROFILED + changes)
-    assert [(w.line, w.column) for w in load(path).warnings] == [(9, 69)]
+    assert [(w.line, w.column) for w in load(path).warnings] == [(4, 3), (9, 69)]
     second = PROFILED[PROFILED.index("  front:") :].replace("front", "back") + changes
     path.write_text(PROFILED + changes + second)
     text = r"unit 1 coil 4 is used by front changes\.command\.at on line 9"
@@ -206,8 +206,8 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
     ("old", "new", "wanted"),
     [
         ("unit: 1", "unit: 1", []),
-        ("moving: [1]", "moving: [1, 2]", ["9:63: 2 is listed under open already"]),
-        ("{4: blocked}", "{0: blocked}", ["9:87: 0 is listed under closed already"]),
+        ("moving: [1]", "moving: [1, 2]", ["9:63: 'moving': 2 is listed under open already"]),
+        ("{4: blocked}", "{0: blocked}", ["9:87: 'faults': 0 is listed under closed already"]),
         ("open: [2], ", "", ["9:7: 'status' needs 'open': a list ([...])"]),
         ("open: [2]", "open: []", ["9:64: 'open' has 0 entries: at least 1 are needed"]),
         (
@@ -224,29 +224,29 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
             ],
         ),
         ("hold: 1, release: 0", "hold: 1, release: 1", ["10:47: 'release' is the value of hold"]),
-        ("hold: 1", "hold: 2", ["10:35: a coil is 0 or 1"]),
+        ("hold: 1", "hold: 2", ["10:35: 'hold': a coil is 0 or 1"]),
         (
             "unit: 1",
             "unit: 1\n    profile: generic-register-door",
-            ["8:14: 'map' is written out as well: delete one of the two"],
+            ["8:14: 'profile': 'map' is written out as well: delete one of the two"],
         ),
         (
             "unit: 1",
             "unit: 1\n    profile: generic-door",
-            ["8:14: 'map' is written out as well: delete one of the two"],
+            ["8:14: 'profile': 'map' is written out as well: delete one of the two"],
         ),
         (
             "unit: 1",
             "unit: 1\n    base_address: 65535\n    feedback: estimated",
             [
                 "9:15: the status says where the door is: leave feedback out",
-                "6:3: feedback: estimated needs open_delay_s, the time the door takes to open",
+                "6:3: 'front': feedback: estimated needs open_delay_s, the time the door takes to open",
             ],
         ),
         (
             "unit: 1",
             "unit: 1\n    on_fire: open",
-            ["8:14: an operator on registers has no fire input: leave this out"],
+            ["8:14: 'on_fire': an operator on registers has no fire input: leave this out"],
         ),
     ],
 )  # fmt: skip
@@ -278,7 +278,10 @@ def test_two_doors_never_share_a_command(tmp_path: Path) -> None:
 
 def test_the_shipped_doors_are_sound() -> None:
     config = load(CONFIG / "door_register.yaml")
-    assert (config.warnings, list(config.devices)) == ((), ["ward_door", "lab_door"])
+    assert [w.text.partition(" when ")[0] for w in config.warnings] == [
+        "warning: bus 'line': units 1, 2 keep their outputs"
+    ]
+    assert list(config.devices) == ["ward_door", "lab_door"]
 
 
 def test_a_problem_in_a_profile_has_its_file_line_and_column(tmp_path: Path) -> None:
@@ -290,4 +293,23 @@ def test_a_problem_in_a_profile_has_its_file_line_and_column(tmp_path: Path) -> 
     line = text[: text.index("open: [2]")].count("\n") + 1
     assert str(caught.value).startswith(
         f"{broken}:{line}:5: unknown key 'opens': did you mean 'open'?"
+    )
+
+
+def test_each_number_of_the_status_and_each_error_bit_is_a_row() -> None:
+    status, errors = tables(load(CONFIG / "door_register.yaml").devices["ward_door"])
+    assert status.rows == (
+        ("closed", "0"),
+        ("moving", "1"),
+        ("open", "2"),
+        ("moving", "3"),
+        ("not known, with the fault: blocked", "4"),
+        ("not known, with the fault: motor failure", "5"),
+        ("not known, with a fault", "any other"),
+    )
+    assert errors.rows == (
+        ("motor too hot", "0"),
+        ("light curtain failed", "1"),
+        ("on battery", "2"),
+        ("an error, by its number", "any other"),
     )

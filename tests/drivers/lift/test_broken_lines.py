@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.lift.signals import Hazard
-from drivers.lift.dry_contact import Settings, debounce
+from drivers.lift.broken_lines import floor_warnings
+from drivers.lift.dry_contact import Settings, debounce, wires
 from tests.drivers.lift.test_checks import found, warned
 from tests.drivers.lift.test_decode import sample
 from tests.drivers.lift.wirings import alarm, bits, inputs, line
@@ -140,3 +141,11 @@ def test_exactly_the_lines_are_refused_that_can_make_it_less_safe(
     }
     paths = [path for path, _ in found(lift)]
     assert paths == [f"inputs.service.bits.{bit}" for bit in sorted(worse)]
+
+
+def test_each_code_of_a_landing_is_judged_for_broken_lines() -> None:
+    code = {"encoding": "binary", "bits": bits(3, 60), "codes": {1: "L1", 6: "L1", 4: "L2"}}
+    lift = wired(floors=["L1", "L2"], floor_code=code)
+    assert floor_warnings(lift.floor_code, {w.signal: w for w in wires(lift)}) == (
+        "with floor_bit1 cut, L1 reads as L2; with floor_bit1 shorted, L2 reads as L1"
+    )

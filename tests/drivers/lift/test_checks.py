@@ -423,6 +423,23 @@ def test_a_fire_that_no_topic_tells_of_is_noted_and_not_warned_of() -> None:
     assert (list(notes(settings())), warned(settings())) == (silent, [])
     assert list(notes(settings(alarm="fire_alarm_trigger"))) == []
     assert list(notes(settings(inputs=inputs(fire_alarm=None)))) == []
+    blue = inputs(code_blue={"point": "BCM27", "active": "low", "pull": "down"})
+    untold = "code_blue stops this lift for robots, and the fleets are not told"
+    assert list(notes(settings(alarm="emergency_signal", inputs=blue))) == [(("alarm_on",), untold)]
+    both = ["fire_alarm", "code_blue"]
+    assert list(notes(settings(alarm="emergency_signal", alarm_on=both, inputs=blue))) == []
     assert [str(note).partition("note: ")[2] for note in load(CONFIG).notes] == [
         f"'Lift1': {silent[0][1]}"
     ]
+
+
+def test_a_hazard_of_alarm_on_that_is_not_wired_is_warned_of() -> None:
+    text = "no code_blue: this lift does not report it, so nobody is told"
+    both = settings(alarm="emergency_signal", alarm_on=["fire_alarm", "code_blue"])
+    assert [w for w in warnings(both) if w[0][0] == "alarm_on"] == [(("alarm_on", "1"), text)]
+
+
+def test_alarm_on_without_a_topic_is_refused() -> None:
+    text = "nothing is told with alarm: none; write alarm: emergency_signal"
+    found = list(settings(alarm_on=["code_blue"]).problems())
+    assert (("alarm_on",), text) in found

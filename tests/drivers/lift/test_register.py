@@ -8,7 +8,7 @@ import pytest
 
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from bridges.settings.load import load
-from drivers.lift.register import Settings, decode, encode, warnings
+from drivers.lift.register import Settings, decode, encode, tables, warnings
 from tests.settings.reading import problems_of
 
 CONFIG = Path(__file__).parents[3] / "config" / "lift_gateway.yaml"
@@ -92,8 +92,12 @@ MODEL = "looks like a number of the data model, which begins at 1"
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ("4: L4}\n        between", "4: L1}\n        between", "28:9: no code for L4"),
-        ("between_floors: [0]", "between_floors: [1]", "28:20: 1 means between floors as well"),
+        ("4: L4}\n        between", "4: L1}\n        between", "28:9: 'codes': no code for L4"),
+        (
+            "between_floors: [0]",
+            "between_floors: [1]",
+            "28:20: 'codes': 1 means between floors as well",
+        ),
         (
             "at: input register 1\n",
             "at: input register 30002\n",
@@ -105,25 +109,30 @@ MODEL = "looks like a number of the data model, which begins at 1"
             "coil 0\n        bits: [8",
             "32:13: 'coil 0': write 'holding register 0' or 'input register 0'; addresses begin at 0",
         ),
-        ("bits: [8, 9]", "bits: [8, 8]", "33:9: a bit stands here twice"),
-        ("2: down}", "4: down}", "34:39: 4 does not fit on 2 bits"),
+        ("bits: [8, 9]", "bits: [8, 8]", "33:9: 'bits': a bit stands here twice"),
+        ("2: down}", "4: down}", "34:39: 'codes': 4 does not fit on 2 bits"),
         (
             "0: closed, 1: moving, 2: open",
             "0: moving, 1: moving, 2: open",
             "37:9: 'codes' needs a code for open and one for closed",
         ),
-        ("bit: 0, active", "active", "41:7: a flag is one bit of a register: say which"),
+        (
+            "bit: 0, active",
+            "active",
+            "41:7: 'overload': a flag is one bit of a register: say which",
+        ),
         (
             "ask: 2, release: 0",
             "ask: 3, release: 0",
-            "44:51: another command has these bits of holding register 10 already",
+            "44:51: 'ask': another command has these bits of holding register 10 already",
         ),
-        ("none: 0", "none: 4", "47:43: 4 is no call, as none says"),
-        (", 4: L4}\n          none", "}\n          none", "47:11: no code for L4"),
+        ("none: 0", "none: 4", "47:43: 'codes': 4 is no call, as none says"),
+        (", 4: L4}\n          none", "}\n          none", "47:11: 'codes': no code for L4"),
         (
             "    floors:",
             "    agv_mode: by_call\n    floors:",
-            "44:9: agv_mode is by_call, so calls ask for AGV mode: delete one of the two",
+            "44:9: 'agv_mode_request': agv_mode is by_call, so calls ask for AGV mode:"
+            " delete one of the two",
         ),
     ],
 )
@@ -145,4 +154,54 @@ def test_commands_that_cannot_be_read_back_are_warned_of() -> None:
             ("map", "commands", "read_back"),
             "commands cannot be read back: that they are off is not verified",
         )
+    ]
+
+
+def told(title: str) -> list[tuple[str, ...]]:
+    """The rows of one table of the shipped lift."""
+    return next(list(table.rows) for table in tables(shipped()) if table.title == title)
+
+
+def test_each_number_is_a_row_with_what_its_register_then_reads() -> None:
+    others = ", other bits 0"
+    assert told("floor numbers") == [
+        ("between floors", "0", f"0x0000{others}"),
+        ("L1", "1", f"0x0001{others}"),
+        ("L2", "2", f"0x0002{others}"),
+        ("L3", "3", f"0x0003{others}"),
+        ("L4", "4", f"0x0004{others}"),
+        ("a fault", "any other", "-"),
+    ]
+    assert told("motion numbers") == [
+        ("stopped", "0", f"0x0000{others}"),
+        ("up", "1", f"0x0100{others}"),
+        ("down", "2", f"0x0200{others}"),
+        ("a car that moves", "any other", "-"),
+    ]
+    assert told("door numbers")[-1] == ("neither open nor closed", "any other", "-")
+    assert told("service numbers")[-1] == ("out_of_service", "any other", "-")
+
+
+def test_each_command_is_a_row_with_what_is_written() -> None:
+    called = "on until the car is there"
+    held = "on while a robot holds the lift, and 3 s longer"
+    assert told("outputs") == [
+        ("agv_mode_request", "holding register 10: 1", "0", held),
+        ("door_open", "holding register 10: 2", "0", "on while the car stands for a robot"),
+        ("call L1", "holding register 11: 1", "0", called),
+        ("call L2", "holding register 11: 2", "0", called),
+        ("call L3", "holding register 11: 3", "0", called),
+        ("call L4", "holding register 11: 4", "0", called),
+    ]
+
+
+def test_floors_the_wrong_way_round_show() -> None:
+    settings = shipped()
+    turned = msgspec.structs.replace(settings, floors=list(settings.floors)[::-1])
+    first = next(iter(tables(turned)))
+    assert [row[:2] for row in first.rows] == [
+        ("lowest", "L4"),
+        ("2", "L3"),
+        ("3", "L2"),
+        ("highest", "L1"),
     ]

@@ -217,7 +217,7 @@ def test_a_range_check_takes_a_moment() -> None:
     assert seen == [None, None, True]
 
 
-def test_what_does_not_exist_cannot_be_pressed_driven_or_broken() -> None:
+def test_an_unknown_part_or_signal_cannot_be_pressed_driven_or_broken() -> None:
     plant = ChargerPlant("a")
     with pytest.raises(
         ValueError, match=r"there are foreign_object, out_of_range, over_temp.*, robot, str"

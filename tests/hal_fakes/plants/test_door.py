@@ -24,7 +24,7 @@ def edges(door: DoorPlant) -> list[tuple[float, str, object]]:
     return [(edge.at, edge.signal, edge.value) for edge in door.edges]
 
 
-def test_it_opens_while_it_is_held_and_closes_by_itself_afterwards() -> None:
+def test_a_door_opens_while_it_is_held_and_closes_by_itself_afterwards() -> None:
     door = plant()
     door.drive("hold_open", True, 1.0)
     door.drive("hold_open", False, 10.0)
@@ -128,7 +128,7 @@ def test_an_operator_wired_the_wrong_way_round_opens_when_it_is_released() -> No
     ]
 
 
-def test_what_cannot_be_pressed_or_fail_is_refused_with_what_can() -> None:
+def test_an_unknown_press_or_failure_is_refused_with_those_that_exist() -> None:
     with pytest.raises(ValueError, match="no 'bell' to press; there are fire, obstruction, push"):
         plant().press("bell", True, 0.0)
     with pytest.raises(ValueError, match=r"there are closed, fire, hold_open, .*, server, unit"):

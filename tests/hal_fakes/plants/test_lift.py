@@ -35,7 +35,7 @@ def test_at_first_it_stands_at_the_lowest_landing_closed() -> None:
     )
 
 
-def test_a_ride_of_a_robot() -> None:
+def test_a_robots_calls_bring_the_car_and_hold_its_door() -> None:
     plant = lift()
     plant.drive("agv_mode_request", True, 1.0)
     plant.drive("call_1", True, 2.0)
@@ -394,7 +394,7 @@ PARTS: list[tuple[str, FailureMode, list[tuple[float, str, object]]]] = [
 
 
 @pytest.mark.parametrize(("part", "mode", "events"), PARTS)
-def test_a_part_that_fails_does_so_in_its_own_way(
+def test_each_part_fails_in_its_own_way(
     part: str, mode: FailureMode, events: list[tuple[float, str, object]]
 ) -> None:
     plant = in_agv_mode()
@@ -447,7 +447,7 @@ def broken(do: Callable[[LiftPlant], None]) -> str:
     return str(refused.value)
 
 
-def test_what_does_not_exist_is_named_with_what_does() -> None:
+def test_an_unknown_part_or_signal_is_named_with_those_that_exist() -> None:
     assert broken(lambda p: p.press("fire", True, 0.0)) == (
         "lift has no 'fire' to press; there are fire_alarm, hall_B1, hall_G, hall_1, obstruction"
     )

@@ -174,6 +174,6 @@ def test_a_robot_that_leaves_while_it_charges_is_released() -> None:
     assert at(plant, 20.0).battery == 0.0
 
 
-def test_what_cannot_be_pressed_is_named() -> None:
+def test_an_unknown_press_is_named() -> None:
     with pytest.raises(ValueError, match="there are foreign_object, misparked, robot, stranger"):
         PadPlant("a").press("door", True, 0.0)

@@ -27,6 +27,12 @@ class Clock(Time):
         return time.monotonic() + self.now
 
 
+def data_frame(frame_id: int, payload: str, extended: bool = False) -> can.Message:
+    """A data frame; its payload in hex digits."""
+    data = bytes.fromhex(payload)
+    return can.Message(arbitration_id=frame_id, is_extended_id=extended, data=data)
+
+
 class FarEnd:
     """Whoever else is on the bus: sends anything, and has heard what we sent."""
 
@@ -35,8 +41,7 @@ class FarEnd:
 
     def send(self, frame_id: int, payload: str = "", extended: bool = False) -> None:
         """A data frame; its payload in hex digits."""
-        data = bytes.fromhex(payload)
-        self._bus.send(can.Message(arbitration_id=frame_id, is_extended_id=extended, data=data))
+        self._bus.send(data_frame(frame_id, payload, extended))
 
     def trouble(self, error_id: int) -> None:
         """An error frame, as SocketCAN makes them of its controller's troubles."""
@@ -53,10 +58,6 @@ class FarEnd:
         while (message := self._bus.recv(wait_s)) is not None:
             found.append((message.arbitration_id, bytes(message.data).hex()))
         return found
-
-    def recv(self) -> can.Message | None:
-        """The next frame of ours, if there is one soon."""
-        return self._bus.recv(0.02)
 
     def close(self) -> None:
         """Leave."""
@@ -105,6 +106,10 @@ class Reactive(can.BusABC):
             return self.later.pop(0)
         self.now += (timeout or 0.0) + 1e-6
         return None
+
+    def say(self, frame_id: int, payload: str = "", extended: bool = False) -> None:
+        """Somebody on the bus sends this by itself; its payload in hex digits."""
+        self.coming.append(data_frame(frame_id, payload, extended))
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         self.coming.extend(self.react(msg))

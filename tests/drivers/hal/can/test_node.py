@@ -1,14 +1,14 @@
 """A CANopen node: whose answer an answer is, and whether the node lives."""
 
 import struct
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
+import can
 import pytest
 
 from drivers.hal.can import CanBus, Wanted
 from drivers.hal.can.canopen import CanOpenNode
-from tests.drivers.hal.can.far_end import Clock, FarEnd, failure, two_ends
+from tests.drivers.hal.can.far_end import Reactive, data_frame, failure
 
 NODE = 10
 STATE = (0x2002, 0x0A, 2)
@@ -22,39 +22,28 @@ def value(request: bytes, number: int, command: int = 0x4B) -> str:
 
 
 class Node:
-    """What answers the requests to node 10; each answer is a list of payloads in hex."""
+    """Answers the requests to node 10; each answer is a list of payloads in hex."""
 
-    def __init__(self, far: FarEnd) -> None:
+    def __init__(self, far: Reactive) -> None:
         self.answer: Answer = lambda request: [value(request, 5)]
         self.asked: list[str] = []
-        self._far = far
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
+        far.react = self._react
 
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            message = self._far.recv()
-            if message is None:
-                continue
-            self.asked.append(bytes(message.data).hex())
-            for payload in self.answer(bytes(message.data)):
-                self._far.send(0x580 + NODE, payload)
-
-    def close(self) -> None:
-        self._ended.set()
-        self._thread.join()
+    def _react(self, message: can.Message) -> list[can.Message]:
+        request = bytes(message.data)
+        self.asked.append(request.hex())
+        return [data_frame(0x580 + NODE, payload) for payload in self.answer(request)]
 
 
-Side = tuple[CanOpenNode, Node, FarEnd, CanBus, Clock]
+Side = tuple[CanOpenNode, Node, Reactive, CanBus]
 
 
 @pytest.fixture
-def side() -> Iterator[Side]:
-    with two_ends() as (bus, far, clock):
-        node = Node(far)
-        yield CanOpenNode(bus, NODE, 0.5), node, far, bus, clock
-        node.close()
+def side() -> Side:
+    far = Reactive()
+    bus = far.bus()
+    bus.take()
+    return CanOpenNode(bus, NODE, 0.5), Node(far), far, bus
 
 
 NAME = "CANopen node 10 at can0"
@@ -98,13 +87,13 @@ def test_a_refusal_is_named_and_is_no_reason_to_pause(side: Side) -> None:
 
 
 def test_no_answer_is_no_number_and_pauses_the_node(side: Side) -> None:
-    ours, node, _, _, clock = side
+    ours, node, far, _ = side
     node.answer = lambda request: []
     text = f"{NAME}, read 0x2002:0A: no reply within 0.05 s"
     assert [failure(lambda: ours.read(*STATE)) for _ in range(3)] == [text] * 3
     assert len(node.asked) == 1
     node.answer = lambda request: [value(request, 7)]
-    clock.now += 0.6
+    far.now += 0.6
     assert ours.read(*STATE) == 7
 
 
@@ -120,12 +109,12 @@ def test_no_answer_is_no_number_and_pauses_the_node(side: Side) -> None:
 def test_a_reply_of_another_length_or_about_another_object_is_named_and_never_taken(
     side: Side, odd: Callable[[bytes], str], text: str
 ) -> None:
-    ours, node, _, _, clock = side
+    ours, node, far, _ = side
     node.answer = lambda request: [odd(request)]
     assert failure(lambda: ours.read(*STATE)) == (
         f"{NAME}, read 0x2002:0A: no reply within 0.05 s, but {text}"
     )
-    clock.now += 1
+    far.now += 1
     node.answer = lambda request: [odd(request), value(request, 9), odd(request)]
     assert ours.read(*STATE) == 9
 
@@ -147,29 +136,29 @@ def test_a_write_is_done_only_when_the_node_says_so(side: Side) -> None:
 
 
 def test_a_late_answer_is_never_the_answer_to_the_next_question(side: Side) -> None:
-    ours, node, far, _, clock = side
+    ours, node, far, _ = side
     node.answer = lambda request: []
     assert failure(lambda: ours.read(*STATE))
-    clock.now += 0.6
-    far.send(0x580 + NODE, "4b02200a05000000")  # state 5, of before
+    far.now += 0.6
+    far.say(0x580 + NODE, "4b02200a05000000")  # state 5, of before
     node.answer = lambda request: [value(request, 238)]
     assert ours.read(*STATE) == 238
 
 
 def test_a_node_that_owes_an_answer_is_asked_nothing(side: Side) -> None:
-    ours, node, _, _, clock = side
+    ours, node, far, _ = side
     node.answer = lambda request: []
     assert failure(lambda: ours.read(*STATE))
     ours._sdo_pause.mended()  # no pause keeps us from asking
     assert failure(lambda: ours.read(*STATE)) == (f"{NAME}, read 0x2002:0A: no reply within 0.05 s")
     assert len(node.asked) == 1
-    clock.now += 0.2
+    far.now += 0.2
     node.answer = lambda request: [value(request, 1)]
     assert ours.read(*STATE) == 1
 
 
 def test_what_switches_off_before_the_end_is_sent_whatever_the_pause(side: Side) -> None:
-    ours, node, _, bus, _ = side
+    ours, node, _, bus = side
     node.answer = lambda request: []
     assert failure(lambda: ours.write(*ENABLE, 1))
     node.answer = lambda request: ["60" + request[1:4].hex() + "00000000"]
@@ -183,43 +172,45 @@ def test_what_switches_off_before_the_end_is_sent_whatever_the_pause(side: Side)
 
 
 def test_a_node_whose_heartbeat_comes_in_time_is_alive(side: Side) -> None:
-    ours, _, far, _, _ = side
-    far.send(0x70A, "05")
+    ours, _, far, _ = side
+    far.say(0x70A, "05")
     ours.alive()
-    threading.Timer(0.01, lambda: far.send(0x70A, "05")).start()
+    far.now += 0.55
+    far.later = [data_frame(0x70A, "05")]
     ours.alive()
+    assert ours.starts == 0
 
 
 def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side) -> None:
-    ours, _, far, _, clock = side
-    far.send(0x70A, "05")
+    ours, _, far, _ = side
+    far.say(0x70A, "05")
     ours.alive()
-    clock.now += 0.55
+    far.now += 0.55
     assert failure(ours.alive) == (
         f"{NAME}: no heartbeat within 0.5 s: nothing else is heard on the bus either: power,"
         " cable, termination, bitrate?"
     )
-    far.send(0x70A, "05")
+    far.say(0x70A, "05")
     assert failure(ours.alive) == ""
 
 
 def test_a_node_that_was_lost_counts_as_started_anew(side: Side) -> None:
     """Its boot-up frame may have come while nobody listened: what it was told is told again."""
-    ours, _, far, _, clock = side
-    far.send(0x70A, "05")
+    ours, _, far, _ = side
+    far.say(0x70A, "05")
     ours.alive()
     assert ours.starts == 0
-    clock.now += 0.55
+    far.now += 0.55
     assert failure(ours.alive)
-    far.send(0x70A, "05")
+    far.say(0x70A, "05")
     ours.alive()
     assert ours.starts == 1
 
 
 def test_another_nodes_heartbeat_does_not_count_and_is_named(side: Side) -> None:
-    ours, _, far, _, _ = side
-    far.send(0x70B, "05")
-    far.send(0x70A, "05", extended=True)
+    ours, _, far, _ = side
+    far.say(0x70B, "05")
+    far.say(0x70A, "05", extended=True)
     assert failure(ours.alive) == (
         f"{NAME}: no heartbeat within 0.5 s, but of node 11: is 'node' right?"
     )
@@ -227,8 +218,8 @@ def test_another_nodes_heartbeat_does_not_count_and_is_named(side: Side) -> None
 
 @pytest.mark.parametrize("payload", ["", "0500", "0505050505050505"])
 def test_a_heartbeat_of_the_wrong_length_is_ignored(side: Side, payload: str) -> None:
-    ours, _, far, _, _ = side
-    far.send(0x70A, payload)
+    ours, _, far, _ = side
+    far.say(0x70A, payload)
     assert failure(ours.alive) == (
         f"{NAME}: no heartbeat within 0.5 s, but one of {len(payload) // 2} bytes:"
         " is it a CANopen node?"
@@ -240,27 +231,29 @@ def test_a_heartbeat_of_the_wrong_length_is_ignored(side: Side, payload: str) ->
     [("00", "starting"), ("04", "stopped"), ("7f", "pre-operational"), ("03", "in state 3")],
 )
 def test_a_node_that_is_not_operational_is_not_asked(side: Side, state: str, text: str) -> None:
-    ours, _, far, _, _ = side
-    far.send(0x70A, state)
+    ours, _, far, _ = side
+    far.say(0x70A, state)
     assert failure(ours.alive) == f"{NAME} is {text}, not operational: look at the node"
 
 
 def test_a_start_is_counted_and_ends_the_pause(side: Side) -> None:
-    ours, node, far, _, _ = side
+    ours, node, far, _ = side
     node.answer = lambda request: []
     assert failure(lambda: ours.read(*STATE))
-    far.send(0x70A, "00")
-    far.send(0x70A, "05")
+    far.say(0x70A, "00")
+    far.say(0x70A, "05")
     ours.alive()
     assert ours.starts == 1
 
 
 def test_a_node_without_a_heartbeat_is_alive_as_long_as_it_answers() -> None:
-    with two_ends() as (bus, far, _):
-        ours = CanOpenNode(bus, NODE, None)
-        ours.alive()
-        heard: list[object] = []
-        bus.listen([Wanted(1)], lambda frame, at: heard.append(frame))
-        far.send(1)
-        ours.alive()
-        assert len(heard) == 1
+    far = Reactive()
+    bus = far.bus()
+    bus.take()
+    ours = CanOpenNode(bus, NODE, None)
+    ours.alive()
+    heard: list[object] = []
+    bus.listen([Wanted(1)], lambda frame, at: heard.append(frame))
+    far.say(1)
+    ours.alive()
+    assert len(heard) == 1

@@ -88,7 +88,7 @@ def test_a_line_is_a_frame_and_a_frame_a_line() -> None:
         assert encoded(decoded(line)) == line.encode() + b"\r"
 
 
-def test_acknowledgements_between_frames_hide_none(desk: Desk) -> None:
+def test_acknowledgements_between_frames_hide_no_frame(desk: Desk) -> None:
     for n in range(50):
         desk.bus.send(Frame(0x123, bytes((n,))))
     assert desk.bus.wait(lambda: len(desk.heard) == 50, PATIENCE_S)

@@ -183,7 +183,7 @@ def test_an_output_that_reads_back_on_after_make_safe_is_an_error(
     bus.close()
 
 
-def test_a_failed_read_is_the_pins(lgpio: StandIn) -> None:
+def test_a_failed_read_names_the_pin(lgpio: StandIn) -> None:
     bus = header()
     lines = bus.lines({"BCM4": "down"}, {})
     lines.claim()

@@ -539,7 +539,7 @@ def test_after_a_failure_calls_fail_at_once_until_it_is_time_again() -> None:
         bus.close()
 
 
-def test_who_insists_is_not_held_back_by_the_pause_after_a_failure() -> None:
+def test_a_call_that_insists_is_not_held_back_by_the_pause_after_a_failure() -> None:
     with FarEnd(once(b"?"), always(answer())) as far:
         bus = bus_to(far.port, clock=lambda: 0.0)
         for _ in range(2):

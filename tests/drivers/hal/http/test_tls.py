@@ -29,7 +29,7 @@ class Answers(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nobody reads it."""
+        """Nobody reads what the server would log."""
 
 
 class Site:
@@ -77,7 +77,7 @@ def test_a_reading_and_a_command_go_through_with_the_key_in_its_header(
     assert site.server.asked == ["/status?id=0 secret", "/relay/0?turn=on&timer=9 secret"]
 
 
-def test_who_is_signed_by_somebody_else_is_not_believed(site: Site, tmp_path: Path) -> None:
+def test_a_server_signed_by_somebody_else_is_not_believed(site: Site, tmp_path: Path) -> None:
     other = tmp_path / "other.pem"
     trustme.CA().cert_pem.write_to_path(str(other))
     for ca_file in (str(other), None):
@@ -99,7 +99,7 @@ def test_an_answer_that_stops_half_way_ends_by_the_deadline(site: Site) -> None:
     bus.close()
 
 
-def test_a_ca_file_that_is_not_there_is_said(site: Site) -> None:
+def test_a_missing_ca_file_is_named(site: Site) -> None:
     bus = site.bus(ca_file="/no/such/ca.pem")
     with pytest.raises(HalError, match=r"fails: /no/such/ca\.pem is no file: check ca_file"):
         bus.get_json("/status")

@@ -45,7 +45,7 @@ def test_a_pipe_in_place_of_a_token_file_keeps_nobody_waiting(tmp_path: Path) ->
     with pytest.raises(HalError) as caught:
         bus.get_json("/state")
     assert str(caught.value) == (
-        f"token_file {file} cannot be read: it is no file but a pipe, a socket or a device"
+        f"token_file {file} cannot be read: it is a pipe, a socket or a device, not a file"
     )
 
 
@@ -67,5 +67,5 @@ def test_a_token_file_that_others_can_read_or_write_is_refused_and_not_sent(
 
 def test_a_token_over_plain_http_is_worth_a_warning() -> None:
     assert list(warnings(Settings(api_base="tpu"))) == []
-    [(path, text)] = warnings(Settings(api_base="tpu", token_file="/etc/rmf-bridge/tpu.token"))
+    [(path, text)] = warnings(Settings(api_base="tpu", token_file="/etc/rmf-bridges/tpu.token"))
     assert (path, "unencrypted" in text) == (("token_file",), True)

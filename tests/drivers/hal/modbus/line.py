@@ -66,12 +66,12 @@ class SerialModule(Module):
         self._threads[-1].start()
 
     def hang_up(self) -> None:
-        """Out and in again."""
+        """Pull the adapter out, and plug it in again."""
         self.pull()
         self.plug()
 
     def close(self) -> None:
-        """End it all."""
+        """Stop answering, and free the port."""
         if self._link.is_symlink():
             self.pull()
         self._directory.cleanup()

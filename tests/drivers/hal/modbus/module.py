@@ -75,7 +75,7 @@ class Module:
                 end.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        """End it all."""
+        """Close every connection and stop listening."""
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
         self._threads[0].join()

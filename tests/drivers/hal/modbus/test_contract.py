@@ -192,6 +192,6 @@ def test_the_echo_of_another_write_is_no_answer(either: Module, pdu: bytes) -> N
     either.reply = lambda request: (
         frame(request, pdu) if request[7] == 5 else either.answer(request)
     )
-    lines = bus_to(either.port, timeout_s=0.05).lines({IN0: None}, {COIL: False})
+    lines = bus_to(either.port, timeout_s=0.3).lines({IN0: None}, {COIL: False})
     with pytest.raises(HalError, match="tried 2x"):
         lines.write({COIL: True})

@@ -76,6 +76,10 @@ class Site:
         except DriverError as error:
             return str(error)
 
+    def reads(self, name: str) -> DoorSample:
+        """A reading, as the daemon's next scan would give it."""
+        return at_last(self.doors[name].read, "a reading", self.a_moment)
+
     def write(self, name: str, outputs: DoorOutputs) -> None:
         """These outputs."""
         at_last(lambda: self.doors[name].write(outputs), "written", self.a_moment)
@@ -114,14 +118,13 @@ def site(request: pytest.FixtureRequest) -> Iterator[Site]:
 def test_a_held_door_opens_and_a_released_one_closes_by_itself(site: Site) -> None:
     edges: queue.SimpleQueue[Edge] = queue.SimpleQueue()
     site.plants["front"].on_edge = edges.put
-    front = site.doors["front"]
-    assert front.read() == CLOSED
-    front.write(HOLD)
+    assert site.reads("front") == CLOSED
+    site.write("front", HOLD)
     seen = [edges.get(timeout=PATIENCE_S) for _ in range(3)]
-    assert front.read() == OPEN
-    front.write(RELEASE)
+    assert site.reads("front") == OPEN
+    site.write("front", RELEASE)
     seen += [edges.get(timeout=PATIENCE_S) for _ in range(3)]
-    assert front.read() == CLOSED
+    assert site.reads("front") == CLOSED
     assert [(edge.what, edge.signal, edge.value) for edge in seen] == [
         ("relay", "hold_open", True),
         ("sensor", "closed", False),
@@ -130,7 +133,7 @@ def test_a_held_door_opens_and_a_released_one_closes_by_itself(site: Site) -> No
         ("sensor", "opened", False),
         ("sensor", "closed", True),
     ]
-    assert site.doors["ward"].read() == CLOSED
+    assert site.reads("ward") == CLOSED
 
 
 def test_make_safe_and_close_leave_every_relay_off(site: Site) -> None:
@@ -145,7 +148,7 @@ def test_make_safe_and_close_leave_every_relay_off(site: Site) -> None:
     assert relays == {"front": [True, False], "ward": [True, False]}
 
 
-def test_an_address_that_nobody_has_is_refused_and_a_unit_by_a_gateway_alone(site: Site) -> None:
+def test_an_unknown_address_is_refused_and_an_unknown_unit_by_a_gateway_only(site: Site) -> None:
     def refusal(point: str) -> str:
         with pytest.raises(HalError) as caught:
             site.bus.lines({point: None}, {}).read()

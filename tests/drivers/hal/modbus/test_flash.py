@@ -324,7 +324,7 @@ def test_a_flash_that_cannot_be_is_found_where_it_stands(
     assert problems_of(tmp_path / "door.yaml", text) == ([problem] if problem else [])
 
 
-def test_a_pin_has_nobody_who_times_its_pulses() -> None:
+def test_no_board_times_the_pulses_of_a_pin() -> None:
     wire = Wire("hold_open", "out", "BCM17", "high", flash=Flash("BCM27", 0.5))
     text = "flash is for modules that time pulses; a pin's are timed here: leave it out"
     assert list(gpio.wire_problems(wire)) == [text]

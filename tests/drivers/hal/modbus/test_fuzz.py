@@ -231,9 +231,19 @@ def test_a_register_reads_as_what_was_sent_or_not_at_all(sort: type[Module], pdu
 def test_a_pulse_is_asked_for_once_and_believed_by_its_echo_alone(
     sort: type[Module], pdu: bytes
 ) -> None:
-    with saying(sort, pdu) as (module, bus):
-        with suppress(HalError):
-            bus.flash(Point(1, "coil", 0x200), 0.7)
-            assert pdu.hex() == "0502000007"
-        wait_until(lambda: module.asked, "the module has read what was asked")
-        assert len(module.asked) == 1
+    asked: list[bytes] = []
+
+    def connected() -> bool:
+        with saying(sort, pdu) as (module, bus):
+            try:
+                bus.flash(Point(1, "coil", 0x200), 0.7)
+                assert pdu.hex() == "0502000007"
+            except HalError as error:
+                if "no Modbus TCP connection" in str(error):  # a busy machine
+                    return False
+            wait_until(lambda: module.asked, "the module has read what was asked")
+            asked.extend(module.asked)
+        return True
+
+    wait_until(connected, "a connection")
+    assert len(asked) == 1

@@ -107,7 +107,7 @@ def site() -> Iterator[Site]:
     built.close()
 
 
-def test_it_is_armed_before_anything_is_driven_and_read_back(site: Site) -> None:
+def test_the_watchdog_is_armed_and_read_back_before_anything_is_driven(site: Site) -> None:
     assert site.register(STATE) == STOPPED
     site.bench.driver.open()
     assert (site.register(STATE), site.register(TIME)) == (RUNNING, SLOW)
@@ -280,14 +280,16 @@ SHORT = (
         ("{units: [1], profile: wago-750}", []),
         ("{units: [1], habits: " + SHORT % ("0.5", "coil 2") + "}", []),
         ("{units: [1]}", ["7:5: 'module_watchdog' needs 'habits', or a profile: wago-750"]),
-        ("{units: [1, 1], profile: wago-750}", ["7:23: names a unit twice"]),
+        ("{units: [1, 1], profile: wago-750}", ["7:23: 'units': names a unit twice"]),
         (
             "{units: [1], profile: wago}",
             ["7:44: unknown profile 'wago': did you mean 'wago-750'? known here: wago-750"],
         ),
         (
             "{units: [1], habits: " + SHORT % ("0.6", "coil 2") + "}",
-            ["7:66: one late scan would drop the outputs: at most 0.5, half of time_s"],
+            [
+                "7:66: 'refresh_s': one late scan would drop the outputs: at most 0.5, half of time_s"
+            ],
         ),
         (
             "{units: [1], habits: " + SHORT % ("0.5", "input register 2") + "}",
@@ -298,7 +300,9 @@ SHORT = (
         ),
     ],
 )
-def test_what_cannot_be_right_about_it_is_said(tmp_path: Path, dog: str, wanted: list[str]) -> None:
+def test_a_watchdog_that_cannot_be_right_is_refused_where_it_stands(
+    tmp_path: Path, dog: str, wanted: list[str]
+) -> None:
     assert problems_of(tmp_path / "door.yaml", dog) == wanted
 
 

@@ -32,7 +32,7 @@ def describe(point: str) -> str:
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:
-    """What cannot be."""
+    """Wires that cannot be."""
     if wire.direction == "in" and wire.pull is None:
         yield "pull is missing"
     if wire.direction == "in" and wire.pull == "up" and "9" in wire.point:
@@ -42,7 +42,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
 
 
 def open_bus(settings: Settings) -> Bus:
-    """Never."""
+    """No test opens it."""
     raise NotImplementedError
 
 

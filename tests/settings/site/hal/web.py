@@ -12,7 +12,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 def open_bus(settings: Settings) -> Bus:
-    """Never."""
+    """No test opens it."""
     raise NotImplementedError
 
 

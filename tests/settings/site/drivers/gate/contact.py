@@ -87,7 +87,7 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
 
 
 def create(name: str, settings: Settings, bus: object) -> Driver[None, None]:
-    """Never."""
+    """No test runs it."""
     raise NotImplementedError
 
 

@@ -18,7 +18,7 @@ def describe(settings: Settings, bus: web.Settings) -> list[tuple[str, str]]:
 
 
 def create(name: str, settings: Settings, bus: object) -> Driver[None, None]:
-    """Never."""
+    """No test runs it."""
     raise NotImplementedError
 
 

@@ -1,0 +1,217 @@
+"""Who wants to be charged. Place, battery and task decide; the mode is a hint.
+
+RMF's fleet adapter shows the mode CHARGING from the first charge on, in every later task too, and
+IDLE in none (rmf_ros2 9dedd0f: TaskManager::robot_mode; RobotContext::current_mode, which WaitForCharge
+and DockRobot alone set). So, of a robot that has stood at one of our waypoints for SETTLES_S:
+1. Below `again_percent` it wants to be charged, if it has no task, or shows CHARGING or DOCKING.
+2. Above that, and below `full_percent`, only a task that shows CHARGING or DOCKING is believed. A robot
+   that was charged in that task is not served again. One that was charged, and has not left our
+   waypoints since, may be waiting for traffic on its pad: it is believed after LINGERS_S.
+3. Without a task, it wants to be charged where a schedule says so; after that, not again in the same
+   time before it has worked.
+4. A wish lasts while the robot stands at one of our waypoints so, and while it drives there: in the
+   same task, or without one while a station is kept for it. A task that begins within COMES_S of
+   the call is that drive: RMF's automatic retreat, or its ChargeBattery started again.
+5. RMF moves no robot without a task under `finishing_request: nothing` or `park`, until its battery is
+   very low. Such a robot keeps its place when it is called. After COMES_S it loses the station, and
+   ABSENT_S later it is called again.
+"""
+
+from typing import Final
+
+from msgspec.structs import replace
+
+from bridges.charger.settings import Robot
+from bridges.charger_coordinator import schedule
+from bridges.charger_coordinator.memory import By, Grant, Memory, Site, Standing, Wish, without
+from bridges.charger_coordinator.signals import Sighting, Wanted
+
+SETTLES_S: Final = 2.0
+"""A robot that passes by on another task may still show the mode CHARGING."""
+LINGERS_S: Final = 300.0
+"""No traffic lasts so long: a robot that stands there still waits for its battery."""
+COMES_S: Final = 60.0
+"""RMF acts on a charging assignment at once, or not at all."""
+ABSENT_S: Final = 600.0
+
+
+def sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memory:
+    """A fleet has shown one robot."""
+    who = sighting.who
+    standing = _standing(memory.robots.get(who), sighting, now)
+    memory = replace(memory, robots={**memory.robots, who: standing})
+    memory = _rested(_called(_served(memory, sighting), sighting, now), sighting, site)
+    wish = memory.wish(who)
+    if wish is None:
+        return _begun(memory, standing, now, site)
+    if wish.by == "operator":
+        return fulfilled(memory.takes_back(who), who, site) if _full(memory, who, site) else memory
+    if not memory.faulty(who) and _lasts(memory, wish, sighting, site):
+        return memory
+    full = _full(memory, who, site)
+    memory = memory.takes_back(who)
+    return fulfilled(memory, who, site) if full else memory.without_wish(who)
+
+
+def wanted(memory: Memory, event: Wanted, site: Site) -> tuple[Memory, str]:
+    """An operator wants this robot charged."""
+    who = event.robot
+    if event.request_id in memory.over:
+        return memory, "request is over"
+    if event.station and event.station not in site.robots[who]:
+        return memory, "station does not suit the robot"
+    wish, before = Wish.of(event), memory.wish(who)
+    if wish == before:
+        return memory, ""
+    memory = replace(memory, strikes=without(memory.strikes, who))
+    if before is None:
+        return replace(memory, wishes=(*memory.wishes, wish)), ""
+    has = memory.station_of(who)
+    if wish.station not in ("", has):
+        memory = memory.takes_back(who)
+    return replace(memory, wishes=tuple(wish if w is before else w for w in memory.wishes)), ""
+
+
+def unwanted(memory: Memory, request_id: str) -> tuple[Memory, str]:
+    """An operator withdraws a request."""
+    wish = next((w for w in memory.wishes if request_id and w.request_id == request_id), None)
+    grants = memory.grants.values()
+    granted = next((g.robot for g in grants if g.request_id == request_id and not g.over), None)
+    who = wish.robot if wish else granted
+    if who is None:
+        return memory, "" if request_id in memory.over else "no such wish"
+    return memory.takes_back(who).without_wish(who), ""
+
+
+def fulfilled(memory: Memory, who: Robot, site: Site) -> Memory:
+    """The robot was charged in its present task, so its failures are forgotten."""
+    standing = memory.robots.get(who)
+    served = {**memory.served, who: standing.sighting.task_id if standing else ""}
+    memory = replace(memory, served=served, strikes=without(memory.strikes, who))
+    if schedule.target(site.schedule, who, memory.when):
+        memory = replace(memory, rested=memory.rested | {who})
+    return memory.without_wish(who)
+
+
+def stays_away(memory: Memory, station: str, grant: Grant, site: Site) -> bool:
+    """Has a robot without a task not left its place since it was called?"""
+    standing, wish = memory.robots.get(grant.robot), memory.wish(grant.robot)
+    if standing is None or wish is None or wish.by == "operator" or standing.sighting.task_id:
+        return False
+    elsewhere = memory.stands_at(grant.robot, site) != station
+    return elsewhere and standing.here_since <= grant.made_at
+
+
+def gives_up(memory: Memory, who: Robot, now: float) -> Memory:
+    """It did not come when it was called: the station is for others."""
+    absent = {**memory.absent, who: now + ABSENT_S}
+    return replace(memory.takes_back(who).without_wish(who), absent=absent)
+
+
+# ---- inside
+
+
+def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standing:
+    if before is None:
+        return Standing(sighting, now)
+    was = before.sighting
+    here = was.place == sighting.place
+    same = here and (was.charges, was.task_id) == (sighting.charges, sighting.task_id)
+    return Standing(
+        sighting, now, before.since if same else now, before.here_since if here else now
+    )
+
+
+def _served(memory: Memory, sighting: Sighting) -> Memory:
+    """A robot that has left in another task was served long ago."""
+    who, task = sighting.who, sighting.task_id
+    if sighting.place is None and task and memory.served.get(who, task) != task:
+        return replace(memory, served=without(memory.served, who))
+    return memory
+
+
+def _rested(memory: Memory, sighting: Sighting, site: Site) -> Memory:
+    """Full enough for the schedule's present time; until that is over, or the robot has worked."""
+    who = sighting.who
+    aim = schedule.target(site.schedule, who, memory.when)
+    worked = bool(sighting.task_id) and sighting.place is None
+    if not aim or worked:
+        return replace(memory, rested=memory.rested - {who})
+    if sighting.battery_percent >= aim:
+        return replace(memory, rested=memory.rested | {who})
+    return memory
+
+
+def _called(memory: Memory, sighting: Sighting, now: float) -> Memory:
+    """A task that begins when the robot is called is its drive to the station."""
+    who, task = sighting.who, sighting.task_id
+    wish, station = memory.wish(who), memory.station_of(who)
+    if wish is None or wish.by == "operator" or wish.task_id or not task or station is None:
+        return memory
+    grant = memory.grants[station]
+    if grant.started or now >= grant.made_at + COMES_S:
+        return memory
+    called = replace(wish, task_id=task, called=True)
+    return replace(memory, wishes=tuple(called if w is wish else w for w in memory.wishes))
+
+
+def _begun(memory: Memory, standing: Standing, now: float, site: Site) -> Memory:
+    sighting = standing.sighting
+    who = sighting.who
+    by = None if memory.faulty(who) else _asks(memory, standing, now, site)
+    if by is None:
+        return memory
+    memory = replace(memory, served=without(memory.served, who), absent=without(memory.absent, who))
+    return replace(memory, wishes=(*memory.wishes, Wish(who, by, sighting.task_id)))
+
+
+def _asks(memory: Memory, standing: Standing, now: float, site: Site) -> By | None:
+    """Does what the fleet shows of it, and the schedule, say that this robot is to be charged?"""
+    s = standing.sighting
+    if s.place is None or s.battery_percent >= site.full_percent:
+        return None
+    if now < standing.since + SETTLES_S or standing.works:
+        return None
+    low = s.battery_percent < site.again_percent
+    if s.charges and (low or _believed(memory, standing, now)):
+        return "schedule" if s.who in memory.preferred and not memory.alone else "fleet"
+    if s.charges or now < memory.absent.get(s.who, now):
+        return None
+    aim = schedule.target(site.schedule, s.who, memory.when)
+    if s.battery_percent < aim and s.who not in memory.rested:
+        return "schedule"
+    return "fleet" if low else None
+
+
+def _believed(memory: Memory, standing: Standing, now: float) -> bool:
+    """Is the mode that of this task?"""
+    served = memory.served.get(standing.sighting.who)
+    if served is None:
+        return True
+    return served != standing.sighting.task_id and now >= standing.since + LINGERS_S
+
+
+def _lasts(memory: Memory, wish: Wish, s: Sighting, site: Site) -> bool:
+    """Does it still want to be charged, and stand at one of our waypoints or drive there?"""
+    if s.battery_percent >= _goal(memory, wish, site):
+        return False
+    same = s.task_id == wish.task_id
+    if s.place is not None:
+        return s.charges or not s.task_id or (same and wish.called)
+    return same and (bool(s.task_id) or memory.station_of(s.who) is not None)
+
+
+def _goal(memory: Memory, wish: Wish, site: Site) -> float:
+    """How far it is to be charged (%)."""
+    if wish.by != "schedule" or not site.schedule:
+        return site.full_percent
+    aim = schedule.target(site.schedule, wish.robot, memory.when)
+    return max(aim, site.again_percent)
+
+
+def _full(memory: Memory, who: Robot, site: Site) -> bool:
+    """It has been charged, and its fleet shows as much as it was to be charged."""
+    grant, wish = memory.grants.get(memory.station_of(who) or ""), memory.wish(who)
+    percent = memory.robots[who].sighting.battery_percent
+    goal = site.full_percent if wish is None else _goal(memory, wish, site)
+    return grant is not None and grant.started and percent >= goal

@@ -1,0 +1,102 @@
+"""The process that the kill test kills: it switches one output on as the daemon would, and says `on`.
+
+`python -m bridges.commands.doctoring.victim FILE DEVICE STEP RUNTIME_DIR`. It switches off and ends
+when its input ends or after ON_S, because whoever started it may have died.
+"""
+
+import select
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+from bridges.commands.walking.core import Step
+from bridges.commands.walking.steps import steps
+from bridges.serve import directory, guard, places, record, signals
+from bridges.settings.load import Config, SettingsError, load
+from drivers import Driver, DriverError
+from drivers.hal import Bus
+
+ON_S: Final = 5.0
+
+
+def main(file: Path, device: str, step: str, runtime_dir: str | None) -> int:
+    """0 when the output is verified off."""
+    signals.End()
+    try:
+        config = load(file)
+        found = directory.find(file, runtime_dir)
+        places.own(found)
+        held = directory.RuntimeDirectory(found, file, serves=False)
+    except (SettingsError, directory.AlreadyRunning, directory.Unknown, PermissionError) as error:
+        return _say(f"{error}")
+    try:
+        return _held(config, device, step, held, guard.command(file, runtime_dir))
+    finally:
+        held.close()
+
+
+def _held(
+    config: Config,
+    device: str,
+    step: str,
+    held: directory.RuntimeDirectory,
+    switches_off: list[str],
+) -> int:
+    held.claim(record.of(config))
+    watching = guard.Guard(switches_off)
+    places.work_somewhere(held.places)
+    try:
+        bus = config.open_bus(config.bus_of(device))
+        driver = config.driver_type(device).create(device, config.devices[device], bus)
+        off = _on_for_a_while(driver, bus, step_called(config, device, step))
+    except DriverError as error:
+        return _say(f"{error}")
+    if off:
+        held.released()
+        watching.dismiss()
+    return 0 if off else 1
+
+
+def step_called(config: Config, device: str, name: str | None) -> Step | None:
+    """The output of this name; the first one by default, None if there is no such."""
+    wires = config.wires(device)
+    wired = {wire.signal for wire in wires if wire.direction == "out"} if wires else None
+    found = steps(config.kind, config.devices[device], wired)
+    return next((step for step in found if name in (None, step.name)), None)
+
+
+def _on_for_a_while(driver: Driver[Any, Any], bus: Bus, step: Step | None) -> bool:
+    """Switch it on, and off again if nobody has killed us. True when it was verified off."""
+    assert step is not None  # or the kill test would not have started
+    try:
+        driver.open()
+        if why := step.hindrance(driver.read()):
+            _say(why)
+        else:
+            driver.write(step.outputs)
+            bus.scanned()
+            _say("on")
+            select.select([sys.stdin], [], [], ON_S)
+    except DriverError as error:
+        _say(f"{error}")
+    try:
+        bus.insist()
+        driver.make_safe()
+    except DriverError:
+        return False
+    finally:
+        driver.close()
+        bus.close()
+    return True
+
+
+def _say(text: str) -> int:
+    with suppress(OSError):
+        print(text, flush=True)
+    return 1
+
+
+if __name__ == "__main__":
+    _, file, device, step, runtime_dir = sys.argv
+    sys.exit(main(Path(file), device, step, runtime_dir or None))

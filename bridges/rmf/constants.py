@@ -1,0 +1,111 @@
+"""The constants of RMF's messages, as the `.msg` files number them. Type hashes do not cover them.
+
+Source: as `definitions.py`. No release has numbered any of them otherwise; Jazzy's RobotMode ends with
+MODE_CLEANING.
+"""
+
+from enum import IntEnum
+
+
+class LiftRequestType(IntEnum):
+    """LiftRequest.request_type. Not LiftState's numbers: there HUMAN is 1 and AGV is 2."""
+
+    REQUEST_END_SESSION = 0
+    REQUEST_AGV_MODE = 1
+    REQUEST_HUMAN_MODE = 2
+
+
+class LiftRequestDoor(IntEnum):
+    """LiftRequest.door_state."""
+
+    DOOR_CLOSED = 0
+    DOOR_OPEN = 2
+
+
+class LiftDoor(IntEnum):
+    """LiftState.door_state."""
+
+    DOOR_CLOSED = 0
+    DOOR_MOVING = 1
+    DOOR_OPEN = 2
+
+
+class LiftMotion(IntEnum):
+    """LiftState.motion_state."""
+
+    MOTION_STOPPED = 0
+    MOTION_UP = 1
+    MOTION_DOWN = 2
+    MOTION_UNKNOWN = 3
+
+
+class LiftMode(IntEnum):
+    """LiftState.current_mode and available_modes."""
+
+    MODE_UNKNOWN = 0
+    MODE_HUMAN = 1
+    MODE_AGV = 2
+    MODE_FIRE = 3
+    MODE_OFFLINE = 4
+    MODE_EMERGENCY = 5
+
+
+class DoorModeValue(IntEnum):
+    """DoorMode.value."""
+
+    MODE_CLOSED = 0
+    MODE_MOVING = 1
+    MODE_OPEN = 2
+    MODE_OFFLINE = 3
+    MODE_UNKNOWN = 4
+
+
+class ChargerStateValue(IntEnum):
+    """ChargerState.state. There is no 0: a default-constructed message is invalid."""
+
+    CHARGER_IDLE = 1
+    CHARGER_ASSIGNED = 2
+    CHARGER_CHARGING = 3
+    CHARGER_RELEASED = 4
+    CHARGER_ERROR = 200
+
+
+class RobotModeValue(IntEnum):
+    """RobotMode.mode."""
+
+    MODE_IDLE = 0
+    MODE_CHARGING = 1
+    MODE_MOVING = 2
+    MODE_PAUSED = 3
+    MODE_WAITING = 4
+    MODE_EMERGENCY = 5
+    MODE_GOING_HOME = 6
+    MODE_DOCKING = 7
+    MODE_ADAPTER_ERROR = 8
+    MODE_CLEANING = 9
+    MODE_PERFORMING_ACTION = 10
+    MODE_ACTION_COMPLETED = 11
+
+
+class ChargingMode(IntEnum):
+    """ChargingAssignment.mode: charge at the waypoint, or wait there for a charger."""
+
+    MODE_CHARGE = 0
+    MODE_WAIT = 1
+
+
+class AlertTier(IntEnum):
+    """Alert.tier."""
+
+    TIER_INFO = 0
+    TIER_WARNING = 1
+    TIER_ERROR = 2
+
+
+class DiagnosticLevel(IntEnum):
+    """DiagnosticStatus.level."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3

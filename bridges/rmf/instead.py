@@ -1,0 +1,41 @@
+"""What is said where RMF's release lacks a message: its purpose takes the next best way.
+
+- EmergencySignal to all fleets: `fire_alarm_trigger`, which every release's fleet adapters hear.
+- Alert: the log. What it is about is among the daemon's faults too, and so in its diagnostics.
+"""
+
+import logging
+from typing import Final
+
+from bridges.log import pairs
+from bridges.rmf.definitions import Alert, Bool, EmergencySignal, Message
+from bridges.rmf.releases import RELEASES
+from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, AnyTopic
+
+log = logging.getLogger(__name__)
+
+INSTEAD: Final[dict[str, AnyTopic]] = {EMERGENCY_SIGNAL.name: FIRE_ALARM_TRIGGER}
+"""Topic -> the one that serves the same purpose in every release."""
+
+
+def converted(message: Message) -> Message | None:
+    """The message for the topic in INSTEAD. None for one that goes into the log, which happens here."""
+    match message:
+        case EmergencySignal():
+            return Bool(message.is_emergency)
+        case Alert():
+            log.warning(pairs("alert", title=message.title, message=message.message))
+    return None
+
+
+def told(topic: AnyTopic, wanted: str) -> list[str]:
+    """What a person is told of a topic that is sent on; `wanted`: the YAML's `release`."""
+    names = RELEASES if wanted == "auto" else [wanted]
+    way = (
+        f"goes out on {INSTEAD[topic.name].name}" if topic.name in INSTEAD else "goes into the log"
+    )
+    return [
+        f"RMF's {name} has no {topic.type.__name__}: there what is for {topic.name} {way}"
+        for name in names
+        if not RELEASES[name].has(topic.type)
+    ]

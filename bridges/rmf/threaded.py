@@ -1,0 +1,64 @@
+"""What the transports with a thread of their own share: `dds`, `zenoh` and `ros2`."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import ClassVar
+
+from bridges.rmf.peers import Peers
+from bridges.rmf.releases import Release
+from bridges.rmf.transport import TransportError
+
+
+class Threaded:
+    """A node on the graph, with one thread. `refusals`: the exceptions by which its library refuses.
+
+    `release`: None to follow RMF's.
+    """
+
+    refusals: ClassVar[tuple[type[Exception], ...]]
+
+    def __init__(self, node_name: str, release: Release | None = None) -> None:
+        self.name = node_name
+        self._peers = Peers(release)
+        self.dropped: dict[str, int] = {}
+        self._lock = threading.Lock()
+        self._closed = False
+
+    @property
+    def release(self) -> Release:
+        """The release of RMF's messages that it speaks now."""
+        return self._peers.release
+
+    def faults(self) -> list[tuple[str, str]]:
+        """(code, detail) of what keeps it apart from others now; from any thread."""
+        return self._peers.faults()
+
+    @property
+    def lives(self) -> bool:
+        """Whether its thread runs; also true without a network, a router or a peer."""
+        return not self._closed and self._thread.is_alive()
+
+    def wall(self) -> float:
+        """The wall clock (s since the epoch)."""
+        return time.time()
+
+    def _start(self, run: Callable[[], None], wire: str) -> None:
+        self._thread = threading.Thread(target=run, name=f"{self.name}-{wire}", daemon=True)
+        self._thread.start()
+
+    def _join_thread(self) -> None:
+        """Wait until the thread has ended, unless it is the one that asks."""
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    @contextmanager
+    def _reporting(self, text: str) -> Iterator[None]:
+        """Raise the library's exceptions as TransportError. `text`: what cannot be done."""
+        if self._closed:
+            raise TransportError(f"{text}: {self.name} has left the graph")
+        try:
+            yield
+        except self.refusals as error:
+            raise TransportError(f"{text}: {error}") from error

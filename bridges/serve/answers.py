@@ -1,0 +1,46 @@
+"""Refused requests that wait for an answer: bounded, so that a flood of them causes no other."""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from bridges.core.durations import AGES_AGO, NEVER
+from bridges.core.kind import Answer
+from bridges.serve.clock import TELL_GAP_S
+from bridges.serve.subject import Publish
+
+MOST: Final = 10
+"""So many are answered at once, at most each TELL_GAP_S: the last ones."""
+
+
+class Answers:
+    """The refusals of one device or node. `last`: what was said of the last one."""
+
+    def __init__(self) -> None:
+        self.last: Mapping[str, str] = {}
+        self._waiting: deque[tuple[object, str]] = deque(maxlen=MOST)
+        self._said_at = AGES_AGO
+
+    def add(self, asked: object, reason: str) -> None:
+        """A request was refused: the message or the event, and why. From any thread."""
+        self._waiting.append((asked, reason))
+
+    @property
+    def due_at(self) -> float:
+        """When the next are to be said (monotonic s); NEVER if none waits."""
+        return self._said_at + TELL_GAP_S if self._waiting else NEVER
+
+    def say(self, now: float, answer: Callable[[object, str], Answer | None], say: Publish) -> None:
+        """Say what is due."""
+        if now < self.due_at:
+            return
+        self._said_at = now
+        for _ in range(len(self._waiting)):
+            found = answer(*self._waiting.popleft())
+            if found is not None:
+                self.last = found.told
+                say(found.topic, found.message)
+
+    def shown(self) -> Mapping[str, Mapping[str, str]]:
+        """For the status file; nothing before the first."""
+        return {"last_refusal": self.last} if self.last else {}

@@ -1,0 +1,65 @@
+"""Reads one bus of a device YAML: its `type`, and the settings of that type."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from yaml import MappingNode, ScalarNode
+
+from bridges.settings import names as named
+from bridges.settings.nodes import Page, either, nearest, unknown
+from bridges.settings.top import word
+from bridges.settings.values import BROKEN, Entry, Values, below
+from drivers.hal import AnyBus, Remark
+
+
+@dataclass(frozen=True, slots=True)
+class BusRead:
+    """A bus as far as it could be read.
+
+    `type` and `hal`: None where the type is missing or wrong. `settings`: BROKEN where they are wrong.
+    """
+
+    entry: Entry
+    type: str | None = None
+    hal: AnyBus | None = None
+    settings: object = BROKEN
+
+    def remarks(self) -> Iterable[Remark]:
+        """What is legal about its settings but may be a mistake."""
+        return self.hal.warnings(self.settings) if self.hal and self.settings is not BROKEN else ()
+
+
+def read_bus(entry: Entry, allowed: list[str], driver: str, values: Values, page: Page) -> BusRead:
+    """Read a bus; problems go to the page. `allowed`: the bus types that the file's drivers can use."""
+    if not isinstance(entry.value, MappingNode):
+        values.entries(entry.spot())
+        return BusRead(entry)
+    kind = below(entry.value, "type")
+    if kind is None:
+        _note_untyped(entry, allowed, values, page)
+        return BusRead(entry)
+    if _is_other_type(kind, allowed):
+        text = f"'type' is '{kind.value.value}', but the driver '{driver}' needs a bus of type"
+        page.note(kind.value, f"{text} {either(allowed)}")
+        return BusRead(entry)
+    name = word(values, kind, allowed)
+    if name is None:
+        return BusRead(entry)
+    hal = named.bus_called(name)
+    return BusRead(entry, name, hal, values.make(hal.settings, entry.spot(), ("type",)))
+
+
+def _note_untyped(bus: Entry, allowed: list[str], values: Values, page: Page) -> None:
+    """Note that a bus has no `type`, or misspells the key; its other keys mean nothing yet."""
+    entries = {e.name: e for e in values.entries(bus.spot())}
+    near = nearest("type", entries)
+    if near is None:
+        page.note(bus.key, f"'{bus.name}' needs 'type': {either(allowed)}")
+    else:
+        page.note(entries[near].key, unknown("key", near, ["type"]))
+
+
+def _is_other_type(kind: Entry, allowed: list[str]) -> bool:
+    """Whether there is such a bus type, but none of the file's drivers can use it."""
+    others = set(named.bus_types()).difference(allowed)
+    return isinstance(kind.value, ScalarNode) and kind.value.value in others

@@ -1,0 +1,144 @@
+"""The configuration file of a fleet adapter (EasyFullControl): the keys that our files must agree with.
+
+    rmf_fleet:
+      name: tiny
+      recharge_threshold: 0.2           # below it RMF gives a robot no task
+      recharge_soc: 1.0                 # RMF's ChargeBattery ends there
+      finishing_request: charge         # charge, park or nothing
+      robots: {AMR01: {charger: charger_a}}
+    reference_coordinates: {L1: {rmf: [[x, y], ...], robot: [[x, y], ...]}}
+
+Older files have `robots:` beside `rmf_fleet:`, with `rmf_config: {charger: {waypoint: charger_a}}`, and
+one pair of lists for all levels. Source: open-rmf/fleet_adapter_template, config.yaml and
+fleet_adapter.py. Other keys are not ours, and are not looked at.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+import msgspec
+from yaml import MappingNode, YAMLError
+from yaml.constructor import SafeConstructor
+
+from bridges.settings.nodes import Page, Problem, SettingsError, Sort, compose, read
+from bridges.settings.similarity import Point
+from bridges.settings.values import Spot, locate
+
+FLEET = Sort("fleet configuration", "rmf_fleet: ...", 256 * 1024, 20_000)
+EVERY_LEVEL = ""
+"""The level of reference coordinates that are given once for all."""
+Soc = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Path = tuple[str, ...]
+
+
+class Charger(msgspec.Struct, frozen=True):
+    """`waypoint`: by its name in the navigation graph."""
+
+    waypoint: str | None = None
+
+
+class OlderRobot(msgspec.Struct, frozen=True):
+    """A robot's part that is RMF's."""
+
+    charger: Charger | None = None
+
+
+class Robot(msgspec.Struct, frozen=True):
+    """One robot: its charger's waypoint, in either form."""
+
+    charger: str | Charger | None = None
+    rmf_config: OlderRobot | None = None
+
+    def waypoint(self) -> tuple[Path, str | None]:
+        """Where the waypoint stands below the robot, and its name."""
+        if isinstance(self.charger, str):
+            return ("charger",), self.charger
+        if self.charger is not None:
+            return ("charger", "waypoint"), self.charger.waypoint
+        older = self.rmf_config.charger if self.rmf_config else None
+        return ("rmf_config", "charger", "waypoint"), older.waypoint if older else None
+
+
+class RmfFleet(msgspec.Struct, frozen=True):
+    """The fleet; percentages are fractions of 1 here."""
+
+    name: str
+    recharge_threshold: Soc | None = None
+    recharge_soc: Soc | None = None
+    finishing_request: str | None = None
+    robots: dict[str, Robot | None] = msgspec.field(default_factory=dict)
+
+
+class Pairs(msgspec.Struct, frozen=True):
+    """The same points on RMF's map and on the robot's."""
+
+    rmf: list[Point]
+    robot: list[Point]
+
+
+class Contents(msgspec.Struct, frozen=True):
+    """The whole file."""
+
+    rmf_fleet: RmfFleet
+    robots: dict[str, Robot | None] = msgspec.field(default_factory=dict)
+    reference_coordinates: dict[str, Pairs] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FleetFile:
+    """One file and its places."""
+
+    file: str
+    root: MappingNode
+    contents: Contents
+
+    @property
+    def fleet(self) -> RmfFleet:
+        """The fleet."""
+        return self.contents.rmf_fleet
+
+    def robots(self) -> Iterator[tuple[Path, str, Robot]]:
+        """Each robot's path, name and settings."""
+        for top, found in (
+            (("rmf_fleet", "robots"), self.fleet.robots),
+            (("robots",), self.contents.robots),
+        ):
+            for name, robot in found.items():
+                yield (*top, name), name, robot or Robot()
+
+    def references(self) -> Mapping[str, Pairs]:
+        """Level -> pairs; the level is EVERY_LEVEL in a file that gives them once."""
+        return self.contents.reference_coordinates or {}
+
+    def problem(self, path: Path, text: str) -> Problem:
+        """A problem at this path."""
+        return _problem(self.file, self.root, path, text)
+
+
+def load_fleet(file: str) -> FleetFile:
+    """Read a fleet configuration. Raises SettingsError with what is wrong with it."""
+    page = Page(file)
+    root = compose(page, read(file, FLEET), FLEET)
+    page.check()
+    try:
+        plain = SafeConstructor().construct_document(root)
+    except (YAMLError, ValueError) as error:
+        reason = f"cannot be read: {' '.join(str(error).split())[:200]}"
+        raise SettingsError([page.problem(root, reason)]) from None
+    pairs = plain.get("reference_coordinates")
+    if isinstance(pairs, dict) and {"rmf", "robot"} <= pairs.keys():
+        plain["reference_coordinates"] = {EVERY_LEVEL: pairs}
+    try:
+        return FleetFile(file, root, msgspec.convert(plain, Contents, strict=False))
+    except msgspec.ValidationError as error:
+        text, _, where = str(error).partition(" - at `$")
+        path = tuple(part for part in re.split(r"[.\[\]`]+", where) if part not in ("", "..."))
+        what = f"{text[:1].lower()}{text[1:]}: is this a fleet adapter's configuration?"
+        raise SettingsError([_problem(file, root, path, what)]) from None
+
+
+def _problem(file: str, root: MappingNode, path: Path, text: str) -> Problem:
+    spot = Spot(root, root, "the file")
+    return Page(file).problem(locate(spot, path).key, text)

@@ -1,0 +1,210 @@
+"""Compares a coordinator's YAML with the configuration of a fleet's adapter, and with RMF's map.
+
+The two are written by different people, and RMF says nothing when they differ: a robot waits for ever,
+or stays on a pad. Each mismatch is told with its file, its line and what to write.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from yaml import MappingNode
+
+from bridges.charger_coordinator.settings import Fleet, Settings, Waypoint
+from bridges.settings.building_map import BuildingMap
+from bridges.settings.config import Config
+from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
+from bridges.settings.nodes import Page, Problem, compose, unknown
+from bridges.settings.similarity import Point, Similarity, estimate
+from bridges.settings.values import Spot, locate
+
+Transforms = Mapping[str, Similarity]
+"""Level -> RMF's map to the robot's; EVERY_LEVEL for all."""
+FINISHING = ("charge", "park", "nothing")
+
+
+@dataclass(slots=True)
+class Compared:
+    """What was found: what cannot be right, what may be a mistake, what else is good to know."""
+
+    errors: list[Problem] = field(default_factory=list)
+    warnings: list[Problem] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def compared(config: Config, fleet: FleetFile, building: BuildingMap | None) -> Compared:
+    """A coordinator's file beside one fleet's. `building`: positions are compared too."""
+    found = _Comparing(config, fleet)
+    found.names()
+    found.percentages()
+    found.finishing()
+    found.positions(building)
+    return found.all
+
+
+class _Comparing:
+    def __init__(self, config: Config, fleet: FleetFile) -> None:
+        assert isinstance(config.section, Settings)
+        self.all = Compared()
+        self._settings: Settings = config.section
+        self._page = Page(str(config.path))
+        self._root: MappingNode = compose(self._page, config.text)
+        self._fleet = fleet
+        self._name = fleet.fleet.name
+
+    def names(self) -> None:
+        """The fleet, its robots, and where each of them charges."""
+        if self._name not in self._settings.fleets:
+            text = unknown("fleet", self._name, self._settings.fleets)
+            self._theirs("errors", ("rmf_fleet", "name"), f"{self._ours_file()} has an {text}")
+            return
+        fleet = self._settings.fleets[self._name]
+        theirs = {name: (path, robot) for path, name, robot in self._fleet.robots()}
+        for name in fleet.robots.keys() - theirs.keys():
+            text = unknown("robot", name, theirs)
+            self._ours(("robots", name), f"{self._file()} has an {text}")
+        for name in theirs.keys() - fleet.robots.keys():
+            self._theirs("warnings", theirs[name][0], f"no station of ours charges '{name}'")
+        chargers: dict[str, str] = {}
+        for name in sorted(theirs.keys() & fleet.robots.keys()):
+            path, robot = theirs[name]
+            below, waypoint = robot.waypoint()
+            if waypoint is None:
+                text = f"'{name}' has no charger: a robot without one never goes to charge"
+                self._theirs("errors", path, text)
+                continue
+            owner = chargers.setdefault(waypoint, name)
+            if owner != name:
+                text = f"'{waypoint}' is the charger of '{owner}' too: RMF would send both there"
+                self._theirs("errors", (*path, *below), text)
+            self._charger(fleet, name, (*path, *below), waypoint)
+
+    def _charger(self, fleet: Fleet, name: str, path: tuple[str, ...], waypoint: str) -> None:
+        robot = fleet.robots[name]
+        places = [self._settings.places()[station][self._name] for station in robot.stations]
+        if waypoint not in fleet.waypoints:
+            text = f"{self._ours_file()} has an {unknown('waypoint', waypoint, fleet.waypoints)}"
+            self._theirs("errors", path, text)
+        elif waypoint not in (*places, robot.waits_at):
+            known = ", ".join((*places, robot.waits_at))
+            text = f"'{name}' charges or waits at {known} here: RMF's first way leads elsewhere"
+            self._theirs("warnings", path, text)
+
+    def percentages(self) -> None:
+        """Where charging begins and ends, on both sides."""
+        soc, threshold = self._fleet.fleet.recharge_soc, self._fleet.fleet.recharge_threshold
+        full, again = self._settings.full_percent, self._settings.again_percent
+        if soc is not None and full < 100 * soc:
+            text = (
+                f"a station lets a robot go at full_percent {full:g} %, and RMF has it wait there for"
+                f" recharge_soc {100 * soc:g} %: write recharge_soc: {full / 100:g}, or less"
+            )
+            self._theirs("errors", ("rmf_fleet", "recharge_soc"), text)
+        elif soc is not None and full > 100 * soc:
+            text = (
+                f"RMF's task ends at recharge_soc {100 * soc:g} %, and the robot keeps its station"
+                f" until full_percent {full:g} %: write full_percent: {max(100 * soc, 50):g}"
+            )
+            self._theirs("warnings", ("rmf_fleet", "recharge_soc"), text)
+        if threshold is not None and again <= 100 * threshold:
+            text = (
+                f"below recharge_threshold {100 * threshold:g} % RMF gives a robot no task, and"
+                f" here only below again_percent {again:g} % it is charged again:"
+                f" write again_percent above {100 * threshold:g}"
+            )
+            self._theirs("errors", ("rmf_fleet", "recharge_threshold"), text)
+
+    def finishing(self) -> None:
+        """What a robot does when its task is over."""
+        request = self._fleet.fleet.finishing_request
+        path = ("rmf_fleet", "finishing_request")
+        if request is not None and request not in FINISHING:
+            text = unknown("finishing_request", request, FINISHING)
+            self._theirs("errors", path, text)
+        elif request in (None, "nothing"):
+            text = (
+                "finishing_request: nothing leaves a charged robot on its pad until it gets a task, and"
+                " the next robot waits: write charge"
+            )
+            self._theirs("warnings", path if request else ("rmf_fleet",), text)
+
+    def positions(self, building: BuildingMap | None) -> None:
+        """The maps' transforms, and each waypoint beside the navigation graph."""
+        transforms = dict(self._transforms())
+        fleet = self._settings.fleets.get(self._name)
+        if fleet is None:
+            return
+        levels = {at.level for at in fleet.waypoints.values()}
+        for level in sorted(levels - transforms.keys()) if transforms else ():
+            if EVERY_LEVEL not in transforms:
+                text = f"no pairs for level '{level}', where this fleet has waypoints"
+                self._theirs("warnings", ("reference_coordinates",), text)
+        for name, at in fleet.waypoints.items() if building else ():
+            self._waypoint(name, at, building, transforms)
+
+    def _transforms(self) -> Iterator[tuple[str, Similarity]]:
+        for level, pairs in self._fleet.references().items():
+            path = ("reference_coordinates", *([level] if level else []))
+            try:
+                found = estimate(pairs.rmf, pairs.robot)
+            except ValueError as error:
+                self._theirs("errors", path, str(error))
+                continue
+            yield level, found
+            of = f" for {level}" if level else ""
+            self.all.notes.append(
+                f"{self._file()}: transformation error estimate{of}: {found.mse:g}"
+                f" (turned by {found.rotation:.4f} rad, scaled by {found.scale:.5g},"
+                f" {found.error:.2f} m off on RMF's map)"
+            )
+            if found.error > self._settings.near_m:
+                text = (
+                    f"the pairs do not fit: {found.error:.2f} m off on RMF's map, and near_m is"
+                    f" {self._settings.near_m:g} m: a robot would not be seen at its waypoint"
+                )
+                if estimate(pairs.rmf, _mirrored(pairs.robot)).error <= self._settings.near_m:
+                    text = "one map is the other's mirror image: turn the sign of every robot's y"
+                self._theirs("errors", path, text)
+
+    def _waypoint(
+        self, name: str, at: Waypoint, building: BuildingMap | None, transforms: Transforms
+    ) -> None:
+        if building is None or name not in building.places:
+            return
+        level, x, y = building.places[name]
+        near_m, path = self._settings.near_m, ("waypoints", name)
+        where = f"{Path(building.file).name}:{building.named['waypoint'][name]}"
+        if level != at.level:
+            self._ours((*path, "level"), f"{where} has '{name}' on level '{level}'")
+            return
+        off_m = math.dist((at.x, at.y), (x, y))
+        if off_m <= near_m:
+            return
+        text = f"{where} has '{name}' at x {x:g}, y {y:g}: {off_m:.2f} m away, near_m is {near_m:g}"
+        found = transforms.get(level, transforms.get(EVERY_LEVEL))
+        if found is not None and math.dist(found.back((at.x, at.y)), (x, y)) <= near_m:
+            text = f"this is on the robot's map; on RMF's it is x: {x:g}, y: {y:g} ({where})"
+        self._ours(path, text)
+
+    def _file(self) -> str:
+        return Path(self._fleet.file).name
+
+    def _ours_file(self) -> str:
+        return Path(self._page.file).name
+
+    def _theirs(
+        self, sort: Literal["errors", "warnings"], path: tuple[str, ...], text: str
+    ) -> None:
+        said = f"warning: {text}" if sort == "warnings" else text
+        getattr(self.all, sort).append(self._fleet.problem(path, said))
+
+    def _ours(self, path: tuple[str, ...], text: str) -> None:
+        spot = Spot(self._root, self._root, "the file")
+        entry = locate(spot, ("coordinator", "fleets", self._name, *path))
+        self.all.errors.append(self._page.problem(entry.key, text))
+
+
+def _mirrored(points: Sequence[Point]) -> list[Point]:
+    return [(x, -y) for x, y in points]

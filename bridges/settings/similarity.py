@@ -1,0 +1,59 @@
+"""The similarity transform between two maps, from pairs of the same points: rotation, scale, shift.
+
+It is the least-squares transform that the fleet adapter template estimates with `nudged` from a fleet
+configuration's `reference_coordinates` (open-rmf/fleet_adapter_template, fleet_adapter.py), with the
+same mean squared error. A point is a complex number here: x + y·i.
+"""
+
+import cmath
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Similarity:
+    """`to = turn · from + shift`. `mse`: the mean squared error of its pairs, in units of `to`."""
+
+    turn: complex
+    shift: complex
+    mse: float
+
+    @property
+    def rotation(self) -> float:
+        """Counterclockwise, in radians."""
+        return cmath.phase(self.turn)
+
+    @property
+    def scale(self) -> float:
+        """How many units of `to` one unit of `from` is."""
+        return abs(self.turn)
+
+    @property
+    def error(self) -> float:
+        """The root of `mse`, in units of `from`."""
+        return float(self.mse**0.5 / self.scale)
+
+    def back(self, at: Point) -> Point:
+        """A point of `to`, in `from`."""
+        found = (complex(*at) - self.shift) / self.turn
+        return found.real, found.imag
+
+
+def estimate(these: Sequence[Point], those: Sequence[Point]) -> Similarity:
+    """The transform from `these` to `those`, pair by pair. Raises ValueError with the reason."""
+    if len(these) != len(those):
+        raise ValueError(f"{len(these)} points and {len(those)}: they must be pairs")
+    if len(these) < 2:
+        raise ValueError("two pairs at least are needed, four are better")
+    p, q = [complex(*at) for at in these], [complex(*at) for at in those]
+    middle_p, middle_q = sum(p) / len(p), sum(q) / len(q)
+    spread = sum(abs(a - middle_p) ** 2 for a in p)
+    common = sum((a - middle_p).conjugate() * (b - middle_q) for a, b in zip(p, q, strict=True))
+    if not spread or not common:
+        raise ValueError("the points of one map are all the same, or have nothing in common")
+    turn = common / spread
+    shift = middle_q - turn * middle_p
+    errors = (abs(turn * a + shift - b) ** 2 for a, b in zip(p, q, strict=True))
+    return Similarity(turn, shift, sum(errors) / len(p))

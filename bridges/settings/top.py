@@ -1,0 +1,53 @@
+"""The top of a device YAML: its keys, by kind, and the values that are one word (`kind`, `driver`)."""
+
+from typing import Final
+
+from msgspec.inspect import LiteralType
+from msgspec.structs import fields
+
+from bridges.core.graph_kind import AnyKind, GraphKind
+from bridges.rmf.settings import Rmf
+from bridges.settings import names as named
+from bridges.settings.nodes import either
+from bridges.settings.values import BROKEN, Entry, Values
+from drivers.driver_type import AnyDriver
+
+MAPPING: Final = "a mapping (key: value)"
+
+
+def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
+    """Key -> what its value must be, or None if it is optional. `kind`: None while it is not known."""
+    first = {"kind": either(named.kind_names())}
+    if isinstance(kind, GraphKind):
+        return {**first, "rmf": None, kind.devices_key: None}
+    if kind is None:
+        all_kinds = map(named.kind_called, named.kind_names())
+        sections = dict.fromkeys(found.devices_key for found in all_kinds)
+        return {
+            **first,
+            "driver": "a driver of that kind",
+            "rmf": None,
+            "buses": MAPPING,
+            **sections,
+        }
+    driver = either(named.driver_names(kind.name))
+    return {**first, "driver": driver, "rmf": None, "buses": MAPPING, kind.devices_key: MAPPING}
+
+
+def word(values: Values, entry: Entry | None, words: list[str]) -> str | None:
+    """One of these words; None if the entry is missing or another word."""
+    if entry is None:
+        return None
+    found = values.make(LiteralType(tuple(words)), entry.spot())
+    return None if found is BROKEN else str(found)
+
+
+def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]:
+    """Keys that belong below the top: key -> what it stands below."""
+    below_top = {field.encode_name: "rmf" for field in fields(Rmf)}
+    if isinstance(kind, GraphKind):
+        below_top |= {field.encode_name: kind.devices_key for field in fields(kind.settings)}
+    elif kind and driver:
+        place = f"{kind.devices_key}: <name>"
+        below_top |= {field.encode_name: place for field in fields(driver.settings)}
+    return below_top

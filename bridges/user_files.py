@@ -1,0 +1,59 @@
+"""Files that a user names: read whole, and only regular ones. Secrets have stricter rules.
+
+A FIFO or a device in a file's place would make a daemon wait forever, or never end. A secret comes from
+a file that only the daemon's user can read, never from a YAML.
+"""
+
+import errno
+import os
+import re
+import stat
+from typing import Final, NamedTuple
+
+OTHERS: Final = 0o077
+LONGEST_SECRET: Final = 4096
+
+
+class SecretError(Exception):
+    """The file cannot be read, other users can read it, or it does not hold one secret."""
+
+
+class Content(NamedTuple):
+    """A file's bytes and mode."""
+
+    content: bytes
+    mode: int
+
+
+def read(file: str | os.PathLike[str], longest: int) -> Content:
+    """The first `longest` + 1 bytes of a file, so that a longer one is noticed. Raises OSError."""
+    descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with open(descriptor, "rb") as opened:
+        mode = os.fstat(descriptor).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(file))
+        if not stat.S_ISREG(mode):
+            raise OSError(errno.EINVAL, "it is a pipe, a socket or a device, not a file", str(file))
+        return Content(opened.read(longest + 1), mode)
+
+
+def secret_line(name: str, file: str, what: str) -> str:
+    """The secret in a file: one line of printable ASCII. Raises SecretError with what to do.
+
+    `name`: the setting that names the file. `what`: `token` or `password`, for the error.
+    """
+    line = secret(name, file).strip()
+    if not re.fullmatch(rb"[!-~]{1,%d}" % LONGEST_SECRET, line):
+        raise SecretError(f"{name} {file} does not hold one {what} on one line")
+    return line.decode()
+
+
+def secret(name: str, file: str) -> bytes:
+    """The content of a private file, up to LONGEST_SECRET + 1 bytes. Raises SecretError."""
+    try:
+        content, mode = read(file, LONGEST_SECRET)
+    except OSError as error:
+        raise SecretError(f"{name} {file} cannot be read: {error.strerror}") from None
+    if mode & OTHERS:
+        raise SecretError(f"{name} {file} is open to other users: chmod 600 {file}")
+    return content

@@ -1,0 +1,140 @@
+"""The fleets of `make demo-charging` and the pads that their robots stand on.
+
+A robot that arrives at a charger's waypoint stands on that charger's pad, and its battery fills while
+the charger says that it charges. The first fleet's finishing request is `charge`, the second's is
+`nothing`.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from bridges.charger.settings import Robot
+from bridges.charger_coordinator.settings import Settings
+from bridges.rmf import definitions as d
+from bridges.rmf.topics import CHARGING_ASSIGNMENTS, DIAGNOSTICS, AnyTopic
+from hal_fakes.demo.world import World
+from hal_fakes.rmf import Party, Said
+from hal_fakes.rmf.fleet import Finishing, Fleet, FleetRobot
+from hal_fakes.rmf.tutorial import tutorial_fleet
+
+WARD: Final = "ward"
+DRIVE_S: Final = 1.0
+FILLS_PER_S: Final = 15.0
+CONFIGURED: Final = {"tiny": Path(__file__).parents[2] / "config" / "fleet_tiny.yaml"}
+"""Fleets that are started from their adapter's configuration; the others have only this."""
+FINISHING: Final[dict[str, Finishing]] = {"porter": "nothing"}
+
+
+class Yard(Party):
+    """Both fleets, as one party on RMF's side; and what the coordinator shows on /diagnostics: its
+    `queue`, and all of it, `shown`, by its key."""
+
+    subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS, DIAGNOSTICS)
+
+    def __init__(self, world: World, site: Settings) -> None:
+        self.world = world
+        self.queue = "-"
+        self.shown: dict[str, str] = {}
+        self.fleets = {name: _fleet(name, site) for name in site.fleets}
+        self._who = {who.name: who for who in site.robots()}
+        self._stations = {
+            (fleet, place): station
+            for station, places in site.places().items()
+            for fleet, place in places.items()
+        }
+        self._on_pad: dict[str, str] = {}
+        self._filled_at = world.wall()
+
+    # ---- a party on RMF's side
+
+    def hear(self, message: d.Message, now: float) -> list[Said]:
+        """Charging assignments, and what the coordinator shows."""
+        if isinstance(message, d.DiagnosticArray):
+            self._diagnosed(message)
+            return []
+        return [said for fleet in self.fleets.values() for said in fleet.hear(message, now)]
+
+    def tick(self, now: float) -> list[Said]:
+        """Robots drive on, batteries fill, pads are stepped on and off."""
+        said = [said for fleet in self.fleets.values() for said in fleet.tick(now)]
+        self._fill(now)
+        for who in self._who.values():
+            self._stands(who)
+        return said
+
+    def wake_at(self) -> float:
+        """All the time."""
+        return 0.0
+
+    # ---- what the day calls
+
+    def robot(self, who: str) -> FleetRobot:
+        """This robot, as its fleet adapter knows it."""
+        return self.fleets[self._who[who].fleet].robots[who]
+
+    def needs(self, who: str, percent: float) -> None:
+        """RMF finds its battery low."""
+        self.world.note(f"is at {percent:.0f} %: its fleet begins a ChargeBattery", who)
+        self.fleets[self._who[who].fleet].charge(who, self.world.wall(), percent)
+
+    def leaves(self, who: str, place: str = WARD) -> None:
+        """It has work elsewhere."""
+        self.world.note(f"has work at {place}", who)
+        self.fleets[self._who[who].fleet].works(who, place, self.world.wall())
+
+    def rests(self, who: str, percent: float) -> None:
+        """Its work is done."""
+        robot, fleet = self.robot(who), self.fleets[self._who[who].fleet]
+        robot.battery_percent = percent
+        finishing = f"finishing_request: {fleet.finishing}"
+        self.world.note(f"has done its work, at {percent:.0f} %: {finishing}", who)
+        fleet.rests(who, self.world.wall())
+
+    def strays(self, who: str, place: str) -> None:
+        """It drives where nobody has sent it."""
+        self.world.note(f"drives to {place} by mistake", who)
+        self.fleets[self._who[who].fleet].strays(who, place, self.world.wall())
+
+    # ---- inside
+
+    def _diagnosed(self, message: d.DiagnosticArray) -> None:
+        """The coordinator's queue, when it has changed."""
+        for status in message.status:
+            values = {pair.key: pair.value for pair in status.values}
+            if values.get("kind") == "charger_coordinator" and "queue" in values:
+                if values["queue"] != self.queue and values["queue"] != "-":
+                    self.world.note(f"   queue: {values['queue']}")
+                self.queue, self.shown = values["queue"], values
+
+    def _fill(self, now: float) -> None:
+        passed_s, self._filled_at = now - self._filled_at, now
+        for who, charger in self._on_pad.items():
+            if self.world.charger_is(charger, "CHARGING", who):
+                robot = self.robot(who)
+                percent = robot.battery_percent + passed_s * FILLS_PER_S
+                robot.battery_percent = min(100.0, percent)
+
+    def _stands(self, who: Robot) -> None:
+        """Onto a pad, and off it."""
+        before = self._on_pad.get(who.name)
+        charger = self._stations.get((who.fleet, self.robot(who.name).place))
+        if charger == before:
+            return
+        if before is not None:
+            del self._on_pad[who.name]
+            self.world.press(before, str(who), False)
+        if charger is not None:
+            self._on_pad[who.name] = charger
+            self.world.note(f"stands on the pad of {charger}", who.name)
+            self.world.press(charger, str(who), True)
+
+
+def _fleet(name: str, site: Settings) -> Fleet:
+    settings = site.fleets[name]
+    graph = {place: (at.level, at.x, at.y) for place, at in settings.waypoints.items()}
+    graph[WARD] = ("L1", -20.0, 0.0)
+    homes = {who: robot.waits_at for who, robot in settings.robots.items()}
+    if name in CONFIGURED:
+        return tutorial_fleet(CONFIGURED[name], graph, DRIVE_S, only=homes)
+    return Fleet(name, graph, homes, DRIVE_S, FINISHING[name])

@@ -1,0 +1,53 @@
+"""Every driver can be read before it was opened, which is how the doctor asks it."""
+
+import dataclasses
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from bridges.commands.doctoring.answers import numbers, ranges, readings, unarmed
+from bridges.settings.examples import device_yamls
+from bridges.settings.load import load
+from hal_fakes.simulate import Simulation
+from tests.waiting import wait_until
+
+CONFIG = Path(__file__).parents[3] / "config"
+ASKED = sorted(
+    path.name
+    for path in device_yamls()
+    if {"modbus", "http", "can"} & set(load(path).bus_types.values())
+)
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_the_devices_of_each_example_answer_an_unopened_driver(name: str, tmp_path: Path) -> None:
+    config = load(CONFIG / name)
+    buses = {bus: unarmed(settings) for bus, settings in config.buses.items()}
+    config = dataclasses.replace(config, buses=buses)
+    with closing(Simulation(config, tmp_path)) as simulation:
+        for bus_name in buses:
+            with closing(simulation.open_bus(bus_name)) as bus:
+                devices = config.devices_on(bus_name)
+
+                def all_answer(bus_name: str = bus_name, bus: object = bus) -> bool:
+                    found = list(readings(config, bus_name, bus, "bus"))
+                    assert [one.subject for one in found] == ["bus"] * len(found)
+                    return {one.level for one in found} == {"ok"}
+
+                wait_until(all_answer, f"{', '.join(devices)} answer")
+
+
+def test_the_units_and_nodes_of_a_file_are_known() -> None:
+    found = {name: _numbers(name) for name in ("door_modbus.yaml", "charger_canopen.yaml")}
+    assert found == {"door_modbus.yaml": ({1}, set()), "charger_canopen.yaml": (set(), {10})}
+
+
+def _numbers(name: str) -> tuple[set[int], set[int]]:
+    config = load(CONFIG / name)
+    (bus,) = config.buses
+    return set(numbers(config, bus, "unit")), set(numbers(config, bus, "node"))
+
+
+def test_numbers_are_told_as_ranges() -> None:
+    assert [ranges(n) for n in ([], [4], [1, 2, 3, 9, 11, 12])] == ["", "4", "1 to 3, 9, 11 to 12"]

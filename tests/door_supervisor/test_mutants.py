@@ -1,0 +1,22 @@
+"""The supervisor's core at its edges: what a mutation run found untested (docs/mutation.md)."""
+
+import pytest
+
+from bridges.door_supervisor import keep
+from bridges.door_supervisor.settings import Settings
+from tests.door_supervisor.alone import Alone
+
+
+def test_nothing_that_counts_is_refused() -> None:
+    desk = Alone()
+    desk.opens()
+    desk.shows("OPEN")
+    desk.until(0.5)
+    desk.closes()
+    desk.shows("CLOSED")
+    assert (desk.sent, desk.refused) == ([(0.0, "OPEN"), (0.5, "CLOSED")], [])
+
+
+def test_a_file_that_is_no_table_is_refused_by_what_it_should_be() -> None:
+    with pytest.raises(ValueError, match=r"^not a table of who holds which door: "):
+        keep.restore(b"[]", Settings(), 0.0)

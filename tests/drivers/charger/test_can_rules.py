@@ -1,0 +1,132 @@
+"""A charger on CAN without a state number: rules, an error number and a flag byte say what it does."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, ClassVar
+
+import can
+import msgspec
+import pytest
+
+from bridges.charger.signals import Activity
+from drivers.charger.can_frames import FrameDriver, Settings, create, describe, frame_tables
+from drivers.charger.can_map import FrameMap
+from drivers.hal import can as hal
+from tests.drivers.charger.test_contract_can import Frames
+from tests.drivers.hal.can.far_end import Reactive, failure
+
+MAP: dict[str, Any] = {
+    "dbc": str(Path(__file__).with_name("rules.dbc")),
+    "state_timeout_s": 1,
+    "amps": "Status.Current",
+    "volts": "Status.Voltage",
+    "receiver": "Pad.Receiver",
+    "out_of_range": "Status.Beside",
+    "rules": [
+        {"means": "charging", "when": {"Status.Current": {"above": 0.5}}},
+        {"means": "handshake", "when": {"Status.Relay": {"one_of": [1]}}},
+        {"means": "idle", "when": {"Status.Relay": {"one_of": [0]}}},
+        {"means": "error", "when": {"Status.Relay": {"one_of": [2]}}, "text": "the relay sticks"},
+    ],
+    "errors": {
+        "codes": [
+            {
+                "at": "Status.Fault",
+                "station": {17: "foreign object"},
+                "robot": {33: "no receiver answers"},
+            }
+        ],
+        "bits": [{"at": "Status.Flags", "station": {1: "too hot"}, "robot": {3: "battery"}}],
+    },
+    "send": [{"frame": "Command", "every_s": 0.5, "on": {"Enable": 1}, "off": {"Enable": 0}}],
+}
+BOTH = "too hot; no receiver answers"
+SETTINGS = msgspec.convert({"map": MAP}, Settings)
+
+
+class Charger:
+    """One that broadcasts its status."""
+
+    def __init__(self) -> None:
+        self.far = Reactive()
+        self.bus = self.far.bus()
+        self.driver: FrameDriver = create("c", SETTINGS, self.bus)
+
+    def shows(self, payload: str) -> tuple[Activity, int | str, str, str, bool]:
+        """What the driver makes of a status: activity, code, text, side, does it charge."""
+        for frame_id, said in ((0x100, payload), (0x101, "00 00 12 67")):
+            data = bytes.fromhex(said)
+            message = can.Message(arbitration_id=frame_id, is_extended_id=False, data=data)
+            self.far.coming.append(message)
+        sample = self.driver.read()
+        return sample.activity, sample.code, sample.error_text, sample.side, sample.charges
+
+
+@pytest.fixture
+def charger() -> Iterator[Charger]:
+    made = Charger()
+    made.bus.take()
+    made.driver.open()
+    yield made
+    made.bus.close()
+
+
+@pytest.mark.parametrize(
+    ("payload", "wanted"),
+    [
+        ("0000 0000 00 00 00 00", (Activity.IDLE, "rule 3", "", "", False)),
+        ("0000 0000 01 00 00 00", (Activity.HANDSHAKE, "rule 2", "", "", False)),
+        ("0081 0102 01 00 00 00", (Activity.CHARGING, "rule 1", "", "", False)),
+        ("0000 0000 03 00 00 00", (Activity.UNKNOWN, "of no rule", "", "", False)),
+        ("0000 0000 02 00 00 00", (Activity.ERROR, "rule 4", "the relay sticks", "", False)),
+        ("0081 0102 01 11 00 00", (Activity.ERROR, "rule 1", "foreign object", "station", True)),
+        ("0000 0000 01 21 00 00", (Activity.ERROR, "rule 2", "no receiver answers", "robot", False)),
+        ("0000 0000 01 07 00 00", (Activity.ERROR, "rule 2", "error 7", "", False)),
+        ("0000 0000 00 21 02 00", (Activity.ERROR, "rule 3", BOTH, "station", False)),
+        ("0000 0000 00 00 50 00", (Activity.ERROR, "rule 3", "error bit 4; error bit 6", "", False)),
+        ("0000 0000 00 00 08 00", (Activity.ERROR, "rule 3", "battery", "robot", False)),
+    ],
+)  # fmt: skip
+def test_a_frame_without_a_state_number_is_judged_as_on_http_and_modbus(
+    charger: Charger, payload: str, wanted: object
+) -> None:
+    assert charger.shows(payload) == wanted
+
+
+def test_a_frame_that_rules_need_and_that_stays_away_is_no_reading(charger: Charger) -> None:
+    assert charger.shows("0000 0000 00 00 00 00")[0] is Activity.IDLE
+    charger.far.now += 1.1
+    assert "no Status (0x100)" in failure(charger.driver.read)
+
+
+def test_check_tells_rules_numbers_and_bits() -> None:
+    rows = describe(SETTINGS, hal.Settings(socketcan="can0"))
+    assert ("rule 1", "Status.Current above 0.5 is charging") in rows
+    assert ("station's error", "Status.Fault 17: foreign object") in rows
+    assert ("robot's error", "Status.Flags bit 3: battery") in rows
+    _, read = frame_tables(SETTINGS)
+    assert [row[2:] for row in read.rows] == [
+        ("00 00 01 02 00 00 00 00", "Voltage 25.8 V"),
+        ("00 81 00 00 00 00 00 00", "Current 12.9 A"),
+        ("00 00 12 67", "Receiver 4711"),
+        ("00 00 00 00 04 00 00 00", "Beside 1"),
+        ("00 00 00 00 00 11 00 00", "Fault 17: station's error, foreign object"),
+        ("00 00 00 00 00 21 00 00", "Fault 33: robot's error, no receiver answers"),
+        ("00 00 00 00 00 00 02 00", "Flags 2: station's error, too hot"),
+        ("00 00 00 00 00 00 08 00", "Flags 8: robot's error, battery"),
+        ("00 00 00 00 01 00 00 00", "Relay 1"),
+    ]
+
+
+def test_a_map_says_somehow_what_the_state_is() -> None:
+    found = msgspec.convert({**MAP, "rules": []}, FrameMap)
+    assert list(found.problems()) == [
+        (("state",), "needs state (its number, and what that means), or rules")
+    ]
+
+
+class TestTheFakeShowsIt(Frames):
+    """The far side of the same map: what the plant does is what the driver reads."""
+
+    foreign_object = "foreign object"
+    settings: ClassVar = {"map": MAP}

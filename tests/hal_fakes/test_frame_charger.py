@@ -1,0 +1,66 @@
+"""The fake charger on CAN frames: what keeps it charging."""
+
+import can
+import msgspec
+
+from bridges.charger.signals import ChargerOutputs
+from drivers.charger.can_frames import Settings, create
+from hal_fakes.can.frame_charger import PERIODS, STATUS_S, FrameCharger
+from hal_fakes.plants.pad import PadPlant
+from tests.drivers.hal.can.far_end import Reactive
+
+SETTINGS = msgspec.convert(
+    {"profile": "wiferion", "setpoints": {"max_volts": 29.4, "volts": 29.2, "amps": 30}}, Settings
+)
+FED_EVERY_S = 0.5
+
+
+class Bench:
+    """A driver that feeds the charger, in virtual time."""
+
+    def __init__(self) -> None:
+        self.far = Reactive()
+        self.plant = PadPlant("a")
+        self.station = FrameCharger(self.plant, SETTINGS)
+        self.far.react = self._hear
+        bus = self.far.bus()
+        bus.take()
+        self.driver = create("a", SETTINGS, bus)
+        self.driver.open()
+
+    def passes(self, seconds: float, fed: bool) -> None:
+        """Time passes; the charger looks at the bus all the while."""
+        until = self.far.now + seconds
+        while self.far.now < until:
+            self.far.now += STATUS_S / 2
+            self.station.tick(self.far.now, self._send)
+            if fed:
+                self.driver.read()
+                self.driver.write(ChargerOutputs(True))
+
+    def _hear(self, message: can.Message) -> list[can.Message]:
+        self.station.hear(message, self.far.now, self._send)
+        return []
+
+    def _send(self, message: can.Message, late: bool = False) -> None:
+        self.far.coming.append(message)
+
+    def enabled(self) -> list[object]:
+        return [edge.value for edge in self.plant.edges if edge.signal == "enable"]
+
+
+def test_it_charges_while_it_is_fed_and_stops_three_periods_after_the_last_frame() -> None:
+    bench = Bench()
+    bench.passes(5.0, fed=True)
+    bench.passes((PERIODS - 1) * FED_EVERY_S - STATUS_S, fed=False)
+    assert bench.enabled() == [True]
+    bench.passes(FED_EVERY_S + STATUS_S, fed=False)
+    assert bench.enabled() == [True, False]
+
+
+def test_a_machine_that_holds_it_up_for_a_while_does_not_make_it_stop() -> None:
+    bench = Bench()
+    bench.passes(5.0, fed=True)
+    bench.far.now += 10.0
+    bench.passes(STATUS_S / 2, fed=False)
+    assert bench.enabled() == [True]

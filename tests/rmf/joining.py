@@ -1,0 +1,37 @@
+"""Opens nodes on loopback, by the name of a transport."""
+
+import importlib
+from collections.abc import Callable
+
+from bridges.rmf.choose import missing_of_ros
+from bridges.rmf.releases import NEWEST, Release
+from bridges.rmf.ros_types import installed
+from bridges.rmf.settings import Zenoh
+from bridges.rmf.transport import Transport
+from bridges.rmf.zenoh import ZenohTransport
+
+RELEASE = NEWEST if missing_of_ros() else installed()
+"""What the tests speak: where ROS is installed, its release on every wire."""
+
+Join = Callable[[str], Transport]
+"""Open a node of this name on one graph."""
+
+ZENOH = {"zenoh": Zenoh(), "zenoh_ros2dds": Zenoh(keys="ros2dds")}
+"""The two ways to name things on zenoh."""
+
+
+def joining(transport: str, domain: int, release: Release | None = RELEASE) -> Join:
+    """What opens nodes of this transport in this domain, on loopback."""
+
+    def join(name: str) -> Transport:
+        if transport.startswith("zenoh"):
+            ways = ZENOH[transport]
+            return ZenohTransport(name, domain, loopback=True, settings=ways, release=release)
+        # Imported here: there may be no ROS.
+        module = importlib.import_module(f"bridges.rmf.{transport}")
+        kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
+        wanted = {} if transport == "ros2" else {"release": release}  # that takes what is installed
+        node: Transport = getattr(module, kind)(name, domain, loopback=True, **wanted)
+        return node
+
+    return join

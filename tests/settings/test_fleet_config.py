@@ -1,0 +1,355 @@
+"""`check COORDINATOR --fleet-config CONFIG`: each mismatch with file, line and what to write."""
+
+import cmath
+import math
+from pathlib import Path
+
+import pytest
+
+from bridges.cli import main
+from bridges.settings.fleet_config import load_fleet
+from bridges.settings.load import SettingsError
+from bridges.settings.similarity import Point, estimate
+
+OURS = """\
+kind: charger_coordinator
+coordinator:
+  stations: {charger_a: {}, charger_b: {waypoint: dock_b}}
+  fleets:
+    tiny:
+      waypoints:
+        charger_a: {level: L1, x: 10, y: 2}
+        dock_b: {level: L1, x: 10, y: 5}
+        wait_1: {level: L1, x: 4, y: 2}
+        wait_2: {level: L1, x: 4, y: 6}
+      robots:
+        AMR01: {stations: [charger_a, charger_b], waits_at: wait_1}
+        AMR02: {stations: [charger_b, charger_a], waits_at: wait_2}
+"""
+THEIRS = """\
+rmf_fleet:
+  name: tiny
+  recharge_threshold: 0.2
+  recharge_soc: 1.0
+  finishing_request: park
+  robots:
+    AMR01: {charger: charger_a}
+    AMR02: {charger: dock_b}
+reference_coordinates:
+  L1:
+    rmf: [[10, 2], [10, 5], [4, 2], [4, 6]]
+    robot: [[7, -5], [4, -5], [7, -11], [3, -11]]
+"""
+GRAPH = """\
+levels:
+  L1:
+    lanes: []
+    vertices:
+    - [10.2, 2.1, {name: charger_a, is_charger: true}]
+    - [10.0, 5.0, {name: dock_b, is_charger: true}]
+    - [4.0, 2.0, {name: wait_1}]
+    - [4.0, 6.0, {name: wait_2}]
+"""
+
+
+class Site:
+    """The two files, and RMF's navigation graph if it is given."""
+
+    def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        self._folder, self._capsys = folder, capsys
+
+    def check(
+        self, ours: str = OURS, theirs: str = THEIRS, graph: str = "", *more: str
+    ) -> tuple[int, list[str]]:
+        """The exit code, and each problem and warning without the folder."""
+        for name, text in (("ours.yaml", ours), ("config.yaml", theirs), ("graph.yaml", graph)):
+            (self._folder / name).write_text(text)
+        options = ["--building-map", str(self._folder / "graph.yaml")] if graph else []
+        files = [
+            str(self._folder / "ours.yaml"),
+            "--fleet-config",
+            str(self._folder / "config.yaml"),
+        ]
+        code = main(["check", *files, *options, *more])
+        self.out, err = self._capsys.readouterr()
+        lines = [line.removeprefix(f"{self._folder}/") for line in err.splitlines()]
+        return code, [line for line in lines if ".yaml:" in line]
+
+
+@pytest.fixture
+def site(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Site:
+    return Site(tmp_path, capsys)
+
+
+def test_two_files_that_agree_are_right_and_the_transforms_error_is_told(site: Site) -> None:
+    assert site.check() == (0, [])
+    assert (
+        "config.yaml: transformation error estimate for L1: 0"
+        " (turned by 1.5708 rad, scaled by 1, 0.00 m off on RMF's map)" in site.out
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        (
+            "name: tiny",
+            "name: tinny",
+            "config.yaml:2:3: ours.yaml has an unknown fleet 'tinny': did you mean 'tiny'?"
+            " known here: tiny",
+        ),
+        (
+            "    AMR02: {charger: dock_b}\n",
+            "    AMR2: {charger: dock_b}\n",
+            "ours.yaml:13:9: config.yaml has an unknown robot 'AMR02': did you mean 'AMR2'?"
+            " known here: AMR01, AMR2",
+        ),
+        (
+            "AMR02: {charger: dock_b}",
+            "AMR02: {charger: dok_b}",
+            "config.yaml:8:13: ours.yaml has an unknown waypoint 'dok_b': did you mean 'dock_b'?"
+            " known here: charger_a, dock_b, wait_1, wait_2",
+        ),
+        (
+            "AMR02: {charger: dock_b}",
+            "AMR02: {charger: charger_a}",
+            "config.yaml:8:13: 'charger_a' is the charger of 'AMR01' too: RMF would send both there",
+        ),
+        (
+            "AMR02: {charger: dock_b}",
+            "AMR02: {}",
+            "config.yaml:8:5: 'AMR02' has no charger: a robot without one never goes to charge",
+        ),
+        (
+            "recharge_threshold: 0.2",
+            "recharge_threshold: 0.9",
+            "config.yaml:3:3: below recharge_threshold 90 % RMF gives a robot no task, and here only"
+            " below again_percent 90 % it is charged again: write again_percent above 90",
+        ),
+        (
+            "finishing_request: park",
+            "finishing_request: dance",
+            "config.yaml:5:3: unknown finishing_request 'dance': known here: charge, park, nothing",
+        ),
+        (
+            "robot: [[7, -5], [4, -5], [7, -11], [3, -11]]",
+            "robot: [[7, -5], [4, -5], [7, -11], [30, -11]]",
+            "config.yaml:10:3: the pairs do not fit: 5.46 m off on RMF's map, and near_m is 1 m:"
+            " a robot would not be seen at its waypoint",
+        ),
+        (
+            "robot: [[7, -5], [4, -5], [7, -11], [3, -11]]",
+            "robot: [[7, 5], [4, 5], [7, 11], [3, 11]]",
+            "config.yaml:10:3: one map is the other's mirror image: turn the sign of every robot's y",
+        ),
+        (
+            "robot: [[7, -5], [4, -5], [7, -11], [3, -11]]",
+            "robot: [[7, -5], [4, -5]]",
+            "config.yaml:10:3: 4 points and 2: they must be pairs",
+        ),
+    ],
+)
+def test_what_cannot_be_right_is_named_where_it_stands(
+    site: Site, old: str, new: str, problem: str
+) -> None:
+    assert THEIRS.count(old) == 1
+    code, found = site.check(theirs=THEIRS.replace(old, new))
+    assert (code, problem in found) == (78, True), found
+
+
+def test_a_station_that_lets_go_before_rmf_is_content_is_a_mismatch(site: Site) -> None:
+    code, found = site.check(ours=OURS + "  full_percent: 95\n")
+    assert (code, found) == (
+        78,
+        [
+            "config.yaml:4:3: a station lets a robot go at full_percent 95 %, and RMF has it wait"
+            " there for recharge_soc 100 %: write recharge_soc: 0.95, or less"
+        ],
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "warning"),
+    [
+        (
+            "recharge_soc: 1.0",
+            "recharge_soc: 0.9",
+            "config.yaml:4:3: warning: RMF's task ends at recharge_soc 90 %, and the robot keeps its"
+            " station until full_percent 100 %: write full_percent: 90",
+        ),
+        (
+            "  finishing_request: park",
+            "  finishing_request: nothing",
+            "config.yaml:5:3: warning: finishing_request: nothing leaves a charged robot on its pad"
+            " until it gets a task, and the next robot waits: write charge",
+        ),
+        (
+            "  finishing_request: park\n",
+            "",
+            "config.yaml:1:1: warning: finishing_request: nothing leaves a charged robot on its pad"
+            " until it gets a task, and the next robot waits: write charge",
+        ),
+        (
+            "    AMR02: {charger: dock_b}\n",
+            "    AMR02: {charger: dock_b}\n    AMR03: {charger: wait_1}\n",
+            "config.yaml:9:5: warning: no station of ours charges 'AMR03'",
+        ),
+        (
+            "AMR02: {charger: dock_b}",
+            "AMR02: {charger: wait_1}",
+            "config.yaml:8:13: warning: 'AMR02' charges or waits at dock_b, charger_a, wait_2 here:"
+            " RMF's first way leads elsewhere",
+        ),
+        (
+            "  L1:\n",
+            "  L2:\n",
+            "config.yaml:9:1: warning: no pairs for level 'L1', where this fleet has waypoints",
+        ),
+    ],
+)
+def test_what_may_be_a_mistake_is_warned_of(site: Site, old: str, new: str, warning: str) -> None:
+    assert THEIRS.count(old) == 1
+    assert site.check(theirs=THEIRS.replace(old, new)) == (0, [warning])
+
+
+def test_the_older_form_of_the_file_says_the_same(site: Site) -> None:
+    head, _, pairs = THEIRS.partition("  robots:\n")
+    rmf, robot = (line.strip() for line in pairs.splitlines()[-2:])
+    older = f"""\
+{head}robots:
+  AMR01: {{rmf_config: {{charger: {{waypoint: charger_a}}}}}}
+  AMR02: {{rmf_config: {{charger: {{waypoint: dok_b}}}}}}
+reference_coordinates:
+  {rmf}
+  {robot}
+"""
+    code, found = site.check(theirs=older)
+    assert code == 78
+    assert [line.split(": ")[0] for line in found] == ["config.yaml:8:34"]
+    code, found = site.check(theirs=older.replace("dok_b", "dock_b"))
+    assert (code, found) == (0, [])
+    assert "config.yaml: transformation error estimate: 0 (" in site.out
+
+
+def test_waypoints_are_compared_with_the_navigation_graph(site: Site) -> None:
+    assert site.check(OURS, THEIRS, GRAPH) == (0, [])
+    code, found = site.check(OURS.replace("x: 10, y: 5", "x: 10, y: 7"), THEIRS, GRAPH)
+    assert (code, found) == (
+        78,
+        ["ours.yaml:8:9: graph.yaml:6 has 'dock_b' at x 10, y 5: 2.00 m away, near_m is 1"],
+    )
+
+
+def test_a_waypoint_in_the_robots_coordinates_is_named_with_rmfs(site: Site) -> None:
+    code, found = site.check(OURS.replace("x: 10, y: 5", "x: 4, y: -5"), THEIRS, GRAPH)
+    text = "this is on the robot's map; on RMF's it is x: 10, y: 5 (graph.yaml:6)"
+    assert (code, found) == (78, [f"ours.yaml:8:9: {text}"])
+
+
+def test_a_waypoint_on_another_level_is_named(site: Site) -> None:
+    code, found = site.check(
+        OURS.replace("dock_b: {level: L1", "dock_b: {level: L2"), THEIRS, GRAPH
+    )
+    assert code == 78
+    assert "ours.yaml:8:18: graph.yaml:6 has 'dock_b' on level 'L1'" in found
+
+
+def test_a_file_that_is_no_fleet_configuration_is_refused_with_its_line(site: Site) -> None:
+    code, found = site.check(theirs="rmf_fleet:\n  name: tiny\n  recharge_soc: 80\n")
+    assert (code, found) == (
+        78,
+        [
+            "config.yaml:3:3: expected `float` <= 1.0: is this a fleet adapter's configuration?",
+        ],
+    )
+    code, found = site.check(theirs="levels: {}\n")
+    text = "object missing required field `rmf_fleet`: is this a fleet adapter's configuration?"
+    assert (code, found) == (78, [f"config.yaml:1:1: {text}"])
+
+
+def test_a_fleet_configuration_without_a_coordinator_is_compared_with_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    theirs = tmp_path / "config.yaml"
+    theirs.write_text(THEIRS)
+    assert main(["check", "-q", "config/lift_one_hot.yaml", "--fleet-config", str(theirs)]) == 78
+    assert "no FILE is one" in capsys.readouterr().err
+
+
+def test_the_shipped_fleet_agrees_with_the_shipped_coordinator(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    files = ["config/charger_coordinator.yaml", "--fleet-config", "config/fleet_tiny.yaml"]
+    assert main(["check", "-q", *files]) == 0
+    assert capsys.readouterr().err == ""
+
+
+# --- the transform -----------------------------------------------------------------------------
+
+
+def test_the_transform_of_the_adapter_templates_example_and_its_mean_squared_error() -> None:
+    """open-rmf/fleet_adapter_template, config.yaml; the values were checked with nudged 0.3.1's
+    formulas, term by term."""
+    rmf = [(20.33, -3.156), (8.908, -2.57), (13.02, -3.601), (21.93, -4.124)]
+    robot = [(59.0, 399.0), (57.0, 172.0), (68.0, 251.0), (75.0, 429.0)]
+    found = estimate(rmf, robot)
+    sums = _nudged(rmf, robot)
+    assert math.isclose(found.turn.real, sums[0])
+    assert math.isclose(found.turn.imag, sums[1])
+    assert math.isclose(found.shift.real, sums[2])
+    assert math.isclose(found.shift.imag, sums[3])
+
+
+def _nudged(x: list[tuple[float, float]], y: list[tuple[float, float]]) -> tuple[float, ...]:
+    """Scale-rotation (s, r) and translation, by the sums of the least-squares normal equations."""
+    n = len(x)
+    a1, b1 = sum(p[0] for p in x), sum(p[1] for p in x)
+    c1, d1 = sum(p[0] for p in y), sum(p[1] for p in y)
+    a2, b2 = sum(p[0] ** 2 for p in x), sum(p[1] ** 2 for p in x)
+    ac = sum(p[0] * q[0] for p, q in zip(x, y, strict=True))
+    ad = sum(p[0] * q[1] for p, q in zip(x, y, strict=True))
+    bc = sum(p[1] * q[0] for p, q in zip(x, y, strict=True))
+    bd = sum(p[1] * q[1] for p, q in zip(x, y, strict=True))
+    den = n * a2 + n * b2 - a1 * a1 - b1 * b1
+    s = (n * (ac + bd) - a1 * c1 - b1 * d1) / den
+    r = (n * (ad - bc) + b1 * c1 - a1 * d1) / den
+    return s, r, (c1 - s * a1 + r * b1) / n, (d1 - s * b1 - r * a1) / n
+
+
+def test_a_known_transform_is_found_and_undone() -> None:
+    rmf = [(0.0, 0.0), (1.0, 0.0), (0.0, 2.0)]
+    robot = [(5.0, 5.0), (5.0, 7.0), (1.0, 5.0)]  # turned by 90 degrees, twice as large, shifted
+    found = estimate(rmf, robot)
+    assert cmath.isclose(found.turn, 2j, abs_tol=1e-12)
+    assert cmath.isclose(found.shift, 5 + 5j, abs_tol=1e-12)
+    assert round(found.rotation, 6) == 1.570796
+    assert (round(found.scale, 9), round(found.error, 9)) == (2.0, 0.0)
+    assert math.dist(found.back((1.0, 5.0)), (0.0, 2.0)) < 1e-12
+
+
+def test_the_error_is_the_mean_of_the_squares_and_in_metres_its_root() -> None:
+    found = estimate([(0.0, 0.0), (2.0, 0.0), (0.0, 0.0)], [(0.0, 2.0), (4.0, 0.0), (0.0, -2.0)])
+    assert (round(found.mse, 9), round(found.error, 9)) == (
+        round(8 / 3, 9),
+        round((8 / 3) ** 0.5 / 2, 9),
+    )
+
+
+@pytest.mark.parametrize(
+    ("pairs", "reason"),
+    [
+        (([(0.0, 0.0)], [(1.0, 1.0)]), "two pairs at least"),
+        (([(0.0, 0.0), (0.0, 0.0)], [(1.0, 1.0), (2.0, 2.0)]), "all the same"),
+        (([(0.0, 0.0), (1.0, 0.0)], [(1.0, 1.0), (1.0, 1.0)]), "all the same"),
+    ],
+)
+def test_points_that_define_no_transform_are_refused(
+    pairs: tuple[list[Point], list[Point]], reason: str
+) -> None:
+    with pytest.raises(ValueError, match=reason):
+        estimate(*pairs)
+
+
+def test_a_file_that_cannot_be_read_is_a_problem_of_that_file(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="cannot be read: No such file"):
+        load_fleet(str(tmp_path / "none.yaml"))

@@ -1,0 +1,67 @@
+"""Charging as RMF knows it: what a fleet adapter tells of its robot, and the places of a coordinator.
+
+ChargeBattery drives to the robot's dedicated place and waits there in the mode CHARGING until the
+battery is full (rmf_ros2 9dedd0f, ChargeBattery.cpp). `charging_assignments` says which place that is.
+"""
+
+from bridges.charger_coordinator.settings import Fleet, RobotSettings, Settings, Station, Waypoint
+from bridges.rmf import definitions as d
+
+FLEET = "fleet"
+LOW, FULL = 30.0, 100.0
+
+
+def settings(chargers: tuple[str, ...], robots: tuple[str, ...]) -> Settings:
+    """The coordinator's: every robot may use every charger, and waits at a place of its own."""
+    places = [*chargers, *map(waits_at, robots)]
+    waypoints = {name: Waypoint(level="L1", x=10.0 * n, y=0.0) for n, name in enumerate(places)}
+    known = {
+        robot: RobotSettings(stations=list(chargers), waits_at=waits_at(robot)) for robot in robots
+    }
+    fleets = {FLEET: Fleet(waypoints=waypoints, robots=known)}
+    return Settings(
+        stations={name: Station() for name in chargers}, fleets=fleets, start_timeout_s=40.0
+    )
+
+
+def waits_at(robot: str) -> str:
+    """A robot's own place."""
+    return f"wait_{robot}"
+
+
+class Charge:
+    """What a fleet adapter tells of its robot. `place`: the waypoint where it is, "" on the road."""
+
+    def __init__(self, robot: str, known: Settings) -> None:
+        self.robot = robot
+        self.dedicated = waits_at(robot)
+        self.place = ""
+        self.task_id = ""
+        self.battery = FULL
+        self._waypoints = known.fleets[FLEET].waypoints
+        self._tasks = 0
+
+    def begins(self) -> None:
+        """RMF finds its battery low."""
+        self._tasks += 1
+        self.task_id, self.battery = f"charge-{self._tasks}", LOW
+
+    def ends(self) -> None:
+        """It is full, or called away."""
+        self.task_id, self.battery, self.place = "", FULL, ""
+
+    def hear(self, message: d.ChargingAssignments) -> None:
+        """Its dedicated place may change."""
+        for assignment in message.assignments:
+            if assignment.robot_name == self.robot:
+                self.dedicated = assignment.waypoint_name
+
+    def state(self) -> d.FleetState:
+        """The state of its fleet, as far as this adapter knows it."""
+        modes = d.RobotModeValue
+        at = self._waypoints.get(self.place)
+        away = d.Location(x=-1000.0, y=-1000.0, level_name="L1")
+        where = d.Location(x=at.x, y=at.y, level_name=at.level) if at else away
+        mode = d.RobotMode(int(modes.MODE_CHARGING if self.task_id else modes.MODE_MOVING))
+        robot = d.RobotState(self.robot, "model", self.task_id, 0, mode, self.battery, where)
+        return d.FleetState(FLEET, (robot,))
