@@ -18,7 +18,8 @@ from bridges.serve.last_shown import ages
 from bridges.serve.places import Places, act_as_owner, by_hand, work_somewhere
 from bridges.serve.record import Record, Records
 from bridges.serve.switch_off import outputs_off
-from bridges.settings.load import Config, SettingsError, load
+from bridges.settings.config import Config
+from bridges.settings.problems import SettingsError
 
 TIMEOUT_S = 5.0
 EX_UNAVAILABLE, EX_CONFIG = 69, 78
@@ -77,6 +78,8 @@ def _asked_by_our_daemon(places: Places) -> bool:
 
 
 def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
+    from bridges.settings.load import load
+
     try:
         config = load(file)
     except SettingsError as error:

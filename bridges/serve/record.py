@@ -1,5 +1,9 @@
 """The record of what a daemon claims, written before it claims: all that is needed to switch it off.
 
+It holds the YAML, and what the daemon made of it: the settings as they were validated, so that who
+switches off need not load and judge the YAML again. Settings that do not decode, as those of another
+version may not, are made from the YAML.
+
 A record is a file named by its content, in the daemon's state directory, or in its runtime directory
 if that cannot be written. So a daemon that restarts on the same YAML finds its record, and one on
 another YAML overwrites none. Tokens are not in it: they are read from their files when used.
@@ -13,9 +17,12 @@ from pathlib import Path
 
 import msgspec
 
+from bridges import __version__
+from bridges.rmf.settings import Rmf
 from bridges.serve.files import replace
 from bridges.serve.places import Places, named
-from bridges.settings.load import Config, understood
+from bridges.settings import names
+from bridges.settings.config import Config
 from drivers.profiles import texts
 
 PATTERN = "claimed-*.json"
@@ -23,16 +30,27 @@ SIZE_MAX = 64 << 20
 """Larger than any YAML with its profiles and DBC files."""
 
 
+class Claim(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Validated settings, each as JSON. `version`: of the program that wrote them."""
+
+    version: str
+    kind: str
+    driver: str
+    buses: dict[str, tuple[str, bytes]]
+    devices: dict[str, bytes]
+
+
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """`file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files, by name.
 
-    `safe`: the devices whose outputs have since been verified off.
+    `safe`: the devices whose outputs have since been verified off. `claim`: the YAML as settings.
     """
 
     file: str
     yaml: bytes
     texts: dict[str, bytes]
     safe: tuple[str, ...] = ()
+    claim: Claim | None = None
 
     @property
     def name(self) -> str:
@@ -46,12 +64,58 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         From then on this process uses the record's profiles and DBC files, and no others.
         """
         texts.give(self.texts)
+        with suppress(msgspec.MsgspecError, ImportError, AttributeError):
+            if self.claim is not None and self.claim.version == __version__:
+                return _claimed(self, self.claim)
+        from bridges.settings.load import understood
+
         return understood(self.file, self.yaml)
 
 
 def of(config: Config) -> Record:
     """The record of this config, which must be the only one that this process has loaded."""
-    return Record(named(config.path), config.text, dict(sorted(texts.all_known().items())))
+    known = dict(sorted(texts.all_known().items()))
+    return Record(named(config.path), config.text, known, claim=_claim(config))
+
+
+def _claim(config: Config) -> Claim:
+    buses = {name: (config.bus_types[name], _json(bus)) for name, bus in config.buses.items()}
+    devices = {name: _json(device) for name, device in config.devices.items()}
+    return Claim(__version__, config.kind, config.driver, buses, devices)
+
+
+def _json(settings: msgspec.Struct) -> bytes:
+    return msgspec.json.encode(settings)
+
+
+def _claimed(record: Record, claim: Claim) -> Config:
+    """The Config of these settings. Raises MsgspecError, ImportError or AttributeError."""
+    return Config(
+        path=Path(record.file),
+        text=record.yaml,
+        kind=claim.kind,
+        driver=claim.driver,
+        rmf=Rmf(),  # who switches off talks to nobody
+        buses={
+            name: msgspec.json.decode(text, type=names.bus_called(kind).settings)
+            for name, (kind, text) in claim.buses.items()
+        },
+        devices={name: _device(claim, text) for name, text in claim.devices.items()},
+        bus_types={name: kind for name, (kind, _) in claim.buses.items()},
+    )
+
+
+def _device(claim: Claim, text: bytes) -> msgspec.Struct:
+    """A device's settings, of its own driver or the file's."""
+    own = msgspec.json.decode(text, type=_OwnDriver).driver or claim.driver
+    device: msgspec.Struct = msgspec.json.decode(
+        text, type=names.driver_called(claim.kind, own).settings
+    )
+    return device
+
+
+class _OwnDriver(msgspec.Struct):
+    driver: str | None = None
 
 
 class Records:

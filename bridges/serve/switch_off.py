@@ -11,7 +11,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 
 from bridges.log import pairs
-from bridges.settings.load import Config
+from bridges.settings.config import Config
 from drivers import DriverError
 from drivers.hal import Bus, HalError
 

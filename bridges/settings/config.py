@@ -7,7 +7,7 @@ from typing import Any
 
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
-from bridges.settings.nodes import Problem
+from bridges.settings.problems import Problem
 from drivers.driver_type import AnyDriver
 from drivers.hal import AnyBus, Bus
 from drivers.hal.points import Wire

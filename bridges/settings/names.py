@@ -9,13 +9,16 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import bridges
 import drivers
 import drivers.hal
-from bridges.core.graph_kind import AnyKind
 from drivers.driver_type import AnyDriver
 from drivers.hal import AnyBus
+
+if TYPE_CHECKING:
+    from bridges.core.graph_kind import AnyKind
 
 
 def kind_names() -> list[str]:
@@ -47,7 +50,7 @@ def _found(
     return sorted({name(path) for path in found if holds(path.read_text("utf-8"))})
 
 
-def kind_called(name: str) -> AnyKind:
+def kind_called(name: str) -> "AnyKind":
     """The kind that `kind:` names; one of `kind_names()`."""
     kind: AnyKind = importlib.import_module(f"bridges.{name}").KIND
     return kind

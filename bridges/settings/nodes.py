@@ -18,6 +18,8 @@ from yaml.reader import ReaderError
 from bridges import user_files
 from bridges.rmf.words import printable
 from bridges.settings import slips
+from bridges.settings.problems import Problem as Problem
+from bridges.settings.problems import SettingsError as SettingsError
 
 MAX_DEPTH = 32
 
@@ -33,27 +35,6 @@ class Sort:
 
 
 DEVICE = Sort("device YAML", "kind: ...", 256 * 1024, 20_000)
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class Problem:
-    """One problem or warning and its place; line and column count from 1."""
-
-    file: str
-    line: int
-    column: int
-    text: str
-
-    def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}: {self.text}"
-
-
-class SettingsError(Exception):
-    """An invalid file: `problems` holds every problem found, in file order."""
-
-    def __init__(self, problems: Iterable[Problem]) -> None:
-        self.problems = tuple(sorted(set(problems)))
-        super().__init__("\n".join(map(str, self.problems)))
 
 
 class Page:

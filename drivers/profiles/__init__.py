@@ -5,7 +5,8 @@
     source: "..."            where its numbers come from
     map: {...}               the content, under the key that holds it in a device YAML
 
-It is parsed like a device YAML, so each problem has its file, line and column.
+It is parsed like a device YAML, so each problem has its file, line and column. What parses it is
+imported then: who switches off by a record on contacts needs none of it.
 """
 
 import functools
@@ -17,8 +18,7 @@ import msgspec
 from msgspec.inspect import LiteralType
 
 from bridges.core.fields import Name
-from bridges.settings.nodes import Page, SettingsError, compose, either, read, unknown
-from bridges.settings.values import BROKEN, Spot, Values
+from bridges.settings.problems import SettingsError
 from drivers.profiles import texts
 from drivers.profiles.texts import FOLDER
 
@@ -50,6 +50,8 @@ class Profile(Generic[Content]):
         return self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried"
 
     def _read(self, file: Path) -> dict[str, object]:
+        from bridges.settings.nodes import read
+
         text = texts.text(file, lambda: read(str(file)))
         return _understood(str(file), text, self.reader, self.key, self._content)
 
@@ -62,6 +64,9 @@ def _lines(file: Path) -> list[str]:
 def _understood(
     file: str, text: bytes, reader: str, key: str, content: type[msgspec.Struct]
 ) -> dict[str, object]:
+    from bridges.settings.nodes import Page, compose
+    from bridges.settings.values import BROKEN, Spot, Values
+
     page = Page(file)
     root = compose(page, text)
     spot, values = Spot(root, root, "the file"), Values(page)
@@ -82,6 +87,8 @@ def profile_problems(
     sort: Profile[msgspec.Struct], name: str | None, inline: object
 ) -> Iterator[tuple[tuple[str, ...], str]]:
     """Problems of `profile:` and of the key that may replace it (`map`)."""
+    from bridges.settings.nodes import either
+
     if name is None and inline is None:
         text = f"needs '{sort.key}', or a profile: {either(sort.names())}"
         yield ("profile",), text
@@ -92,6 +99,8 @@ def profile_problems(
 
 
 def _named(sort: Profile[msgspec.Struct], name: str) -> Iterator[tuple[tuple[str, ...], str]]:
+    from bridges.settings.nodes import unknown
+
     if name not in sort.names():
         yield ("profile",), unknown("profile", name, sort.names())
         return
