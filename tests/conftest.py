@@ -22,7 +22,7 @@ _deselected: list[str] = []
 
 @pytest.fixture(autouse=True)
 def _log_as_before() -> Iterator[None]:
-    """A command that a test calls in this process starts its own log; the next test has its own again."""
+    """A command that a test calls in this process starts a log of its own; the next test has none."""
     root = logging.getLogger()
     handlers, level = list(root.handlers), root.level
     yield
