@@ -360,7 +360,7 @@ def test_the_report_names_each_station_with_its_state_and_robot() -> None:
     site_.run(1)
     shown = report.report(site_.memory, site_.now, SITE)
     assert shown.read_at == 2.0
-    assert shown.stations == ((A, "CHARGING tiny/AMR01"), (B, "?"))
+    assert shown.stations == ((A, "CHARGING tiny/AMR01, by the robot"), (B, "?"))
     site_.hears(Unwanted(site_.memory.grants[A].request_id))
     assert report.report(site_.memory, site_.now, SITE).stations[0] == (A, "CHARGING")
 

@@ -147,11 +147,10 @@ class Site:
 
     def _mend_queue(self) -> None:
         """A technician who has seen to robots and stations that failed tells the coordinator so."""
-        told = (
-            [s["faults"] for s in self.coordinator.summary().values()] if self.coordinated else []
-        )
+        if not (self.coordinated and self.coordinator.alive):
+            return
         calm = self.ills.calm_since() + BY_RESET_S < self.timeline.now
-        if self.coordinated and self.coordinator.alive and calm and any(told):
+        if calm and any(s["faults"] for s in self.coordinator.summary().values()):
             self.coordinator.reset()
 
     def _live(self) -> None:
