@@ -392,6 +392,11 @@ class Site:
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:
+        """A party dies and comes back, its clock stepped.
+
+        Under RMF's own door supervisor no adapter's clock steps back: that supervisor ignores its CLOSE
+        as too old and sends a heartbeat, which it answers with a CLOSE, as fast as the wire carries them.
+        """
         ours = [node for node in self.nodes if isinstance(node, GraphDaemon)]
         sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.robots], [*ours]]
         sorts = [parties for parties in sorts if parties]
@@ -400,7 +405,7 @@ class Site:
 
         def end() -> None:
             if isinstance(party, Resident):
-                party.skew += skew_s
+                party.skew += skew_s if self.rmf == "ours" else max(0.0, skew_s)
             elif isinstance(party, DeviceDaemon):
                 party.wall_step_s = skew_s
             party.start()
