@@ -394,8 +394,8 @@ class Site:
     def _restart(self, random: Random) -> Ill:
         """A party dies and comes back, its clock stepped.
 
-        Under RMF's own door supervisor no adapter's clock steps back: that supervisor ignores its CLOSE
-        as too old and sends a heartbeat, which it answers with a CLOSE, as fast as the wire carries them.
+        Under RMF's own door supervisor no adapter's clock steps back: that supervisor would ignore its
+        CLOSE as too old and send a heartbeat, which it answers with a CLOSE, as fast as the wire is.
         """
         ours = [node for node in self.nodes if isinstance(node, GraphDaemon)]
         sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.robots], [*ours]]
