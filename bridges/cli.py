@@ -8,6 +8,9 @@ from collections.abc import Container
 
 from bridges import __version__
 
+EX_PIPE = 141
+"""The reader of our output has gone: what a shell shows for a program that SIGPIPE ended."""
+
 COMMANDS = {
     "init": (
         "write a first YAML for the device in front of you",
@@ -80,7 +83,7 @@ def main(argv: list[str] | None = None) -> int:
         return int(_module(parsed.command).run(parsed))
     except BrokenPipeError:  # the reader of a pipe has closed it, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        return EX_PIPE
 
 
 def parser(whole: Container[str]) -> argparse.ArgumentParser:

@@ -25,6 +25,7 @@ from bridges.commands.drafts.answers import (
     Wiring,
 )
 from bridges.settings.building_map import BuildingMap, load_map
+from bridges.settings.load import understood
 from bridges.settings.nodes import SettingsError
 
 EX_USAGE, EX_NOINPUT, EX_CANTCREAT, EX_INTERRUPTED = 64, 66, 73, 130
@@ -141,8 +142,6 @@ def run(args: argparse.Namespace) -> int:
     """0; 64: answers are missing or do not go together; 66: the map; 73: the file is there already."""
     try:
         given = answered(args, load_map(args.map) if args.map else None)
-        text = draft(answers(given))
-        write(args.file, f"{_schema_line()}{text}")
     except SettingsError as error:
         print("\n".join(map(str, error.problems)), file=sys.stderr)
         return EX_NOINPUT
@@ -152,11 +151,27 @@ def run(args: argparse.Namespace) -> int:
     except Impossible as error:
         print(f"rmf-bridge init: {error}", file=sys.stderr)
         return EX_USAGE
+    return _written(args.file, given)
+
+
+def _written(file: Path, given: Given) -> int:
+    """Write what `check` finds right."""
+    try:
+        text = draft(answers(given))
+        understood(file, text.encode())
+        write(file, f"{_schema_line()}{text}")
+    except SettingsError as error:
+        told = "\n".join(problem.text for problem in error.problems)
+        print(f"rmf-bridge init: with these answers check would say:\n{told}", file=sys.stderr)
+        return EX_USAGE
+    except Impossible as error:
+        print(f"rmf-bridge init: {error}", file=sys.stderr)
+        return EX_USAGE
     except OSError as error:
-        print(f"{args.file} is not written: {error.strerror}", file=sys.stderr)
+        print(f"{file} is not written: {error.strerror}", file=sys.stderr)
         return EX_CANTCREAT
-    print(f"{args.file} is written. Compare it with the wires; then:")
-    print(f"  rmf-bridge check {args.file}\n  rmf-bridge run {args.file} --simulate")
+    print(f"{file} is written. Compare it with the wires; then:")
+    print(f"  rmf-bridge check {file}\n  rmf-bridge run {file} --simulate")
     return 0
 
 
@@ -216,7 +231,7 @@ def _ask(question: Question, offered: str, given: Given, found: BuildingMap | No
     if choices:
         first = offered if offered in choices else None
         return str(questionary.select(question.text, list(choices), default=first).unsafe_ask())
-    return str(questionary.text(question.text, default=offered).unsafe_ask())
+    return str(questionary.text(f"{question.text} [{offered}]").unsafe_ask()) or offered
 
 
 def answers(given: Given) -> Answers:

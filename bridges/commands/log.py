@@ -1,10 +1,11 @@
 """`rmf-bridge log FILE`: the log of a device's service, from systemd's journal."""
 
 import argparse
+import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 from bridges.log import pairs
 
@@ -29,10 +30,13 @@ def run(args: argparse.Namespace) -> int:
             "no journalctl here: a daemon without systemd logs to its own terminal", file=sys.stderr
         )
         return EX_UNAVAILABLE
-    try:
-        return subprocess.run(command(args)).returncode
-    except KeyboardInterrupt:  # the normal end of --follow
-        return 0
+    sys.stdout.flush()
+    return _become(command(args))
+
+
+def _become(words: list[str]) -> NoReturn:
+    """journalctl takes our place, so that what ends us ends it."""
+    os.execvp(words[0], words)
 
 
 def command(args: argparse.Namespace) -> list[str]:

@@ -21,7 +21,15 @@ from bridges.commands.faults import Remedy, remedies
 from bridges.commands.paint import bold, red
 from bridges.rmf.words import printable
 from bridges.serve import directory
-from bridges.serve.places import SERVICE_RUN, Places, owner_of, runtimes
+from bridges.serve.places import (
+    SERVICE_RUN,
+    SERVICE_STATE,
+    Places,
+    owner_of,
+    runtimes,
+    state_base,
+)
+from bridges.serve.record import paths, read
 from bridges.serve.subject import Status
 
 OLD_AFTER_S: Final = 5.0
@@ -35,6 +43,7 @@ LEVEL_OF: Final = {
     "serving": WELL,
     "old": DOWN,
     "died": DOWN,
+    "left on": DOWN,
     "failed": DOWN,
     "unknown": NONE,
     "stopped": WELL,
@@ -67,8 +76,9 @@ class Told(msgspec.Struct):
 class Daemon(msgspec.Struct, kw_only=True):
     """One daemon, or a unit without one.
 
-    `state`: `serving`; `old`: it writes no status any more; `died` without tidying up; `failed`:
-    systemd has given up; `stopped`; `unknown`: this user may not see it. `unit`: what systemd says.
+    `state`: `serving`; `old`: it writes no status any more; `died` without tidying up; `left on`: it
+    died with outputs that nobody has verified off; `failed`: systemd has given up; `stopped`;
+    `unknown`: this user may not see it. `unit`: what systemd says.
     """
 
     name: str
@@ -145,9 +155,18 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> Daemon:
         one.state = "serving" if fresh else "old"
     elif status:
         one.state = "died"
+    elif _unreleased(folder):
+        one.state = "left on"
     elif unit.startswith("failed"):
         one.state = "failed"
     return one
+
+
+def _unreleased(folder: Path) -> bool:
+    """Does a record there name outputs of a dead daemon that nobody has verified off?"""
+    state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
+    found = map(read, paths(Places(folder, state / folder.name)))
+    return any(record is not None for record in found)
 
 
 def _without_directory(unit: str) -> str:
@@ -214,7 +233,7 @@ def _serving(one: Daemon, known: Mapping[str, Remedy], out: TextIO) -> Iterator[
         yield f"  {topic}: " + ("nobody sends" if not nodes else f"from {_nodes(nodes)}")
     yield from _fault_lines(one.status, known, out)
     for name, device in one.devices.items():
-        yield f"  {printable(name)}: {_told(device)}; {_age(device)}"
+        yield f"  {printable(name)}: {_told(device)}; {_age(device, one.age_s or 0.0)}"
         yield from _fault_lines(device, known, out)
 
 
@@ -227,8 +246,13 @@ def _state(one: Daemon) -> str:
                 else f"silent for {one.age_s:.0f} s"
             )
             return f"runs, but {age}"
+        case "died" if one.status.get("simulated"):
+            return "has died"
         case "died":
-            return "has died; its next start tidies up, or `rmf-bridge outputs-off FILE`"
+            file = one.status.get("file") or "FILE"
+            return f"has died; its next start tidies up, or `rmf-bridge outputs-off {file}`"
+        case "left on":
+            return "has died, and its outputs were not verified off: see its log"
         case "unknown":
             return "cannot be seen"
         case "serving" if one.status.get("passive"):
@@ -243,9 +267,10 @@ def _told(device: Status) -> str:
     return printable(shown) or "nothing to tell"
 
 
-def _age(device: Status) -> str:
+def _age(device: Status, snapshot_s: float) -> str:
+    """Counted from now: the status file itself is up to a second old."""
     age_s = device.get("input_age_s")
-    return "never read" if age_s is None else f"read {age_s:.1f} s ago"
+    return "never read" if age_s is None else f"read {age_s + snapshot_s:.1f} s ago"
 
 
 def _nodes(count: int) -> str:

@@ -135,7 +135,9 @@ def _walk(
 
 def _record_path(args: argparse.Namespace, device: str) -> Path:
     day = datetime.now().strftime("%Y-%m-%d-%H%M")
-    return args.record or Path(f"walk-{device.replace('/', '_')}-{day}")
+    return args.record or Path(
+        f"{'practice' if args.simulate else 'walk'}-{device.replace('/', '_')}-{day}"
+    )
 
 
 def _on(args: argparse.Namespace, config: Config, device: str, bus: Bus, end: signals.End) -> int:
@@ -167,6 +169,7 @@ def _on(args: argparse.Namespace, config: Config, device: str, bus: Bus, end: si
                 steps=tried,
                 memory=bench.memory,
                 end=how,
+                simulated=args.simulate,
             ),
         )
 

@@ -172,6 +172,15 @@ def test_a_floor_that_is_not_served_fails_at_once_with_the_nearest_name() -> Non
     )
 
 
+def test_where_a_robot_may_be_in_the_car_the_remedy_asks_to_look_into_it() -> None:
+    held = Heard(replace(LIFT, session_id=OTHER, current_mode=d.LiftMode(2)), 1.0)
+    seen = replace(Seen(0.0, 10.0), states=(held,), boarded="yes")
+    assert next(iter(RIDE.obstacles(seen))).remedy == (
+        "a robot may be in the car; if it is empty:"
+        " rmf-bridge release Lift1 --car-empty --direct --localhost"
+    )
+
+
 @pytest.mark.parametrize(
     ("state", "reason"),
     [

@@ -113,6 +113,7 @@ def test_a_file_that_is_there_is_never_overwritten(tmp_path: Path) -> None:
         ("--kind lift --signals fire --yes", "a lift has no input fire; there are fire_alarm"),
         ("--kind door --unit 0 --yes", "unit is '0': write a whole number from 1 to 247"),
         ("--kind door --domain-id x --yes", "domain_id is 'x': write a whole number from 0 to 232"),
+        ("--kind charger --wiring http --address x_y!:z --yes", "with these answers check would"),
         ("--kind door --name= --yes", "'' is no name for a door"),
     ],
 )
@@ -138,7 +139,7 @@ def test_on_a_terminal_it_asks_one_thing_after_the_other(tmp_path: Path) -> None
     terminal.wait_for("What is it?")
     terminal.type("\x1b[B\r")  # down: door
     terminal.wait_for("Its name on RMF's map?")
-    terminal.type("\x15ward\r")  # clears what is offered
+    terminal.type("ward\r")
     terminal.wait_for("How is it wired?")
     terminal.type("\r")
     terminal.wait_for("Its host")

@@ -15,6 +15,9 @@ import pytest
 from bridges import cli
 from bridges.commands import faults
 from bridges.commands.status import DOWN, FAULTY, NONE, WELL, Daemon, daemons, show
+from bridges.serve.places import Places
+from bridges.serve.record import Records, of
+from bridges.settings.load import load
 
 ROOT = Path(__file__).parents[2]
 STUCK = {"code": "DOOR_OPENING_FAULT", "detail": "held, but not open after 8 s"}
@@ -108,6 +111,28 @@ def test_a_daemon_that_left_its_status_has_died(tmp_path: Path) -> None:
     found = seen(folder)
     assert [(one.state, one.level) for one in found] == [("died", DOWN)]
     assert len(shown(found)) == 1
+
+
+def test_the_age_of_a_reading_counts_from_now_not_from_the_status_file(tmp_path: Path) -> None:
+    with served(tmp_path / "lift_a", lift()) as folder:
+        assert shown(seen(folder, age_s=0.9))[-1] == "  Lift1: mode AGV, floor L1; read 0.9 s ago"
+
+
+def test_outputs_that_nobody_has_verified_off_are_told_when_the_status_is_gone(
+    tmp_path: Path,
+) -> None:
+    with served(tmp_path / "lift_a", lift()) as folder:
+        (folder / "status.json").unlink()
+    config = load(ROOT / "config" / "door_modbus.yaml")
+    Records(Places(folder, folder), config.path).write(of(config))
+    assert [(one.state, one.level) for one in seen(folder)] == [("left on", DOWN)]
+
+
+def test_of_a_dead_simulation_nothing_is_to_be_switched_off(tmp_path: Path) -> None:
+    with served(tmp_path / "lift_a", lift() | {"simulated": True}) as folder:
+        pass
+    (line,) = shown(seen(folder))
+    assert line.startswith("lift_a: has died SIMULATED (")
 
 
 def test_a_daemon_that_ended_well_has_left_only_its_lock(tmp_path: Path) -> None:

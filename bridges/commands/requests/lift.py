@@ -60,6 +60,12 @@ class LiftRide(_Lift):
         where = "" if self.granted_only else f" at {self.floor}, door open,"
         return Done(f"{self.name} is{where} held by {self.session}; to end that: {self._release}")
 
+    def _remedy(self, seen: Seen) -> str:
+        if seen.boarded != "yes":
+            return f"to end that session: {self._release}"
+        release = self.line.other("release", self.name, "--car-empty")
+        return f"a robot may be in the car; if it is empty: {release}"
+
     def _fulfilled(self, state: d.LiftState | None) -> bool:
         if state is None or state.session_id != self.session:
             return False
@@ -75,7 +81,7 @@ class LiftRide(_Lift):
             Obstacle(
                 session not in ("", self.session),
                 f"{name} is held by {session}",
-                f"to end that session: {self._release}",
+                self._remedy(seen),
             ),
             Obstacle(mode in SHUT_OUT, f"{name} serves no robot while its mode is {word}"),
             Obstacle(not session, f"{name} did not grant the session: its daemon's log says why"),

@@ -25,6 +25,7 @@ def told(
     steps: Sequence[Step],
     memory: Memory,
     end: str,
+    simulated: bool,
 ) -> dict[str, Any]:
     """The record. `at`: when the walk began. `end`: how it ended, or that it has not."""
     return {
@@ -32,6 +33,7 @@ def told(
         "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
         "version": __version__,
         "device": device,
+        "simulated": simulated,
         "by": by,
         "begun": at.isoformat(timespec="seconds"),
         "end": end,
@@ -57,8 +59,9 @@ def _seen(one: Input) -> str:
 
 def markdown(record: dict[str, Any]) -> str:
     """The record for people; it is signed below."""
+    practice = " on fake hardware: practice, no commissioning" if record["simulated"] else ""
     lines = [
-        f"# Walk of {record['device']}",
+        f"# Walk of {record['device']}{practice}",
         "",
         f"- file: `{record['file']}` (sha256 `{record['sha256']}`), rmf-bridges {record['version']}",
         f"- begun {record['begun']} by {record['by']}; {record['end']}",
@@ -71,8 +74,7 @@ def markdown(record: dict[str, Any]) -> str:
         "|---|---|---|",
         *(f"| {one['output']} | {one['expected']} | {one['seen']} |" for one in record["outputs"]),
         "",
-        "Signed:",
-        "",
+        *(() if record["simulated"] else ("Signed:", "")),
     ]
     return "\n".join(lines)
 
