@@ -184,9 +184,13 @@ class Laws:
         lied = any(group(wire) in SHOWN for wire in self._ills.lying(name, SETTLES_S))
         true_at = truth.open_at.get(state.current_floor, -NEVER)
         self.require(
-            lied or now - true_at <= SENSED_S,
+            lied or now - true_at <= self._sensed_s(name),
             f"{name} is OPEN at {state.current_floor}, which it is not",
         )
+
+    def _sensed_s(self, name: str) -> float:
+        """How long ago (s) a shown state was true at least: the last reading counts until it is stale."""
+        return STALE_S if self._ills.since(name, "bus") <= self._timeline.now else SENSED_S
 
     def _door_state(self, name: str, state: d.DoorState) -> None:
         mode = d.DoorModeValue(state.current_mode.value)
@@ -198,7 +202,7 @@ class Laws:
         stale = self._ills.since(name, "bus") + STALE_S < now
         self.require(not stale, f"{name} is OPEN though nobody can see it")
         lied = {"opened", "closed"} & set(self._ills.lying(name, SETTLES_S))
-        true = bool(lied) or now - self._doors[name] <= SENSED_S
+        true = bool(lied) or now - self._doors[name] <= self._sensed_s(name)
         self.require(true, f"{name} is OPEN, which it is not")
 
     def _charger_state(self, name: str, state: d.ChargerState) -> None:
