@@ -189,7 +189,7 @@ class Laws:
         )
 
     def _sensed_s(self, name: str) -> float:
-        """How long ago (s) a shown state was true at least: the last reading counts until it is stale."""
+        """How long ago (s) a shown state may have been true: a reading counts until it is stale."""
         return STALE_S if self._ills.since(name, "bus") <= self._timeline.now else SENSED_S
 
     def _door_state(self, name: str, state: d.DoorState) -> None:
