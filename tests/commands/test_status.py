@@ -1,12 +1,8 @@
 """`rmf-bridge status`: what it finds in runtime directories, its words and its exit codes."""
 
-import fcntl
 import io
 import json
-import os
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +14,7 @@ from bridges.commands.status import DOWN, FAULTY, NONE, WELL, Daemon, daemons, s
 from bridges.serve.places import Places
 from bridges.serve.record import Records, of
 from bridges.settings.load import load
+from tests.commands.runtime import served
 
 ROOT = Path(__file__).parents[2]
 STUCK = {"code": "DOOR_OPENING_FAULT", "detail": "held, but not open after 8 s"}
@@ -43,20 +40,6 @@ def lift(*found: dict[str, str]) -> dict[str, Any]:
             }
         },
     }
-
-
-@contextmanager
-def served(folder: Path, told: object) -> Iterator[Path]:
-    """A runtime directory whose lock a daemon holds."""
-    folder.mkdir()
-    (folder / "status.json").write_text(json.dumps(told))
-    lock = os.open(folder / "lock", os.O_RDWR | os.O_CREAT)
-    os.write(lock, json.dumps({"pid": 4711, "file": "x", "serves": True}).encode())
-    fcntl.flock(lock, fcntl.LOCK_EX)
-    try:
-        yield folder
-    finally:
-        os.close(lock)
 
 
 def seen(folder: Path, age_s: float = 0.0, units: dict[str, str] | None = None) -> list[Daemon]:

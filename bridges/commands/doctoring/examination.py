@@ -64,7 +64,8 @@ def examined(
     if asked.listen_s:
         from bridges.commands.doctoring.graph import Look, graph
 
-        look = Look(asked.localhost, asked.listen_s, now.serving, asked.ros_args)
+        loopback = asked.localhost or now.simulated
+        look = Look(loopback, asked.listen_s, now.serving, asked.ros_args)
         yield from graph(config, look)
     if asked.kill_test:
         yield from _killed(config, machine, places, now, asked)

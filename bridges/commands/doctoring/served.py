@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from bridges.commands.doctoring.finding import Finding, ok, warning, wrong
+from bridges.commands.doctoring.finding import Finding, note, ok, warning, wrong
 from bridges.commands.faults import remedies
 from bridges.commands.status import Daemon, daemons
 from bridges.serve import directory
@@ -24,12 +24,14 @@ NOT_ASKED: Final = "its buses are not asked, because a controller has one master
 class Served:
     """What is known of the daemon. `busy`: why its buses must not be opened; "" if they may be.
 
-    `serving`: a daemon serves this file; None where that cannot be seen.
+    `serving`: a daemon serves this file; None where that cannot be seen. `simulated`: on fake hardware,
+    and on loopback.
     """
 
     findings: list[Finding] = field(default_factory=list)
     busy: str = ""
     serving: bool | None = False
+    simulated: bool = False
 
 
 def served(places: Places, file: Path, wall: float) -> Served:
@@ -44,7 +46,8 @@ def served(places: Places, file: Path, wall: float) -> Served:
         found = f"{holder} uses it: walk, outputs-off or another doctor"
         return Served([warning(DAEMON, found, NOT_ASKED, "wait until it has ended")], found)
     one = next(daemons([places.runtime], {}, wall))
-    return Served(list(_told(one)), f"process {holder.pid} serves it", True)
+    busy, simulated = f"process {holder.pid} serves it", bool(one.status.get("simulated"))
+    return Served(list(_told(one)), busy, True, simulated)
 
 
 def unseen(why: str) -> Served:
@@ -68,7 +71,11 @@ def _told(one: Daemon) -> Iterator[Finding]:
     else:
         version = one.status.get("version", "?")
         yield ok(DAEMON, f"it serves this file, version {version}; {NOT_ASKED}")
-    yield from _listeners(one.status)
+    if one.status.get("simulated"):
+        means = "no hardware moves; what is said of pins and ports holds for a real device"
+        yield note(DAEMON, "it is a SIMULATION", means, "run it without --simulate on the Pi")
+    else:
+        yield from _listeners(one.status)
     yield from _faults("", one.status)
     for name, device in one.devices.items():
         age_s = device.get("input_age_s")

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Any
 import pytest
 
 from bridges import cli
+from bridges.commands.doctoring.served import served
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorState, Time
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
 from bridges.serve import record
@@ -21,6 +23,7 @@ from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.settings.load import load
 from hal_fakes.wire import join
+from tests.commands import runtime
 from tests.commands.terminal import Terminal
 from tests.serve.site import Module, command, daemon, environment
 from tests.waiting import PATIENCE_S, wait_until
@@ -400,3 +403,13 @@ def test_a_name_that_is_not_on_the_map_is_wrong(module: Module, tmp_path: Path) 
     assert code == 2
     ((level, text),) = [one for one in found["file"] if one[0] not in ("ok", "note")]
     assert (level, "ward_door" in text) == ("wrong", True)
+
+
+def test_a_simulation_is_named_and_looked_for_on_loopback(tmp_path: Path) -> None:
+    told = {"simulated": True, "version": "1", "heard_by": {"lift_states": 0}, "devices": {}}
+    with runtime.served(tmp_path / "lift_a", told) as folder:
+        found = served(Places(folder, folder), tmp_path / "lift_a.yaml", time.time())
+    assert found.simulated
+    assert [(one.level, one.found) for one in found.findings][1:] == [
+        ("note", "it is a SIMULATION")
+    ]
