@@ -7,7 +7,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, get_args
@@ -266,12 +266,10 @@ def write(path: Path, text: str) -> None:
 
 
 def _schema_line() -> str:
-    """The line by which an editor completes and checks the file; "" if the schema cannot be kept."""
-    return "".join(f"# yaml-language-server: $schema={path}\n" for path in _installed_schema())
+    """The line by which an editor completes and checks the file; "" if the schema cannot be kept.
 
-
-def _installed_schema() -> Iterator[Path]:
-    """The schema of this version, kept among the user's data."""
+    The schema of this version is kept among the user's data.
+    """
     from bridges.settings.reference import schema
 
     base = os.environ.get("XDG_DATA_HOME") or os.path.expanduser("~/.local/share")
@@ -280,5 +278,5 @@ def _installed_schema() -> Iterator[Path]:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(schema()), encoding="utf-8")
     except OSError:
-        return
-    yield path
+        return ""
+    return f"# yaml-language-server: $schema={path}\n"

@@ -9,6 +9,7 @@ import argparse
 import getpass
 import importlib.util
 import logging
+import os
 import sys
 import time
 from contextlib import ExitStack
@@ -21,7 +22,7 @@ from bridges.serve import guard, places, record, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import Bus, HalError
 
-EX_USAGE, EX_UNAVAILABLE, EX_CONFIG = 64, 69, 78
+NOT_OFF, EX_USAGE, EX_UNAVAILABLE, EX_CONFIG = 1, 64, 69, 78
 DRAW_S = 0.05
 
 
@@ -43,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: done, all off; 1: not verified off; 64: no terminal; 69: the device is in use; 78: YAML."""
+    """0: all off; 1: not verified off; 64: no terminal; 69: in use; 73: no record; 78: the YAML."""
     log.start("WARNING")
     if why := _no_screen():
         print(why, file=sys.stderr)
@@ -112,22 +113,19 @@ def _walk(
         print(f"a dead daemon may have left outputs on: rmf-bridge outputs-off {args.file}")
         return EX_UNAVAILABLE
     with ExitStack() as stack:
-        bus_name = next(name for name in config.buses if device in config.devices_on(name))
+        bus_name = config.bus_of(device)
+        path = _record_path(args, device).absolute()
         if args.simulate:
             from hal_fakes.simulate import Simulation
 
             simulation = Simulation(config, held.path)
             stack.callback(simulation.close)
-            bus = simulation.open_bus(bus_name)
-            return _on(args, config, device, bus, end)
-        ours = record.of(config)
-        held.claim(ours)
+            return _on(args, config, device, simulation.open_bus(bus_name), path, end)
+        held.claim(record.of(config))
         watching = guard.Guard(guard.command(args.file, args.runtime_dir))
-        path = _record_path(args, device).absolute()
-        args.record = path
         places.work_somewhere(held.places)
-        code = _on(args, config, device, config.open_bus(bus_name), end)
-        if code == 0:
+        code = _on(args, config, device, config.open_bus(bus_name), path, end)
+        if code != NOT_OFF:
             held.released()
             watching.dismiss()
         return code
@@ -140,7 +138,9 @@ def _record_path(args: argparse.Namespace, device: str) -> Path:
     )
 
 
-def _on(args: argparse.Namespace, config: Config, device: str, bus: Bus, end: signals.End) -> int:
+def _on(
+    args: argparse.Namespace, config: Config, device: str, bus: Bus, path: Path, end: signals.End
+) -> int:
     from bridges.commands.walking import signed
     from bridges.commands.walking.bench import Bench, Input
     from bridges.commands.walking.screen import Screen, keyboard, keys
@@ -149,12 +149,11 @@ def _on(args: argparse.Namespace, config: Config, device: str, bus: Bus, end: si
 
     settings, driver_type = config.devices[device], config.driver_type(device)
     tap = Tap(bus)
-    wires = list(driver_type.wires(settings))
+    wires = config.wires(device)
     inputs = [Input(w, tap.canonical(w.point)) for w in wires if w.direction == "in"]
-    wired = {w.signal for w in wires if w.direction == "out"} if wires else None
-    tried = steps(config.kind, settings, wired)
+    tried = steps(config, device)
     bench = Bench(driver_type.create(device, settings, tap), tap, inputs, tried, OFF[config.kind])
-    path, file, begun = _record_path(args, device).absolute(), args.file.absolute(), datetime.now()
+    file, begun = args.file.absolute(), datetime.now()
     by = args.by or getpass.getuser()
 
     def note(how: str) -> None:
@@ -188,9 +187,13 @@ def _on(args: argparse.Namespace, config: Config, device: str, bus: Bus, end: si
         how = f"interrupted: {error.strerror}"  # the terminal has gone
     finally:
         off = "every output verified off" if bench.verified_off else "outputs NOT verified off"
-        note(f"{how}; {off}")
         bus.close()
-    print(f"{off}. Record: {path}.md and .json")
+    code, told = 0, f"{path}.md and .json"
+    try:
+        note(f"{how}; {off}")
+    except OSError as error:
+        code, told = os.EX_CANTCREAT, f"not written: {error}"
+    print(f"{off}. Record: {told}")
     if not bench.verified_off:
         logging.error("cut the relays' supply before working on the device")
-    return 0 if bench.verified_off else 1
+    return code if bench.verified_off else NOT_OFF

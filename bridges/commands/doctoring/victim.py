@@ -60,10 +60,7 @@ def _held(
 
 def step_called(config: Config, device: str, name: str | None) -> Step | None:
     """The output of this name; the first one by default, None if there is no such."""
-    wires = config.wires(device)
-    wired = {wire.signal for wire in wires if wire.direction == "out"} if wires else None
-    found = steps(config.kind, config.devices[device], wired)
-    return next((step for step in found if name in (None, step.name)), None)
+    return next((step for step in steps(config, device) if name in (None, step.name)), None)
 
 
 def _on_for_a_while(driver: Driver[Any, Any], bus: Bus, step: Step | None) -> bool:

@@ -8,6 +8,7 @@ from bridges.commands.walking.core import Step
 from bridges.door.signals import DoorOutputs, DoorSample
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side
+from bridges.settings.load import Config
 
 Wired = Collection[str] | None
 """The names of the output lines; None where the driver has no lines."""
@@ -111,6 +112,8 @@ KINDS: Final[dict[str, Callable[[Any, Wired], Iterator[Step]]]] = {
 OFF: Final = {"lift": LiftOutputs(), "door": DoorOutputs(), "charger": ChargerOutputs(power=False)}
 
 
-def steps(kind: str, settings: Any, wired: Wired) -> list[Step]:
+def steps(config: Config, device: str) -> list[Step]:
     """Every output of a device, in the order in which they are tried."""
-    return list(KINDS[kind](settings, wired))
+    wires = config.wires(device)
+    wired = {wire.signal for wire in wires if wire.direction == "out"} if wires else None
+    return list(KINDS[config.kind](config.devices[device], wired))

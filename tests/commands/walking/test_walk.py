@@ -82,6 +82,17 @@ def test_it_refuses_a_device_that_is_served(module: Module, tmp_path: Path) -> N
         assert terminal.end() == 69
 
 
+def test_a_record_that_cannot_be_written_ends_the_walk_before_anything_is_switched(
+    module: Module, tmp_path: Path
+) -> None:
+    (tmp_path / "record").write_text("a file, not a directory")
+    words = ("--runtime-dir", tmp_path / "run", "--record", tmp_path / "record" / "of")
+    terminal = Terminal("walk", module.file, *words, environ=environment())
+    terminal.wait_for("every output verified off. Record: not written")
+    assert terminal.end() == os.EX_CANTCREAT
+    assert module.relay() == []
+
+
 def test_without_a_terminal_it_switches_nothing(
     module: Module, capsys: pytest.CaptureFixture[str]
 ) -> None:
