@@ -1,0 +1,23 @@
+"""One message of RMF's graph, as everything that looks at a graph or a recording gets it.
+
+A live graph and every kind of recording give the same values in the same order, so what judges,
+explains or draws does not know where they come from.
+"""
+
+from dataclasses import dataclass
+
+from bridges.rmf.definitions import Message
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A message, its topic's ROS name, and when it arrived.
+
+    `at`: s on a clock that never steps; its zero means nothing. `wall`: s since the epoch, as the
+    clock of the listening machine said it, so that stamps can be compared with it.
+    """
+
+    at: float
+    wall: float
+    topic: str
+    message: Message
