@@ -318,8 +318,9 @@ class PadPlant(Machine):
         self._coil_c, self._coil_at = self._warmth(), self.now
 
     def _trips_at(self) -> float:
+        """When it becomes too hot, or cool enough again."""
         goal = self._tends_to_c()
-        if goal <= TRIP_C or self._coil_c >= TRIP_C:
+        if (goal > TRIP_C) == (self._coil_c >= TRIP_C):
             return NEVER
         rest = (goal - TRIP_C) / (goal - self._coil_c)
         return self._coil_at - WARMS_IN_S * math.log(rest) + 1e-6

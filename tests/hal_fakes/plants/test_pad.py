@@ -95,6 +95,17 @@ def test_a_part_that_fails_ends_in_its_error(failure: tuple[str, FailureMode], s
     assert (reading.activity, reading.faults) == (Activity.ERROR, frozenset({shown}))
 
 
+def test_a_pad_that_is_too_hot_says_when_it_will_have_cooled_and_is_well_then() -> None:
+    plant = parked(("fan", "off"))
+    at(plant, 3.0)
+    hot_at = plant.next_at()
+    shown = [at(plant, hot_at).activity]
+    plant.drive("enable", False, hot_at)
+    shown += [plant.reading().activity, at(plant, plant.next_at()).activity]
+    assert shown == [Activity.ERROR, Activity.ERROR, Activity.IDLE]
+    assert plant.next_at() == float("inf")
+
+
 @pytest.mark.parametrize("mode", ["off", "stuck", "slow", "garbage", "wrong"])
 def test_a_thermometer_that_fails_lets_nobody_charge(mode: FailureMode) -> None:
     assert states(parked(("thermometer", mode)), 60.0) == []
