@@ -90,10 +90,14 @@ class World:
 
     def finds_again(self, robot: Robot, apart_s: float = 0.02) -> None:
         """The supervisor finds an adapter again that was cut off, and hears what it has retained."""
-        for request in self._history[robot.requester_id][-REPLAYED:]:
+        for request in self.asked_by(robot):
             self._deliver(self.supervisor.hear(request, self._now))
             self._arrive()
             self.run(self.story.now + apart_s)
+
+    def asked_by(self, robot: Robot) -> list[LiftRequest]:
+        """What its adapter has retained."""
+        return self._history[robot.requester_id][-REPLAYED:]
 
     def restart_adapter(self, robot: Robot) -> Robot:
         """A new fleet adapter for the same robot, which has no task and holds no lift."""
