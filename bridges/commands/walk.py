@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         held = runtime.RuntimeDirectory(_places(args), file, serves=False)
     except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
-        print(f"{error}: stop it first, a device has one master", file=sys.stderr)
+        print(f"walk needs the device for itself: {error}", file=sys.stderr)
         return EX_UNAVAILABLE
     try:
         return _walk(args, config, device, held, end)
