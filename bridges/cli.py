@@ -62,7 +62,7 @@ COMMANDS = {
     "log": ("show the log of a device's service", "log my_lift.yaml --follow --event fault"),
     "completion": (
         "print the completion script for bash, zsh or fish",
-        "completion bash > /etc/bash_completion.d/rmf",
+        "completion fish > ~/.config/fish/completions/rmf-bridge.fish",
     ),
     "outputs-off": (
         "switch off every output of a device whose daemon is dead",

@@ -2,6 +2,7 @@
 
 import argparse
 
+from bridges.commands.completion import completed_by
 from bridges.commands.plants import add_simulation, names, obey, tell
 
 MODES = ("off", "stuck", "slow", "garbage", "wrong", "ok")
@@ -16,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         help="a signal of the file, or a part such as car; without one: print what there is",
     )
-    part.completer = names("fail")  # type: ignore[attr-defined]  # argcomplete's way
+    completed_by(part, names("fail"))
     parser.add_argument("mode", nargs="?", choices=MODES, help="how it fails; ok mends it")
     parser.set_defaults(usage=parser.error)
 

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import NoReturn
 
+from bridges.commands.completion import completed_by, device_names, service_names
 from bridges.commands.services import CONFIG
 from bridges.commands.status import daemons, units
 from bridges.log import pairs
@@ -19,11 +20,15 @@ ETC = Path("/") / CONFIG
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `log`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML, or its name")
+    file = parser.add_argument(
+        "file", type=Path, metavar="FILE", help="the device YAML, or its service's name"
+    )
+    completed_by(file, service_names)
     parser.add_argument("-f", "--follow", action="store_true", help="go on with what comes")
     parser.add_argument("-n", "--lines", type=int, default=100, metavar="N", help="default: 100")
     parser.add_argument("--since", metavar="TIME", help="such as today, '1 hour ago', '09:30'")
-    parser.add_argument("--device", metavar="NAME", help="only what is about this device")
+    device = parser.add_argument("--device", metavar="NAME", help="only what is about this device")
+    completed_by(device, device_names)
     parser.add_argument("--event", metavar="WORD", help="only this event: state, fault, refused …")
     parser.add_argument("--json", action="store_true", help="the journal's JSON, a line each")
 

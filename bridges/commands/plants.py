@@ -5,22 +5,23 @@ import json
 import shlex
 import socket
 import sys
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from bridges.commands.completion import Completer, completed_by, device_names
 from bridges.serve.places import as_told, by_hand
 
 EX_UNAVAILABLE = 69
 ANSWER_S = 5.0
-Completer = Callable[..., list[str]]
-"""As argcomplete calls it: with the prefix and what was typed so far."""
 
 
 def add_simulation(parser: argparse.ArgumentParser) -> None:
     """The options that name a simulation and one of its devices."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the YAML that is simulated")
-    parser.add_argument("--device", metavar="NAME", help="which device, if the file has several")
+    device = parser.add_argument(
+        "--device", metavar="NAME", help="which device, if the file has several"
+    )
+    completed_by(device, device_names)
     parser.add_argument("--runtime-dir", metavar="DIR", help="the simulation's runtime directory")
 
 

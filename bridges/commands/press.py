@@ -2,6 +2,7 @@
 
 import argparse
 
+from bridges.commands.completion import completed_by
 from bridges.commands.plants import add_simulation, names, obey, tell
 
 
@@ -11,7 +12,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     signal = parser.add_argument(
         "signal", metavar="SIGNAL", nargs="?", help="without one: print what there is"
     )
-    signal.completer = names("press")  # type: ignore[attr-defined]  # argcomplete's way
+    completed_by(signal, names("press"))
     parser.add_argument("how", nargs="?", choices=("on", "off"), default="on", help="default: on")
 
 
