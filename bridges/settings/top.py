@@ -9,7 +9,8 @@ from bridges.core.graph_kind import AnyKind, GraphKind
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.nodes import either
-from bridges.settings.values import BROKEN, Entry, Values
+from bridges.settings.spots import Entry
+from bridges.settings.values import BROKEN, Values
 from drivers.driver_type import AnyDriver
 
 MAPPING: Final = "a mapping (key: value)"
