@@ -13,10 +13,10 @@ MOST_SPANS: Final = 2000
 NOT_HEARD: Final = "not heard"
 
 
-def label(text: str) -> str:
+def label(text: str, longest: int = LONGEST_LABEL) -> str:
     """A text from the network as a label: one line, not too long."""
-    shown = words.printable(text[:LONGEST_LABEL])
-    return shown if len(shown) <= LONGEST_LABEL else shown[: LONGEST_LABEL - 1] + "…"
+    shown = words.printable(text[: longest + 1])
+    return shown if len(shown) <= longest else shown[: longest - 1] + "…"
 
 
 class Row:

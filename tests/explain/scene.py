@@ -112,8 +112,9 @@ class Scene:
             daemon.start()
         self._supervise(rmf)
         self._second()
-        self.run(6.0)  # what supervisors listen for before they speak
+        self.run(4.0)  # supervisors listen before they speak
         self.heard.clear()
+        self.run(2.0)
 
     def robot(self, name: str) -> Guest:
         """A robot of this name, FLEET/ROBOT."""
