@@ -117,9 +117,13 @@ class DeviceDaemon:
         """Something has happened to the plant: see it, at once or at the next poll."""
         self._timeline.after(self.device.poll_s, self.scan)
 
+    def status(self) -> Status:
+        """As the status file has it."""
+        return self._node.status()
+
     def faults(self) -> list[str]:
         """What it says is wrong."""
-        return [fault["code"] for fault in self._node.status()["faults"]] if self.alive else []
+        return [fault["code"] for fault in self.status()["faults"]] if self.alive else []
 
     def _edge(self, edge: Edge) -> None:
         """Of the plant, whose own record is not needed."""
