@@ -7,9 +7,6 @@ from collections.abc import Sequence
 from random import Random
 from typing import Any
 
-from hal_fakes.rmf.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from hal_fakes.rmf.robot import Phase, Robot
-
 from bridges.charger_coordinator import KIND as COORDINATOR
 from bridges.core.graph_kind import AnyGraphKind
 from bridges.door_supervisor import KIND as DOOR_SUPERVISOR
@@ -19,6 +16,8 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import Topic
+from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Phase, Robot
 from bridges.serve import diagnostics
 from tests.site import charging
 from tests.site.building import CHARGERS, devices
