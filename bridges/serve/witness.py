@@ -348,7 +348,7 @@ def _step_of(
         now,
         name,
         tree(event),
-        decision.wake_at,
+        tree(decision.wake_at),
         decision.refused,
         [] if decision.outputs == subject.outputs else [tree(decision.outputs)],
         [] if news == subject.news else [tree(news)],
