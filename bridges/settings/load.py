@@ -36,8 +36,9 @@ from bridges.settings.nodes import (
     unknown,
 )
 from bridges.settings.plausible import milliseconds, out_of_step
+from bridges.settings.spots import Entry, Spot, below, is_none, locate
 from bridges.settings.top import MAPPING, keys_below, top_keys, word
-from bridges.settings.values import BROKEN, Broken, Entry, Spot, Values, below, is_none, locate
+from bridges.settings.values import BROKEN, Broken, Values
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
 from drivers.driver_type import AnyDriver
 from drivers.hal.points import Wire

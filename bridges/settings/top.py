@@ -10,7 +10,8 @@ from bridges.recording.settings import Recording
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.nodes import either
-from bridges.settings.values import BROKEN, Entry, Values
+from bridges.settings.spots import Entry
+from bridges.settings.values import BROKEN, Values
 from drivers.driver_type import AnyDriver
 
 MAPPING: Final = "a mapping (key: value)"
