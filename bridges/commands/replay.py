@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
+from dataclasses import asdict
 from datetime import datetime
 from itertools import islice
 from pathlib import Path
@@ -94,17 +95,7 @@ def _as_json(
         "decisions": course.decisions,
         "not_replayed": course.unusable,
         "damage": notes.damage,
-        "differences": [
-            {
-                "subject": one.subject,
-                "at": one.wall,
-                "what": one.what,
-                "recorded": one.recorded,
-                "today": one.today,
-                "before": [{"at": at, "event": words} for at, words in one.before],
-            }
-            for one in differences
-        ],
+        "differences": [asdict(one) for one in differences],
     }
 
 

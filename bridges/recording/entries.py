@@ -55,13 +55,14 @@ class Spoken(Entry, frozen=True, tag_field="is", tag=1):
 
 class Known(Entry, frozen=True, tag_field="is", tag=2):
     """All that is to be known of a subject to go on from here: its memory, the last reading, and what
-    was last decided; None before the first."""
+    was last decided; None before the first. `anew`: the memory is not what the last decision left."""
 
     subject: str
     memory: Tree
     reading: Tree
     outputs: Tree
     report: Tree
+    anew: bool = False
 
 
 class Step(Entry, frozen=True, tag_field="is", tag=3):

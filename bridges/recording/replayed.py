@@ -243,7 +243,7 @@ class Replay:
     def _known(self, entry: Known, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
         """Begin a subject's course, or compare the memory that it has come to."""
         name = entry.subject
-        if name not in self._subjects:
+        if entry.anew or name not in self._subjects:
             core = self._cores.of(name)
             self._subjects[name] = _Subject(core, entry) if core else None
             self.course.subjects |= {name} if core else set()
