@@ -64,6 +64,10 @@ COMMANDS = {
         "make a recording of a daemon's last minutes, for whoever looks into it",
         'incident my_lift.yaml --note "the robot waits before an open door"',
     ),
+    "recorder": (
+        "make recordings of this machine's daemons when something goes wrong",
+        "recorder --output /var/lib/rmf-bridge-recorder",
+    ),
     "replay": (
         "let today's core decide again on what was recorded, and compare",
         "replay my_lift_2026-11-22_10-00-00.mcap --config other.yaml",
