@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import shlex
 import socket
 import sys
@@ -11,7 +12,6 @@ from pathlib import Path
 
 from bridges.serve.places import as_told, by_hand
 
-EX_UNAVAILABLE = 69
 ANSWER_S = 5.0
 Completer = Callable[..., list[str]]
 """As argcomplete calls it: with the prefix and what was typed so far."""
@@ -48,12 +48,19 @@ def _folder(args: argparse.Namespace) -> Path:
 
 
 def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
-    """Send one command. 0; 1 if the simulation refuses it; 69 if there is none."""
+    """Send one command. 0; 1 if the simulation refuses it; 64, 69, 78: no device, simulation, YAML."""
+    from bridges.commands.by_hand import NoDevice, device_of
+    from bridges.settings.load import SettingsError, load
+
     try:
-        answers = [_ask(path, [verb, *_device(args), *words]) for path in _sockets(args)]
+        device = args.device or device_of(load(args.file), None)
+        answers = [_ask(path, [verb, device, *words]) for path in _sockets(args)]
+    except (NoDevice, SettingsError) as error:
+        print(error, file=sys.stderr)
+        return os.EX_USAGE if isinstance(error, NoDevice) else os.EX_CONFIG
     except OSError as error:
         print(f"the simulation of {args.file} does not answer: {error}", file=sys.stderr)
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     if "ok" in answers:
         return 0
     if not answers:
@@ -62,22 +69,10 @@ def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
             f" Start one with rmf-bridge run {args.file} --simulate",
             file=sys.stderr,
         )
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     known = [one for one in answers if "no device" not in one] or answers
     print("\n".join(one.removeprefix("error ") for one in known), file=sys.stderr)
     return 1
-
-
-def _device(args: argparse.Namespace) -> list[str]:
-    """The device's name; the file's only one if none is given."""
-    if args.device:
-        return [args.device]
-    from bridges.settings.load import load
-
-    devices = list(load(args.file).devices)
-    if len(devices) > 1:
-        raise SystemExit(f"--device is needed: {args.file} has {', '.join(devices)}")
-    return devices
 
 
 def _ask(path: Path, words: list[str]) -> str:

@@ -124,7 +124,7 @@ class Daemon:
             log.critical(pairs("died", transport=self._transport.name))
         elif all(loop.alive for loop in self._loops):
             return
-        raise SystemExit(70)
+        raise SystemExit(os.EX_SOFTWARE)
 
     def _shut_down(self) -> bool:
         self._convenience("sd_notify", partial(notify, "STOPPING=1"))
