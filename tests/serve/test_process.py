@@ -27,13 +27,6 @@ def module(domain: int, request: pytest.FixtureRequest, tmp_path: Path) -> Itera
     standing.close()
 
 
-@pytest.fixture
-def graph(module: Module) -> Iterator[Graph]:
-    joined = Graph(module.domain)
-    yield joined
-    joined.transport.close()
-
-
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_releases_the_relay_and_leaves_the_graph_at_once(
     module: Module, graph: Graph, tmp_path: Path, number: signal.Signals

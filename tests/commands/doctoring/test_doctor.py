@@ -33,13 +33,6 @@ READS = {1, 2, 3, 4}
 """Modbus functions that change nothing."""
 
 
-@pytest.fixture
-def module(domain: int, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, domain)
-    yield standing
-    standing.close()
-
-
 def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, list[Any]]]:
     """The exit code, and the findings of each subject: (level, found)."""
     words: list[str | Path] = ["doctor", file, "--json", "--runtime-dir", tmp_path / "run"]

@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,13 +11,6 @@ from bridges import cli
 from tests.commands.terminal import Terminal
 from tests.serve.site import Module, daemon, environment
 from tests.waiting import wait_until
-
-
-@pytest.fixture
-def module(domain: int, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, domain)
-    yield standing
-    standing.close()
 
 
 def walk(module: Module, tmp_path: Path) -> Terminal:
