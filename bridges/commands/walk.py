@@ -18,6 +18,7 @@ from pathlib import Path
 
 from bridges import log
 from bridges.commands.by_hand import NoDevice, device_of, guarded
+from bridges.commands.completion import completed_by, device_names
 from bridges.serve import directory as runtime
 from bridges.serve import guard, places, signals
 from bridges.settings.load import Config, SettingsError, load
@@ -30,7 +31,10 @@ DRAW_S = 0.05
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `walk`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
-    parser.add_argument("--device", metavar="NAME", help="which device, if the file has several")
+    device = parser.add_argument(
+        "--device", metavar="NAME", help="which device, if the file has several"
+    )
+    completed_by(device, device_names)
     parser.add_argument(
         "--by", metavar="NAME", help="who does it, for the record (default: the user)"
     )
@@ -65,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         held = runtime.RuntimeDirectory(_places(args), file, serves=False)
     except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
-        print(f"{error}: stop it first, a device has one master", file=sys.stderr)
+        print(f"walk needs the device for itself: {error}", file=sys.stderr)
         return os.EX_UNAVAILABLE
     try:
         return _walk(args, config, device, held, end)

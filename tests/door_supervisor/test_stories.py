@@ -3,7 +3,7 @@
 from bridges.door_supervisor import keep
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
-from hal_fakes.rmf import NEVER, door_request
+from bridges.rmf_rules import NEVER, door_request
 from tests.door_supervisor.world import (
     WARD,
     DoorDaemon,

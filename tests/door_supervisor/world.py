@@ -12,9 +12,9 @@ from bridges.door_supervisor.settings import Settings
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
-from hal_fakes.rmf.phases import DoorClose, DoorOpen
-from hal_fakes.rmf.robot import Phase, Robot
-from hal_fakes.rmf.supervisors import DoorSupervisor
+from bridges.rmf_rules.phases import DoorClose, DoorOpen
+from bridges.rmf_rules.robot import Phase, Robot
+from bridges.rmf_rules.supervisors import DoorSupervisor
 from tests.door.virtual import SCAN_S, Door
 from tests.serve.virtual_graph import EPOCH, NEVER, Disk, Served, StandIn, World, say
 

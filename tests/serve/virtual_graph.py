@@ -16,10 +16,10 @@ from bridges.rmf.definitions import Message
 from bridges.rmf.releases import NEWEST
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Subscription
+from bridges.rmf_rules import Party as RmfParty
+from bridges.rmf_rules import Said
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
-from hal_fakes.rmf import Party as RmfParty
-from hal_fakes.rmf import Said
 
 EPOCH = 2.0**30
 """Wall time when the world's clock shows 0; a power of two, so that sums of times stay exact."""

@@ -16,12 +16,12 @@ from bridges.core.graph_kind import AnyGraphKind
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
 from bridges.rmf.transport import Publisher
+from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
 from bridges.serve.clock import Clock
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
 from bridges.serve.subject import Status
 from hal_fakes.plants.plant import Edge
-from hal_fakes.rmf.supervisors import DoorSupervisor, LiftSupervisor
 from tests.serve.virtual_graph import Disk
 from tests.site.building import Device
 from tests.site.network import Air, Place
@@ -118,9 +118,13 @@ class DeviceDaemon:
         """Something has happened to the plant: see it, at once or at the next poll."""
         self._timeline.after(self.device.poll_s, self.scan)
 
+    def status(self) -> Status:
+        """As the status file has it."""
+        return self._node.status()
+
     def faults(self) -> list[str]:
         """What it says is wrong."""
-        return [fault["code"] for fault in self._node.status()["faults"]] if self.alive else []
+        return [fault["code"] for fault in self.status()["faults"]] if self.alive else []
 
     def _edge(self, edge: Edge) -> None:
         """Of the plant, whose own record is not needed."""
