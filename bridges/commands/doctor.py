@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final, TextIO
 import msgspec
 
 from bridges import log
+from bridges.commands.by_hand import NoDevice, device_of
 from bridges.commands.completion import completed_by, device_names
 from bridges.commands.doctoring.finding import Finding, exit_code
 from bridges.commands.graph import TRANSPORTS, interruptible, overridden
@@ -26,7 +27,6 @@ from bridges.settings.load import Config, SettingsError, load
 if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
 
-EX_USAGE: Final = 64
 INTERRUPTED: Final = 130
 LISTEN_S: Final = 3.0
 
@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         return os.EX_CONFIG
     if args.kill_test and (why := _not_confirmed(config, args)):
         print(why, file=sys.stderr)
-        return EX_USAGE
+        return os.EX_USAGE
     found: list[Finding] = []
     show = Page(sys.stdout).show if not args.json else _nothing
     try:
@@ -119,11 +119,10 @@ def _not_confirmed(config: Config, args: argparse.Namespace) -> str:
     """Why no output may be switched on; "" if it may."""
     from bridges.commands.doctoring.victim import step_called
 
-    if not config.devices:
-        return f"a {config.kind} has no output to test"
-    args.device = args.device or next(iter(config.devices))
-    if args.device not in config.devices:
-        return f"the file has no device '{args.device}'; it has {', '.join(config.devices)}"
+    try:
+        args.device = device_of(config, args.device or next(iter(config.devices), None))
+    except NoDevice as error:
+        return str(error)
     step = step_called(config, args.device, args.output)
     if step is None:
         return f"{args.device} has no such output: rmf-bridge walk shows those that it has"
