@@ -20,10 +20,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """0 when the daemon was told, 1 when none runs, 69 if this user may not see or signal it."""
-    if not args.file.exists() and not args.runtime_dir:
-        print(f"{args.file} does not exist", file=sys.stderr)
-        return 1
     try:
+        if not args.runtime_dir and not args.file.exists():
+            print(f"{args.file} does not exist", file=sys.stderr)
+            return 1
         places = runtime.find(args.file.absolute(), args.runtime_dir)
         act_as_owner(places)
         return _reset(args.file, places)

@@ -4,9 +4,10 @@
 The structs, with their bounds and units, remain the only description of a file's contents.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
 from typing import Final, TypeVar, overload
 
 from msgspec import inspect
@@ -30,6 +31,12 @@ VERBS = ("is", "has", "needs", "must", "says")
 """A problem that begins with one of these words gets its key as the subject."""
 
 T = TypeVar("T")
+
+
+@cache
+def described(cls: Hashable) -> Type:
+    """msgspec's description of a type. It takes a millisecond, and every file needs the same ones."""
+    return inspect.type_info(cls)
 
 
 class Broken(Enum):
@@ -140,7 +147,7 @@ class Values:
 
         `besides`: keys that the caller reads itself.
         """
-        wanted = cls if isinstance(cls, Type) else inspect.type_info(cls)
+        wanted = cls if isinstance(cls, Type) else described(cls)
         if isinstance(wanted, StructType):
             return self._struct(wanted, spot, besides)
         return self._value(wanted, spot)
