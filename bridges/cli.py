@@ -39,6 +39,10 @@ COMMANDS = {
         "look for what keeps a bridge from working on this machine; nothing is switched",
         "doctor my_lift.yaml --scan",
     ),
+    "explain": (
+        "say why a robot waits for a lift, door or charger: live, or from a recording",
+        "explain --live Lift1 --localhost",
+    ),
     "send": (
         "send a request as RMF does, and wait for its effect",
         "send lift Lift1 L3 --session me --direct --localhost",
