@@ -3,8 +3,10 @@
 import argparse
 import importlib
 import os
+import re
 import sys
 from collections.abc import Container
+from typing import NoReturn
 
 from bridges import __version__
 
@@ -64,7 +66,7 @@ COMMANDS = {
     "log": ("show the log of a device's service", "log my_lift.yaml --follow --event fault"),
     "completion": (
         "print the completion script for bash, zsh or fish",
-        "completion bash > /etc/bash_completion.d/rmf",
+        "completion fish > ~/.config/fish/completions/rmf-bridge.fish",
     ),
     "outputs-off": (
         "switch off every output of a device whose daemon is dead",
@@ -90,11 +92,25 @@ def main(argv: list[str] | None = None) -> int:
         return EX_PIPE
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """Also name the choice that is nearest to a wrong one."""
+        wrong = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
+        if wrong and (near := _nearest(wrong[1], wrong[2])):
+            message = f"{message[: wrong.start()]}there is no '{wrong[1]}'; did you mean '{near}'?"
+        super().error(message)
+
+
+def _nearest(typed: str, listed: str) -> str:
+    from difflib import get_close_matches
+
+    known = [one.strip(" '") for one in listed.split(",")]
+    return next(iter(get_close_matches(typed.lower(), known, n=1)), "")
+
+
 def parser(whole: Container[str]) -> argparse.ArgumentParser:
     """The command line's parser. `whole`: the subcommands with options; only they are imported."""
-    top = argparse.ArgumentParser(
-        prog="rmf-bridge", description="Connect Open-RMF to lifts, doors and chargers."
-    )
+    top = _Parser(prog="rmf-bridge", description="Connect Open-RMF to lifts, doors and chargers.")
     top.add_argument("--version", action="version", version=f"rmf-bridge {__version__}")
     subparsers = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, (text, example) in COMMANDS.items():

@@ -51,9 +51,12 @@ put systemd/80-rmf-can0.network usr/share/doc/rmf-bridges/examples/80-rmf-can0.n
 sed 's#/opt/rmf-bridges/.venv/bin/#/usr/lib/rmf-bridges/bin/#' "$here/systemd/rmf-bridge@.service" \
   > "$root/usr/lib/systemd/system/rmf-bridge@.service"
 for file in "$here"/config/*.yaml; do put "config/${file##*/}" "usr/share/doc/rmf-bridges/examples/${file##*/}"; done
-mkdir -p "$root/usr/share/man/man1" "$root/usr/share/bash-completion/completions"
+mkdir -p "$root/usr/share/man/man1" "$root/usr/share/bash-completion/completions" \
+  "$root/usr/share/zsh/vendor-completions" "$root/usr/share/fish/vendor_completions.d"
 gzip -9nc "$here/build/rmf-bridge.1" > "$root/usr/share/man/man1/rmf-bridge.1.gz"
 "$bin/rmf-bridge" completion bash > "$root/usr/share/bash-completion/completions/rmf-bridge"
+"$bin/rmf-bridge" completion zsh > "$root/usr/share/zsh/vendor-completions/_rmf-bridge"
+"$bin/rmf-bridge" completion fish > "$root/usr/share/fish/vendor_completions.d/rmf-bridge.fish"
 printf 'rmf-bridges (%s+%s) unstable; urgency=medium\n\n  * See CHANGELOG.md of the project.\n\n -- rmf-bridges maintainers <rmf-bridges@localhost>  %s\n' \
   "$version" "$release" "$(date -Rud "@$SOURCE_DATE_EPOCH")" | gzip -9nc > "$root/usr/share/doc/rmf-bridges/changelog.gz"
 { printf 'Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/\n\nFiles: *\nCopyright: the authors of rmf-bridges\nLicense: Apache-2.0\n On Debian systems the text is in /usr/share/common-licenses/Apache-2.0.\n'

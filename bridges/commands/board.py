@@ -18,6 +18,8 @@ from bridges.rmf import words
 from bridges.serve import diagnostics
 
 KINDS: Final = {d.LiftState: "lift", d.DoorState: "door", d.ChargerState: "charger"}
+SETTLES_S: Final = 1.5
+"""A daemon's diagnostics come at 1 Hz."""
 COORDINATOR: Final = "charger_coordinator"
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
 SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
@@ -95,6 +97,7 @@ class Board:
 
     def __init__(self) -> None:
         self._latest: dict[tuple[str, str], Heard[words.Stated]] = {}
+        self._first_at: dict[tuple[str, str], float] = {}
         self._requesters: dict[str, str] = {}
         self._places: dict[str, str] = {}
         self._diagnoses: dict[str, Diagnosis] = {}
@@ -117,6 +120,13 @@ class Board:
             case d.LiftState() | d.DoorState() | d.ChargerState() as state:
                 key = (KINDS[type(state)], words.device(state))
                 self._latest[key] = Heard(state, heard.at)
+                self._first_at.setdefault(key, heard.at)
+
+    def unsettled(self, now: float) -> set[tuple[str, str]]:
+        """Kind and name of devices heard only just now, whose daemon may yet say that it simulates."""
+        known = {(one.kind, one.status.hardware_id) for one in self._current(now)}
+        young = {key for key, at in self._first_at.items() if now - at < SETTLES_S}
+        return {(kind, words.printable(name)) for kind, name in young - known}
 
     def rows(self, now: float, wall: float) -> list[Row]:
         """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""

@@ -44,7 +44,7 @@ def switch_off(args: argparse.Namespace) -> int:
     try:
         held = runtime.RuntimeDirectory(places, file, serves=False)
     except runtime.AlreadyRunning as error:
-        logging.error("%s: stop it instead, it switches its outputs off", error)
+        logging.error("%s. That switches its outputs off", error)
         return EX_UNAVAILABLE
     try:
         if held.records.unreleased():

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final, TextIO
 import msgspec
 
 from bridges import log
+from bridges.commands.completion import completed_by, device_names
 from bridges.commands.doctoring.finding import Finding, exit_code
 from bridges.commands.paint import bold, red
 from bridges.rmf.words import printable
@@ -56,7 +57,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="hold one output on, kill the process that does, and see that it goes off",
     )
-    kill.add_argument("--device", metavar="NAME", help="whose output (default: the first device)")
+    device = kill.add_argument(
+        "--device", metavar="NAME", help="whose output (default: the first device)"
+    )
+    completed_by(device, device_names)
     kill.add_argument("--output", metavar="NAME", help="which output, as walk names it")
     kill.add_argument("--yes", action="store_true", help="do not ask again")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")

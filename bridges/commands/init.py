@@ -122,7 +122,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--address", help="host, serial port or CAN interface")
     parser.add_argument("--unit", help="unit id of a Modbus module")
     parser.add_argument("--floors", help="such as L1,L2,L3, from below")
-    parser.add_argument("--signals", help=f"of {','.join(LIFT_INPUTS)}")
+    parser.add_argument("--signals", help=f"some of: {', '.join(LIFT_INPUTS)}")
     parser.add_argument("--encoding", choices=get_args(Encoding), help="of the floor lines")
     parser.add_argument("--contacts", choices=get_args(Level), help="level of a closed contact")
     parser.add_argument("--relays", choices=get_args(Level), help="level that switches a relay on")

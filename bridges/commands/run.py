@@ -122,7 +122,7 @@ def _serve(
     from hal_fakes.simulate import Simulation
 
     logging.warning("SIMULATED: no hardware moves, and RMF is told simulated states")
-    simulation = Simulation(config, held.path)
+    simulation = Simulation(config, held.path, log_format=args.log_format)
     from bridges.serve.daemon import Daemon  # imported while the fakes start
 
     try:

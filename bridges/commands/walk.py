@@ -17,6 +17,7 @@ from datetime import datetime
 from pathlib import Path
 
 from bridges import log
+from bridges.commands.completion import completed_by, device_names
 from bridges.serve import directory as runtime
 from bridges.serve import guard, places, record, signals
 from bridges.settings.load import Config, SettingsError, load
@@ -29,7 +30,10 @@ DRAW_S = 0.05
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `walk`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
-    parser.add_argument("--device", metavar="NAME", help="which device, if the file has several")
+    device = parser.add_argument(
+        "--device", metavar="NAME", help="which device, if the file has several"
+    )
+    completed_by(device, device_names)
     parser.add_argument(
         "--by", metavar="NAME", help="who does it, for the record (default: the user)"
     )
@@ -61,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         held = runtime.RuntimeDirectory(_places(args), file, serves=False)
     except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
-        print(f"{error}: stop it first, a device has one master", file=sys.stderr)
+        print(f"walk needs the device for itself: {error}", file=sys.stderr)
         return EX_UNAVAILABLE
     try:
         return _walk(args, config, device, held, end)

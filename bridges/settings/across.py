@@ -11,7 +11,7 @@ from bridges.core.graph_kind import GraphKind
 from bridges.settings import names as named
 from bridges.settings.load import Config
 from bridges.settings.nodes import Page, Problem, compose, unknown
-from bridges.settings.values import Spot, locate
+from bridges.settings.spots import Spot, locate
 from drivers.hal import Where
 
 Path = tuple[str, ...]

@@ -18,7 +18,7 @@ from bridges.settings.config import Config
 from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
 from bridges.settings.nodes import Page, Problem, compose, unknown
 from bridges.settings.similarity import Point, Similarity, estimate
-from bridges.settings.values import Spot, locate
+from bridges.settings.spots import Spot, locate
 
 Transforms = Mapping[str, Similarity]
 """Level -> RMF's map to the robot's; EVERY_LEVEL for all."""

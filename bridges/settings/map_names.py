@@ -13,7 +13,7 @@ from bridges.settings import names as named
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.load import Config
 from bridges.settings.nodes import Page, Problem, compose, nearest, short
-from bridges.settings.values import Spot, locate
+from bridges.settings.spots import Spot, locate
 
 
 def places(config: Config) -> list[Place]:

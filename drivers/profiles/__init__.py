@@ -65,7 +65,8 @@ def _understood(
     file: str, text: bytes, reader: str, key: str, content: type[msgspec.Struct]
 ) -> dict[str, object]:
     from bridges.settings.nodes import Page, compose
-    from bridges.settings.values import BROKEN, Spot, Values
+    from bridges.settings.spots import Spot
+    from bridges.settings.values import BROKEN, Values
 
     page = Page(file)
     root = compose(page, text)

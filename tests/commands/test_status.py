@@ -81,6 +81,24 @@ def test_a_fault_is_shown_with_its_cause_and_what_to_do(tmp_path: Path) -> None:
     ]
 
 
+def test_a_remedy_names_the_device_its_file_and_what_the_file_sets() -> None:
+    file = str(Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml")
+    known = faults.values(file, "Lift1")
+    told = faults.remedies()
+    assert faults.here(told["RMF_SILENT"], file, "Lift1", known).cause == (
+        "no request for `request_timeout_s` (30 s)"
+    )
+    assert faults.here(told["FIRE_LATCHED"], file, "Lift1", known).do == (
+        f"when it is safe: `rmf-bridge reset {file}`"
+    )
+    held = faults.here(told["HOLDER_SILENT"], "/x/lift a.yaml", "Lift 1", {})
+    assert held.do == (
+        "look into the car; then `rmf-bridge release 'Lift 1'`, or set `holder_ttl_s` to have this"
+        " done automatically"
+    )
+    assert faults.values("/no/such.yaml", "Lift1") == faults.values(file, "Lift9") == {}
+
+
 def test_a_daemon_whose_status_is_old_hangs(tmp_path: Path) -> None:
     with served(tmp_path / "lift_a", lift()) as folder:
         found = seen(folder, age_s=6.0)

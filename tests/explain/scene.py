@@ -16,9 +16,9 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import Topic
+from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Phase, Robot
 from bridges.serve import diagnostics
-from hal_fakes.rmf.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from hal_fakes.rmf.robot import Phase, Robot
 from tests.site import charging
 from tests.site.building import CHARGERS, devices
 from tests.site.daemons import (

@@ -16,12 +16,12 @@ from bridges.core.graph_kind import AnyGraphKind
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
 from bridges.rmf.transport import Publisher
+from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
 from bridges.serve.clock import Clock
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
 from bridges.serve.subject import Status
 from hal_fakes.plants.plant import Edge
-from hal_fakes.rmf.supervisors import DoorSupervisor, LiftSupervisor
 from tests.site.building import Device
 from tests.site.network import Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline

@@ -78,7 +78,7 @@ def test_it_refuses_a_device_that_is_served(module: Module, tmp_path: Path) -> N
     with daemon(module.file, tmp_path / "run") as running:
         running.wait_for("ready file")
         terminal = walk(module, tmp_path)
-        terminal.wait_for("stop it first")
+        terminal.wait_for("To stop it: ")
         assert terminal.end() == 69
 
 

@@ -12,7 +12,7 @@ from typing import Final
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
-from hal_fakes.rmf import Party, Said, door_request
+from bridges.rmf_rules import Party, Said, door_request
 
 
 class LiftSupervisor(Party):

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Final
 
 from bridges.rmf import definitions as d
-from hal_fakes.rmf import Said, has_session
-from hal_fakes.rmf.robot import LiftDestination, Phase, Robot
+from bridges.rmf_rules import Said, has_session
+from bridges.rmf_rules.robot import LiftDestination, Phase, Robot
 
 REPEAT_S: Final = 1.0
 

@@ -8,10 +8,10 @@ import pytest
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
-from hal_fakes.rmf import NEVER, Party, Said, door_request
-from hal_fakes.rmf.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from hal_fakes.rmf.robot import Robot
-from hal_fakes.rmf.supervisors import DoorSupervisor, LiftSupervisor
+from bridges.rmf_rules import NEVER, Party, Said, door_request
+from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Robot
+from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
 
 A, B = "fleet/a", "fleet/b"
 AGV = d.LiftRequest("Lift1", d.Time(), A, 1, "L3", 2)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
-from hal_fakes.rmf import NEVER, Party, Said, door_request, has_session
+from bridges.rmf_rules import NEVER, Party, Said, door_request, has_session
 
 
 @dataclass(frozen=True, slots=True)
