@@ -45,6 +45,10 @@ COMMANDS = {
         "say why a robot waits for a lift, door or charger: live, or from a recording",
         "explain --live Lift1 --localhost",
     ),
+    "plot": (
+        "draw what happened to a lift, door or charger, from a recording",
+        "plot incident.mcap --device Lift1 -o ride.html",
+    ),
     "send": (
         "send a request as RMF does, and wait for its effect",
         "send lift Lift1 L3 --session me --direct --localhost",

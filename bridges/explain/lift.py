@@ -14,6 +14,7 @@ from bridges.explain.device import SILENT_S
 from bridges.explain.explanation import Field, Step, Who
 from bridges.explain.lift_facts import NO_FLOOR, NOBODY, LiftFacts
 from bridges.explain.phrases import Clock, lasted
+from bridges.explain.rows import label
 
 SETTLES_S: Final = 2.0
 """Between a request and its grant, or a supervisor's change of mind, so much time is usual."""
@@ -36,9 +37,10 @@ def answer(lift: LiftFacts, clock: Clock, around: common.Heard, focus: str = "")
         return _with_askers(stopped, lift, clock)
     claim = _in_question(lift, clock, focus)
     found = Answer(since=_begins(lift, claim))
-    if claim is not None and lift.matches(claim):
-        found.say(f"{claim.who} has {lift.name}, and RMF has all that it waits for.")
-    elif claim is not None and claim.ended is None:
+    if focus and claim is None:
+        told = "its last ride is told below" if lift.kept else "it was not heard asking"
+        found.say(f"{label(focus)} neither has {lift.name} nor asks for it now: {told}.")
+    if claim is not None and claim.ended is None and not lift.matches(claim):
         where = claim.wants or "no floor"
         found.say(f"{claim.who} waits for {lift.name} at {where} {clock.since(claim.since)}.")
     _hold(found, lift, clock)
@@ -153,8 +155,10 @@ def _others_wait(found: Answer, lift: LiftFacts, claim: Claim | None, clock: Clo
 def _why(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
     """Why this claim is not met, or who goes on if it is."""
     holder = lift.session.value
-    if lift.matches(claim):
+    if lift.matches(claim) and claim.asks(clock.now):
         _drives(found, lift, claim, clock)
+    elif lift.matches(claim):
+        _without_word(found, lift, holder, clock)
     elif lift.mode.value in HAZARDS:
         _hazard(found, lift, clock)
     elif holder == claim.who:

@@ -47,6 +47,17 @@ def holder_is_dead() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
+def holder_alone_is_dead() -> Told:
+    """The holder's fleet adapter died without END, and nobody else asks."""
+    scene = Scene("Lift1")
+    red = scene.robot("fleet/red")
+    red.asks("Lift1", "L2")
+    scene.until(red)
+    red.dies()
+    scene.run(20.0)
+    return scene.heard, "lift", "Lift1"
+
+
 def fire() -> Told:
     """The lift goes into fire mode before the robot has boarded."""
     scene, _, _ = _two("Lift1")
@@ -272,6 +283,7 @@ SCENES: Final[Mapping[str, Callable[[], Told]]] = {
         held_by_another,
         holder_rides,
         holder_is_dead,
+        holder_alone_is_dead,
         fire,
         fire_with_a_robot_inside,
         open_but_at_no_floor,

@@ -22,7 +22,7 @@ def told(name: str) -> list[str]:
     site = Site(device)
     for one in heard:
         site.take(one)
-    known = {code: (one.cause, one.do) for code, one in remedies().items()}
+    known = dict.fromkeys(remedies(), ("its cause", "its remedy"))
     return lines(site.explain(kind, device, UTC, known), UTC)
 
 
