@@ -45,6 +45,10 @@ COMMANDS = {
         "send a request as RMF does, and wait for its effect",
         "send lift Lift1 L3 --session me --direct --localhost",
     ),
+    "judge": (
+        "hold any lift, door or charger node against RMF's contract",
+        "judge lift Lift1 --active --ride L1 L3 --localhost",
+    ),
     "release": ("end the session of whoever holds a lift", "release Lift1"),
     "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
     "walk": (

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import shlex
 import socket
 import sys
@@ -11,7 +12,6 @@ from pathlib import Path
 from bridges.commands.completion import Completer, completed_by, device_names
 from bridges.serve.places import as_told, by_hand
 
-EX_UNAVAILABLE = 69
 ANSWER_S = 5.0
 
 
@@ -64,8 +64,18 @@ def tell(args: argparse.Namespace, verb: str) -> int:
 
 
 def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
-    """Send one command and say what was done. 0; 1 if it is refused; 69 without a simulation."""
-    device = _device(args)
+    """Send one command and say what was done.
+
+    0; 1 if it is refused; 69 without a simulation; 64 for no such device; 78 for a wrong YAML.
+    """
+    from bridges.commands.by_hand import NoDevice, device_of
+    from bridges.settings.load import SettingsError, load
+
+    try:
+        device = args.device or device_of(load(args.file), None)
+    except (NoDevice, SettingsError) as error:
+        print(error, file=sys.stderr)
+        return os.EX_USAGE if isinstance(error, NoDevice) else os.EX_CONFIG
     try:
         answers = [_ask(path, [verb, device, *words]) for path in _sockets(args)]
     except OSError as error:
@@ -82,7 +92,7 @@ def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
 
 def _silent(args: argparse.Namespace, error: Exception) -> int:
     print(f"the simulation of {args.file} does not answer: {error}", file=sys.stderr)
-    return EX_UNAVAILABLE
+    return os.EX_UNAVAILABLE
 
 
 def _nobody(args: argparse.Namespace) -> int:
@@ -91,25 +101,7 @@ def _nobody(args: argparse.Namespace) -> int:
         f" Start one with rmf-bridge run {args.file} --simulate",
         file=sys.stderr,
     )
-    return EX_UNAVAILABLE
-
-
-def _device(args: argparse.Namespace) -> str:
-    """The device's name; the file's only one if none is given. Raises SystemExit."""
-    if args.device:
-        return str(args.device)
-    from bridges.settings.load import SettingsError, load
-
-    try:
-        config = load(args.file)
-    except SettingsError as error:
-        raise SystemExit("\n".join(map(str, error.problems))) from None
-    devices = list(config.devices)
-    if len(devices) > 1:
-        raise SystemExit(f"--device is needed: {args.file} has {', '.join(devices)}")
-    if not devices:
-        raise SystemExit(f"a {config.kind} has nothing to press or to fail")
-    return devices[0]
+    return os.EX_UNAVAILABLE
 
 
 def _ask(path: Path, words: list[str]) -> str:

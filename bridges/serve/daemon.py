@@ -158,7 +158,7 @@ class Daemon:
             return
         else:
             self._witness.died("; ".join(loop.died for loop in self._loops if loop.died))
-        raise SystemExit(70)
+        raise SystemExit(os.EX_SOFTWARE)
 
     def _shut_down(self) -> bool:
         self._convenience("sd_notify", partial(notify, "STOPPING=1"))

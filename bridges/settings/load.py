@@ -20,21 +20,14 @@ from yaml import MappingNode, Node, ScalarNode
 
 from bridges.core.fields import DeviceSettings, Name
 from bridges.core.graph_kind import AnyGraphKind, AnyKind, GraphKind
+from bridges.core.spelling import either, unknown
 from bridges.recording.settings import Recording
 from bridges.rmf import topics
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
-from bridges.settings.nodes import (
-    Page,
-    Problem,
-    SettingsError,
-    compose,
-    either,
-    read,
-    unknown,
-)
+from bridges.settings.nodes import Page, Problem, SettingsError, compose, read
 from bridges.settings.plausible import milliseconds, out_of_step
 from bridges.settings.spots import Entry, Spot, below, is_none, locate
 from bridges.settings.top import MAPPING, keys_below, top_keys, word

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.settings.nodes import is_plain, short
+from bridges.core.spelling import short
+from bridges.settings.nodes import is_plain
 from bridges.settings.scalars import is_null_word
 
 

@@ -6,10 +6,10 @@ from msgspec.inspect import LiteralType
 from msgspec.structs import fields
 
 from bridges.core.graph_kind import AnyKind, GraphKind
+from bridges.core.spelling import either
 from bridges.recording.settings import Recording
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
-from bridges.settings.nodes import either
 from bridges.settings.spots import Entry
 from bridges.settings.values import BROKEN, Values
 from drivers.driver_type import AnyDriver

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 from yaml import Node
 
-from bridges.settings.nodes import Page, unknown
+from bridges.core.spelling import unknown
+from bridges.settings.nodes import Page
 from bridges.settings.spots import Spot, below, locate
 from bridges.settings.values import BROKEN, Check
 from drivers.hal import AnyBus

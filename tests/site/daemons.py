@@ -23,6 +23,7 @@ from bridges.serve.graph import AnyGraphNode, GraphNode
 from bridges.serve.subject import Status
 from bridges.serve.witness import NOBODY, Nobody
 from hal_fakes.plants.plant import Edge
+from tests.serve.virtual_graph import Disk
 from tests.site.building import Device
 from tests.site.network import Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
@@ -154,19 +155,6 @@ class DeviceDaemon:
     def _publish(self, topic: Topic[Any], message: Message) -> None:
         self._publishers[topic.name].publish(message)
         self.witness.spoken(topic.name, message, sent=True)
-
-
-class Disk:
-    """The state directory of a supervisor. It outlives it."""
-
-    def __init__(self) -> None:
-        self._kept: bytes | None = None
-
-    def read(self) -> bytes | None:
-        return self._kept
-
-    def write(self, kept: bytes) -> None:
-        self._kept = kept
 
 
 RIVAL = "rmf_lift_supervisor"
