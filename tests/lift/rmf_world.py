@@ -10,10 +10,10 @@ from bridges.rmf.topics import (
     LIFT_STATES,
     AnyTopic,
 )
-from hal_fakes.rmf import Party, Said
-from hal_fakes.rmf.phases import EndLiftSession, RequestLift
-from hal_fakes.rmf.robot import Robot
-from hal_fakes.rmf.supervisors import LiftSupervisor
+from bridges.rmf_rules import Party, Said
+from bridges.rmf_rules.phases import EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Robot
+from bridges.rmf_rules.supervisors import LiftSupervisor
 from tests.lift.story import WALL, Story
 
 STEP_S = 0.25

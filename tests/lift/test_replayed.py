@@ -6,7 +6,7 @@ import pytest
 
 from bridges.lift.replayed import LASTS_S, MOST, noted
 from bridges.lift.signals import Ended, Requested
-from hal_fakes.rmf.robot import Robot
+from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
 from tests.lift.story import AGV, END
 from tests.lift.test_forgotten import Overheard
