@@ -45,6 +45,10 @@ COMMANDS = {
         "send a request as RMF does, and wait for its effect",
         "send lift Lift1 L3 --session me --direct --localhost",
     ),
+    "judge": (
+        "hold any lift, door or charger node against RMF's contract",
+        "judge lift Lift1 --active --ride L1 L3 --localhost",
+    ),
     "release": ("end the session of whoever holds a lift", "release Lift1"),
     "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
     "walk": (
@@ -60,6 +64,18 @@ COMMANDS = {
         "fail my_lift.yaml door_opened stuck",
     ),
     "log": ("show the log of a device's service", "log my_lift.yaml --follow --event fault"),
+    "incident": (
+        "make a recording of a daemon's last minutes, for whoever looks into it",
+        'incident my_lift.yaml --note "the robot waits before an open door"',
+    ),
+    "recorder": (
+        "make recordings of this machine's daemons when something goes wrong",
+        "recorder --output /var/lib/rmf-bridge-recorder",
+    ),
+    "replay": (
+        "let today's core decide again on what was recorded, and compare",
+        "replay my_lift_2026-11-22_10-00-00.mcap --config other.yaml",
+    ),
     "completion": (
         "print the completion script for bash, zsh or fish",
         "completion fish > ~/.config/fish/completions/rmf-bridge.fish",

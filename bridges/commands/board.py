@@ -278,13 +278,25 @@ def repaint(
     """The text that redraws a terminal showing `lines_before` lines of the table, and the new number
     of lines. No line wraps and nothing scrolls away.
     """
-    shown = table(rows)
+    shown = list(_fitting(rows, columns - 1))
     if len(shown) >= lines:
-        shown = [*shown[: lines - 2], f"… and {len(shown) - lines + 2} more"]
-    marked = {i for i, row in enumerate(rows, start=1) if row.wrong}
+        more = len(shown) - lines + 2
+        shown = [*shown[: lines - 2], (f"… and {more} more", False)]
     text = f"\x1b[{lines_before}A" if lines_before else ""
-    for i, line in enumerate(shown):
+    for line, wrong in shown:
         line = line[: columns - 1]
-        red = coloured and i in marked
+        red = coloured and wrong
         text += f"\r\x1b[K\x1b[31m{line}\x1b[0m\n" if red else f"\r\x1b[K{line}\n"
     return text + "\x1b[J", len(shown)
+
+
+def _fitting(rows: list[Row], width: int) -> Iterator[tuple[str, bool]]:
+    """Each line of the table, and whether it needs attention. Where it is too long for a terminal, its
+    marks and faults follow on a line of their own."""
+    heading, *lines = table(rows)
+    yield heading, False
+    for row, line in zip(rows, lines, strict=True):
+        yield line, row.wrong
+        told = " ".join(filter(None, row.cells()[-2:]))
+        if told and len(line) > width:
+            yield f"  {told}", row.wrong

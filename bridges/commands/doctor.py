@@ -9,6 +9,7 @@ import json
 import os
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TextIO
 
@@ -18,6 +19,7 @@ from bridges import log
 from bridges.commands.by_hand import NoDevice, device_of
 from bridges.commands.completion import completed_by, device_names
 from bridges.commands.doctoring.finding import Finding, exit_code
+from bridges.commands.graph import TRANSPORTS, interruptible, overridden
 from bridges.commands.paint import bold, red
 from bridges.rmf.words import printable
 from bridges.settings.load import Config, SettingsError, load
@@ -48,6 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="how long to hear RMF's graph (default 3; 0: do not join it)",
     )
     parser.add_argument("--localhost", action="store_true", help="join the graph on loopback alone")
+    parser.add_argument("--domain-id", type=int, metavar="N", help="overrides the YAML's domain_id")
+    parser.add_argument("--transport", choices=TRANSPORTS, help="overrides the YAML's transport")
     parser.add_argument(
         "--building-map", metavar="MAP", help="compare the names with RMF's, as check does"
     )
@@ -78,11 +82,10 @@ def _seconds(text: str) -> float:
 
 def run(args: argparse.Namespace) -> int:
     """0 all well, 1 warnings, 2 something is wrong, 64 not confirmed, 78 a YAML that is wrong."""
-    from bridges.commands.graph import interruptible
-
     log.start("CRITICAL")  # what the buses would log is told as findings
     try:
         config = load(args.file)
+        config = replace(config, rmf=overridden(config.rmf, args))
         building = _building(args.building_map)
     except SettingsError as error:
         print("\n".join(map(str, error.problems)), file=sys.stderr)

@@ -116,7 +116,10 @@ def run(args: argparse.Namespace) -> int:
     folders = [Path(args.runtime_dir)] if args.runtime_dir else list(runtimes())
     found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
     if args.name:
+        there = [one.name for one in found if one.state != "stopped" or one.unit]
         found = [one for one in found if one.name == Path(args.name).stem]
+        if there and not found:
+            print(f"no daemon {Path(args.name).stem}; there is {', '.join(there)}", file=sys.stderr)
     else:  # what was started by hand once is no news
         found = [one for one in found if one.state != "stopped" or one.unit]
     if args.json:

@@ -55,13 +55,14 @@ class Spoken(Entry, frozen=True, tag_field="is", tag=1):
 
 class Known(Entry, frozen=True, tag_field="is", tag=2):
     """All that is to be known of a subject to go on from here: its memory, the last reading, and what
-    was last decided; None before the first."""
+    was last decided; None before the first. `anew`: the memory is not what the last decision left."""
 
     subject: str
     memory: Tree
     reading: Tree
     outputs: Tree
     report: Tree
+    anew: bool = False
 
 
 class Step(Entry, frozen=True, tag_field="is", tag=3):
@@ -70,7 +71,7 @@ class Step(Entry, frozen=True, tag_field="is", tag=3):
 
     subject: str
     event: Tree
-    wake_at: float
+    wake_at: Tree
     refused: str = ""
     outputs: list[Tree] = []
     news: list[Tree] = []
@@ -119,6 +120,7 @@ AnyEntry = Clocks | Spoken | Known | Step | Same | Told | Forgotten | Died | Los
 
 _ENCODER: Final = msgspec.msgpack.Encoder()
 _DECODER: Final[msgspec.msgpack.Decoder[AnyEntry]] = msgspec.msgpack.Decoder(AnyEntry)
+_JSON: Final[msgspec.json.Decoder[AnyEntry]] = msgspec.json.Decoder(AnyEntry)
 _HEADS: Final = msgspec.msgpack.Decoder(Head)
 
 
@@ -130,6 +132,21 @@ def encode(entry: AnyEntry | Head) -> bytes:
 def decode(content: bytes) -> AnyEntry:
     """Raises msgspec.MsgspecError."""
     return _DECODER.decode(content)
+
+
+def as_json(entry: AnyEntry | Head) -> str:
+    """An entry, or a head, as text."""
+    return msgspec.json.encode(entry).decode()
+
+
+def of_json(content: str) -> AnyEntry:
+    """Raises msgspec.MsgspecError."""
+    return _JSON.decode(content)
+
+
+def head_of_json(content: str) -> Head:
+    """Raises msgspec.MsgspecError."""
+    return msgspec.json.decode(content, type=Head)
 
 
 def decode_head(content: bytes) -> Head:

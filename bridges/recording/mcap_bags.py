@@ -12,6 +12,7 @@ from bridges.rmf.releases import Release
 
 LIBRARY: Final = "rmf-bridges"
 """With this the `library` in the header of our own files begins."""
+OWN_TOPICS: Final = "rmf_bridge/"
 NO_CHANNEL: Final = Source("", None, "of no channel")
 
 
@@ -23,7 +24,8 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
             if isinstance(record, Message):
                 found = declared.sources.get(record.channel_id, NO_CHANNEL)
                 if found.decode is None:
-                    notes.skipped[found.why] += 1
+                    if not declared.is_ours(found):
+                        notes.skipped[found.why] += 1
                     continue
                 wall = record.publish_time if declared.ours else record.log_time
                 yield Raw(record.log_time, wall, found.topic, record.data, found.decode)
@@ -40,6 +42,10 @@ class _Declared:
         self.ours = False
         self.sources: dict[int, Source] = {}
         self._types: dict[int, tuple[str, list[Release]]] = {}
+
+    def is_ours(self, found: Source) -> bool:
+        """Is it a topic of our recorder's own?"""
+        return self.ours and found.topic.startswith(OWN_TOPICS)
 
     def take(self, record: McapRecord) -> None:
         """Note a header, a schema or a channel."""

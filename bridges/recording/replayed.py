@@ -8,18 +8,24 @@ limits have changed.
 import struct
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
+from bridges.core.decision import Decision, IoFailed, Sampled
 from bridges.core.graph_kind import GraphKind
 from bridges.log import plain
-from bridges.recording.entries import AnyEntry, Forgotten, Known, Same, Step, Told
+from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Known, Same, Step, Told
 from bridges.recording.trees import Tree, UnknownValue, tree, value
 from bridges.settings.config import Config
 from bridges.settings.names import kind_called
 
+AnyDecision = Decision[Any, Any, Any]
+Parts = tuple[str, Tree, Tree]
+"""A part of a decision that differs: its name, as recorded, and today."""
 CONTEXT: Final = 6
 """So many events before a difference are told with it."""
+PARTS: Final = ("outputs", "news", "refused")
+"""What is compared where other limits are tried: what anybody sees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,23 +38,37 @@ class Core:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Where a decision is another one. `what`: which part of it. `before`: the last events, in words,
-    each with its time, up to this one."""
+    """Where a decision is another one. `wall`: when (s since the epoch). `what`: which part of it.
+
+    `before`: the last events up to this one, each with its time, in words.
+    """
 
     subject: str
-    at: float
+    wall: float
     what: str
     recorded: Tree
     today: Tree
-    before: tuple[str, ...]
+    before: tuple[tuple[float, str], ...]
 
 
 @dataclass(slots=True)
-class Count:
-    """How much was compared. `unusable`: entries of subjects whose memory is not in the recording."""
+class Course:
+    """How far a replay has come. `decisions`: how many were compared. `unusable`: entries of subjects
+    that cannot be replayed. `subjects`: those that were. `began`, `ended`: s since the epoch."""
 
     decisions: int = 0
     unusable: int = 0
+    subjects: set[str] = field(default_factory=set)
+    began: float = 0.0
+    ended: float = 0.0
+    offset_s: float = 0.0
+
+    def reach(self, entry: AnyEntry) -> None:
+        """Note the time of an entry."""
+        if isinstance(entry, Clocks):
+            self.offset_s = entry.wall - entry.at
+        self.ended = entry.at + self.offset_s
+        self.began = self.began or self.ended
 
 
 class Cores:
@@ -81,120 +101,164 @@ def _with(decide: Callable[..., Any], limits: Any) -> Callable[[Any, Any, float]
     return lambda memory, event, now: decide(memory, event, now, limits)
 
 
-class _Course:
-    """One subject, played from its memory on."""
+class _Subject:
+    """One subject, decided on again from its memory on."""
 
     def __init__(self, core: Core, known: Known) -> None:
         self._core = core
         self._memory = value(known.memory)
         self._reading = value(known.reading)
         self._report = value(known.report)
-        self.recorded = {"outputs": known.outputs, **_report_trees(self._report)}
-        self._words: deque[str] = deque(maxlen=CONTEXT)
+        self._outputs: object = value(known.outputs)
+        self._news = self._report.news() if self._report else None
+        self._recorded = _trees(self._outputs, self._report)
+        self.last: deque[tuple[float, object]] = deque(maxlen=CONTEXT)
 
     def memory(self) -> Tree:
         """What is remembered now."""
         return tree(self._memory)
 
-    def step(self, step: Step) -> Iterator[tuple[str, Tree, Tree]]:
-        """Decide on an event; gives what differs, as (part, recorded, today)."""
-        event = value(step.event)
-        if type(event).__name__ in ("Sampled", "IoFailed"):
-            self._reading = event
-        for part, new in (("outputs", step.outputs), ("news", step.news), ("faults", step.faults)):
-            if new:
-                self.recorded[part] = new[0]
-        told: dict[str, Tree] = {
-            "refused": step.refused,
-            "wake_at": tree(step.wake_at),
-            "publish": step.publish,
-        }
-        yield from self._decide(event, step.at, told)
-
-    def again(self, at: float) -> Iterator[tuple[str, Tree, Tree]]:
-        """The last reading once more, which changed nothing."""
-        yield from self._decide(self._reading, at, {"refused": "", "publish": []})
-
     def told(self) -> None:
         """The report has gone out."""
         self._memory = self._core.published(self._memory, self._report)
 
-    def words(self) -> tuple[str, ...]:
-        """The last events."""
-        return tuple(self._words)
+    def step(self, step: Step) -> list[Parts]:
+        """Decide on an event; gives what differs."""
+        event = value(step.event)
+        if type(event) in (Sampled, IoFailed):
+            self._reading = event
+        for part, new in (("outputs", step.outputs), ("news", step.news), ("faults", step.faults)):
+            if new:
+                self._recorded[part] = new[0]
+        told = {"refused": step.refused, "publish": step.publish, "wake_at": step.wake_at}
+        decision = self._decide(event, step.at)
+        self._outputs, self._news = decision.outputs, decision.report.news()
+        return _differing(self._recorded | told, decision)
 
-    def _decide(
-        self, event: object, at: float, told: dict[str, Tree]
-    ) -> Iterator[tuple[str, Tree, Tree]]:
-        self._words.append(f"{at:.3f} {plain(event)}")
-        decision = self._core.decide(self._memory, event, at)
+    def again(self, at: float) -> list[Parts]:
+        """The last reading once more, which changed nothing when it was recorded."""
+        outputs, news, report = self._outputs, self._news, self._report
+        decision = self._decide(self._reading, at)
+        if (
+            decision.outputs == outputs
+            and decision.report.faults == report.faults
+            and decision.report.news() == news
+            and not decision.refused
+            and not decision.publish
+        ):
+            return []
+        self._outputs, self._news = decision.outputs, decision.report.news()
+        return _differing(self._recorded | {"refused": "", "publish": []}, decision)
+
+    def _decide(self, event: object, at: float) -> AnyDecision:
+        self.last.append((at, event))
+        decision: AnyDecision = self._core.decide(self._memory, event, at)
         self._memory, self._report = decision.memory, decision.report
-        recorded = self.recorded | told
-        today = {
-            "outputs": tree(decision.outputs),
-            **_report_trees(decision.report),
-            "refused": decision.refused,
-            "wake_at": tree(decision.wake_at),
-            "publish": [[topic.name, tree(message)] for topic, message in decision.publish],
-        }
-        for part, was in recorded.items():
-            if today[part] != was:
-                yield part, was, today[part]
+        return decision
 
 
-def _report_trees(report: Any) -> dict[str, Tree]:
+def _trees(outputs: object, report: Any) -> dict[str, Tree]:
     if report is None:
-        return {"news": None, "faults": None}
-    return {"news": tree(report.news()), "faults": tree(report.faults)}
+        return {"outputs": None, "news": None, "faults": None}
+    news, faults = tree(report.news()), tree(report.faults)
+    return {"outputs": tree(outputs), "news": news, "faults": faults}
 
 
-def replay(entries: Iterable[AnyEntry], cores: Cores, count: Count) -> Iterator[Difference]:
-    """Each subject's first difference: where today's core decides, or remembers, something else."""
-    courses: dict[str, _Course | None] = {}
-    for entry in entries:
-        for subject, what, was, now in _played(entry, cores, courses, count):
-            course = courses[subject]
-            assert course
-            yield Difference(subject, entry.at, what, was, now, course.words())
-            courses[subject] = None
-            break
+def _differing(recorded: dict[str, Tree], decision: AnyDecision) -> list[Parts]:
+    today: dict[str, Tree] = {
+        **_trees(decision.outputs, decision.report),
+        "refused": decision.refused,
+        "publish": [[topic.name, tree(message)] for topic, message in decision.publish],
+        "wake_at": tree(decision.wake_at),
+    }
+    return [(part, was, today[part]) for part, was in recorded.items() if today[part] != was]
 
 
-def _played(
-    entry: AnyEntry, cores: Cores, courses: dict[str, _Course | None], count: Count
-) -> Iterator[tuple[str, str, Tree, Tree]]:
-    """What differs in one entry."""
-    if not isinstance(entry, Known | Step | Same | Told | Forgotten):
-        return
-    subject = entry.subject
-    if isinstance(entry, Known):
-        yield from _known(entry, cores, courses)
-        return
-    course = courses.get(subject)
-    if isinstance(entry, Forgotten):
-        courses.pop(subject, None)
-    elif course is None:
-        count.unusable += subject not in courses
-    elif isinstance(entry, Told):
-        course.told()
-    elif isinstance(entry, Step):
-        count.decisions += 1
-        yield from ((subject, *found) for found in course.step(entry))
-    else:
-        for at in times(entry):
-            count.decisions += 1
-            yield from ((subject, *found) for found in course.again(at))
+class Replay:
+    """A recording played again. `course`: how far it has come."""
+
+    def __init__(self, entries: Iterable[AnyEntry], cores: Cores) -> None:
+        self.course = Course()
+        self._entries = entries
+        self._cores = cores
+        self._subjects: dict[str, _Subject | None] = {}
+
+    def differences(self) -> Iterator[Difference]:
+        """The first difference of each subject: today's core decides, or remembers, something else."""
+        for entry in self._entries:
+            self.course.reach(entry)
+            for at, found in self._played(entry, strict=True):
+                if found:
+                    yield self._difference(entry, at, found[0])
+                    self._subjects[_name(entry)] = None
+                    break
+
+    def changes(self) -> Iterator[Difference]:
+        """Where other limits decide something else: each time that outputs, state or refusal begin to
+        differ, differ in another way, or are as recorded again."""
+        shown: dict[tuple[str, str], Tree] = {}
+        for entry in self._entries:
+            self.course.reach(entry)
+            for at, found in self._played(entry, strict=False):
+                differing = {part: (was, now) for part, was, now in found}
+                for part in PARTS:
+                    was, now = differing.get(part, (None, None))
+                    key = (_name(entry), part)
+                    if shown.get(key) != now:
+                        shown[key] = now
+                        yield self._difference(entry, at, (part, was, now))
+
+    def _difference(self, entry: AnyEntry, at: float, found: Parts) -> Difference:
+        subject, offset_s = self._subjects[_name(entry)], self.course.offset_s
+        last = subject.last if subject else ()
+        words = tuple((when + offset_s, f"{_kind(event)} {plain(event)}") for when, event in last)
+        return Difference(_name(entry), at + offset_s, *found, words)
+
+    def _played(self, entry: AnyEntry, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
+        """Each decision of one entry: when, and what differs. `strict`: memories are compared too."""
+        if isinstance(entry, Known):
+            yield from self._known(entry, strict=strict)
+        elif isinstance(entry, Forgotten):
+            self._subjects.pop(entry.subject, None)
+        elif isinstance(entry, Step | Same | Told):
+            subject = self._subjects.get(entry.subject)
+            if subject is not None:
+                yield from self._decided(subject, entry)
+            else:
+                self.course.unusable += entry.subject not in self._subjects
+
+    def _decided(
+        self, subject: _Subject, entry: Step | Same | Told
+    ) -> Iterator[tuple[float, list[Parts]]]:
+        if isinstance(entry, Told):
+            subject.told()
+        elif isinstance(entry, Step):
+            self.course.decisions += 1
+            yield entry.at, subject.step(entry)
+        else:
+            for at in times(entry):
+                self.course.decisions += 1
+                yield at, subject.again(at)
+
+    def _known(self, entry: Known, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
+        """Begin a subject's course, or compare the memory that it has come to."""
+        name = entry.subject
+        if entry.anew or name not in self._subjects:
+            core = self._cores.of(name)
+            self._subjects[name] = _Subject(core, entry) if core else None
+            self.course.subjects |= {name} if core else set()
+            return
+        subject = self._subjects[name]
+        if strict and subject and (memory := subject.memory()) != entry.memory:
+            yield entry.at, [("memory", entry.memory, memory)]
 
 
-def _known(
-    entry: Known, cores: Cores, courses: dict[str, _Course | None]
-) -> Iterator[tuple[str, str, Tree, Tree]]:
-    """Begin a subject's course, or compare the memory that it has come to."""
-    subject, core = entry.subject, cores.of(entry.subject)
-    if subject not in courses:
-        courses[subject] = _Course(core, entry) if core else None
-    elif (course := courses[subject]) and (memory := course.memory()) != entry.memory:
-        yield subject, "memory", entry.memory, memory
+def _name(entry: AnyEntry) -> str:
+    return getattr(entry, "subject", "")
+
+
+def _kind(event: object) -> str:
+    return type(event).__name__
 
 
 def times(entry: Same) -> tuple[float, ...]:

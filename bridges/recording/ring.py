@@ -11,7 +11,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 import msgspec
 
@@ -30,6 +30,7 @@ FRAME: Final = struct.Struct("<II")
 """An entry begins with its length and its checksum."""
 PAGE: Final = 4096
 LARGEST: Final = 72 << 20
+LONGEST_TOP: Final = 4 << 20
 NAME: Final = "ring"
 DIED: Final = "ring.died"
 
@@ -129,18 +130,12 @@ class Read:
 
     def __init__(self, path: Path) -> None:
         """Raises RingError."""
+        self.head, first, size = _top(path)
         try:
             content = user_files.read(path, LARGEST).content
-            magic, self.ended, size, length = TOP.unpack_from(content)
-            (checksum,) = struct.unpack_from("<I", content, TOP.size)
-            told = content[TOP.size + 4 : TOP.size + 4 + length]
-            if magic != MAGIC or zlib.crc32(told) != checksum or size < PAGE:
-                raise RingError(f"{path} is no ring of this version")
-            self.head = entries.decode_head(told)
-        except (OSError, struct.error, msgspec.MsgspecError) as error:
-            raise RingError(f"{path} cannot be read as a ring: {error}") from None
-        self._content = content
-        first = -(-(TOP.size + 4 + length) // PAGE) * PAGE
+        except OSError as error:
+            raise RingError(f"{path} cannot be read: {error.strerror}") from None
+        self.ended = content[ENDED_AT : ENDED_AT + 1] == b"\1"
         starts = {}
         for place in range(first, len(content) - MARK.size, size):
             number, checksum = MARK.unpack_from(content, place)
@@ -155,6 +150,68 @@ class Read:
         """Every entry, the oldest first."""
         for found in self.segments.values():
             yield from found
+
+
+class Tail:
+    """Follows a ring that is being written: what is new since the last look.
+
+    `head`: of the run. Raises RingError when it is made, and when the file cannot be read any more.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.head, self._first, self._size = _top(path)
+        self._number = 0
+        self._offset = MARK.size
+
+    def new(self) -> list[AnyEntry]:
+        """What was written since the last call; at first, all that is there. What the ring has lost
+        meanwhile is left out."""
+        try:
+            with self.path.open("rb") as ring:
+                return self._new(ring)
+        except (OSError, msgspec.MsgspecError) as error:
+            raise RingError(f"{self.path} cannot be followed: {error}") from None
+
+    def _new(self, ring: IO[bytes]) -> list[AnyEntry]:
+        found: list[AnyEntry] = []
+        starts = [self._start(ring, turn) for turn in range(SEGMENTS)]
+        for number, place in sorted((number, turn) for turn, number in enumerate(starts) if number):
+            if number < self._number:
+                continue
+            if number > self._number:
+                self._number, self._offset = number, MARK.size
+            ring.seek(self._first + place * self._size + self._offset)
+            content = ring.read(self._size - self._offset)
+            end = 0
+            for entry, end in frames(content, number, 0):  # noqa: B007 - the last one counts
+                found.append(entries.decode(entry))
+            self._offset += end
+        return found
+
+    def _start(self, ring: IO[bytes], turn: int) -> int:
+        """The number of the segment at a place; 0 for none."""
+        ring.seek(self._first + turn * self._size)
+        start = ring.read(MARK.size)
+        if len(start) < MARK.size:
+            return 0
+        number, checksum = MARK.unpack(start)
+        valid = zlib.crc32(number.to_bytes(8, "little")) == checksum
+        return number if valid else 0
+
+
+def _top(path: Path) -> tuple[Head, int, int]:
+    """A ring's head, where its first segment is, and the size of a segment. Raises RingError."""
+    try:
+        content = user_files.read(path, LONGEST_TOP).content
+        magic, _, size, length = TOP.unpack_from(content)
+        (checksum,) = struct.unpack_from("<I", content, TOP.size)
+        told = content[TOP.size + 4 : TOP.size + 4 + length]
+        if magic != MAGIC or zlib.crc32(told) != checksum or size < PAGE:
+            raise RingError(f"{path} is no ring of this version")
+        return entries.decode_head(told), -(-(TOP.size + 4 + length) // PAGE) * PAGE, size
+    except (OSError, struct.error, msgspec.MsgspecError) as error:
+        raise RingError(f"{path} cannot be read as a ring: {error}") from None
 
 
 def _entries(segment: bytes, number: int) -> list[AnyEntry]:

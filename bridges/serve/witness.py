@@ -231,7 +231,7 @@ class Witness(Nobody):
 
     def _anew(self, name: str, memory: object, now: float) -> _Subject:
         self._say_same(name)
-        self._put(_known(name, _Subject(memory), now))
+        self._put(_known(name, _Subject(memory), now, anew=True))
         self._subjects[name] = subject = _Subject(memory)
         return subject
 
@@ -323,7 +323,7 @@ class Witness(Nobody):
             self._out.clear()
 
 
-def _known(name: str, subject: _Subject, now: float) -> Known:
+def _known(name: str, subject: _Subject, now: float, *, anew: bool = False) -> Known:
     return Known(
         now,
         name,
@@ -331,6 +331,7 @@ def _known(name: str, subject: _Subject, now: float) -> Known:
         tree(subject.reading),
         tree(subject.outputs),
         tree(subject.report),
+        anew,
     )
 
 
@@ -348,7 +349,7 @@ def _step_of(
         now,
         name,
         tree(event),
-        decision.wake_at,
+        tree(decision.wake_at),
         decision.refused,
         [] if decision.outputs == subject.outputs else [tree(decision.outputs)],
         [] if news == subject.news else [tree(news)],

@@ -4,8 +4,9 @@
 The structs, with their bounds and units, remain the only description of a file's contents.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from enum import Enum
+from functools import cache
 from typing import Final, TypeVar, overload
 
 from msgspec import inspect
@@ -31,6 +32,12 @@ VERBS = ("is", "has", "needs", "must", "says")
 """A problem that begins with one of these words gets its key as the subject."""
 
 T = TypeVar("T")
+
+
+@cache
+def described(cls: Hashable) -> Type:
+    """msgspec's description of a type. It takes a millisecond, and every file needs the same ones."""
+    return inspect.type_info(cls)
 
 
 class Broken(Enum):
@@ -80,7 +87,7 @@ class Values:
 
         `besides`: keys that the caller reads itself.
         """
-        wanted = cls if isinstance(cls, Type) else inspect.type_info(cls)
+        wanted = cls if isinstance(cls, Type) else described(cls)
         if isinstance(wanted, StructType):
             return self._struct(wanted, spot, besides)
         return self._value(wanted, spot)

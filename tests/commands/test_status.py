@@ -187,3 +187,13 @@ def test_each_fault_of_the_source_has_a_remedy_and_each_remedy_a_fault() -> None
 def test_the_page_of_faults_is_the_table_itself() -> None:
     """`python -m bridges.commands.faults > docs/faults.md` brings it up to date."""
     assert (ROOT / "docs" / "faults.md").read_text() == faults.page()
+
+
+def test_a_name_that_nobody_has_is_answered_with_the_names_there_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "rmf-bridge").mkdir()
+    with served(tmp_path / "rmf-bridge" / "lift_named", lift()):
+        assert cli.main(["status", "no_such_lift"]) == NONE
+    assert re.search(r"^no daemon no_such_lift; there is .*\blift_named\b", capsys.readouterr().err)

@@ -6,7 +6,7 @@ import pytest
 
 from bridges.recording import entries
 from bridges.recording.entries import AnyEntry, Forgotten, Head
-from bridges.recording.ring import DIED, MARK, SEGMENTS, Read, Ring, RingError
+from bridges.recording.ring import DIED, MARK, SEGMENTS, Read, Ring, RingError, Tail
 from bridges.recording.settings import Recording
 
 HEAD = Head("run1", 7, "0.1.0", "lift", "/l.yaml", b"kind: lift", {}, False, {}, Recording())
@@ -31,7 +31,7 @@ def test_what_was_written_is_read_with_its_head(tmp_path: Path) -> None:
 
     read = Read(ring.path)
 
-    assert (read.head, read.ended) == (HEAD, 0)
+    assert (read.head, read.ended) == (HEAD, False)
     assert list(read.entries()) == [entry(number) for number in range(5)]
     ring.close(ended=False)
 
@@ -117,3 +117,32 @@ def test_a_segment_whose_number_was_torn_is_left_out(tmp_path: Path) -> None:
     ring.path.write_bytes(content)
 
     assert list(Read(ring.path).entries()) == [entry(1)]
+
+
+def test_who_follows_a_ring_gets_each_entry_once_and_misses_what_was_overwritten(
+    tmp_path: Path,
+) -> None:
+    ring = Ring(tmp_path, HEAD, SIZE)
+    tail = Tail(ring.path)
+    followed = list(tail.new())
+    for number in range(200):
+        write(ring, entry(number))
+        if number % 7 == 0:
+            followed += tail.new()
+    assert followed + tail.new() == [entry(number) for number in range(200)]
+    assert tail.new() == []
+
+    for number in range(200, 3000):
+        write(ring, entry(number))
+    late = tail.new()
+    assert late == [entry(number) for number in range(3000 - len(late), 3000)]
+    ring.close(ended=False)
+
+
+def test_a_ring_that_cannot_be_followed_says_so(tmp_path: Path) -> None:
+    ring = Ring(tmp_path, HEAD, SIZE)
+    tail = Tail(ring.path)
+    ring.path.unlink()
+    ring.close(ended=False)
+    with pytest.raises(RingError, match="cannot be followed"):
+        tail.new()

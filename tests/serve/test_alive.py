@@ -54,15 +54,19 @@ def _state(pid: int) -> str:
 def test_after_sigstop_no_state_of_before_is_shown_as_new(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
+    scan_s = 2.0
+    module.file.write_text(module.yaml.replace("modbus,", f"modbus, scan_s: {scan_s},"))
     with daemon(module.file, tmp_path / "run", **SERVICE) as running:
         hold_open(module, graph, running)
         wait_until(lambda: graph.last() is DoorModeValue.MODE_OPEN, "the door shows OPEN")
+        shown = len(graph.states)
+        wait_until(lambda: len(graph.states) > shown, "a scan has ended, and the next is far")
         pid = running.process.pid
         os.kill(pid, signal.SIGSTOP)
         wait_until(lambda: _state(pid) == "T", "the daemon is suspended")
         module.tell("fail", "ward_door", "opened", "off")
         stopped = time.monotonic()
-        wait_until(lambda: time.monotonic() > stopped + 2 * SUSPENDED_S, "that takes a while")
+        wait_until(lambda: time.monotonic() > stopped + scan_s + 2 * SUSPENDED_S, "a while")
         resumed = time.time()
         os.kill(pid, signal.SIGCONT)
         wait_until(lambda: _since(graph, resumed), "states go on")

@@ -429,6 +429,23 @@ def test_a_user_without_permission_is_told_what_to_do_and_switches_nothing(
 
 
 @pytest.mark.skipif(
+    os.geteuid() != 0 or not _runs_for_others(), reason="no other user can run this Python"
+)
+def test_reset_of_a_file_in_a_folder_that_others_may_not_read_says_so(tmp_path: Path) -> None:
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o700)
+    told = subprocess.run(
+        command("reset", closed / "door.yaml"),
+        env=environment(),
+        capture_output=True,
+        text=True,
+        user=65534,
+    )
+    assert (told.returncode, "Permission denied" in told.stderr) == (69, True)
+    assert "Traceback" not in told.stderr
+
+
+@pytest.mark.skipif(
     os.geteuid() == 0 and not _runs_for_others(), reason="no other user can run this Python"
 )
 @pytest.mark.parametrize("name", ["door_rs485.yaml", "charger_wiferion.yaml"])

@@ -12,7 +12,7 @@ import pytest
 
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.daemon import STARTING
-from hal_fakes.wire import wire
+from hal_fakes.wire import runs_here
 from tests.rmf.conftest import ROS2
 from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment, hold_open
 from tests.waiting import LEASE_S, PATIENCE_S, wait_until
@@ -20,8 +20,14 @@ from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(params=[wire(), ROS2])
-def module(domain: int, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Module]:
+@pytest.fixture(params=[runs_here(), ROS2])
+def module(
+    domain: int,
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Iterator[Module]:
+    monkeypatch.setenv("TRANSPORT", runs_here())
     standing = Module(tmp_path, domain, request.param)
     yield standing
     standing.close()
@@ -56,7 +62,7 @@ def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_th
 
 
 def test_outputs_that_cannot_be_verified_off_are_reported(module: Module, tmp_path: Path) -> None:
-    module.file.write_text(YAML.format(domain=module.domain, transport=wire(), port=1))
+    module.file.write_text(YAML.format(domain=module.domain, transport=runs_here(), port=1))
     done = subprocess.run(
         command("outputs-off", module.file, "--runtime-dir", tmp_path / "run"),
         env=environment(),

@@ -21,6 +21,7 @@ from bridges.serve.clock import Clock
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
 from bridges.serve.subject import Status
+from bridges.serve.witness import NOBODY, Nobody
 from hal_fakes.plants.plant import Edge
 from tests.serve.virtual_graph import Disk
 from tests.site.building import Device
@@ -49,6 +50,7 @@ class DeviceDaemon:
         self.looks: Callable[[DeviceDaemon, float], None] = lambda daemon, at: None
         self.scanned: Callable[[DeviceDaemon], None] = lambda daemon: None
         self.relayed: Callable[[Edge], None] = lambda edge: None
+        self.witness: Nobody = NOBODY
         self._changed = False
         device.plant.on_edge = self._edge
         self._timeline = timeline
@@ -69,7 +71,14 @@ class DeviceDaemon:
             lambda: self._timeline.now, lambda: EPOCH + self._timeline.now + self.wall_step_s
         )
         self._node = Node(
-            self.name, kind, device.settings, limits, device.driver(), self._publish, clock
+            self.name,
+            kind,
+            device.settings,
+            limits,
+            device.driver(),
+            self._publish,
+            clock,
+            self.witness,
         )
         self.alive = True
         for topic in kind.requests:
@@ -98,6 +107,7 @@ class DeviceDaemon:
         self.advance()
         self._changed = False
         self._node.scan(events)
+        self.witness.flush()
         self.scans += 1
         self.scanned(self)
         changes_at = (now if self._changed else self.device.plant.next_at()) + self.device.poll_s
@@ -137,12 +147,14 @@ class DeviceDaemon:
     def _hear(self, topic: Topic[Any], message: Any) -> None:
         if self.device.kind.device_name(message) != self.name:
             return
+        self.witness.spoken(topic.name, message, sent=False)
         event = self._node.event(topic, message)
         if event is not None:
             self.scan(event)
 
     def _publish(self, topic: Topic[Any], message: Message) -> None:
         self._publishers[topic.name].publish(message)
+        self.witness.spoken(topic.name, message, sent=True)
 
 
 RIVAL = "rmf_lift_supervisor"
@@ -218,6 +230,7 @@ class GraphDaemon:
         self.kind = kind
         self._settings = settings or kind.settings()
         self.alive = False
+        self.witness: Nobody = NOBODY
         self._timeline = timeline
         self._air = air
         self._disk = Disk()
@@ -230,7 +243,9 @@ class GraphDaemon:
         """A new one, which knows what it has kept."""
         self._place = Place(self._air, self.name, self._round)
         kept = self._disk if self.kind.persist else None
-        self.node = GraphNode(self.kind, self._settings, self._place, self._clock, kept=kept)
+        self.node = GraphNode(
+            self.kind, self._settings, self._place, self._clock, kept=kept, witness=self.witness
+        )
         self.alive = True
         self.node.subscribe()
         self._round()

@@ -96,8 +96,10 @@ class Screen:
         seen = self._bench.memory.results.get(self._cursor, NOT_TRIED)
         return f"{step.name} {step.does}; should be seen: {step.expects}. So far: {seen}"
 
-    def _inputs(self, now: float, most: int, *, wires: bool) -> Table:
+    def _inputs(self, now: float, most: int, *, wires: bool) -> Table | Text:
         """Every input; where there is no room, those that have changed last."""
+        if not self._bench.inputs:
+            return Text("no contacts: registers or messages, decoded", style="dim")
         table = _table("input", *(["wire"] if wires else []), "level", "is", "for", "seen")
         known = self._bench.inputs
         latest = sorted(known, key=lambda one: -(one.changed_at or 0.0))[:most]

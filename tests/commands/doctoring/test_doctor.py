@@ -24,7 +24,7 @@ from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.settings.load import load
 from hal_fakes.caller import Caller
-from hal_fakes.wire import join
+from hal_fakes.wire import join, wire
 from tests.commands import runtime
 from tests.commands.terminal import Terminal
 from tests.serve.site import Module, command, daemon, environment
@@ -377,12 +377,13 @@ def test_our_daemon_is_heard_and_a_graph_without_rmf_is_warned_of(
 def test_a_supervisor_beside_another_one_would_be_passive(domain: int, tmp_path: Path) -> None:
     file = tmp_path / "supervisor.yaml"
     file.write_text(
-        f"kind: door_supervisor\nrmf: {{network: localhost, domain_id: {domain}}}\nsupervisor: {{}}\n"
+        "kind: door_supervisor\nsupervisor: {}\n"
+        f"rmf: {{transport: {wire()}, network: localhost, domain_id: {domain}}}\n"
     )
     rmf = join("rmf", domain)
     rmf.publisher(DOOR_REQUESTS)
     try:
-        code, found = doctor(file, tmp_path, "--listen", "6")
+        code, found = doctor(file, tmp_path, "--listen", "6", "--domain-id", str(domain))
     finally:
         rmf.close()
     assert code == 1

@@ -89,3 +89,9 @@ def test_a_wide_and_high_terminal_shows_every_wire_and_every_output() -> None:
 )
 def test_how_the_rows_are_shared(rows: int, known: tuple[int, int], fit: Room) -> None:
     assert room(rows, *known) == fit
+
+
+def test_a_device_without_contacts_has_what_is_decoded_alone() -> None:
+    lines = shown(40, 24, count=0)
+    assert lines[1] == "no contacts: registers or messages,"
+    assert "input" not in " ".join(lines)

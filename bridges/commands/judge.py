@@ -1,0 +1,289 @@
+"""`rmf-bridge judge`: hold any lift, door or charger node against RMF's contract.
+
+`bridges/judge/` has the laws and the plays; here are the options, the graph, the clock and the verdict.
+Exit code 0: every law that was seen is kept. 1: one is broken. 2: a wrong command line. 69: nothing was
+heard, the graph cannot be joined, or what was to be played was not.
+"""
+
+import argparse
+import os
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from uuid import uuid4
+
+from bridges.commands.graph import add_graph_arguments, complain, interruptible, open_graph
+from bridges.judge.judge import KINDS, Judge, Kind
+from bridges.judge.law import Verdict, shown
+from bridges.judge.plays import FLEET, Charge, Passages, Performance, Ride
+from bridges.judge.report import Report, as_json, junit, report, text, verdict
+from bridges.judge.stage import Stage
+from bridges.rmf import topics
+from bridges.rmf.definitions import Message
+from bridges.rmf.topics import AnyTopic
+from bridges.rmf.transport import Publisher, Transport, TransportError
+from bridges.rmf_rules import NEVER, Said
+
+NODE_NAME = "rmf_bridge_judge"
+LOOK_EVERY_S = 0.1
+WIDTH = 120
+HEARD: dict[Kind, tuple[AnyTopic, ...]] = {
+    "lift": (topics.LIFT_STATES, topics.LIFT_REQUESTS, topics.ADAPTER_LIFT_REQUESTS.live()),
+    "door": (
+        *(topics.DOOR_STATES, topics.DOOR_REQUESTS, topics.ADAPTER_DOOR_REQUESTS),
+        topics.DOOR_SUPERVISOR_HEARTBEAT,
+    ),
+    "charger": (
+        *(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS),
+        topics.CHARGER_REFUSALS,
+    ),
+}
+BESIDE: dict[str, tuple[str, ...]] = {
+    "supervisor": (
+        topics.LIFT_REQUESTS.name,
+        topics.DOOR_REQUESTS.name,
+        topics.DOOR_SUPERVISOR_HEARTBEAT.name,
+    ),
+    "fleet": (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name),
+    "coordinator": (topics.CHARGER_REQUESTS.name, topics.CHARGER_CANCELS.name),
+}
+"""Whose topics a play may share, if it is told to play beside them."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which device, for how long, and what to play."""
+    parser.add_argument("kind", choices=KINDS)
+    parser.add_argument("name", metavar="NAME", help="the device, as RMF names it")
+    add_graph_arguments(parser)
+    parser.add_argument(
+        "--for",
+        type=_seconds,
+        dest="for_s",
+        default=NEVER,
+        metavar="S",
+        help="listen for S seconds (default: until Ctrl-C, which judges)",
+    )
+    parser.add_argument("--json", action="store_true", help="the verdict as one JSON object")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="the verdict for a CI server")
+    _add_plays(parser)
+    parser.set_defaults(usage=parser.error)
+
+
+def _add_plays(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--active",
+        action="store_true",
+        help="move the device: needs --ride, --passages or --charge, and a device that is idle",
+    )
+    parser.add_argument(
+        "--ride", nargs=2, metavar="FLOOR", help="play a robot that rides from one floor to another"
+    )
+    parser.add_argument(
+        "--robots", type=int, choices=(1, 2), default=1, help="two: the second rides back"
+    )
+    parser.add_argument("--passages", type=int, metavar="N", help="play N passages of a door")
+    parser.add_argument("--charge", action="store_true", help="request a charger, and cancel")
+    parser.add_argument(
+        "--robot",
+        default=f"{FLEET}/robot1",
+        metavar="FLEET/ROBOT",
+        help="who asks for the charger; one that it knows",
+    )
+    parser.add_argument(
+        "--restarts",
+        action="store_true",
+        help="restart RMF's supervisor in between; in a simulation only (--localhost)",
+    )
+    parser.add_argument(
+        "--beside",
+        action="append",
+        choices=tuple(BESIDE),
+        default=[],
+        help="play although this one is on the graph, and through a supervisor",
+    )
+    parser.add_argument(
+        "--patience",
+        type=_seconds,
+        default=120.0,
+        metavar="S",
+        help="how long a robot waits for one thing (default: 120)",
+    )
+
+
+def _seconds(written: str) -> float:
+    with suppress(ValueError):
+        if 0 < float(written) <= 7 * 86400:
+            return float(written)
+    raise argparse.ArgumentTypeError(f"'{written}' is not a number of seconds up to a week")
+
+
+def performance_of(args: argparse.Namespace) -> Performance | None:
+    """What is to be played; None to listen alone. A contradiction ends with exit code 2."""
+    kinds: dict[Kind, bool] = {
+        "lift": args.ride is not None,
+        "door": args.passages is not None,
+        "charger": args.charge,
+    }
+    wanted = [kind for kind, asked in kinds.items() if asked]
+    if not wanted and not args.active:
+        return None
+    if wanted != [args.kind]:
+        args.usage("a lift is played by --ride A B, a door by --passages N, a charger by --charge")
+    if not args.active:
+        args.usage(f"this moves {words_of(args)}: say --active as well")
+    if args.restarts and not args.localhost:
+        args.usage(
+            "--restarts needs --localhost: on site a restart is not to be tried with a device"
+        )
+    through = "supervisor" in args.beside
+    match args.kind:
+        case "lift":
+            floors = (args.ride[0], args.ride[1])
+            how = {"through": through, "restarts": args.restarts}
+            return Ride(args.name, floors, args.robots, args.patience, **how)
+        case "door":
+            how = {"through": through, "restarts": args.restarts}
+            return Passages(args.name, max(1, args.passages), args.patience, **how)
+        case _:
+            request_id = f"{FLEET}-{uuid4().hex[:8]}"
+            return Charge(args.name, args.robot, request_id, min(args.patience, 30.0))
+
+
+def words_of(args: argparse.Namespace) -> str:
+    """The device, for a person."""
+    return f"the {args.kind} {shown(args.name)}"
+
+
+def run(args: argparse.Namespace) -> int:
+    """Listen or play, and judge."""
+    performance = performance_of(args)
+    stage: Stage | None = None
+    try:
+        with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
+            live = Live(transport, args.kind, args.beside, performance)
+            stage = Stage(Judge(args.kind, args.name), performance, args.for_s, live.strangers)
+            live.judge(stage)
+    except TransportError as error:
+        complain("judge", error)
+        if stage is None:
+            return os.EX_UNAVAILABLE
+    except KeyboardInterrupt:
+        if stage is None:
+            return os.EX_UNAVAILABLE
+    judged = stage.judge.end(time.monotonic(), time.time())
+    notes = [f"not played to its end: {stage.note}"] if stage.note else []
+    return tell(report(stage.judge, judged, notes), args)
+
+
+def tell(found: Report, args: argparse.Namespace) -> int:
+    """Print the verdict, write the file, and give the exit code."""
+    if args.junit is not None:
+        try:
+            args.junit.write_text(junit(found), "utf-8")
+        except OSError as error:
+            complain("judge", f"{args.junit} is not written: {error.strerror or error}")
+            return os.EX_CANTCREAT
+    width = shutil.get_terminal_size((WIDTH, 50)).columns if sys.stdout.isatty() else 10**6
+    print(as_json(found) if args.json else text(found, width))
+    sys.stdout.flush()
+    if verdict(found) is Verdict.BROKEN:
+        return 1
+    return os.EX_UNAVAILABLE if found.notes or not found.states else 0
+
+
+class Live:
+    """The graph: what is heard on it, in order of arrival, and what is said."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        kind: Kind,
+        beside: list[str],
+        performance: Performance | None,
+    ) -> None:
+        self._transport = transport
+        self._waiting: SimpleQueue[tuple[AnyTopic, Message, float, float]] = SimpleQueue()
+        self._publishers: dict[str, Publisher[Message]] = {}
+        allowed = {topic for name in beside for topic in BESIDE[name]}
+        speaks = performance.speaks if performance else ()
+        self._speaks = {topic.name for topic in speaks}
+        self._heard = {
+            topic.name: transport.subscribe(topic, self._receive(topic), others_only=True)
+            for topic in HEARD[kind]
+        }
+        self._sole = [name for name in self._heard if name in self._speaks - allowed]
+        self._fire = (
+            [
+                transport.subscribe(topics.FIRE_ALARM_TRIGGER.live(), self._receive_fire),
+                transport.subscribe(topics.FIRE_ALARM_TRIGGER, lambda message: None),
+            ]
+            if kind == "lift"
+            else []
+        )
+        self._looked_at = 0.0
+
+    def strangers(self) -> str:
+        """Who speaks where the play would alone."""
+        found = [name for name in self._sole if self._heard[name].matched()]
+        if not found:
+            return ""
+        who = [name for name, topics in BESIDE.items() if set(topics) & set(found)]
+        beside = " ".join(f"--beside {name}" for name in who)
+        return f"others publish on {', '.join(found)}: to play all the same, say {beside}"
+
+    def judge(self, stage: Stage) -> None:
+        """Until there is a verdict. An interrupt ends a play by letting the device go."""
+        stage.begin(time.monotonic(), time.time())
+        while not stage.done:
+            with _interrupts_end(stage, self._say):
+                self._turn(stage)
+
+    def _turn(self, stage: Stage) -> None:
+        for topic, message, at, wall in self._arrived(stage.wake_at() - time.monotonic()):
+            self._say(stage.hear(topic, message, at, wall))
+        now, wall = time.monotonic(), time.time()
+        if self._fire and now > self._looked_at + 1.0:
+            self._looked_at = now
+            stage.judge.fire_ends(self._fire[0].matched(), self._fire[1].matched(), now, wall)
+        self._say(stage.turn(now, wall))
+
+    def _arrived(self, timeout_s: float) -> Iterator[tuple[AnyTopic, Message, float, float]]:
+        """Everything that has, after a wait for the first."""
+        with suppress(Empty):
+            yield self._waiting.get(timeout=min(max(0.0, timeout_s), LOOK_EVERY_S))
+            for _ in range(self._waiting.qsize()):
+                yield self._waiting.get_nowait()
+
+    def _say(self, said: list[Said]) -> None:
+        for topic, message in said:
+            if topic.name not in self._publishers:
+                self._publishers[topic.name] = self._transport.publisher(topic)
+            self._publishers[topic.name].publish(message)
+
+    def _receive(self, topic: AnyTopic) -> Callable[[Message], None]:
+        def received(message: Message) -> None:
+            self._waiting.put((topic, message, time.monotonic(), time.time()))
+
+        return received
+
+    def _receive_fire(self, message: Message) -> None:
+        self._receive(topics.FIRE_ALARM_TRIGGER)(message)
+
+
+@contextmanager
+def _interrupts_end(stage: Stage, say: Callable[[list[Said]], None]) -> Iterator[None]:
+    """Ctrl-C or SIGTERM: let the device go, then judge. Another one meanwhile changes nothing."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        while True:
+            try:
+                said = stage.stop()
+                say(said)
+                return
+            except KeyboardInterrupt:
+                continue
