@@ -11,7 +11,7 @@ import grp
 import os
 import pwd
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,11 +63,11 @@ def by_hand(file: Path) -> Places:
     return Places(runtime / "rmf-bridge" / file.stem, state_base() / file.stem)
 
 
-def state_base(environ: Mapping[str, str] = os.environ) -> Path:
+def state_base() -> Path:
     """This user's state directory; one below /tmp if there is no home."""
     home = os.path.expanduser("~")
     default = Path(home) / ".local/state" if os.path.isabs(home) else TMP / f"rmf-{os.getuid()}"
-    return Path(environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
+    return Path(os.environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
 
 
 def everywhere(file: Path) -> Iterator[Places]:
