@@ -24,7 +24,7 @@ mkdir -p "$root/DEBIAN" "$root/$lib/bin" "$work/wheel"
 extra=--extra=gpio; [ "$python" = 3.13 ] && extra=--extra=
 "$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work/wheel" "$here"
 "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
-  --target "$root/$lib/lib/python$python/site-packages" $extra
+  --target "$root/$lib/lib/python$python/site-packages" $extra --extra=recording
 rm -rf "$root/$lib/lib/python$python/site-packages/bin"
 
 # A virtual environment that sees the system's packages (rclpy, lgpio), on the system's own Python.
@@ -50,6 +50,8 @@ put systemd/60-rmf-bridges.rules usr/lib/udev/rules.d/60-rmf-bridges.rules
 put systemd/80-rmf-can0.network usr/share/doc/rmf-bridges/examples/80-rmf-can0.network
 sed 's#/opt/rmf-bridges/.venv/bin/#/usr/lib/rmf-bridges/bin/#' "$here/systemd/rmf-bridge@.service" \
   > "$root/usr/lib/systemd/system/rmf-bridge@.service"
+sed 's#/opt/rmf-bridges/.venv/bin/#/usr/lib/rmf-bridges/bin/#' "$here/systemd/rmf-bridge-recorder.service" \
+  > "$root/usr/lib/systemd/system/rmf-bridge-recorder.service"
 for file in "$here"/config/*.yaml; do put "config/${file##*/}" "usr/share/doc/rmf-bridges/examples/${file##*/}"; done
 mkdir -p "$root/usr/share/man/man1" "$root/usr/share/bash-completion/completions" \
   "$root/usr/share/zsh/vendor-completions" "$root/usr/share/fish/vendor_completions.d"

@@ -1,6 +1,7 @@
 """`rmf-bridge recorder`: the process that turns the rings of this machine's daemons into files."""
 
 import argparse
+import os
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -46,8 +47,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _folder() -> Path:
     """Where recordings lie: in the unit's state directory, else in the user's."""
-    found = places.as_told(None)
-    return found.state if found else places.state_base() / "recordings"
+    given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
+    return Path(given) if given else places.state_base() / "recordings"
 
 
 def _notify(state: str) -> None:

@@ -120,7 +120,7 @@ def _lines(
 
 def _what_if(one: Difference) -> Iterator[str]:
     """One line: what would have been, or that it is as it was again."""
-    where = f"{_time(one.wall)} {one.subject}: {one.what}"
+    where = f"{_time(one.wall)} {one.subject}: {_part(one)}"
     if one.today is None:
         yield f"{where}: as recorded again"
     else:
@@ -128,12 +128,16 @@ def _what_if(one: Difference) -> Iterator[str]:
 
 
 def _difference(one: Difference) -> Iterator[str]:
-    yield f"{one.subject} at {_time(one.wall)}: another {one.what}"
+    yield f"{one.subject} at {_time(one.wall)}: {_part(one)} differs"
     yield f"  recorded: {_plain(one.recorded)}"
     yield f"  today:    {_plain(one.today)}"
     yield "  after these events:"
     for at, words in one.before:
         yield f"    {_time(at)} {words}"
+
+
+def _part(one: Difference) -> str:
+    return "state" if one.what == "news" else one.what
 
 
 def _plain(told: Tree) -> str:

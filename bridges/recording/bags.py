@@ -26,7 +26,7 @@ NS: Final = 1e-9
 STEPPED_NS: Final = 10**9
 """A clock was set back if it goes back by so much; less is the recorder's disorder."""
 LONGEST_MESSAGE: Final = 8 << 20
-INSTALL: Final = "pip install 'rmf-bridges[recording]'"
+INSTALL: Final = "pip install 'rmf-bridges[recording,sqlite]'"
 
 
 def heard_in(path: Path, notes: Notes | None = None) -> Iterator[Heard]:
