@@ -41,6 +41,14 @@ COMMANDS = {
         "look for what keeps a bridge from working on this machine; nothing is switched",
         "doctor my_lift.yaml --scan",
     ),
+    "explain": (
+        "say why a robot waits for a lift, door or charger: live, or from a recording",
+        "explain --live Lift1 --localhost",
+    ),
+    "plot": (
+        "draw what happened to a lift, door or charger, from a recording",
+        "plot incident.mcap --device Lift1 -o ride.html",
+    ),
     "send": (
         "send a request as RMF does, and wait for its effect",
         "send lift Lift1 L3 --session me --direct --localhost",

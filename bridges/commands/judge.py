@@ -174,9 +174,10 @@ def run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         if stage is None:
             return os.EX_UNAVAILABLE
-    judged = stage.judge.end(time.monotonic(), time.time())
+    now = time.monotonic()
+    judged = stage.judge.end(now, time.time())
     notes = [f"not played to its end: {stage.note}"] if stage.note else []
-    return tell(report(stage.judge, judged, notes), args)
+    return tell(report(stage.judge, judged, now - stage.began_at, *notes), args)
 
 
 def tell(found: Report, args: argparse.Namespace) -> int:

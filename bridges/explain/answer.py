@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Final
 
+from bridges.explain.claims import Claim
 from bridges.explain.device import CLOCKS_DIFFER_S, OLD_S, SILENT_S, Device
 from bridges.explain.explanation import FaultTold, Field, Step
 from bridges.explain.phrases import Clock, lasted, listed
@@ -24,6 +25,7 @@ class Answer:
     next: list[Step] = field(default_factory=list)
     asks: str = ""
     fields: tuple[Field, ...] = ()
+    notes: tuple[str, ...] = ()
     since: float = float("-inf")
 
     def say(self, text: str, *steps: Step) -> "Answer":
@@ -126,6 +128,18 @@ def notes(device: Device, clock: Clock) -> tuple[str, ...]:
             " and refusals are not known."
         )
     return tuple(found)
+
+
+def clock_of(claim: Claim) -> tuple[str, ...]:
+    """A stamp from another clock makes a request look old or new."""
+    age_s = claim.stamp_age_s
+    if abs(age_s) < CLOCKS_DIFFER_S or not claim.stamped:
+        return ()
+    side = "behind" if age_s > 0 else "ahead of"
+    return (
+        f"The requests of {claim.who} are stamped {lasted(abs(age_s))} {side} this clock. One that"
+        " looks old is taken for a replay until it has been repeated for a while.",
+    )
 
 
 def faults(device: Device, clock: Clock, remedies: Remedies) -> tuple[FaultTold, ...]:

@@ -47,9 +47,8 @@ def _state(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
     who, request = charger.robot.value, charger.request.value
     whose = "" if who == NOBODY else f" for {who}"
     asked = f" (request {request})" if request else ""
-    found.say(
-        f"{charger.name} is {charger.state.value}{whose}{asked} {clock.since(charger.state.since)}."
-    )
+    state = {"error": "in error", "assigned": "kept"}.get(charger.state.value, charger.state.value)
+    found.say(f"{charger.name} is {state}{whose}{asked} {clock.since(charger.state.since)}.")
 
 
 def _next(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
@@ -59,7 +58,7 @@ def _next(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
             _idle(found, charger, clock)
         case "assigned":
             found.say(
-                f"It is kept for {who}, which it does not see on its pad yet, or cannot charge yet.",
+                f"It does not see {who} on its pad yet, or cannot charge it yet.",
                 Step("the robot", f"{who} has to come to {charger.name} and stand there exactly"),
             )
         case "charging":
@@ -77,7 +76,8 @@ def _next(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
             _error(found, charger)
         case other:
             found.say(
-                f"RMF defines no charger state {other}.", Step("our node", "publish RMF's states")
+                f"RMF defines no charger state {other}.",
+                Step("the device's node", "publish RMF's states"),
             )
 
 
@@ -94,7 +94,7 @@ def _idle(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
     found.say(
         f"It is asked to charge {first.wants} {clock.since(first.first)} (request {first.who}), and has"
         " not taken the request.",
-        Step("our node", "take the request; a refusal is told below, or in its log"),
+        Step("the device's node", "take the request; a refusal is told below, or in its log"),
     )
 
 

@@ -10,10 +10,9 @@ from typing import Final
 from bridges.explain import answer as common
 from bridges.explain.answer import Answer
 from bridges.explain.claims import Claim
-from bridges.explain.device import CLOCKS_DIFFER_S
 from bridges.explain.door_facts import CLOSED, OPEN, DoorFacts
 from bridges.explain.explanation import Field, Step
-from bridges.explain.phrases import Clock, Moment, lasted
+from bridges.explain.phrases import Clock, Moment
 
 SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
@@ -42,6 +41,7 @@ def answer(door: DoorFacts, clock: Clock, around: common.Heard, focus: str = "")
         _nobody_asks(found, door, clock)
         return found
     found.asks, found.fields = claim.who, _fields(door, claim, clock)
+    found.notes += common.clock_of(claim)
     if door.mode.value in AWAY:
         _away(found, door, clock)
     elif claim.wants == OPEN:
@@ -150,10 +150,6 @@ def _not_listed(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> N
                 "the supervisor", f"take the request of {claim.who}; its log says why it does not"
             ),
         )
-        age_s = claim.stamp_age_s
-        if abs(age_s) > CLOCKS_DIFFER_S:
-            side = "behind" if age_s > 0 else "ahead of"
-            found.say(f"The requests are stamped {lasted(abs(age_s))} {side} this clock.")
 
 
 def _not_let_go(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> None:

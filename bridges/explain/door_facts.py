@@ -41,6 +41,7 @@ class DoorFacts(Device):
             return
         who = label(request.requester_id)
         claim, new = self.claims.ask(who, wants, moment)
+        claim.stamped = request.request_time != d.Time()
         claim.stamp_age_s = moment.wall - in_seconds(request.request_time)
         if new and (wants == OPEN or who in self.holders):
             self.tell(moment, f"{who} asks for the door to be {wants}")

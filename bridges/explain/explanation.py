@@ -14,11 +14,11 @@ Who = Literal[
     "the fleet adapter",
     "the supervisor",
     "the coordinator",
-    "our node",
+    "the device's node",
     "the controller",
     "a person",
 ]
-"""Who has to do the next thing. our node: the device's own daemon, ours or another maker's. the
+"""Who has to do the next thing. the device's node: its own daemon, ours or another maker's. the
 controller: the lift's, door's or charger's own."""
 
 

@@ -11,6 +11,7 @@ give a `Timeline` of plain values: `dataclasses.asdict` makes JSON of it.
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
+from bridges.charger import refusals
 from bridges.explain import tones
 from bridges.explain.rows import Row, label
 from bridges.explain.timeline import LANES, Kind, Lane, LaneName, Level, Timeline, Tone
@@ -140,6 +141,8 @@ class Drawing:
                     self._request(topic, message)
             case d.SupervisorHeartbeat() if self._kind == "door":
                 self._heartbeat(message)
+            case d.DiagnosticStatus():
+                self._refusal(message)
             case d.DiagnosticArray():
                 for status in message.status:
                     self._diagnosis(status)
@@ -205,9 +208,16 @@ class Drawing:
         if passed_on and who != "door_supervisor":
             text = f"{text} for {who}"
         row = self._row("requests", SUPERVISOR if passed_on else who)
-        row.say(self._now, "" if ends else label(text), "asks")
-        if ends:
+        once = isinstance(message, d.ChargerRequest | d.ChargerCancel)
+        row.say(self._now, "" if ends or once else label(text), "asks")
+        if ends or once:
             row.mark(self._now, label(text), "asks")
+
+    def _refusal(self, status: d.DiagnosticStatus) -> None:
+        refusal = refusals.read(status)
+        if refusal is not None and (self._kind, refusal.charger) == ("charger", self._device):
+            row = self._row("requests", refusal.robot)
+            row.mark(self._now, label(f"refused: {refusal.text}"), "wrong")
 
     def _heartbeat(self, message: d.SupervisorHeartbeat) -> None:
         """RMF's own supervisor sends it after requests only: a session lasts until one without it."""
@@ -259,4 +269,5 @@ def _outputs(told: str) -> Iterator[tuple[str, str]]:
     """`agv_request yes, call L3` as the status file says it (`bridges.log.plain`)."""
     for part in told.split(", ") if told != "-" else ():
         name, _, value = part.partition(" ")
-        yield name, value
+        if value != "0":  # of a counter
+            yield name, value

@@ -10,10 +10,11 @@ from typing import Final
 from bridges.explain import answer as common
 from bridges.explain.answer import Answer
 from bridges.explain.claims import Claim
-from bridges.explain.device import CLOCKS_DIFFER_S, SILENT_S
+from bridges.explain.device import SILENT_S
 from bridges.explain.explanation import Field, Step, Who
 from bridges.explain.lift_facts import NO_FLOOR, NOBODY, LiftFacts
 from bridges.explain.phrases import Clock, lasted
+from bridges.explain.rows import label
 
 SETTLES_S: Final = 2.0
 """Between a request and its grant, or a supervisor's change of mind, so much time is usual."""
@@ -22,7 +23,7 @@ LONG_S: Final = 60.0
 HAZARDS: Final = {
     "FIRE": "the fire alarm has to end, and be reset where its settings ask for that",
     "EMERGENCY": "the emergency (stop, code blue, earthquake) has to end",
-    "OFFLINE": "somebody has to see why it is out of service or cannot be read",
+    "OFFLINE": "see why it is out of service, or cannot be read",
 }
 
 
@@ -36,9 +37,10 @@ def answer(lift: LiftFacts, clock: Clock, around: common.Heard, focus: str = "")
         return _with_askers(stopped, lift, clock)
     claim = _in_question(lift, clock, focus)
     found = Answer(since=_begins(lift, claim))
-    if claim is not None and lift.matches(claim):
-        found.say(f"{claim.who} has {lift.name}, and RMF has all that it waits for.")
-    elif claim is not None and claim.ended is None:
+    if focus and claim is None:
+        told = "its last ride is told below" if lift.kept else "it was not heard asking"
+        found.say(f"{label(focus)} neither has {lift.name} nor asks for it now: {told}.")
+    if claim is not None and claim.ended is None and not lift.matches(claim):
         where = claim.wants or "no floor"
         found.say(f"{claim.who} waits for {lift.name} at {where} {clock.since(claim.since)}.")
     _hold(found, lift, clock)
@@ -50,6 +52,7 @@ def answer(lift: LiftFacts, clock: Clock, around: common.Heard, focus: str = "")
         _end_not_obeyed(found, lift, claim, clock)
     else:
         found.asks, found.fields = claim.who, _fields(lift, claim, clock)
+        found.notes += common.clock_of(claim)
         _why(found, lift, claim, clock)
     _others_wait(found, lift, claim, clock)
     return found
@@ -82,13 +85,15 @@ def _begins(lift: LiftFacts, claim: Claim | None) -> float:
     starts = [claim.first.at] if claim else []
     if holder is not None:
         starts.append(holder.first.at)
+    elif lift.session.value == NOBODY and claim is None:
+        starts.append(lift.rides.last_from)
     elif lift.session.value != NOBODY:
         starts.append(lift.session.since.at)
     return min(starts, default=float("-inf"))
 
 
 def _with_askers(found: Answer, lift: LiftFacts, clock: Clock) -> Answer:
-    for claim in waiters(lift, clock)[:3]:
+    for claim in [one for one in waiters(lift, clock) if one.met is None][:3]:
         since = clock.since(claim.since)
         found.say(f"{claim.who} waits for it at {claim.wants or 'no floor'} {since}.")
         found.since = min(found.since, claim.first.at)
@@ -150,8 +155,10 @@ def _others_wait(found: Answer, lift: LiftFacts, claim: Claim | None, clock: Clo
 def _why(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
     """Why this claim is not met, or who goes on if it is."""
     holder = lift.session.value
-    if lift.matches(claim):
+    if lift.matches(claim) and claim.asks(clock.now):
         _drives(found, lift, claim, clock)
+    elif lift.matches(claim):
+        _without_word(found, lift, holder, clock)
     elif lift.mode.value in HAZARDS:
         _hazard(found, lift, clock)
     elif holder == claim.who:
@@ -170,11 +177,16 @@ def _hazard(found: Answer, lift: LiftFacts, clock: Clock) -> None:
         " ends. RMF does not look at the mode, so it only sees that the lift does not come.",
         Step(who, HAZARDS[mode]),
     )
-    if lift.session.value != NOBODY:
-        found.say(
-            f"{lift.session.value} keeps the session meanwhile, as RMF's supervisor would never end"
-            " one that is shown no more."
-        )
+    holder = lift.session.value
+    if holder == NOBODY:
+        return
+    own = lift.own(clock.now)
+    inside = own.values.get("boarded") if own else None
+    door = {
+        "yes": " It may be in the car, so it is shown the true door and can leave.",
+        "no": " It was not let into the car, so it is shown no open door.",
+    }.get(inside or "", "")
+    found.say(f"{holder} keeps the session meanwhile: only its END ends one.{door}")
 
 
 def _held(found: Answer, lift: LiftFacts, claim: Claim, holder: str, clock: Clock) -> None:
@@ -241,13 +253,14 @@ def _end_not_obeyed(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) 
     assert claim.ended is not None
     if clock.now.at - claim.ended.at < SETTLES_S:
         found.say(
-            f"{claim.who} has just sent END.", Step("our node", "the next state shows no session")
+            f"{claim.who} has just sent END.",
+            Step("the device's node", "the next state shows no session"),
         )
         return
     found.say(
         f"{claim.who} sent END at {clock.time(claim.ended.wall)}, and the lift still shows its"
         " session.",
-        Step("our node", f"end the session; until then: `rmf-bridge release {lift.name}`"),
+        Step("the device's node", f"end the session; until then: `rmf-bridge release {lift.name}`"),
     )
 
 
@@ -287,6 +300,13 @@ def _missing(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None
                 "confirm AGV mode: a key switch, people's calls that it serves first, or the contact",
             ),
         )
+    elif lift.floor.value == NO_FLOOR and lift.motion.value == "stopped":
+        found.say(
+            f"The car stands, and at no known floor, {clock.since(lift.floor.since)}{on}.",
+            Step(
+                "the controller", "show its floor: a wire of the floor code, or a stop on the way"
+            ),
+        )
     elif lift.floor.value != claim.wants:
         found.say(
             f"The car has not come to {claim.wants}: it is at {lift.floor.value}"
@@ -314,7 +334,7 @@ def _not_granted(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> 
         )
         return
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
-        found.say("It was asked for a moment ago.", Step("our node", "grant the session"))
+        found.say("It was asked for a moment ago.", Step("the device's node", "grant the session"))
         return
     if _not_passed_on(found, lift, claim, clock):
         return
@@ -322,15 +342,16 @@ def _not_granted(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> 
     if reasons:
         found.say(
             f"Its daemon refuses the request: {', '.join(reasons)}.",
-            Step("our node", "grant the session once that is over; its log has the details"),
+            Step(
+                "the device's node", "grant the session once that is over; its log has the details"
+            ),
         )
     else:
         found.say(
             "The request is passed on to the lift's node, which does not grant it and says no reason"
             " on the graph.",
-            Step("our node", "grant the session; its log says why it does not"),
+            Step("the device's node", "grant the session; its log says why it does not"),
         )
-    _clocks(found, claim)
 
 
 def _not_passed_on(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> bool:
@@ -353,18 +374,4 @@ def _not_passed_on(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -
                 f"pass on the request of {claim.who}; its log says why it does not",
             ),
         )
-    _clocks(found, claim)
     return True
-
-
-def _clocks(found: Answer, claim: Claim) -> None:
-    """A stamp from another clock makes a request look old or new."""
-    age_s = claim.stamp_age_s
-    if abs(age_s) < CLOCKS_DIFFER_S:
-        return
-    text = "behind" if age_s > 0 else "ahead of"
-    found.say(
-        f"Its requests are stamped {lasted(abs(age_s))} {text} this clock: a request that looks old is"
-        " refused as a replay until it has been repeated for a while.",
-        Step("a person", "set the clocks of all machines by one time server"),
-    )

@@ -21,12 +21,13 @@ NO_FLOOR: Final = "no known floor"
 
 @dataclass(slots=True)
 class Rides:
-    """Of all rides that were heard: how many ended, and the longest wait for the car."""
+    """Of all rides: how many ended, the longest wait for the car, and when the last one began."""
 
     ended: int = 0
     longest_s: float = 0.0
     longest_who: str = ""
     longest_at: Moment | None = None
+    last_from: float = float("-inf")
 
 
 class LiftFacts(Device):
@@ -73,6 +74,7 @@ class LiftFacts(Device):
         claim, new = self.claims.ask(who, wants, moment, keep=self.session.value)
         claim.own = claim.own or not passed_on
         claim.passed_on = moment if passed_on else claim.passed_on
+        claim.stamped = request.request_time != d.Time()
         claim.stamp_age_s = moment.wall - in_seconds(request.request_time)
         if new:
             self._asks(moment, claim, request)
@@ -209,6 +211,7 @@ class LiftFacts(Device):
         """The ride is over, or was given up."""
         if claim.granted is not None:
             self.rides.ended += 1
+            self.rides.last_from = claim.first.at
         if claim.who == self.focus:
             self.kept = self.lines_since(claim.first.at)
         if claim.ended is not None:

@@ -43,13 +43,14 @@ class Site:
 
     def __init__(self, name: str = "", session: str = "") -> None:
         self.messages = 0
+        self._story_from = float("-inf")
         self._name = name
         self._session = session
         self._devices: dict[tuple[Kind, str], Device] = {}
         self._names: dict[Kind, dict[str, None]] = {"lift": {}, "door": {}, "charger": {}}
         self._began: Moment | None = None
         self._now = Moment(0.0, 0.0)
-        self._offset = 0.0
+        self._offset: float | None = None
         self._steps: list[tuple[Moment, float]] = []
         self._coordinator: tuple[Moment, Mapping[str, str]] | None = None
 
@@ -78,6 +79,10 @@ class Site:
             case d.DiagnosticArray():
                 for status in message.status:
                     self._diagnose(moment, status)
+
+    def story_from(self, at: float) -> None:
+        """Leave out of the stories what was before this time (s)."""
+        self._story_from = at
 
     def passed(self, at: float, wall: float) -> None:
         """Time passes, and nothing is heard."""
@@ -114,7 +119,7 @@ class Site:
             asks=answer.asks,
             fields=answer.fields,
             faults=common.faults(device, clock, remedies or {}),
-            notes=(*common.notes(device, clock), *self._stepped(clock)),
+            notes=(*answer.notes, *common.notes(device, clock), *self._stepped(clock)),
             story=story[-STORY_LINES:],
             left_out=max(0, len(story) - STORY_LINES),
             before=_before(device, clock),
@@ -137,7 +142,7 @@ class Site:
         """All that is remembered of the ride in question."""
         if isinstance(device, LiftFacts) and device.kept and not answer.asks:
             return device.kept
-        return device.lines_since(answer.since)
+        return device.lines_since(max(answer.since, self._story_from))
 
     # ---- who hears what
 
@@ -146,8 +151,9 @@ class Site:
         offset = heard.wall - heard.at
         if self._began is None:
             self._began = Moment(at, heard.wall, seen=False)
-        elif abs(offset - self._offset) > STEP_S and len(self._steps) < 3:
-            self._steps.append((Moment(at, heard.wall), offset - self._offset))
+        before = offset if self._offset is None else self._offset
+        if abs(offset - before) > STEP_S and len(self._steps) < 3:
+            self._steps.append((Moment(at, heard.wall), offset - before))
         self._offset = offset
         self._now = Moment(at, heard.wall)
         return self._now

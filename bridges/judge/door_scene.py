@@ -15,8 +15,10 @@ REOPENS_WITHIN_S: Final = 1.0
 AT_ONCE_S: Final = 0.3
 CROSSES_S: Final = 0.5
 """A state may be heard after the CLOSE that it has caused."""
-DWELLS_S: Final = 1.0
+DWELLS_S: Final = 0.5
 """No operator lets a door that people have opened go sooner."""
+OPENING_S: Final = 1.0
+"""None turns round sooner while it opens."""
 
 
 class DoorScene(Scene[d.DoorState]):
@@ -89,7 +91,8 @@ class DoorScene(Scene[d.DoorState]):
             self._opens()
         elif self.mode_before == OPEN:
             self._left_open_at = self.now
-            self._people_leave(self.now - max(self._people_open_at, self._people_close_at))
+            open_s = self.now - max(self._people_open_at, self._people_close_at)
+            self._people_leave(open_s < DWELLS_S)
         if self.mode_before == CLOSED and not self.latched:
             self._people_at, self._people_open_at = self.now, NEVER
             crossed = self.now - self.closed_at < CROSSES_S
@@ -97,7 +100,7 @@ class DoorScene(Scene[d.DoorState]):
             if self.mode == OPEN:
                 self._people_open_at = self.now
         elif self.mode == CLOSED and self._people_at > NEVER:
-            self._people_leave(0.0)
+            self._people_leave(self.now - self._people_close_at < OPENING_S)
 
     def _opens(self) -> None:
         if self.latched and self._was_closed and not self.was_open:
@@ -109,11 +112,11 @@ class DoorScene(Scene[d.DoorState]):
         if self._people_at > NEVER:
             self._people_open_at = self.now
 
-    def _people_leave(self, dwelt_s: float) -> None:
+    def _people_leave(self, at_once: bool) -> None:
         """The opening that people made is over, or ends."""
         if self._people_at > NEVER and self._people_close_at > NEVER:
             self.left = True
-            self.shut = self.shut + 1 if dwelt_s < DWELLS_S else 0
+            self.shut = self.shut + 1 if at_once else 0
         self._people_at = NEVER
 
     def _ask_open(self) -> None:

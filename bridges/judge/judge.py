@@ -53,7 +53,7 @@ class _Tally:
 class Judge:
     """One device by RMF's name. Bounded memory, whatever is heard.
 
-    `only`: the ids of the laws to judge by; all of the kind without it.
+    `only`: the ids of the laws to judge by; all of the kind without it. `broken`: any of them is.
     """
 
     def __init__(self, kind: Kind, name: str, only: Iterable[str] | None = None) -> None:
@@ -62,13 +62,12 @@ class Judge:
         self.name = name
         self.scene = SCENES[kind](name)
         self.first: Heard | None = None
-        self.latest: Heard | None = None
+        self.broken = False
         self._tallies = [_Tally(law) for law in LAWS[kind] if law.id in ids]
 
     def hear(self, heard: Heard) -> None:
         """The next message, of any device; in order of arrival."""
         self.first = self.first or heard
-        self.latest = heard
         if self.scene.take(heard):
             for tally in self._tallies:
                 self._check(tally, heard.at, heard.wall)
@@ -96,6 +95,10 @@ class Judge:
         """As far as it has been heard."""
         return tuple(tally.judged() for tally in self._tallies)
 
+    def _breaks(self, tally: _Tally, evidence: Evidence) -> None:
+        self.broken = True
+        tally.found(evidence)
+
     def _check(self, tally: _Tally, at: float, wall: float) -> None:
         finding = tally.law.check(self.scene)
         if finding is None:
@@ -103,7 +106,7 @@ class Judge:
         if isinstance(finding, Doubt):
             tally.doubt = tally.doubt or (finding, Evidence(at, wall, finding.text))
         elif finding:
-            tally.found(Evidence(at, wall, finding))
+            self._breaks(tally, Evidence(at, wall, finding))
         else:
             tally.kept += 1
 
@@ -117,4 +120,4 @@ class Judge:
                 tally.kept += 1
             elif now - evidence.at > LEEWAY_S:
                 tally.doubt = None
-                tally.found(evidence)
+                self._breaks(tally, evidence)

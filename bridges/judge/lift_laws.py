@@ -1,289 +1,11 @@
-"""The laws of a lift's node. Each is a sentence, where it stands, and a function of the scene."""
+"""The laws of a lift's node, as data."""
 
 from typing import Final
 
-from bridges.judge.law import KEPT, Doubt, Finding, Law, shown
-from bridges.judge.lift_scene import GRACE_S, HAZARDS, LATE_S, LiftScene
-from bridges.judge.scene import NEVER
+from bridges.judge import lift_checks as checks
+from bridges.judge.law import Law
+from bridges.judge.lift_scene import LiftScene
 from bridges.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
-from bridges.rmf import definitions as d
-from bridges.rmf import words
-
-ENDS_WITHIN_S: Final = 3.0
-"""A state period of 2 s, and what a scan takes."""
-GRANTS_WITHIN_S: Final = 30.0
-GRANT_ASKED: Final = 10
-JUMPS_WITHIN_S: Final = 1.5
-REFUSED: Final = 3
-FOREIGN_S: Final = 2.0
-REOPENED: Final = 3
-REOPENED_WITHIN_S: Final = 30.0
-FALSE: Final = 3
-FALSE_WITHIN_S: Final = 30.0
-SETTLED_S: Final = 3.0
-"""After a node began to speak: what it was asked before may not have been heard."""
-
-
-def _opened(state: d.LiftState) -> bool:
-    return state.door_state == d.LiftDoor.DOOR_OPEN
-
-
-def _is_open(scene: LiftScene) -> d.LiftState | None:
-    state = scene.new
-    return state if state is not None and _opened(state) else None
-
-
-def _numbers(scene: LiftScene) -> Finding:
-    state = scene.new
-    if state is None:
-        return None
-    found = [
-        f"{field} {value}"
-        for field, value, known in (
-            ("door_state", state.door_state, d.LiftDoor),
-            ("motion_state", state.motion_state, d.LiftMotion),
-            ("current_mode", state.current_mode, d.LiftMode),
-            *(("available_modes", mode, d.LiftMode) for mode in state.available_modes[:20]),
-        )
-        if value not in list(known)
-    ]
-    return f"{', '.join(found[:3])}: RMF has no such number" if found else KEPT
-
-
-def _other_lift(scene: LiftScene) -> Finding:
-    """Given to one who asked for another lift alone."""
-    session = scene.session
-    if scene.new is None or not session or session == scene.session_before:
-        return None
-    if session not in scene.elsewhere or scene.before is None:
-        return KEPT
-    return Doubt(
-        f"held by {shown(session)}, who asked for another lift", lambda: session in scene.asks
-    )
-
-
-def _own_name(scene: LiftScene) -> Finding:
-    """Given to nobody who did not ask."""
-    session = scene.session
-    if scene.new is None or scene.before is None or not session:
-        return None
-    if session == scene.session_before:
-        return None
-    if session in scene.asks or session in scene.elsewhere or scene.now - scene.since < SETTLED_S:
-        return KEPT
-    return Doubt(f"held by {shown(session)}, who never asked", lambda: session in scene.asks)
-
-
-def _grants(scene: LiftScene) -> Finding:
-    """The first request on a free lift in service is granted."""
-    if scene.new is None or scene.before is None:
-        return None
-    if scene.session:
-        return KEPT if scene.session != scene.session_before else None
-    free_s = scene.now - scene.free_since
-    for session, ask in list(scene.asks.items()):
-        asked = ask.direct and ask.times >= GRANT_ASKED and scene.now - ask.at < 3.0
-        served = ask.floors[-1] in scene.new.available_floors or not scene.new.available_floors
-        long_s = min(free_s, scene.now - ask.since)
-        if asked and served and session and not ask.human and long_s > GRANTS_WITHIN_S:
-            return f"{shown(session)} has asked {ask.times} times in {long_s:.0f} s, and it is free"
-    return None
-
-
-def _bypassed(scene: LiftScene) -> Finding:
-    """Nobody is granted by what fleet adapters say to the supervisor."""
-    session = scene.session
-    if scene.new is None or scene.before is None or session in ("", scene.session_before):
-        return None
-    ask = scene.asks.get(session)
-    if ask is None or ask.direct or scene.now - scene.other_asked_at > 10.0:
-        return KEPT if ask else None
-
-    def excused() -> bool:
-        later = scene.asks.get(session)
-        return later is not None and later.direct
-
-    text = f"held by {shown(session)}, whom the supervisor has not asked for"
-    return Doubt(text, excused)
-
-
-def _ended_unasked(scene: LiftScene) -> Finding:
-    """A session goes by its own END alone."""
-    old, new, since = scene.session_before, scene.session, scene.held_since
-    if scene.new is None or scene.before is None or old in ("", new):
-        return None
-    ask = scene.asks.get(old)
-    if scene.has_ended(old, since) or (ask and ask.human) or _foreign_end(scene, old, since):
-        return KEPT
-    what = f"went from {shown(old)} to {shown(new)}" if new else f"session of {shown(old)} gone"
-
-    def excused() -> bool:
-        return scene.has_ended(old, since) or bool(_foreign_end(scene, old, since))
-
-    return Doubt(f"{what}, and no END_SESSION for it was heard", excused)
-
-
-def _foreign_end(scene: LiftScene, session: str, since: float) -> str:
-    """Whose END came just now, while this session's has not since then; "" for nobody's."""
-    if scene.has_ended(session, since):
-        return ""
-    others = (who for who in scene.ended if who not in ("", session))
-    return next((who for who in others if scene.now - scene.ended[who] < FOREIGN_S), "")
-
-
-def _ended_by_another(scene: LiftScene) -> Finding:
-    """The END of who does not have it changes nothing."""
-    old = scene.session_before
-    if scene.new is None or scene.before is None or not old:
-        return None
-    since = scene.granted_at if old == scene.session else scene.held_since
-    other = _foreign_end(scene, old, since)
-    if not other or old not in scene.asks:
-        return None
-    if old == scene.session:
-        return KEPT
-    text = f"END_SESSION of {shown(other)} ended the session of {shown(old)}"
-    return Doubt(text, lambda: scene.has_ended(old, since))
-
-
-def _ends(scene: LiftScene) -> Finding:
-    """An END of the holder ends it, whatever floor and door it has."""
-    if scene.new is None:
-        return None
-    if scene.bare_refused >= REFUSED:
-        return f"{REFUSED} sessions in a row outlived an END without a floor, as fleet adapters send it"
-    if scene.session_before and scene.session != scene.session_before:
-        return KEPT
-    at = scene.ending.at
-    if at == NEVER or scene.now - at < ENDS_WITHIN_S:
-        return None
-    bare = scene.ending.bare_at == at and scene.ending.floor_at == NEVER
-    floor = " without a floor" if bare else ""
-    return f"still held by {shown(scene.session)} {scene.now - at:.1f} s after its END{floor}"
-
-
-def _stopped(scene: LiftScene) -> Finding:
-    state = _is_open(scene)
-    if state is None:
-        return None
-    moving = state.motion_state in (d.LiftMotion.MOTION_UP, d.LiftMotion.MOTION_DOWN)
-    return words.described(state) if moving else KEPT
-
-
-def _somewhere(scene: LiftScene) -> Finding:
-    state = _is_open(scene)
-    if state is None:
-        return None
-    return KEPT if state.current_floor else words.described(state)
-
-
-def _no_jump(scene: LiftScene) -> Finding:
-    state = _is_open(scene)
-    if state is None or not state.current_floor:
-        return None
-    floor, at = scene.open_seen
-    if floor in ("", state.current_floor) or scene.now - at > JUMPS_WITHIN_S:
-        return KEPT
-    return (
-        f"open at {shown(floor)}, and {scene.now - at:.1f} s later at {shown(state.current_floor)}"
-    )
-
-
-def _in_agv(scene: LiftScene) -> Finding:
-    """A robot is let in with the car taken from the public."""
-    state = scene.new
-    if state is None or not (scene.offers and scene.offered):
-        return None
-    if state.current_mode == d.LiftMode.MODE_HUMAN:
-        return words.described(state)
-    return KEPT if state.current_mode == d.LiftMode.MODE_AGV else None
-
-
-def _holds(scene: LiftScene) -> Finding:
-    """The door stays open for the robot."""
-    state = _is_open(scene)
-    if state is None or not state.session_id or not scene.was_asked_to(state.current_floor):
-        return None
-    often = len(scene.reopened) == REOPENED
-    if often and scene.now - scene.reopened[0] < REOPENED_WITHIN_S:
-        return f"open, not open and open again within 1 s, {REOPENED} times in one stop"
-    return KEPT
-
-
-def _floors(scene: LiftScene) -> Finding:
-    state = scene.new
-    if state is None or not state.available_floors:
-        return None
-    if state.current_floor in ("", *state.available_floors):
-        return KEPT
-    return f"current_floor {shown(state.current_floor)} is none of its available_floors"
-
-
-def _destination(scene: LiftScene) -> Finding:
-    """Where the car goes is what its holder asked for."""
-    state = scene.new
-    if state is None or not state.session_id or not state.destination_floor:
-        return None
-    if not scene.known or scene.was_asked_to(state.destination_floor):
-        return KEPT
-    if state.session_id not in scene.asks:
-        return None  # another law says so
-    floor = state.destination_floor
-    return Doubt(
-        f"destination {shown(floor)}, which {shown(state.session_id)} did not ask for",
-        lambda: scene.was_asked_to(floor) or scene.session != state.session_id,
-    )
-
-
-def _unserved(scene: LiftScene) -> Finding:
-    state = scene.new
-    if state is None or not state.available_floors or not state.destination_floor:
-        return None
-    if state.destination_floor in state.available_floors:
-        return KEPT
-    return f"destination {shown(state.destination_floor)} is none of its available_floors"
-
-
-def _lets_nobody_in(scene: LiftScene) -> Finding:
-    """Under a hazard no robot is let in."""
-    state = scene.new
-    if state is None or state.current_mode not in HAZARDS or not state.session_id:
-        return None
-    return words.described(state) if scene.offers else KEPT
-
-
-def _grants_nothing(scene: LiftScene) -> Finding:
-    """Under a hazard nobody new gets it."""
-    state, before = scene.new, scene.before
-    if state is None or before is None or state.current_mode not in HAZARDS:
-        return None
-    new = state.session_id not in ("", before.session_id)
-    again = state.session_id == scene.last and scene.now - scene.last_at < GRACE_S + LATE_S
-    if not new or again or before.current_mode not in HAZARDS:
-        return KEPT if before.current_mode in HAZARDS else None
-    return f"granted in mode {words.word(d.LiftMode, state.current_mode)}: {words.described(state)}"
-
-
-def _no_false(scene: LiftScene) -> Finding:
-    """Nothing calls an alarm off but its end by an operator."""
-    if not isinstance(scene.news, d.Bool):
-        return None
-    often = len(scene.false_alarms) == FALSE
-    if often and scene.now - scene.false_alarms[0] < FALSE_WITHIN_S:
-        return f"`false` {FALSE} times, with no alarm to call off"
-    return KEPT
-
-
-def _retained(scene: LiftScene) -> Finding:
-    """Fleets hear the alarm."""
-    if scene.volatile is None:
-        return None
-    return "its publisher is volatile: fleet adapters do not match it" if scene.volatile else KEPT
-
-
-def _blind(state: d.LiftState) -> bool:
-    return state.current_mode in (d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_UNKNOWN)
-
 
 A6: Final = "rmf_ros2 lift_supervisor/Node.cpp:58-140"
 REQUEST_LIFT: Final = "rmf_ros2 phases/RequestLift.cpp:322-326"
@@ -293,69 +15,69 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
     named(RATE, "L2.rate"),
     named(ANSWERED, "L2.answer"),
     named(ONE, "B0.one"),
-    named(STAMP, "L3.stamp", check=stamped(_blind)),
+    named(STAMP, "L3.stamp", check=stamped(checks.blind)),
     Law(
         "T1.numbers",
         "door_state, motion_state and modes are numbers of LiftState.msg",
         "RMF compares numbers: one that it does not know is never true",
         "LiftState.msg",
-        _numbers,
+        checks.numbers,
     ),
     Law(
         "L1.other",
         "A request for another lift changes nothing here",
         "All lifts share one topic: who looks at the name too late gives this lift to that robot",
         "LiftRequest.msg; sharp-rmf/low_level_lift did so",
-        _other_lift,
+        checks.other_lift,
     ),
     Law(
         "L1.bypass",
         "A session is granted on lift_requests, not on adapter_lift_requests",
         "Only the supervisor decides between two robots: around it, both believe they have the lift",
         A6,
-        _bypassed,
+        checks.bypassed,
     ),
     Law(
         "L4.own",
         "session_id is the session_id of a request for this lift",
         "A robot enters only when it reads its own fleet/robot there",
         REQUEST_LIFT,
-        _own_name,
+        checks.own_name,
     ),
     Law(
         "L4.grants",
         "A free lift in service shows the session of who asks for it",
         "A fleet adapter has no timeout: it asks and waits for ever. AGV_MODE is 1 in a request",
         "rmf_ros2 phases/RequestLift.cpp; LiftRequest.msg",
-        _grants,
+        checks.grants,
     ),
     Law(
         "L5.ends",
         "END_SESSION of the holder ends the session, with an empty floor too, within 3 s",
         "Fleet adapters send END with no floor and door 0. Refused, the lift is lost to the next robot",
         CONTEXT,
-        _ends,
+        checks.ends,
     ),
     Law(
         "L5.foreign",
         "END_SESSION of another session changes nothing",
         "rmf-web sends END for every robot that it knows: a robot in the car must keep its lift",
         "rmf-web PR#808; " + A6,
-        _ended_by_another,
+        checks.ended_by_another,
     ),
     Law(
         "L4.ends",
         "A session ends by its END_SESSION alone: by no timeout, hazard, fault or other request",
         "The supervisor frees its slot only at END: a robot then waits for a lift that has let it go",
         "rmf_ros2#314; contract b0.1",
-        _ended_unasked,
+        checks.ended_unasked,
     ),
     Law(
         "L7.stopped",
         "DOOR_OPEN is shown only while the car stands",
         "A robot drives on door, floor and session alone; motion_state it does not read",
         REQUEST_LIFT,
-        _stopped,
+        checks.stopped,
         sensed=True,
     ),
     Law(
@@ -363,7 +85,7 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
         "DOOR_OPEN is shown only at a known floor",
         "An open door with no floor is an unproven one",
         REQUEST_LIFT + "; contract L7",
-        _somewhere,
+        checks.somewhere,
         sensed=True,
     ),
     Law(
@@ -371,7 +93,7 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
         "The door is not open at two floors within 1.5 s",
         "No car is that fast: one of the two floors was wrong, and a robot may have believed it",
         "contract b0.7",
-        _no_jump,
+        checks.no_jump,
         sensed=True,
     ),
     Law(
@@ -379,7 +101,7 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
         "DOOR_OPEN is no memory: its lift_time goes on",
         "A controller that is not reached any more may have closed the door long ago",
         "LiftState.msg, lift_time; contract L7, T33",
-        fresh(_opened),
+        fresh(checks.opened),
         sensed=True,
     ),
     Law(
@@ -387,7 +109,7 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
         "A robot is let in only in MODE_AGV; in LiftState that is 2, and MODE_HUMAN is 1",
         "RMF does not read the mode, so OPEN must wait for it: else people call the car away",
         "LiftState.msg; contract L7, b0.2",
-        _in_agv,
+        checks.in_agv,
         sensed=True,
     ),
     Law(
@@ -395,7 +117,7 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
         "The door stays OPEN for the session that has called it, and does not flap",
         "A robot sets out at the first OPEN and is on its way while the door says otherwise",
         REQUEST_LIFT + "; contract L7",
-        _holds,
+        checks.holds,
         sensed=True,
     ),
     Law(
@@ -403,7 +125,7 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
         "current_floor is one of available_floors, or empty",
         "RMF compares the names letter by letter",
         REQUEST_LIFT,
-        _floors,
+        checks.floors,
         sensed=True,
     ),
     Law(
@@ -411,41 +133,41 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
         "destination_floor is one that the holder asked for",
         "The supervisor repeats a request until it reads its floor there; another's is another's ride",
         A6,
-        _destination,
+        checks.destination,
     ),
     Law(
         "L9.unserved",
         "destination_floor is one of available_floors, or empty",
         "A floor that is not served is refused, and the car goes nowhere else for it",
         "LiftRequest.msg, destination_floor",
-        _unserved,
+        checks.unserved,
     ),
     Law(
         "L10.board",
         "In FIRE, EMERGENCY or OFFLINE no robot is let in: OPEN is not shown to a session outside",
         "RMF lets a robot in on OPEN, floor and session, in every mode: a fire holds nobody back",
         REQUEST_LIFT + "; contract b0.1, b0.2",
-        _lets_nobody_in,
+        checks.lets_nobody_in,
     ),
     Law(
         "L10.grant",
         "In FIRE, EMERGENCY or OFFLINE no new session is granted",
         "A lift under recall is not the robots'",
         "contract L10",
-        _grants_nothing,
+        checks.grants_nothing,
     ),
     Law(
         "L12.false",
         "fire_alarm_trigger is never told `false` without an alarm to call off",
         "One `false` ends another source's alarm, and the robots go on with their tasks",
         "octarobotics/lci-rmf-adapter; rmf_ros2 FleetUpdateHandle::handle_emergency",
-        _no_false,
+        checks.no_false,
     ),
     Law(
         "L12.retained",
         "fire_alarm_trigger is published TRANSIENT_LOCAL",
         "Fleet adapters subscribe transient-local: a volatile publisher never reaches them",
         "rmf_ros2#341, agv/Node.cpp:73-79",
-        _retained,
+        checks.retained,
     ),
 )

@@ -25,6 +25,7 @@ STRANGER: Final = f"{FLEET}/nobody"
 STAYS_S: Final = 5.0
 LEAVES_S: Final = 10.0
 REPEAT_S: Final = 1.0
+MOST_FLOORS: Final = 20
 START_TIMEOUT_S: Final = 30.0
 
 
@@ -59,6 +60,10 @@ class Performance:
     def why(self) -> str:
         """Why it was not played to its end; "" if it was."""
         return self.failed or self.play.failed
+
+    def unfit(self, state: words.Stated) -> str:
+        """Why it may not be played now; "" if it may."""
+        return busy(state)
 
     def begin(self, now: float) -> list[Said]:
         """It begins."""
@@ -104,6 +109,7 @@ class Ride(Performance):
         restarts: bool = False,
     ) -> None:
         self.lift = lift
+        self._floors = floors
         self._restarts = restarts
         self._through = through
         self._state: d.LiftState | None = None
@@ -130,6 +136,14 @@ class Ride(Performance):
         yield DRIVES_S
         robot.in_car = False
         yield EndLiftSession(self.lift)
+
+    def unfit(self, state: words.Stated) -> str:
+        """A lift that is idle, and serves both floors."""
+        served = state.available_floors if isinstance(state, d.LiftState) else ()
+        missing = [shown(floor) for floor in self._floors if served and floor not in served]
+        if not missing:
+            return busy(state)
+        return f"{', '.join(missing)}: it serves {', '.join(map(shown, served[:MOST_FLOORS]))}"
 
     def hear(self, topic: AnyTopic, message: d.Message, now: float) -> list[Said]:
         """States, until somebody else has the lift."""

@@ -37,14 +37,11 @@ class Report:
         return [judged for judged in self.judged if judged.verdict is verdict]
 
 
-def report(judge: Judge, judged: tuple[Judged, ...], notes: Sequence[str] = ()) -> Report:
+def report(judge: Judge, judged: tuple[Judged, ...], heard_s: float, *notes: str) -> Report:
     """What a judge has found."""
-    first, latest = judge.first, judge.latest
-    heard_s = latest.at - first.at if first and latest else 0.0
-    wall = first.wall if first else 0.0
-    scene = judge.scene
+    wall, scene = judge.first.wall if judge.first else 0.0, judge.scene
     others = tuple(sorted(scene.others))
-    return Report(judge.kind, judge.name, wall, heard_s, scene.states, others, judged, tuple(notes))
+    return Report(judge.kind, judge.name, wall, heard_s, scene.states, others, judged, notes)
 
 
 def text(report: Report, width: int) -> str:
@@ -88,7 +85,8 @@ def _time(wall: float) -> str:
 def _others(report: Report) -> str:
     if not report.others:
         return (
-            f". A {report.kind} whose states are published BEST_EFFORT is not heard, by RMF neither"
+            ": check the name, the domain and the network. States that are published BEST_EFFORT are"
+            " not heard, by RMF on Cyclone DDS neither"
         )
     some = ", ".join(shown(other) for other in report.others[:OTHERS])
     more = len(report.others) - OTHERS
@@ -156,7 +154,7 @@ def junit(report: Report) -> str:
     for judged in report.judged:
         _case(suite, report, judged)
     ElementTree.indent(suite)
-    return ElementTree.tostring(suite, "unicode", xml_declaration=True) + "\n"
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{ElementTree.tostring(suite, "unicode")}\n'
 
 
 def _case(suite: ElementTree.Element, report: Report, judged: Judged) -> None:

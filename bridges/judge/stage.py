@@ -9,7 +9,7 @@ from enum import Enum, auto
 from typing import Final
 
 from bridges.judge.judge import Judge
-from bridges.judge.plays import LEAVES_S, REPEAT_S, Performance, busy
+from bridges.judge.plays import LEAVES_S, REPEAT_S, Performance
 from bridges.judge.shared_laws import BURST_WITHIN_S
 from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
@@ -18,6 +18,8 @@ from bridges.rmf_rules import NEVER, Said
 
 LISTENS_S: Final = 4.0
 """Before anything is played: the device's state has come, and others have been found."""
+APPEARS_S: Final = 15.0
+"""So long the first state may take: nodes find each other."""
 SETTLES_S: Final = 4.0
 """After it: so long a law may need to be seen broken."""
 
@@ -50,6 +52,7 @@ class Stage:
         self._performance = performance
         self._strangers = strangers
         self._for_s = for_s if performance is None else LISTENS_S
+        self.began_at = 0.0
         self._until = NEVER
         self._leave_until = NEVER
         self._epoch = 0.0
@@ -62,7 +65,8 @@ class Stage:
 
     def begin(self, at: float, wall: float) -> None:
         """Listen from now on. `at`: monotonic s. `wall`: s since the epoch."""
-        self._epoch, self._until = wall - at, at + self._for_s
+        self.began_at, self._until = at, at + self._for_s
+        self._epoch = wall - at
         self._last = (at, wall)
 
     def hear(self, topic: AnyTopic, message: d.Message, at: float, wall: float) -> list[Said]:
@@ -120,7 +124,12 @@ class Stage:
         if self._performance is None:
             self.act = Act.DONE
             return []
-        self.note = self._strangers() or (busy(state) if state is not None else "")
+        if state is None and self._last[0] < self.began_at + APPEARS_S:
+            self._until = self._last[0] + REPEAT_S
+            return []
+        self.note = self._strangers() or (
+            self._performance.unfit(state) if state is not None else ""
+        )
         if state is None or self.note:
             self.act = Act.DONE
             return []

@@ -38,10 +38,11 @@ SUPERVISORS: dict[str, AnyGraphKind] = {
 
 
 class Guest:
-    """A fleet adapter with one robot, on the air."""
+    """A fleet adapter with one robot, on the air. `behind_s`: its clock's error."""
 
     def __init__(self, timeline: Timeline, air: Air, name: str) -> None:
         self.robot = Robot(name)
+        self.behind_s = 0.0
         self.place = Place(air, name, lambda: None)
         self._timeline = timeline
         self._alarm = Alarm(timeline, self._tick)
@@ -79,7 +80,7 @@ class Guest:
 
     @property
     def _now(self) -> float:
-        return EPOCH + self._timeline.now
+        return EPOCH + self._timeline.now - self.behind_s
 
     def _hear(self, message: Any) -> None:
         self._say(self.robot.hear(message, self._now))
@@ -90,7 +91,7 @@ class Guest:
     def _say(self, said: Sequence[tuple[Topic[Any], d.Message]]) -> None:
         for topic, message in said:
             self._mouths[topic.name].publish(message)
-        self._alarm.set(self.robot.wake_at() - EPOCH)
+        self._alarm.set(self.robot.wake_at() - EPOCH + self.behind_s)
 
 
 class Scene:

@@ -48,11 +48,12 @@ def in_words(timeline: Timeline) -> list[str]:
 
 RIDE: Final = [
     "sessions: 6.1-10.8 fleet/red, 13.9-21.0 fleet/blue",
-    "floors: 6.1-7.2 L1, 7.2-8.2 ?, 8.2-15.5 L2, 15.5-16.5 ?, 16.5-21.0 L1, *6.1 to L2, "
+    "floors: 4.1-7.2 L1, 7.2-8.2 ?, 8.2-15.5 L2, 15.5-16.5 ?, 16.5-21.0 L1, *6.1 to L2, "
     "*13.9 to L1",
-    "door: 6.1-9.6 closed, 9.6-9.7 moving, 9.7-13.6 open, 13.6-18.0 moving, 18.0-21.0 open",
-    "motion: 6.1-9.7 unknown, 9.7-13.6 stopped, 13.6-18.0 unknown, 18.0-21.0 stopped",
-    "mode: 6.1-6.6 HUMAN, 6.6-13.8 AGV, 13.8-14.8 HUMAN, 14.8-18.1 AGV, 18.1-21.0 FIRE",
+    "door: 4.1-5.0 moving, 5.0-9.6 closed, 9.6-9.7 moving, 9.7-13.6 open, 13.6-18.0 moving, "
+    "18.0-21.0 open",
+    "motion: 4.1-9.7 unknown, 9.7-13.6 stopped, 13.6-18.0 unknown, 18.0-21.0 stopped",
+    "mode: 4.1-6.6 HUMAN, 6.6-13.8 AGV, 13.8-14.8 HUMAN, 14.8-18.1 AGV, 18.1-21.0 FIRE",
     "relays agv_request: 7.0-14.0 yes, 15.0-19.0 yes",
     "relays call: 7.0-9.0 L2, 15.0-17.0 L1",
     "relays hold_door: 9.0-14.0 front, 17.0-19.0 front",
@@ -65,7 +66,7 @@ RIDE: Final = [
 
 PASSAGE: Final = [
     "sessions fleet/red: 6.1-8.3 fleet/red",
-    "door: 6.0-6.1 closed, 6.1-8.1 moving, 8.1-12.4 open, 12.4-15.3 moving, 15.3-16.3 closed",
+    "door: 4.1-6.1 closed, 6.1-8.1 moving, 8.1-12.4 open, 12.4-15.3 moving, 15.3-16.3 closed",
     "relays hold_open: 7.0-12.0 yes",
     "requests fleet/red: 6.0-8.2 open, *8.2 closed",
     "requests supervisor: 6.0-8.3 open, *8.3 closed, *9.3 closed, *10.3 closed, "
@@ -218,7 +219,7 @@ def test_a_charger_is_drawn_with_its_robot() -> None:
     assert [(one.name, one.row, told(one.spans)) for one in drawn.lanes] == [
         ("sessions", "", [(2, 3, "request r1")]),
         ("mode", "", [(0, 2, "idle"), (2, 3, "error: too hot")]),
-        ("requests", "fleet/red", [(1, 3, "r1")]),
+        ("requests", "fleet/red", []),
     ]
 
 

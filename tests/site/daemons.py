@@ -37,7 +37,8 @@ class DeviceDaemon:
     """Serves one device. `wall_step_s`: of its wall clock.
 
     `looks` is called with each time until which the plant was as it is, `scanned` after each scan,
-    `relayed` with each edge of a relay.
+    `relayed` with each edge of a relay, `started` as it starts, `hears` with each message that gets
+    to it.
     """
 
     def __init__(self, timeline: Timeline, air: Air, device: Device) -> None:
@@ -51,6 +52,10 @@ class DeviceDaemon:
         self.scanned: Callable[[DeviceDaemon], None] = lambda daemon: None
         self.relayed: Callable[[Edge], None] = lambda edge: None
         self.witness: Nobody = NOBODY
+        self.started: Callable[[DeviceDaemon], None] = lambda daemon: None
+        self.hears: Callable[[DeviceDaemon, Topic[Any], Any], None] = lambda daemon, topic, told: (
+            None
+        )
         self._changed = False
         device.plant.on_edge = self._edge
         self._timeline = timeline
@@ -62,6 +67,7 @@ class DeviceDaemon:
 
     def start(self) -> None:
         """A new one: nothing remembered."""
+        self.started(self)
         device, kind = self.device, self.device.kind
         self._place = Place(self._air, self.name, lambda: None)
         topics = [kind.states, *kind.publishes(device.settings)]
@@ -145,6 +151,7 @@ class DeviceDaemon:
             self._changed = True
 
     def _hear(self, topic: Topic[Any], message: Any) -> None:
+        self.hears(self, topic, message)
         if self.device.kind.device_name(message) != self.name:
             return
         self.witness.spoken(topic.name, message, sent=False)
