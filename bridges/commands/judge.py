@@ -20,7 +20,7 @@ from bridges.commands.graph import add_graph_arguments, complain, interruptible,
 from bridges.judge.judge import KINDS, Judge, Kind
 from bridges.judge.law import Verdict, shown
 from bridges.judge.plays import FLEET, Charge, Passages, Performance, Ride
-from bridges.judge.report import Report, as_json, junit, report, text, verdict
+from bridges.judge.report import Report, as_json, junit, markdown, report, text, verdict
 from bridges.judge.stage import Stage
 from bridges.rmf import topics
 from bridges.rmf.definitions import Message
@@ -57,7 +57,7 @@ BESIDE: dict[str, tuple[str, ...]] = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which device, for how long, and what to play."""
     parser.add_argument("kind", choices=KINDS)
-    parser.add_argument("name", metavar="NAME", help="the device, as RMF names it")
+    parser.add_argument("name", metavar="NAME", nargs="?", help="the device, as RMF names it")
     add_graph_arguments(parser)
     parser.add_argument(
         "--for",
@@ -69,6 +69,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="the verdict as one JSON object")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="the verdict for a CI server")
+    parser.add_argument(
+        "--laws", action="store_true", help="print the laws of this kind, and why they are; no NAME"
+    )
     _add_plays(parser)
     parser.set_defaults(usage=parser.error)
 
@@ -160,6 +163,11 @@ def words_of(args: argparse.Namespace) -> str:
 
 def run(args: argparse.Namespace) -> int:
     """Listen or play, and judge."""
+    if args.laws:
+        print(markdown(args.kind))
+        return 0
+    if not args.name:
+        args.usage(f"which {args.kind}? Give its NAME")
     performance = performance_of(args)
     stage: Stage | None = None
     try:
