@@ -41,7 +41,7 @@ demo-charging: .venv/ready
 # Many tests wait for a process or a wire: more of them than there are cores run side by side.
 # Each test goes to the next free worker, in the order of conftest.py: long ones first. Tests that share a
 # process stay together (mark xdist_group).
-SIDE_BY_SIDE := -n 8 --dist loadgroup --no-loadscope-reorder
+SIDE_BY_SIDE := -n 4 --dist loadgroup --no-loadscope-reorder
 test: .venv/ready lint
 	$(BIN)/pytest $(SIDE_BY_SIDE)
 
@@ -70,7 +70,7 @@ man: .venv/ready
 	@mkdir -p build
 	$(BIN)/argparse-manpage --module bridges.cli --function whole_parser --prog rmf-bridge \
 	  --project-name rmf-bridges --description "connect Open-RMF to lifts, doors and chargers" \
-	  --manual-section 1 --output build/rmf-bridge.1
+	  --manual-section 1 --manual-title "rmf-bridges manual" --output build/rmf-bridge.1
 
 # Built here for every machine; nothing of it runs here.
 ARCHS ?= amd64 arm64

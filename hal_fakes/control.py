@@ -11,6 +11,7 @@ AF_UNIX, lines of text, words with spaces in quotes. Each line is answered `ok` 
 
 import contextlib
 import json
+import logging
 import shlex
 import socket
 import threading
@@ -20,8 +21,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import cast
 
+from bridges.log import pairs
 from drivers import DriverError
 from hal_fakes.plants.plant import Edge, FailureMode, Plant
+
+log = logging.getLogger(__name__)
 
 
 class Control:
@@ -98,8 +102,11 @@ class Control:
             case ["fail", device, part, mode]:
                 chosen = None if mode == "ok" else cast(FailureMode, mode)
                 self._plant(device).fail(part, chosen)
+                event = "mended" if chosen is None else "failed"
+                log.info(pairs(event, device=device, part=part, mode=mode))
             case ["press", device, signal, "on" | "off" as how]:
                 self._plant(device).press(signal, how == "on", time.monotonic())
+                log.info(pairs("pressed", device=device, signal=signal, to=how))
             case _:
                 raise ValueError(
                     "not understood; say: follow | names | fail DEVICE PART"

@@ -106,6 +106,13 @@ class Forgotten(msgspec.Struct, frozen=True):
     ended: bool = False
 
 
+class Doubted(msgspec.Struct, frozen=True):
+    """A destination, asked for `since`, that may be of an earlier ride (`bridges/lift/replayed.py`)."""
+
+    destination: str
+    since: float
+
+
 class Session(msgspec.Struct, frozen=True):
     """Who holds the lift, what was requested, and how far the ride has come.
 
@@ -114,7 +121,8 @@ class Session(msgspec.Struct, frozen=True):
     `call_at`: when the present call began. `waiting`, `since`: what we wait for, and since when.
     `tries`: how often that has failed. `retry_at`: outputs stay off until then (inf: latched).
     `forgotten`: RMF's supervisor asks for another session. `own_stamp`: the newest stamp (ns) of the
-    robot's own requests, as its adapter sent them.
+    robot's own requests, as its adapter sent them; `own`: the destination of that one, "" for none.
+    `doubted`: another destination that does not count yet.
     """
 
     id: str
@@ -132,6 +140,8 @@ class Session(msgspec.Struct, frozen=True):
     fault: Fault | None = None
     forgotten: Forgotten | None = None
     own_stamp: int = 0
+    own: str = ""
+    doubted: Doubted | None = None
 
 
 class Grace(msgspec.Struct, frozen=True):

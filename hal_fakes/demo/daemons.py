@@ -15,8 +15,8 @@ from pathlib import Path
 from hal_fakes.plants.plant import Edge
 from hal_fakes.wire import wire
 
-STOP_WITHIN_S = 5.0
-CONNECT_WITHIN_S = 15.0
+STOP_WITHIN_S = 20.0
+CONNECT_WITHIN_S = 60.0
 
 
 class Wrong(Exception):

@@ -49,10 +49,11 @@ def tell(
     listeners: int = 1,
     listen_from: float = 0.0,
     timeout_s: float = 10.0,
+    graph: str = "",
 ) -> Told:
     """Look every 0.1 s from 0 on; each message of the story arrives at its time."""
     left = sorted(story, key=lambda entry: entry[0])
-    seen, told = Seen(0.0, timeout_s), Told([], [], Done(""), 0.0)
+    seen, told = Seen(0.0, timeout_s, graph=graph), Told([], [], Done(""), 0.0)
     for tick in range(10_000):
         now = round(tick * 0.1, 1)
         while left and left[0][0] <= now:
@@ -61,6 +62,7 @@ def tell(
         todo = step(request, seen, now)
         if todo.hint and todo.hint not in told.hints:
             told.hints.append(todo.hint)
+            seen = replace(seen, hinted=seen.hinted | {todo.hint})
         if todo.outcome is not None:
             told.outcome, told.at = todo.outcome, now
             return told
@@ -106,10 +108,10 @@ def test_nothing_is_sent_while_nobody_listens_and_a_supervisor_is_missed() -> No
     told = tell(request, every_second(LIFT), listeners=0, timeout_s=5.0)
     missed = (
         "no lift supervisor runs in this domain: no node publishes lift_requests;"
-        " to ask the lift's own daemon:"
+        " lifts heard: Lift1; to ask the lift's own daemon:"
         " rmf-bridge send lift Lift1 L3 --session 'my robot' --localhost --direct"
     )
-    assert told == Told([], [missed], Failed(missed), 5.0)
+    assert told == Told([], [missed], Failed("gave up after 5 s"), 5.0)
 
 
 def test_a_listener_that_comes_late_is_served() -> None:
@@ -177,7 +179,7 @@ def test_where_a_robot_may_be_in_the_car_the_remedy_asks_to_look_into_it() -> No
     seen = replace(Seen(0.0, 10.0), states=(held,), boarded="yes")
     assert next(iter(RIDE.obstacles(seen))).remedy == (
         "a robot may be in the car; if it is empty:"
-        " rmf-bridge release Lift1 --car-empty --direct --localhost"
+        " rmf-bridge release Lift1 --car-empty --localhost"
     )
 
 
@@ -186,9 +188,9 @@ def test_where_a_robot_may_be_in_the_car_the_remedy_asks_to_look_into_it() -> No
     [
         (
             replace(LIFT, session_id=OTHER, current_mode=2),
-            "Lift1 is held by fleet/other"
-            " (last state: car at L1, door closed, mode AGV, held by fleet/other);"
-            " to end that session: rmf-bridge send lift Lift1 --end --direct --localhost",
+            "Lift1 is held by fleet/other;"
+            " to end that session: rmf-bridge send lift Lift1 --end --direct --localhost\n"
+            "gave up after 10 s; last state: car at L1, door closed, mode AGV, held by fleet/other",
         ),
         (
             replace(LIFT, current_mode=3),
@@ -219,7 +221,8 @@ def test_where_a_robot_may_be_in_the_car_the_remedy_asks_to_look_into_it() -> No
 )
 def test_a_ride_that_fails_says_what_stands_in_its_way(state: d.LiftState, reason: str) -> None:
     told = tell(RIDE, every_second(state))
-    assert (told.outcome, told.at) == (Failed(reason), 10.0)
+    assert isinstance(told.outcome, Failed)
+    assert ([*told.hints, told.outcome.text], told.at) == (reason.splitlines(), 10.0)
 
 
 def test_what_a_person_can_do_about_it_is_said_within_seconds_and_not_only_at_the_end() -> None:
@@ -236,7 +239,7 @@ def test_a_simulation_that_is_not_heard_is_looked_for_on_loopback() -> None:
     request = LiftRide("Lift1", "L3", "me", direct=True, line=CommandLine(typed, ("--direct",)))
     assert tell(request, listeners=0).hints == [
         "no lift daemon runs in this domain: no node subscribes to lift_requests;"
-        " for a simulation on the loopback interface:"
+        " nothing is heard; for a simulation on the loopback interface:"
         " rmf-bridge send lift Lift1 L3 --session me --direct --localhost"
     ]
 
@@ -245,15 +248,49 @@ def test_an_unknown_name_is_compared_with_those_that_are_heard() -> None:
     there = every_second(replace(LIFT, lift_name="lift1")) + every_second(
         replace(LIFT, lift_name="Goods")
     )
-    text = "no 'Lift1' on lift_states; there: Goods, lift1; did you mean 'lift1'?"
+    text = "no 'Lift1' on lift_states; lifts heard: Goods, lift1; did you mean 'lift1'?"
     told = tell(RIDE, there)
-    assert (told.hints, told.outcome) == ([text], Failed(text))
+    assert (told.hints, told.outcome) == ([text], Failed("gave up after 10 s"))
 
 
 def test_a_graph_without_any_state_is_said_to_be_empty() -> None:
-    text = "nothing is heard on lift_states: no lift daemon runs in this domain and network"
-    told = tell(RIDE)
-    assert (told.hints, told.outcome) == ([text], Failed(text))
+    told = tell(RIDE, graph="dds in domain 7, on this machine alone")
+    assert (told.hints, told.outcome) == (
+        [
+            "no lift is heard on lift_states;"
+            " nothing is heard by dds in domain 7, on this machine alone;"
+            " is it in another domain (--domain-id), on another transport (--transport),"
+            " on another machine (without --localhost)?"
+            " rmf-bridge status shows a daemon's, on its own machine"
+        ],
+        Failed("gave up after 10 s"),
+    )
+
+
+def test_who_waits_is_told_after_three_seconds_and_not_again_at_the_end() -> None:
+    assert tell(RIDE, every_second(DOOR), timeout_s=2.9).hints == []
+    told = tell(RIDE, every_second(DOOR), timeout_s=3.5)
+    assert (told.hints, told.outcome) == (
+        ["no lift is heard on lift_states; heard: door ward"],
+        Failed("gave up after 3.5 s"),
+    )
+
+
+@pytest.mark.parametrize("listeners", [0, 1])
+def test_a_name_of_another_kind_ends_the_wait_at_once(listeners: int) -> None:
+    request = DoorMove("Lift1", True, ME)
+    told = tell(request, every_second(LIFT), listeners=listeners)
+    assert (told.outcome, told.at) == (
+        Failed("Lift1 is a lift, not a door; rmf-bridge send lift --help"),
+        3.0,
+    )
+
+
+def test_a_door_that_has_a_lifts_name_is_asked_all_the_same() -> None:
+    request = DoorMove("Lift1", True, ME, direct=True)
+    named = replace(DOOR, door_name="Lift1", current_mode=d.DoorMode(2))
+    told = tell(request, [*every_second(LIFT), *every_second(named)])
+    assert told.outcome == Done("Lift1 is open")
 
 
 def test_a_daemon_that_falls_silent_is_named_as_the_reason() -> None:
@@ -362,8 +399,8 @@ def test_a_charger_that_shows_our_request_has_taken_it(state: int) -> None:
         ),
         (
             replace(CHARGER, state=3, request_id="r0"),
-            "a serves request r0 (last state: charging, for request r0);"
-            " to cancel that: rmf-bridge send charger a --cancel r0",
+            "a serves request r0; to cancel that: rmf-bridge send charger a --cancel r0\n"
+            "gave up after 10 s; last state: charging, for request r0",
         ),
         (
             replace(CHARGER, state=200, request_id="r1", error_message="foreign object"),
@@ -372,7 +409,9 @@ def test_a_charger_that_shows_our_request_has_taken_it(state: int) -> None:
     ],
 )
 def test_a_charger_that_does_not_serve_us_says_why(state: d.ChargerState, reason: str) -> None:
-    assert tell(CHARGE, every_second(state)).outcome == Failed(reason)
+    told = tell(CHARGE, every_second(state))
+    assert isinstance(told.outcome, Failed)
+    assert [*told.hints, told.outcome.text] == reason.splitlines()
 
 
 REFUSAL = Refusal(
@@ -453,7 +492,7 @@ def test_a_robot_that_waits_is_said_to_wait_and_how_to_withdraw_it() -> None:
         " (see `rmf-bridge watch`), or the request was refused (see the coordinator's log);"
         " to withdraw the request: rmf-bridge send charger any --queue --cancel r1 --localhost"
     )
-    assert (waits.hints, waits.outcome) == ([text], Failed(text))
+    assert (waits.hints, waits.outcome) == ([text], Failed("gave up after 5 s"))
 
 
 def test_a_charger_of_ones_own_choice_is_named_in_the_request() -> None:

@@ -33,7 +33,7 @@ from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
 from bridges.settings.load import load
-from hal_fakes.wire import Wire, wire
+from hal_fakes.wire import Wire, runs_here
 from tests.rmf.zenoh_programs import Router
 from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 
@@ -274,7 +274,7 @@ def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
 # --- as processes ------------------------------------------------------------------------------
 
 
-@pytest.fixture(params=sorted({wire(), "zenoh"}))
+@pytest.fixture(params=sorted({runs_here(), "zenoh"}))
 def speaks(request: pytest.FixtureRequest) -> Wire:
     """The transport of the daemon and of the command."""
     speaks: Wire = request.param

@@ -10,10 +10,9 @@ from tests.door_supervisor.world import (
     OurSupervisor,
     RmfsSupervisor,
     Walker,
-    in_order,
     to_door,
 )
-from tests.serve.virtual_graph import EPOCH, Disk, World
+from tests.serve.virtual_graph import EPOCH, Disk, World, in_order
 
 A, B = "fleet/a", "fleet/b"
 

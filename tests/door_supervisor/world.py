@@ -3,7 +3,7 @@
 The supervisor is ours as it is served, or the stand-in for RMF's.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 from bridges.door import messages as door_messages
@@ -19,11 +19,6 @@ from tests.door.virtual import SCAN_S, Door
 from tests.serve.virtual_graph import EPOCH, NEVER, Disk, Served, StandIn, World, say
 
 WARD = "ward"
-
-
-def in_order(sender: str, receiver: str) -> Sequence[float]:
-    """A network that takes no time."""
-    return (0.0,)
 
 
 def holds(disk: Disk, who: str) -> bool:

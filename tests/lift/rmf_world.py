@@ -88,6 +88,13 @@ class World:
                 self._deliver(self.supervisor.hear(request, self._now))
         self._arrive()
 
+    def finds_again(self, robot: Robot, apart_s: float = 0.02) -> None:
+        """The supervisor finds an adapter again that was cut off, and hears what it has retained."""
+        for request in self._history[robot.requester_id][-REPLAYED:]:
+            self._deliver(self.supervisor.hear(request, self._now))
+            self._arrive()
+            self.run(self.story.now + apart_s)
+
     def restart_adapter(self, robot: Robot) -> Robot:
         """A new fleet adapter for the same robot, which has no task and holds no lift."""
         fresh = Robot(robot.requester_id)

@@ -2,7 +2,6 @@
 
 import signal
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,13 +10,6 @@ from bridges.serve.last_mark import MARK, leave, says_off
 from tests.serve.site import Module, command, daemon, environment
 
 RUN = {"INVOCATION_ID": "4f5e", "SERVICE_RESULT": "success"}
-
-
-@pytest.fixture
-def module(domain: int, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, domain)
-    yield standing
-    standing.close()
 
 
 @pytest.mark.parametrize(

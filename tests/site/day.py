@@ -188,7 +188,7 @@ class Site:
 
     def _speakers(self, topic: str) -> int:
         """How many there are, but for what a rival has just made of it."""
-        speaking = [end.node.name for end in self.air.memory.publishers if end.topic.name == topic]
+        speaking = [end.node.name for end in self.air.memory.publishers[topic]]
         if RIVAL in speaking and self.rmf == "ours":
             return 1
         return len(speaking)

@@ -1,6 +1,7 @@
 """`rmf-bridge doctor` on real wires: Modbus, HTTP and CAN, and on RMF's graph."""
 
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -22,7 +23,7 @@ from bridges.serve import record
 from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.settings.load import load
-from hal_fakes.wire import join
+from hal_fakes.wire import join, wire
 from tests.commands import runtime
 from tests.commands.terminal import Terminal
 from tests.serve.site import Module, command, daemon, environment
@@ -30,13 +31,6 @@ from tests.waiting import PATIENCE_S, wait_until
 
 READS = {1, 2, 3, 4}
 """Modbus functions that change nothing."""
-
-
-@pytest.fixture
-def module(domain: int, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, domain)
-    yield standing
-    standing.close()
 
 
 def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, list[Any]]]:
@@ -236,7 +230,7 @@ def test_the_kill_test_asks_once_more(module: Module, tmp_path: Path) -> None:
     terminal.wait_for("hold_open of ward_door will be ON for some seconds")
     terminal.type("no\n")
     terminal.wait_for("nothing was switched")
-    assert terminal.end() == 64
+    assert terminal.end() == os.EX_USAGE
     assert module.relay() == []
 
 
@@ -251,7 +245,7 @@ def test_the_kill_test_asks_once_more(module: Module, tmp_path: Path) -> None:
 def test_without_a_terminal_or_an_output_there_is_no_kill_test(
     module: Module, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: Any, why: str
 ) -> None:
-    assert cli.main(["doctor", str(module.file), "--kill-test", *options]) == 64
+    assert cli.main(["doctor", str(module.file), "--kill-test", *options]) == os.EX_USAGE
     assert why in capsys.readouterr().err
     assert module.relay() == []
 
@@ -260,7 +254,7 @@ def test_a_bad_yaml_is_told_as_check_tells_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "bad.yaml").write_text("kind: lift\n")
-    assert cli.main(["doctor", str(tmp_path / "bad.yaml")]) == 78
+    assert cli.main(["doctor", str(tmp_path / "bad.yaml")]) == os.EX_CONFIG
     assert "bad.yaml:1:1:" in capsys.readouterr().err
 
 
@@ -384,12 +378,13 @@ def test_our_daemon_is_heard_and_a_graph_without_rmf_is_warned_of(
 def test_a_supervisor_beside_another_one_would_be_passive(domain: int, tmp_path: Path) -> None:
     file = tmp_path / "supervisor.yaml"
     file.write_text(
-        f"kind: door_supervisor\nrmf: {{network: localhost, domain_id: {domain}}}\nsupervisor: {{}}\n"
+        "kind: door_supervisor\nsupervisor: {}\n"
+        f"rmf: {{transport: {wire()}, network: localhost, domain_id: {domain}}}\n"
     )
     rmf = join("rmf", domain)
     rmf.publisher(DOOR_REQUESTS)
     try:
-        code, found = doctor(file, tmp_path, "--listen", "6")
+        code, found = doctor(file, tmp_path, "--listen", "6", "--domain-id", str(domain))
     finally:
         rmf.close()
     assert code == 1
