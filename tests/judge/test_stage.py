@@ -86,7 +86,7 @@ def test_a_device_that_is_not_there_is_waited_for_a_while_and_not_played_with() 
 def test_whoever_else_speaks_stops_the_play_before_it_begins() -> None:
     stage = Stage(Judge("lift", "Lift1"), ride(), 60.0, lambda: "others publish on lift_requests")
     stage.begin(0.0, EPOCH)
-    stage.hear(topics.LIFT_STATES, STATE, 1.0, EPOCH + 1.0)
+    stage.hear(Heard(1.0, EPOCH + 1.0, "lift_states", STATE))
     assert stage.turn(4.0, EPOCH + 4.0) == []
     assert (stage.done, stage.note) == (True, "others publish on lift_requests")
 
