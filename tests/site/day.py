@@ -384,11 +384,11 @@ class Site:
         )
 
     def _bus_down(self, device: Device) -> None:
-        device.far.down = True
+        device.far.down = "no answer"
         self.timeline.after(2.0, device.far.watchdog)
 
     def _bus_up(self, device: Device) -> None:
-        device.far.down = False
+        device.far.down = ""
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:

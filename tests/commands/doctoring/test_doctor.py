@@ -23,6 +23,7 @@ from bridges.serve import record
 from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.settings.load import load
+from hal_fakes.caller import Caller
 from hal_fakes.wire import join, wire
 from tests.commands import runtime
 from tests.commands.terminal import Terminal
@@ -213,10 +214,8 @@ doors:
 
 def test_the_kill_test_switches_nothing_on_against_a_fire_alarm(tmp_path: Path) -> None:
     with far_side(FIRE.format(port=502), "module", tmp_path) as there:
-        with socket.socket(socket.AF_UNIX) as control:
-            control.connect(str(tmp_path / "plant.sock"))
-            control.sendall(b"press ward_door fire on\n")
-            assert control.recv(100) == b"ok\n"
+        with Caller(tmp_path / "plant.sock") as control:
+            control.order("press ward_door fire on")
         file = tmp_path / "door.yaml"
         file.write_text(FIRE.format(port=there["tcp"]["port"]))
         _, found = doctor(file, tmp_path, "--listen", "0", "--kill-test", "--yes")
