@@ -64,7 +64,7 @@ class DeviceTold(msgspec.Struct):
     input_age_s: float | None = None
 
 
-class Told(msgspec.Struct):
+class StatusFile(msgspec.Struct):
     """What `status` relies on in a status file."""
 
     devices: dict[str, DeviceTold] = {}
@@ -178,7 +178,7 @@ def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
     try:
         written_at = path.stat().st_mtime
         text = path.read_bytes()
-        msgspec.json.decode(text, type=Told)
+        msgspec.json.decode(text, type=StatusFile)
         found = msgspec.json.decode(text, type=dict[str, Any])
     except (FileNotFoundError, msgspec.MsgspecError):
         return {}, None

@@ -161,7 +161,7 @@ RANGE_SETTLE_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Written:
     """What was last written to the receiver. `enabled`: the last ENABLE; None while unknown.
 
     `range_checks`: how many checks were requested; `asked_at`: when the last one was (monotonic s), inf
@@ -181,12 +181,12 @@ class Orders:
     check_range: bool = False
 
 
-def settled(told: Told, now: float) -> bool:
+def settled(told: Written, now: float) -> bool:
     """Does the range result belong to the last range check?"""
     return now - told.asked_at >= RANGE_SETTLE_S
 
 
-def steer(told: Told, outputs: ChargerOutputs, code: int, now: float) -> tuple[Told, Orders]:
+def steer(told: Written, outputs: ChargerOutputs, code: int, now: float) -> tuple[Written, Orders]:
     """What to write in state `code`, and the record of it once it is written.
 
     A start and a range check are written only in state idle, each once. A stop is written once, and
@@ -243,7 +243,7 @@ class Receiver:
     def __init__(self, settings: ChargerSettings, wire: Wire) -> None:
         self._settings = settings
         self._wire = wire
-        self._told = Told()
+        self._told = Written()
         self._code = -1
         self._touched = False
 

@@ -1,6 +1,6 @@
 """A charging station on contacts: an enable relay, and contacts that say what it does.
 
-It is `charger.py`'s station but for its terminal block: `charging` while current flows, `ready` while
+It is `charger.py`'s station with a terminal block: `charging` while current flows, `ready` while
 it could charge, `fault` in an error, which ends when its cause has gone, `at_height` and `range_ok`
 of the pad.
 """

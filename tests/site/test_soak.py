@@ -47,7 +47,7 @@ def test_the_same_seed_is_the_same_day() -> None:
     assert list(days[0].laws.log) == list(days[1].laws.log)
 
 
-def test_what_grows_by_the_hour_is_told() -> None:
+def test_what_grows_by_the_hour_is_named() -> None:
     flat = [Look(hour, 1, 6, 33_000 + 100 * (hour % 2), 34.0) for hour in range(1, 6)]
     assert growth(flat) == []
     assert growth([*flat, Look(6, 2, 9, 39_000, 60.0)]) == [

@@ -10,7 +10,7 @@ from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Mea
 from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from drivers.charger import xnergy
-from drivers.charger.xnergy import Orders, Told, settled, steer
+from drivers.charger.xnergy import Orders, Written, settled, steer
 from tests.depth import examples
 
 WELL = {"state": 0, "error_low": 0, "error_high": 0, "range": 0}
@@ -129,7 +129,7 @@ def test_whatever_the_words_are_only_state_5_without_an_error_is_charging(
 
 def run(*scans: tuple[float, ChargerOutputs, int]) -> list[tuple[float, Orders]]:
     """The orders that are not empty, with their time; each scan is a time, outputs and the state."""
-    given_, told = [], Told()
+    given_, told = [], Written()
     for now, outputs, code in scans:
         told, orders = steer(told, outputs, code, now)
         if orders != Orders():
@@ -175,7 +175,7 @@ def test_a_start_waits_for_a_range_check_that_could_not_be_asked_for_yet() -> No
 
 
 def test_a_result_is_the_last_checks_only_a_second_after_it_was_asked_for() -> None:
-    told = Told()
+    told = Written()
     assert settled(told, 0.0)
     told, _ = steer(told, ChargerOutputs(range_checks=1), 2, 5.0)
     assert not settled(told, 99.0)
