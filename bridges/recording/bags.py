@@ -27,6 +27,8 @@ __all__ = ["BagError", "Notes", "heard_in"]
 log = logging.getLogger(__name__)
 
 NS: Final = 1e-9
+CONTINUOUS: Final = "all"
+"""So our recorder calls the files of `keep: continuous`, where it names what others are for."""
 STEPPED_NS: Final = 10**9
 """A clock was set back if it goes back by so much; less is the recorder's disorder."""
 LONGEST_MESSAGE: Final = 8 << 20
@@ -84,13 +86,18 @@ def _parts(path: Path) -> list[Path]:
     except OSError as error:
         raise BagError(f"{path} cannot be read: {error.strerror}") from None
     if bags := [file for file in files if file.suffix == ".mcap"]:
-        return bags
+        return continuous(bags)
     if any(file.suffix == ".zstd" for file in files):
         raise BagError(f"{path} is compressed as whole files: unpack them with zstd -d")
     databases = [file for file in files if file.suffix == ".db3"]
     if not databases:
         raise BagError(f"{path} holds no recording: no .mcap or .db3 file is in it")
     return [path] if (path / "metadata.yaml").exists() else databases
+
+
+def continuous(files: list[Path]) -> list[Path]:
+    """The files of our recorder that follow each other without overlap; all, if there are none."""
+    return [file for file in files if f"_{CONTINUOUS}_" in file.name] or files
 
 
 def _number(path: Path) -> tuple[int, str]:

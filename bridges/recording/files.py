@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bridges import user_files
-from bridges.recording.bags import INSTALL
+from bridges.recording.bags import INSTALL, continuous
 from bridges.recording.entries import AnyEntry, Head
 from bridges.recording.ring import MAGIC, Read, RingError
 from bridges.recording.sources import BagError, Notes
@@ -33,7 +33,16 @@ def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
 
 
 def _of_all(files: list[Path], folder: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
+    """Of the daemon of the first file; its continuous files alone, if it has any."""
     if not files:
         raise BagError(f"{folder} holds no recording: no .mcap file is in it")
+    files = continuous(files)
     head, _ = opened(files[0], notes)
-    return head, (entry for file in files for entry in opened(file, notes)[1])
+    return head, _in_turn(files, head, notes)
+
+
+def _in_turn(files: list[Path], head: Head, notes: Notes) -> Iterator[AnyEntry]:
+    for file in files:
+        found, entries = opened(file, notes)
+        if found.file == head.file:
+            yield from entries

@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Final
 
 from bridges.log import pairs
+from bridges.recording.bags import CONTINUOUS
 from bridges.recording.entries import AnyEntry, Clocks, Died, Ended, Known
 from bridges.recording.incident import AFTER_S, BEFORE_S, Incident, Note, part
 from bridges.recording.ring import DIED as DIED_NAME
 from bridges.recording.ring import NAME, Read, RingError, Tail
-from bridges.recording.shelf import CONTINUOUS, Shelf
+from bridges.recording.shelf import Shelf
 from bridges.recording.triggers import DIED, Triggers
 
 log = logging.getLogger(__name__)

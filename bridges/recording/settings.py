@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-Megabytes = Annotated[float, Meta(ge=0.25, le=64, extra={"unit": "MB"})]
+Megabytes = Annotated[float, Meta(ge=0.25, le=16, extra={"unit": "MB"})]
 Files = Annotated[int, Meta(ge=1, le=10_000)]
 Space = Annotated[float, Meta(ge=1, le=100_000, extra={"unit": "MB"})]
 Patience = Annotated[float, Meta(ge=10, le=86400, extra={"unit": "s"})]

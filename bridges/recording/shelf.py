@@ -11,7 +11,6 @@ from bridges.recording.incident import Incident
 
 LEAST_FREE: Final = 100_000_000
 """No recording is written to a disk with less room than this (bytes)."""
-CONTINUOUS: Final = "all"
 SUFFIX: Final = ".mcap"
 
 

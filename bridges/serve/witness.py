@@ -32,6 +32,8 @@ SAME_AT_ONCE: Final = 20
 """So many readings without a change make an entry; a kill loses no more of them."""
 LONGEST_SAME: Final = 400
 """Of such an entry (bytes)."""
+MOST_SPOKEN_PER_S: Final = 200.0
+"""Of more messages than these only the number is kept: a flood must cost no scan its time."""
 STEP_S: Final = 0.05
 AGAIN_S: Final = 10.0
 """How long a witness whose ring failed waits until it makes another."""
@@ -151,7 +153,7 @@ class Witness(Nobody):
         self._fresh()
         if ring is not None:
             with suppress(OSError):
-                ring.close(ended=False)
+                ring.close(ended=True)  # it is not the run that has ended
 
     def _fresh(self) -> None:
         """Nothing of this is in the ring yet."""
@@ -159,6 +161,7 @@ class Witness(Nobody):
         self._out = bytearray()
         self._same: dict[str, Seen] = {}
         self._known_at = AGES_AGO
+        self._may_speak, self._spoken_at, self._lost = MOST_SPOKEN_PER_S, AGES_AGO, 0
         self._offset_s = 0.0
 
     def _drain(self) -> None:
@@ -234,9 +237,25 @@ class Witness(Nobody):
             self._put(Forgotten(now, name))
 
     def _spoken(self, now: float, topic: str, message: Message, sent: bool) -> None:
+        if not self._may_keep(now):
+            self._lost += 1
+            return
         release, kind = self._release(), type(message)
         sample = cdr.encode(kind, message, release)
         self._put(Spoken(now, sent, topic, type_name(kind), release.name, sample))
+
+    def _may_keep(self, now: float) -> bool:
+        """Whether there is room for one more message of this second."""
+        gained = MOST_SPOKEN_PER_S * (now - self._spoken_at)
+        self._may_speak = min(MOST_SPOKEN_PER_S, self._may_speak + gained)
+        self._spoken_at = now
+        if self._may_speak < 1.0:
+            return False
+        self._may_speak -= 1.0
+        if self._lost:
+            lost, self._lost = self._lost, 0
+            self._put(entries.Lost(now, lost))
+        return True
 
     def _last(self, entry: AnyEntry) -> None:
         """Append what is said at an end, after all that has come again."""

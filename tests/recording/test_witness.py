@@ -2,6 +2,7 @@
 
 import errno
 import os
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,7 +20,6 @@ from bridges.recording.ring import Read, Ring
 from bridges.recording.settings import Recording
 from bridges.rmf.definitions import LiftState, Message
 from bridges.rmf.releases import KILTED
-from bridges.serve import witness as witnesses
 from bridges.serve.clock import Clock
 from bridges.serve.witness import Witness
 from tests.recording.test_recorder import REPORT, WALL
@@ -174,13 +174,29 @@ def test_a_message_larger_than_a_segment_is_counted_as_lost(tmp_path: Path) -> N
     assert len([one for one in found if isinstance(one, Spoken)]) == 1
 
 
-def test_a_flood_takes_no_more_memory_than_its_bound(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(witnesses, "MOST_WAITING", 50)
+def test_a_flood_takes_no_more_than_its_bound_and_each_decision_is_kept(tmp_path: Path) -> None:
     daemon = Daemon(tmp_path)
-    for _ in range(500):
-        daemon.witness.spoken("lift_states", LiftState(), sent=True)
-    daemon.witness.flush()
+    for _ in range(5):
+        daemon.now += 1.0
+        for _ in range(10_000):
+            daemon.witness.spoken("lift_states", LiftState(), sent=True)
+        daemon.scan(Door.OPEN if daemon.now % 2 else Door.CLOSED)
+    daemon.now += 1.0
+    daemon.say(LiftState())
 
-    assert len([one for one in daemon.entries() if isinstance(one, Spoken)]) == 50
+    found = daemon.entries()  # of the last seconds: the flood has filled the ring
+    kept = Counter(one.at for one in found if isinstance(one, Spoken))
+    assert [kept[at] for at in (104.0, 105.0, 106.0)] == [200, 200, 1]
+    assert {one.number for one in found if isinstance(one, Lost)} == {9_800}
+    assert [one.at for one in found if isinstance(one, Step)][-2:] == [104.0, 105.0]
+
+
+def test_a_ring_that_failed_is_not_taken_for_a_run_that_died(tmp_path: Path) -> None:
+    daemon = Daemon(tmp_path)
+    daemon.memory = object()  # a defect of ours
+    daemon.scan()
+    daemon.now += 11.0
+    daemon.witness.look()
+
+    assert (tmp_path / "ring").exists()
+    assert not (tmp_path / "ring.died").exists()
