@@ -11,14 +11,15 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
+from bridges.core.durations import AGES_AGO
 from bridges.log import pairs
 from bridges.recording.bags import CONTINUOUS
-from bridges.recording.entries import AnyEntry, Clocks, Died, Ended, Known
+from bridges.recording.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Step
 from bridges.recording.incident import AFTER_S, BEFORE_S, Incident, Note, part
 from bridges.recording.ring import DIED as DIED_NAME
 from bridges.recording.ring import NAME, Read, RingError, Tail
 from bridges.recording.shelf import Shelf
-from bridges.recording.triggers import DIED, Triggers
+from bridges.recording.triggers import AGAIN_S, DIED, Triggers
 
 log = logging.getLogger(__name__)
 
@@ -41,6 +42,7 @@ class Recorder:
         self._now = now
         self._followed: dict[Path, _Followed] = {}
         self._seen_dead: set[tuple[int, int]] = set()
+        self._died_at: dict[str, float] = {}
         self._failing = False
 
     def look(self) -> None:
@@ -86,7 +88,8 @@ class Recorder:
             self._put(*due)
 
     def _take_died(self, path: Path) -> None:
-        """A ring that a run left without ending in good order is a recording, once."""
+        """A ring that a run left without ending in good order is a recording, once. A run that never
+        served has nothing to show: a start that fails is in the log."""
         try:
             identity = _identity(path)
             if identity in self._seen_dead:
@@ -96,10 +99,19 @@ class Recorder:
             return
         self._seen_dead.add(identity)
         entries = list(read.entries())
-        if entries and not read.ended and not self._shelf.has(read.head, DIED):
+        served = any(isinstance(entry, Step) for entry in entries)
+        if served and not read.ended and self._is_first(read.head):
             at = entries[-1].at
             note = Note(at, DIED, _last_words(entries))
             self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DIED)
+
+    def _is_first(self, head: Head) -> bool:
+        """Is it not recorded yet, and no part of a row of deaths at each start?"""
+        last = self._died_at.get(head.file, AGES_AGO)
+        if self._shelf.has(head, DIED) or self._now() < last + AGAIN_S:
+            return False
+        self._died_at[head.file] = self._now()
+        return True
 
     def _put(self, incident: Incident, code: str) -> None:
         """Write a file; what fails is said once, and lost."""

@@ -15,7 +15,7 @@ from bridges.core.decision import Decision, IoFailed, Sampled
 from bridges.core.graph_kind import GraphKind
 from bridges.log import plain
 from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Head, Known, Same, Step, Told
-from bridges.recording.trees import Tree, UnknownValue, tree, value
+from bridges.recording.trees import Tree, UnknownValue, first_difference, tree, value
 from bridges.settings.config import Config
 from bridges.settings.load import understood
 from bridges.settings.names import kind_called
@@ -179,7 +179,11 @@ def _differing(recorded: dict[str, Tree], decision: AnyDecision) -> list[Parts]:
         "publish": [[topic.name, tree(message)] for topic, message in decision.publish],
         "wake_at": tree(decision.wake_at),
     }
-    return [(part, was, today[part]) for part, was in recorded.items() if today[part] != was]
+    return [
+        (part, was, today[part])
+        for part, was in recorded.items()
+        if today[part] != was and first_difference(was, today[part])
+    ]
 
 
 class Replay:
@@ -257,8 +261,9 @@ class Replay:
             self.course.subjects |= {name} if core else set()
             return
         subject = self._subjects[name]
-        if strict and subject and (memory := subject.memory()) != entry.memory:
-            yield entry.at, [("memory", entry.memory, memory)]
+        if strict and subject and (found := first_difference(entry.memory, subject.memory())):
+            place, was, now = found
+            yield entry.at, [(f"memory {place}".strip(), was, now)]
 
 
 def _name(entry: AnyEntry) -> str:

@@ -116,6 +116,21 @@ def _made(kind: type[Any], found: dict[str, Tree], held: Tree) -> object:
 _structs: dict[type[Any], Struct | None] = {}
 
 
+def first_difference(one: Tree, other: Tree, path: str = "") -> tuple[str, Tree, Tree] | None:
+    """Where two trees differ, and how; None if they do not. A field that only one of them has is no
+    difference: another version of the program knows more, or less."""
+    if isinstance(one, dict) and isinstance(other, dict) and one.get(TYPE) == other.get(TYPE):
+        names = [name for name in one if name in other]
+        below = ((f"{path}.{name}".strip("."), one[name], other[name]) for name in names)
+    elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+        pairs = enumerate(zip(one, other, strict=True))
+        below = ((f"{path} {place}".strip(), *both) for place, both in pairs)
+    else:
+        return None if one == other else (path, one, other)
+    found = (first_difference(was, now, where) for where, was, now in below)
+    return next(filter(None, found), None)
+
+
 def _struct(kind: type[Any]) -> Struct | None:
     """The fields of a type; None if it has none."""
     if kind not in _structs:

@@ -222,6 +222,29 @@ def test_a_run_that_a_defect_ended_is_recorded_with_its_reason(machine: Machine)
     ]
 
 
+def test_a_daemon_that_dies_again_and_again_makes_one_file_in_ten_minutes(
+    machine: Machine,
+) -> None:
+    for _ in range(20):
+        machine.live(3)
+        machine.start()
+    assert len(machine.files()) == 1
+    machine.live(600)
+    machine.start()
+    machine.live(3)
+    assert len(machine.files()) == 2
+
+
+def test_a_start_that_fails_is_no_recording(machine: Machine) -> None:
+    machine.witness.ended(safe=True)
+    head = Read(machine.runtime / "ring").head
+    for number in range(3):
+        Ring(machine.runtime, replace(head, run=f"f{number}"), 200_000).close(ended=False)
+        machine.live(3)
+
+    assert machine.files() == []
+
+
 def test_a_run_that_ended_in_good_order_is_not_recorded(machine: Machine) -> None:
     machine.live(10)
     machine.witness.ended(safe=True)

@@ -4,6 +4,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
 from bridges.core.decision import Fault, IoFailed, OperatorReset, Sampled
@@ -11,7 +12,7 @@ from bridges.core.durations import NEVER
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.lift.memory import Channel, Memory, Relays, Senses, Session
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Requested, Side
-from bridges.recording.trees import UnknownValue, tree, value
+from bridges.recording.trees import UnknownValue, first_difference, tree, value
 from bridges.rmf.constants import LiftDoor
 from bridges.rmf.definitions import LiftRequest, Time
 
@@ -84,3 +85,16 @@ def test_what_is_no_value_of_a_core_is_refused(told: Any) -> None:
 def test_what_no_core_has_has_no_tree() -> None:
     with pytest.raises(TypeError, match="Exception is no value of a core"):
         tree(Exception())
+
+
+def test_two_trees_are_compared_in_the_fields_that_both_versions_know() -> None:
+    memory = Memory(session=Session("r1", True, "L3", 2.0))
+    was, now = tree(memory), tree(replace(memory, alarmed=True))
+    assert isinstance(was, dict)
+    older = {name: part for name, part in was.items() if name != "fire_latched"}
+
+    assert first_difference(was, was) is None
+    assert first_difference(older, was) is None
+    assert first_difference(was, now) == ("alarmed", False, True)
+    assert first_difference(tree((1, Fault("A"))), tree((1, Fault("B")))) == ("1.code", "A", "B")
+    assert first_difference([1], [1, 2]) == ("", [1], [1, 2])
