@@ -51,7 +51,7 @@ def measure(scratch: Path) -> Tables:
     latencies: Rows = {}
     for wire in reversed(WIRES):  # the hazard's figures are those of the last, dds
         round_trips = _bare_round_trips(scratch, wire)
-        relay, state, off, _ = _daemon_paths(scratch, wire, wire)
+        relay, state, off, _ = daemon_paths(scratch, wire, wire)
         latencies |= {
             f"bare round trip on {wire}": compared(round_trips, round_trips),
             f"LiftRequest to relay edge on {wire}": compared(relay, round_trips),
@@ -78,7 +78,7 @@ def _with_ros(scratch: Path) -> Tables:
     relays: Rows = {"minimal rclpy node": {**compared(bare_relay, bare_relay), "RSS MB": bare_mb}}
     states: Rows = {"minimal rclpy node": compared(bare_state, bare_state)}
     for transport in ("ros2", "dds"):
-        relay, state, _, rss_mb = _daemon_paths(scratch, transport)
+        relay, state, _, rss_mb = daemon_paths(scratch, transport)
         name = f"lift daemon on {transport}"
         relays[name] = {**compared(relay, bare_relay), "RSS MB": rss_mb}
         states[name] = compared(state, bare_state)
@@ -153,15 +153,16 @@ def _contacts(part: Any) -> list[dict[str, Any]]:
     return [contact for each in parts for contact in _contacts(each)]
 
 
-def _daemon_paths(
-    scratch: Path, transport: str, ours: Wire = "dds"
+def daemon_paths(
+    scratch: Path, transport: str, ours: Wire = "dds", *, keep: str = ""
 ) -> tuple[Times, Times, Times, float]:
     """Seconds of each request to the relay, edge to RMF and hazard to all off, and memory (MB).
 
-    `ours`: the wire of this end.
+    `ours`: the wire of this end. `keep`: what is recorded; the default where not given.
     """
-    directory = scratch / f"quick_{transport}"
-    command = daemon(_quick_lift(), directory, transport)
+    directory = scratch / f"quick_{transport}{keep}"
+    recording = {"recording": {"keep": keep}} if keep else {}
+    command = daemon({**_quick_lift(), **recording}, directory, transport)
     with ready(command, directory.with_suffix(".log")) as child, graph(ours) as node:
         far, sock = Graph(node), directory / "plant.sock"
         with Caller(sock) as plant, Caller(sock) as hand:

@@ -12,8 +12,6 @@ from bridges.judge.judge import Judge
 from bridges.judge.plays import LEAVES_S, REPEAT_S, Performance
 from bridges.judge.shared_laws import BURST_WITHIN_S
 from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf.topics import AnyTopic
 from bridges.rmf_rules import NEVER, Said
 
 LISTENS_S: Final = 4.0
@@ -69,15 +67,15 @@ class Stage:
         self._epoch = wall - at
         self._last = (at, wall)
 
-    def hear(self, topic: AnyTopic, message: d.Message, at: float, wall: float) -> list[Said]:
+    def hear(self, heard: Heard) -> list[Said]:
         """A message of the graph, ours not among them."""
-        self._last = (at, wall)
-        self.judge.hear(Heard(at, wall, topic.name, message))
+        self._last = (heard.at, heard.wall)
+        self.judge.hear(heard)
         if self._performance is None or self.act not in (Act.PLAY, Act.LEAVE):
             return []
-        if topic.name not in (heard.name for heard in self._performance.hears):
+        if heard.topic not in (topic.name for topic in self._performance.hears):
             return []
-        said = self._performance.hear(topic, message, self._now)
+        said = self._performance.hear(heard.topic, heard.message, self._now)
         if self.act is not Act.PLAY:
             return []
         if self.judge.scene.burst_s < BURST_WITHIN_S:

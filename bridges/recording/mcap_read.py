@@ -8,7 +8,7 @@ https://mcap.dev/spec (version 0).
 
 import io
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Final
 
@@ -29,7 +29,10 @@ MOST_DECLARED: Final = 10_000
 FRAME: Final = 9
 """Each record begins with its opcode (1 byte) and its length (8 bytes)."""
 
-READ: Final = {
+MESSAGE: Final = struct.Struct("<HIQQ")
+"""A message begins with its channel, its sequence, and when it was logged and published (ns). It is
+taken apart here, because there are more messages than anything else."""
+READ: Final[dict[int, Callable[[ReadDataStream], McapRecord]]] = {
     Opcode.HEADER: Header.read,
     Opcode.SCHEMA: Schema.read,
     Opcode.CHANNEL: Channel.read,
@@ -94,8 +97,9 @@ class _Limits:
 
     def _one(self, opcode: int, body: bytes) -> Iterator[McapRecord]:
         if opcode == Opcode.MESSAGE:
-            yield Message.read(_stream(body), len(body))
-        elif read := READ.get(Opcode(opcode)) if opcode in set(Opcode) else None:
+            channel, sequence, at, published = MESSAGE.unpack_from(body)
+            yield Message(channel, at, body[MESSAGE.size :], published, sequence)
+        elif read := READ.get(opcode):
             self._declared -= opcode in (Opcode.SCHEMA, Opcode.CHANNEL)
             if self._declared < 0:
                 raise Damaged(f"more than {MOST_DECLARED} channels and schemas")

@@ -15,8 +15,8 @@ class Renamed:
     """`Transport`. `names`: RMF's topic name -> the site's."""
 
     def __init__(self, transport: Transport, names: Mapping[str, str]) -> None:
-        self.name, self.speaks, self.domain_id = transport.name, transport.speaks, transport.domain_id
-        self.dropped = transport.dropped
+        self.name, self.speaks, self.dropped = transport.name, transport.speaks, transport.dropped
+        self.domain_id = transport.domain_id
         self.wall, self.close = transport.wall, transport.close
         self._transport = transport
         self._names = names

@@ -16,7 +16,7 @@ EDGES_KEPT = 100_000
 
 
 class Machine(ABC):
-    """A plant (`hal_fakes.plants.plant.Plant`) but for its physics.
+    """What every plant (`hal_fakes.plants.plant.Plant`) has besides its physics.
 
     `wires`: the driver's wiring table of this device; empty where the controller has no contacts.
     `parts`: what can fail besides wires (`car`, `door_operator`); the plant looks at `failures`.

@@ -1,4 +1,4 @@
-"""RMF around one lift: its supervisor and fleet adapters, stood in for, talking to the real node."""
+"""RMF around one lift: stand-ins for its supervisor and its fleet adapters talk to the real node."""
 
 from collections.abc import Callable, Sequence
 
@@ -23,8 +23,8 @@ REPLAYED = 100
 
 
 class World:
-    """`fate` says when a LiftRequest reaches the node (s from now; none: lost; two: doubled), and
-    `hears` whether RMF gets a LiftState. By default all arrives at once and in order.
+    """`fate` gives the delays (s) after which a LiftRequest reaches the node: none loses it, two double
+    it. `hears` says whether RMF gets a LiftState. By default all arrives at once and in order.
 
     The robots hear each state before the supervisor when `adapters_first`.
     """

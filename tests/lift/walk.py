@@ -35,7 +35,7 @@ LONG_S = 55.0
 def limits_of(
     debounce: dict[str, float] | None = None, agv_mode: Any = "requested", **changes: Any
 ) -> LiftLimits:
-    """The default durations, but for the age of readings, which costs scans."""
+    """The default durations, but readings stay fresh for a minute: the walk then needs fewer scans."""
     settings = LiftSettings(
         floors=["L1", "L2", "L3"],
         limits=Durations(**{"stale_after_s": 60.0, **changes}),

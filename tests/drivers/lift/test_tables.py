@@ -83,7 +83,7 @@ def test_codes_that_are_swapped_are_seen(tmp_path: Path) -> None:
     ]
 
 
-def test_how_long_a_call_lasts_is_told(tmp_path: Path) -> None:
+def test_the_table_says_how_long_a_call_lasts(tmp_path: Path) -> None:
     pulse = ("    inputs:\n", "    limits: {call_pulse_s: 0.5}\n    inputs:\n")
     assert table(tmp_path, "outputs", pulse) == [
         "agv_mode_request agv_mode_request on while a robot holds the lift, and 3 s longer",
