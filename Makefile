@@ -78,7 +78,7 @@ man: .venv/ready
 	@mkdir -p build
 	$(BIN)/argparse-manpage --module bridges.cli --function whole_parser --prog rmf-bridge \
 	  --project-name rmf-bridges --description "connect Open-RMF to lifts, doors and chargers" \
-	  --manual-section 1 --output build/rmf-bridge.1
+	  --manual-section 1 --manual-title "rmf-bridges manual" --output build/rmf-bridge.1
 
 # Built here for every machine; nothing of it runs here.
 ARCHS ?= amd64 arm64

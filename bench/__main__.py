@@ -12,11 +12,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench import buses, day, idle, latency
+from bench import buses, day, idle, latency, recording
 from bench.figures import lines
 
 RESULTS = Path(__file__).parent / "results"
-SECTIONS = {"latency": latency, "idle": idle, "buses": buses, "day": day}
+SECTIONS = {"latency": latency, "idle": idle, "buses": buses, "day": day, "recording": recording}
 
 
 def main(chosen: list[str]) -> int:

@@ -9,8 +9,6 @@ from bridges.serve import directory as runtime
 from bridges.serve.places import Places, act_as_owner
 from bridges.serve.signals import RESET
 
-EX_UNAVAILABLE = 69
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `reset`."""
@@ -29,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
         return _reset(args.file, places)
     except (runtime.Unknown, PermissionError) as error:
         print(error, file=sys.stderr)
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
 
 
 def _reset(file: Path, places: Places) -> int:

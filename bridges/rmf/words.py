@@ -38,6 +38,17 @@ def device(message: Stated | Requested) -> str:
             return message.charger_name
 
 
+def kind(state: Stated) -> str:
+    """The kind of device that a state is of: `lift`, `door` or `charger`."""
+    match state:
+        case d.LiftState():
+            return "lift"
+        case d.DoorState():
+            return "door"
+        case d.ChargerState():
+            return "charger"
+
+
 def stamped_at(state: Stated) -> float:
     """When the hardware was read, in seconds since the epoch; 0 for never."""
     match state:

@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from bridges.core.fields import Name
-from bridges.settings.nodes import unknown
+from bridges.core.spelling import unknown
 from drivers.charger import rules as by_rules
 from drivers.charger.rules import Errors, Rule
 from drivers.charger.state_codes import Codes

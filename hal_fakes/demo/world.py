@@ -15,10 +15,10 @@ from bridges.rmf import topics, words
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Publisher, Transport
 from bridges.rmf.words import Requested, Stated
+from bridges.rmf_rules import Party, Said
 from hal_fakes.demo.daemons import Daemon, Wrong
 from hal_fakes.demo.journal import SETTLES_S, Journal
 from hal_fakes.plants.plant import Edge
-from hal_fakes.rmf import Party, Said
 
 TO_DAEMONS: Final[tuple[AnyTopic, ...]] = (
     topics.LIFT_REQUESTS,

@@ -126,6 +126,31 @@ def test_faults_have_a_column_when_there_are_any_and_are_a_change() -> None:
     assert (line["at"], line["name"], line["faults"]) == (WALL, "ward", "DOOR_SILENT")
 
 
+def test_a_device_is_shown_once_it_is_known_whether_it_is_simulated() -> None:
+    """A real one's daemon may be another's, and never say so: it is not waited for long."""
+    young = board(LIFT)
+    assert watch.settled(young, 100.0, WALL) == []
+    assert [row.simulated for row in watch.settled(young, 101.5, WALL)] == [False]
+    young.take(Heard(told("lift_supervisor", "Lift1"), 100.0))
+    assert watch.settled(young, 100.0, WALL) == []
+    young.take(Heard(told("lift", "Lift1"), 100.0))
+    assert [row.name for row in watch.settled(young, 100.0, WALL)] == ["Lift1"]
+
+
+def test_what_a_narrow_terminal_would_cut_off_follows_on_a_line_of_its_own() -> None:
+    faulty = board(LIFT, DOOR, told("door", "ward", "DOOR_SILENT")).rows(100.0, WALL)
+    text, lines = repaint(faulty, 0, columns=40, lines=24, coloured=False)
+    assert (lines, text.replace("\r\x1b[K", "").replace("\x1b[J", "").splitlines()) == (
+        4,
+        [
+            "kind  name   state                     ",
+            "lift  Lift1  car at L1, door open, mode",
+            "door  ward   closed                    ",
+            "  DOOR_SILENT",
+        ],
+    )
+
+
 def test_a_pipe_gets_a_line_for_a_change_and_none_for_an_age() -> None:
     opened = replace(DOOR, current_mode=d.DoorMode(2))
     first = board(DOOR, LIFT).rows(100.0, WALL)

@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
-
 from bridges.commands import reset
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.loop import SUSPENDED_S
@@ -21,21 +19,6 @@ from tests.waiting import wait_until
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 WATCHDOG = {**SERVICE, "WATCHDOG_USEC": "600000"}
 HURT = "tests.serve.hurt"
-EX_SOFTWARE = 70
-
-
-@pytest.fixture
-def module(domain: int, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, domain)
-    yield standing
-    standing.close()
-
-
-@pytest.fixture
-def graph(module: Module) -> Iterator[Graph]:
-    joined = Graph(module.domain)
-    yield joined
-    joined.transport.close()
 
 
 class Systemd:
@@ -126,7 +109,7 @@ def test_a_transport_that_cannot_be_restarted_ends_the_daemon_with_the_relay_off
             return running.process.poll() is not None
 
         wait_until(ended, "the daemon has ended")
-        assert running.process.returncode == EX_SOFTWARE
+        assert running.process.returncode == os.EX_SOFTWARE
         assert [*heard, *manager.heard()][-1] == b"STOPPING=1"
         said = running.log.read_text()
     assert said.count("reader_failed") == 1

@@ -2,7 +2,6 @@
 
 import signal
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,13 +11,6 @@ from tests.serve.site import Module, command, daemon, environment
 from tests.waiting import PATIENCE_S
 
 RUN = {"INVOCATION_ID": "4f5e", "SERVICE_RESULT": "success"}
-
-
-@pytest.fixture
-def module(domain: int, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, domain)
-    yield standing
-    standing.close()
 
 
 @pytest.mark.parametrize(

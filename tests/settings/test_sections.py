@@ -57,7 +57,7 @@ def test_a_file_needs_all_its_sections(file: Path) -> None:
 def test_a_section_of_another_kind_is_unknown(file: Path) -> None:
     assert problems_of(file, changed("gates:", "doors:")) == [
         "1:1: the file needs 'gates': a mapping (key: value)",
-        "6:1: unknown key 'doors': known here: kind, driver, rmf, buses, gates",
+        "6:1: unknown key 'doors': known here: kind, driver, rmf, recording, buses, gates",
     ]
 
 

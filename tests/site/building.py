@@ -28,9 +28,9 @@ from hal_fakes.modbus.register_door import RegisterDoor, contacts
 from hal_fakes.plants import door as door_plant
 from hal_fakes.plants import lift as lift_plant
 from hal_fakes.plants.machine import Machine
+from tests.drivers.far import Far, HttpFar, PointsFar, RegisterFar
 from tests.drivers.lift.wirings import alarm, coil, line
 from tests.site.timeline import Timeline
-from tests.site.wires import Far, HttpFar, PointsFar, RegisterFar
 
 CONFIG = Path(__file__).parents[2] / "config"
 FLOORS = ["L1", "L2", "L3", "L4"]
@@ -68,34 +68,37 @@ def devices(timeline: Timeline) -> dict[str, Device]:
     return {device.name: device for device in found}
 
 
-def _lift(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
-    plant = lift_plant.build(name, settings)
-    far = PointsFar(timeline, plant, lift_dry_contact.wires(settings))
+def _wired(
+    timeline: Timeline,
+    name: str,
+    kind: AnyDeviceKind,
+    driver: Any,
+    plant: Any,
+    settings: Any,
+    bus: str,
+) -> Device:
+    """A device on contacts."""
+    far = PointsFar(timeline, plant, driver.wires(settings))
     return Device(
         name,
-        LIFT,
+        kind,
         settings,
         plant,
         far,
-        lambda: lift_dry_contact.create(name, settings, far),
-        lift_dry_contact.debounce(settings),
+        lambda: driver.create(name, settings, far),
+        driver.debounce(settings),
         POLL_S[bus],
     )
+
+
+def _lift(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
+    plant = lift_plant.build(name, settings)
+    return _wired(timeline, name, LIFT, lift_dry_contact, plant, settings, bus)
 
 
 def _dry_door(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
     plant = door_plant.build(name, settings, door_dry_contact.wires(settings))
-    far = PointsFar(timeline, plant, door_dry_contact.wires(settings))
-    return Device(
-        name,
-        DOOR,
-        settings,
-        plant,
-        far,
-        lambda: door_dry_contact.create(name, settings, far),
-        door_dry_contact.debounce(settings),
-        POLL_S[bus],
-    )
+    return _wired(timeline, name, DOOR, door_dry_contact, plant, settings, bus)
 
 
 def _register_door(timeline: Timeline, name: str, settings: Any) -> Device:

@@ -188,7 +188,7 @@ class Site:
 
     def _speakers(self, topic: str) -> int:
         """How many supervisors speak. Ours and a rival that has just come count as one."""
-        speaking = [end.node.name for end in self.air.memory.publishers if end.topic.name == topic]
+        speaking = [end.node.name for end in self.air.memory.publishers[topic]]
         if RIVAL in speaking and self.rmf == "ours":
             return 1
         return len(speaking)
@@ -384,11 +384,11 @@ class Site:
         )
 
     def _bus_down(self, device: Device) -> None:
-        device.far.down = True
+        device.far.down = "no answer"
         self.timeline.after(2.0, device.far.watchdog)
 
     def _bus_up(self, device: Device) -> None:
-        device.far.down = False
+        device.far.down = ""
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:

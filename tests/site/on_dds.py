@@ -69,6 +69,7 @@ class DdsPlace:
 
     def __init__(self, timeline: RealTime, domain: int, name: str) -> None:
         self.name = name
+        self.domain_id = domain
         self.dropped: dict[str, int] = {}
         self._timeline = timeline
         self._closed = False

@@ -9,6 +9,7 @@ from tests.site.growth import Look, growth
 from tests.site.laws import Broken
 
 MINUTES = depth(8, 20)
+"""Robots go home in the last minutes of a day (`WIND_DOWN_S`): a shorter one has nothing else."""
 
 
 @pytest.mark.long
@@ -47,7 +48,7 @@ def test_the_same_seed_is_the_same_day() -> None:
     assert list(days[0].laws.log) == list(days[1].laws.log)
 
 
-def test_what_grows_by_the_hour_is_named() -> None:
+def test_what_grows_by_the_hour_is_told() -> None:
     flat = [Look(hour, 1, 6, 33_000 + 100 * (hour % 2), 34.0) for hour in range(1, 6)]
     assert growth(flat) == []
     assert growth([*flat, Look(6, 2, 9, 39_000, 60.0)]) == [

@@ -1,0 +1,94 @@
+"""What `explain` and `plot` share: reading a recording, or the part of it that is asked for."""
+
+import argparse
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from bridges.commands.graph import complain
+from bridges.recording.bags import heard_in
+from bridges.recording.heard import Heard
+from bridges.recording.sources import Notes
+
+CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[ T])?(\d\d?):(\d\d)(?::(\d\d(?:\.\d+)?))?")
+
+
+@dataclass(frozen=True, slots=True)
+class Time:
+    """A time as typed: s from the beginning, or a local time of a day (None: the first one)."""
+
+    after_s: float | None = None
+    day: str | None = None
+    of_day_s: float = 0.0
+
+    def wall(self, began: float) -> float:
+        """In s since the epoch, in a recording that began then."""
+        if self.after_s is not None:
+            return began + self.after_s
+        day = datetime.fromisoformat(self.day) if self.day else datetime.fromtimestamp(began)
+        midnight = day.replace(hour=0, minute=0, second=0, microsecond=0)
+        return (midnight + timedelta(seconds=self.of_day_s)).timestamp()
+
+
+@dataclass(slots=True)
+class Span:
+    """The part of a recording that is asked for. `begins_at`: when it began, by `Heard.at`."""
+
+    from_: Time | None
+    to: Time | None
+    begins_at: float = float("-inf")
+
+
+def add_span_arguments(parser: argparse.ArgumentParser) -> None:
+    """`--from` and `--to`."""
+    times = (
+        "14:03, 14:03:07, '2026-11-22 14:03' (this machine's time), or +90: s from its beginning"
+    )
+    parser.add_argument(
+        "--from", dest="from_", type=_time, metavar="TIME", help=f"begin then: {times}"
+    )
+    parser.add_argument("--to", type=_time, metavar="TIME", help="end then")
+
+
+def _time(text: str) -> Time:
+    """Raises ArgumentTypeError."""
+    found = CLOCK.fullmatch(text)
+    try:
+        if found is None:
+            return Time(after_s=_plus(text))
+        day, hour, minute, second = found.groups()
+        if day:
+            datetime.fromisoformat(day)
+        if int(hour) > 23 or int(minute) > 59 or float(second or 0) >= 60:
+            raise ValueError
+    except ValueError:
+        why = "write 14:03:07, '2026-11-22 14:03:07', or +90 for 90 s after the beginning"
+        raise argparse.ArgumentTypeError(f"'{text}' is no time: {why}") from None
+    return Time(None, day, int(hour) * 3600.0 + int(minute) * 60.0 + float(second or 0))
+
+
+def _plus(text: str) -> float:
+    if not re.fullmatch(r"\+\d{1,9}(\.\d+)?", text):
+        raise ValueError(text)
+    return float(text)
+
+
+def heard_between(path: Path, span: Span, command: str) -> Iterator[Heard]:
+    """Everything until the end of the span; what is before it too, as states last.
+
+    Damage is told on standard error. Raises BagError.
+    """
+    notes, began, until = Notes(), None, float("inf")
+    for heard in heard_in(path, notes):
+        if began is None:
+            began = heard.wall
+            until = span.to.wall(began) if span.to else until
+        if span.from_ and span.begins_at == float("-inf") and heard.wall >= span.from_.wall(began):
+            span.begins_at = heard.at
+        if heard.wall > until:
+            break
+        yield heard
+    if notes.damage:
+        complain(command, notes.damage)
