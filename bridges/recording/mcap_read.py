@@ -15,7 +15,7 @@ from typing import IO, Final
 import lz4.frame
 import zstandard
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
+from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata, Schema
 
@@ -28,6 +28,9 @@ MOST_DECLARED: Final = 10_000
 """Schemas, and channels."""
 FRAME: Final = 9
 """Each record begins with its opcode (1 byte) and its length (8 bytes)."""
+
+MESSAGE: Final = struct.Struct("<HIQQ")
+"""A message's channel, sequence number, log time and publish time; its sample follows."""
 
 READ: Final = {
     Opcode.HEADER: Header.read,
@@ -94,7 +97,7 @@ class _Limits:
 
     def _one(self, opcode: int, body: bytes) -> Iterator[McapRecord]:
         if opcode == Opcode.MESSAGE:
-            yield Message.read(_stream(body), len(body))
+            yield _message(body)
         elif read := READ.get(Opcode(opcode)) if opcode in set(Opcode) else None:
             self._declared -= opcode in (Opcode.SCHEMA, Opcode.CHANNEL)
             if self._declared < 0:
@@ -118,6 +121,14 @@ class _Limits:
             raise Damaged(f"a chunk of {len(chunk.data)} bytes unpacks to more than {most}")
         self._unpacked -= len(unpacked)
         return unpacked
+
+
+def _message(body: bytes) -> Message:
+    """Read at once: by the library's stream half a million, a day's, take a third longer."""
+    if len(body) < MESSAGE.size:
+        raise EndOfFile
+    channel, sequence, log_time, publish_time = MESSAGE.unpack_from(body)
+    return Message(channel, log_time, body[MESSAGE.size :], publish_time, sequence)
 
 
 def _stream(body: bytes) -> ReadDataStream:
