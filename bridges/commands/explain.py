@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
 def _recorded(args: argparse.Namespace) -> int:
     site = Site(args.device or "", args.session)
     span = Span(args.from_, args.to)
-    for heard in heard_between(args.file, span, "explain"):
+    for heard in heard_between(args.file, span, "explain", args.device or ""):
         site.take(heard)
     site.story_from(span.begins_at)
     if not site.messages:

@@ -8,6 +8,7 @@ heard, the graph cannot be joined, or what was to be played was not.
 import argparse
 import os
 import shutil
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -254,11 +255,18 @@ class Live:
         return f"others publish on {', '.join(found)}: to play all the same, say {beside}"
 
     def judge(self, stage: Stage) -> None:
-        """Until there is a verdict. An interrupt ends a play by letting the device go."""
+        """Until there is a verdict. Whatever ends a play, the device is let go first."""
         stage.begin(time.monotonic(), time.time())
-        while not stage.done:
-            with _interrupts_end(stage, self._say):
-                self._turn(stage)
+        try:
+            with _told_to_end() as told:
+                while not stage.done:
+                    if told():
+                        self._say(stage.stop())
+                    self._turn(stage)
+        except BaseException:
+            with suppress(TransportError):
+                self._say(stage.stop())
+            raise
 
     def _turn(self, stage: Stage) -> None:
         waits_s = min(stage.wake_at() - time.monotonic(), LOOK_EVERY_S)
@@ -279,15 +287,13 @@ class Live:
 
 
 @contextmanager
-def _interrupts_end(stage: Stage, say: Callable[[list[Said]], None]) -> Iterator[None]:
-    """Ctrl-C or SIGTERM: let the device go, then judge. Another one meanwhile changes nothing."""
+def _told_to_end() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C, SIGTERM or SIGHUP has come; none of them interrupts what is under way."""
+    told: list[int] = []
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, lambda n, _: told.append(n)) for number in signals}
     try:
-        yield
-    except KeyboardInterrupt:
-        while True:
-            try:
-                said = stage.stop()
-                say(said)
-                return
-            except KeyboardInterrupt:
-                continue
+        yield lambda: bool(told)
+    finally:
+        for number, action in before.items():
+            signal.signal(number, action)

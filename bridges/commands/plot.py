@@ -107,7 +107,7 @@ def _read(args: argparse.Namespace, name: str) -> tuple[Timeline, list[str]]:
     """The device's lanes, and its explanation in lines. Raises PlotError if it shows no state."""
     span, site = Span(args.from_, args.to), Site(name)
     drawings = {kind: Drawing(kind, name) for kind in KINDS if args.kind in (None, kind)}
-    for heard in heard_between(args.file, span, "plot"):
+    for heard in heard_between(args.file, span, "plot", name):
         site.take(heard)
         for drawing in drawings.values():
             drawing.take(heard)

@@ -8,7 +8,7 @@ have one clock, which may step: then `at` goes on from where it was.
 """
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
@@ -18,7 +18,7 @@ from bridges.recording.heard import Heard
 from bridges.recording.sources import BagError, Notes, Raw
 from bridges.rmf import cdr
 
-__all__ = ["BagError", "Notes", "heard_in"]
+__all__ = ["BagError", "Keep", "Notes", "heard_in"]
 
 log = logging.getLogger(__name__)
 
@@ -29,15 +29,22 @@ LONGEST_MESSAGE: Final = 8 << 20
 INSTALL: Final = "pip install 'rmf-bridges[recording,sqlite]'"
 
 
-def heard_in(path: Path, notes: Notes | None = None) -> Iterator[Heard]:
+Keep = Callable[[str, bytes, float], bool]
+"""Is a sample of this topic, recorded at this time (s), worth decoding?"""
+
+
+def heard_in(path: Path, notes: Notes | None = None, keep: Keep | None = None) -> Iterator[Heard]:
     """Every message of RMF in a recording, in the order in which it was recorded.
 
     `path`: an MCAP file, a `.db3` file, or a directory of rosbag2. What is skipped or damaged is noted
-    in `notes`; damage is logged where there are none. Raises BagError if it is no recording at all.
+    in `notes`; damage is logged where there are none. What `keep` does not want is left out undecoded,
+    which takes a tenth of the time. Raises BagError if it is no recording at all.
     """
     noted = Notes() if notes is None else notes
     clock = _Clock()
     for raw in _raw(path, noted):
+        if keep is not None and not keep(raw.topic, raw.sample, raw.at * NS):
+            continue
         try:
             if len(raw.sample) > LONGEST_MESSAGE:
                 raise cdr.CdrError("too long")
