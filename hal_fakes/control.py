@@ -17,9 +17,10 @@ import socket
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import cast
+
+import msgspec
 
 from bridges.log import pairs
 from drivers import DriverError
@@ -119,7 +120,7 @@ class Control:
         return self._plants[device]
 
     def _tell(self, edge: Edge) -> None:
-        line = json.dumps(asdict(edge)).encode() + b"\n"
+        line = msgspec.json.encode(edge) + b"\n"
         with self._lock:
             for follower in list(self._followers):
                 if not _sent(follower, line):

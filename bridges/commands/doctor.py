@@ -138,10 +138,10 @@ def _not_confirmed(config: Config, args: argparse.Namespace) -> str:
 def _examined(
     config: Config, building: "BuildingMap | None", args: argparse.Namespace
 ) -> Iterator[Finding]:
-    from bridges.commands.doctoring.examination import Asked, examined
+    from bridges.commands.doctoring.examination import Options, examined
     from bridges.commands.doctoring.machine import Machine
 
-    asked = Asked(
+    asked = Options(
         runtime_dir=args.runtime_dir,
         whole_scan=args.scan,
         listen_s=args.listen,

@@ -32,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--died", action="store_true", help="the run before this one, which did not end in order"
     )
+    parser.add_argument("--anonymous", action="store_true", help="without the site's names")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
 
 
@@ -48,6 +49,10 @@ def run(args: argparse.Namespace) -> int:
     except (runtime.Unknown, RingError) as error:
         print(f"{error}. Does its daemon run, and does its YAML keep a ring?", file=sys.stderr)
         return EX_UNAVAILABLE
+    if args.anonymous:
+        from bridges.recording.anonymous import anonymous
+
+        incident = anonymous(incident)
     path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
     try:
         mcap_write.write(path, incident)

@@ -8,40 +8,34 @@ heard, the graph cannot be joined, or what was to be played was not.
 import argparse
 import os
 import shutil
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from uuid import uuid4
 
 from bridges.commands.graph import add_graph_arguments, complain, interruptible, open_graph
+from bridges.commands.live import OF_DEVICES, Ear
+from bridges.commands.recordings import Span, add_span_arguments, heard_between
 from bridges.judge.judge import KINDS, Judge, Kind
 from bridges.judge.law import Verdict, shown
 from bridges.judge.plays import FLEET, Charge, Passages, Performance, Ride
-from bridges.judge.report import Report, as_json, junit, report, text, verdict
+from bridges.judge.report import Report, as_json, junit, markdown, report, text, verdict
 from bridges.judge.stage import Stage
+from bridges.recording.heard import Heard
+from bridges.recording.sources import BagError
 from bridges.rmf import topics
 from bridges.rmf.definitions import Message
-from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Publisher, Transport, TransportError
 from bridges.rmf_rules import NEVER, Said
 
 NODE_NAME = "rmf_bridge_judge"
 LOOK_EVERY_S = 0.1
+NEVER_YET = float("-inf")
+FIRE = topics.FIRE_ALARM_TRIGGER
 WIDTH = 120
-HEARD: dict[Kind, tuple[AnyTopic, ...]] = {
-    "lift": (topics.LIFT_STATES, topics.LIFT_REQUESTS, topics.ADAPTER_LIFT_REQUESTS.live()),
-    "door": (
-        *(topics.DOOR_STATES, topics.DOOR_REQUESTS, topics.ADAPTER_DOOR_REQUESTS),
-        topics.DOOR_SUPERVISOR_HEARTBEAT,
-    ),
-    "charger": (
-        *(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS),
-        topics.CHARGER_REFUSALS,
-    ),
-}
 BESIDE: dict[str, tuple[str, ...]] = {
     "supervisor": (
         topics.LIFT_REQUESTS.name,
@@ -57,7 +51,7 @@ BESIDE: dict[str, tuple[str, ...]] = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which device, for how long, and what to play."""
     parser.add_argument("kind", choices=KINDS)
-    parser.add_argument("name", metavar="NAME", help="the device, as RMF names it")
+    parser.add_argument("name", metavar="NAME", nargs="?", help="the device, as RMF names it")
     add_graph_arguments(parser)
     parser.add_argument(
         "--for",
@@ -69,6 +63,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="the verdict as one JSON object")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="the verdict for a CI server")
+    parser.add_argument(
+        "--laws", action="store_true", help="print the laws of this kind, and why they are; no NAME"
+    )
+    parser.add_argument(
+        "--recording",
+        type=Path,
+        metavar="FILE",
+        help="judge a recording instead of the graph: MCAP (ours, or of `ros2 bag`) or .db3",
+    )
+    add_span_arguments(parser)
     _add_plays(parser)
     parser.set_defaults(usage=parser.error)
 
@@ -159,8 +163,38 @@ def words_of(args: argparse.Namespace) -> str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Listen or play, and judge."""
+    """Listen, play or read, and judge."""
+    if args.laws:
+        print(markdown(args.kind))
+        return 0
+    if not args.name:
+        args.usage(f"which {args.kind}? Give its NAME")
     performance = performance_of(args)
+    if args.recording is None:
+        return _live(args, performance)
+    if performance is not None:
+        args.usage("a recording cannot be played with: leave --active out")
+    try:
+        return _recorded(args)
+    except BagError as error:
+        complain("judge", error)
+        return os.EX_UNAVAILABLE
+
+
+def _recorded(args: argparse.Namespace) -> int:
+    judge, span = Judge(args.kind, args.name), Span(args.from_, args.to)
+    last: Heard | None = None
+    for heard in heard_between(args.recording, span, "judge"):
+        if args.from_ is None or heard.at >= span.begins_at > NEVER_YET:
+            judge.hear(heard)
+            last = heard
+    if last is None or judge.first is None:
+        complain("judge", f"{args.recording} holds nothing of RMF's then")
+        return os.EX_UNAVAILABLE
+    return tell(report(judge, judge.end(last.at, last.wall), last.at - judge.first.at), args)
+
+
+def _live(args: argparse.Namespace, performance: Performance | None) -> int:
     stage: Stage | None = None
     try:
         with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
@@ -169,11 +203,10 @@ def run(args: argparse.Namespace) -> int:
             live.judge(stage)
     except TransportError as error:
         complain("judge", error)
-        if stage is None:
-            return os.EX_UNAVAILABLE
     except KeyboardInterrupt:
-        if stage is None:
-            return os.EX_UNAVAILABLE
+        pass
+    if stage is None:
+        return os.EX_UNAVAILABLE
     now = time.monotonic()
     judged = stage.judge.end(now, time.time())
     notes = [f"not played to its end: {stage.note}"] if stage.note else []
@@ -200,36 +233,21 @@ class Live:
     """The graph: what is heard on it, in order of arrival, and what is said."""
 
     def __init__(
-        self,
-        transport: Transport,
-        kind: Kind,
-        beside: list[str],
-        performance: Performance | None,
+        self, transport: Transport, kind: Kind, beside: list[str], performance: Performance | None
     ) -> None:
         self._transport = transport
-        self._waiting: SimpleQueue[tuple[AnyTopic, Message, float, float]] = SimpleQueue()
         self._publishers: dict[str, Publisher[Message]] = {}
+        self._ear = Ear(transport, (*OF_DEVICES, FIRE.live()), others_only=True)
+        self._retained = transport.subscribe(FIRE, lambda message: None)
         allowed = {topic for name in beside for topic in BESIDE[name]}
-        speaks = performance.speaks if performance else ()
-        self._speaks = {topic.name for topic in speaks}
-        self._heard = {
-            topic.name: transport.subscribe(topic, self._receive(topic), others_only=True)
-            for topic in HEARD[kind]
-        }
-        self._sole = [name for name in self._heard if name in self._speaks - allowed]
-        self._fire = (
-            [
-                transport.subscribe(topics.FIRE_ALARM_TRIGGER.live(), self._receive_fire),
-                transport.subscribe(topics.FIRE_ALARM_TRIGGER, lambda message: None),
-            ]
-            if kind == "lift"
-            else []
-        )
+        speaks = {topic.name for topic in performance.speaks} if performance else set()
+        self._sole = sorted(speaks - allowed)
+        self._looks_at_fire = kind == "lift"
         self._looked_at = 0.0
 
     def strangers(self) -> str:
         """Who speaks where the play would alone."""
-        found = [name for name in self._sole if self._heard[name].matched()]
+        found = [name for name in self._sole if self._ear.ends[name].matched()]
         if not found:
             return ""
         who = [name for name, topics in BESIDE.items() if set(topics) & set(found)]
@@ -237,27 +255,29 @@ class Live:
         return f"others publish on {', '.join(found)}: to play all the same, say {beside}"
 
     def judge(self, stage: Stage) -> None:
-        """Until there is a verdict. An interrupt ends a play by letting the device go."""
+        """Until there is a verdict. Whatever ends a play, the device is let go first."""
         stage.begin(time.monotonic(), time.time())
-        while not stage.done:
-            with _interrupts_end(stage, self._say):
-                self._turn(stage)
+        try:
+            with _told_to_end() as told:
+                while not stage.done:
+                    if told():
+                        self._say(stage.stop())
+                    self._turn(stage)
+        except BaseException:
+            with suppress(TransportError):
+                self._say(stage.stop())
+            raise
 
     def _turn(self, stage: Stage) -> None:
-        for topic, message, at, wall in self._arrived(stage.wake_at() - time.monotonic()):
-            self._say(stage.hear(topic, message, at, wall))
+        waits_s = min(stage.wake_at() - time.monotonic(), LOOK_EVERY_S)
+        for heard in self._ear.listen(waits_s):
+            self._say(stage.hear(heard))
         now, wall = time.monotonic(), time.time()
-        if self._fire and now > self._looked_at + 1.0:
+        if self._looks_at_fire and now > self._looked_at + 1.0:
             self._looked_at = now
-            stage.judge.fire_ends(self._fire[0].matched(), self._fire[1].matched(), now, wall)
+            publishers = self._ear.ends[FIRE.name].matched()
+            stage.judge.fire_ends(publishers, self._retained.matched(), now, wall)
         self._say(stage.turn(now, wall))
-
-    def _arrived(self, timeout_s: float) -> Iterator[tuple[AnyTopic, Message, float, float]]:
-        """Everything that has, after a wait for the first."""
-        with suppress(Empty):
-            yield self._waiting.get(timeout=min(max(0.0, timeout_s), LOOK_EVERY_S))
-            for _ in range(self._waiting.qsize()):
-                yield self._waiting.get_nowait()
 
     def _say(self, said: list[Said]) -> None:
         for topic, message in said:
@@ -265,26 +285,15 @@ class Live:
                 self._publishers[topic.name] = self._transport.publisher(topic)
             self._publishers[topic.name].publish(message)
 
-    def _receive(self, topic: AnyTopic) -> Callable[[Message], None]:
-        def received(message: Message) -> None:
-            self._waiting.put((topic, message, time.monotonic(), time.time()))
-
-        return received
-
-    def _receive_fire(self, message: Message) -> None:
-        self._receive(topics.FIRE_ALARM_TRIGGER)(message)
-
 
 @contextmanager
-def _interrupts_end(stage: Stage, say: Callable[[list[Said]], None]) -> Iterator[None]:
-    """Ctrl-C or SIGTERM: let the device go, then judge. Another one meanwhile changes nothing."""
+def _told_to_end() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C, SIGTERM or SIGHUP has come; none of them interrupts what is under way."""
+    told: list[int] = []
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, lambda n, _: told.append(n)) for number in signals}
     try:
-        yield
-    except KeyboardInterrupt:
-        while True:
-            try:
-                said = stage.stop()
-                say(said)
-                return
-            except KeyboardInterrupt:
-                continue
+        yield lambda: bool(told)
+    finally:
+        for number, action in before.items():
+            signal.signal(number, action)

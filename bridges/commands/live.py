@@ -10,7 +10,7 @@ from bridges.recording.heard import Heard
 from bridges.rmf import topics
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import AnyTopic
-from bridges.rmf.transport import Transport
+from bridges.rmf.transport import Subscription, Transport
 
 OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
     topics.LIFT_STATES,
@@ -32,12 +32,23 @@ OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
 
 
 class Ear:
-    """Hears these topics from now on."""
+    """Hears these topics from now on. `others_only`: not what the same transport publishes. `ends`: the
+    subscriptions by topic."""
 
-    def __init__(self, transport: Transport, heard: Iterable[AnyTopic] = OF_DEVICES) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        heard: Iterable[AnyTopic] = OF_DEVICES,
+        *,
+        others_only: bool = False,
+    ) -> None:
         self._waiting: SimpleQueue[Heard] = SimpleQueue()
-        for topic in heard:
-            transport.subscribe(topic, partial(self._received, topic.name))
+        self.ends: dict[str, Subscription] = {
+            topic.name: transport.subscribe(
+                topic, partial(self._received, topic.name), others_only=others_only
+            )
+            for topic in heard
+        }
 
     def _received(self, topic: str, message: Message) -> None:
         self._waiting.put(Heard(time.monotonic(), time.time(), topic, message))

@@ -34,7 +34,9 @@ def run(args: argparse.Namespace) -> int:
         print(f"the recorder needs {error.name}: {INSTALL}", file=sys.stderr)
         return EX_UNAVAILABLE
     end = signals.End()
-    recorder = Recorder(places.runtimes, Shelf(args.output or _folder()), machine_s)
+    shelf = Shelf(args.output or _folder())
+    shelf.tidy()
+    recorder = Recorder(places.runtimes, shelf, machine_s)
     recorder.look()
     _notify("READY=1")
     while not end.wait(EVERY_S):

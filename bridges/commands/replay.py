@@ -13,12 +13,10 @@ from typing import Final
 from bridges.log import plain
 from bridges.recording.entries import Head
 from bridges.recording.files import opened
-from bridges.recording.replayed import Cores, Course, Difference, Replay
+from bridges.recording.replayed import Cores, Course, Difference, Replay, of_head
 from bridges.recording.sources import BagError, Notes
 from bridges.recording.trees import Tree, UnknownValue, value
-from bridges.settings.config import Config
-from bridges.settings.load import SettingsError, load, understood
-from drivers.profiles import texts
+from bridges.settings.load import SettingsError, load
 
 EX_DATAERR, EX_CONFIG = 65, 78
 MOST: Final = 200
@@ -55,12 +53,6 @@ def run(args: argparse.Namespace) -> int:
         print(error, file=sys.stderr)
         return EX_DATAERR
     return _told(args, head, replay.course, differences, notes)
-
-
-def of_head(head: Head) -> Config:
-    """The settings that a daemon ran with. Raises SettingsError, if today's rules refuse them."""
-    texts.give(head.texts)
-    return understood(head.file, head.yaml)
 
 
 def _told(

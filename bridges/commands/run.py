@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     end = signals.End()  # before the lock names our pid, which others then signal
     signals.ignore_reset()
     try:
-        held = _held(args)
+        held = runtime.held(args.file, args.runtime_dir, serves=True, simulated=args.simulate)
     except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
         logging.error(str(error))
         return os.EX_UNAVAILABLE
@@ -90,20 +90,6 @@ def too_slow(config: Config, watchdog: float | None) -> str:
                 f" WatchdogSec={watchdog:g}: a call may take half of that at most"
             )
     return ""
-
-
-def _held(args: argparse.Namespace) -> runtime.RuntimeDirectory:
-    """Our directories, locked. A simulation never takes a service's.
-
-    Raises AlreadyRunning, Unknown or PermissionError.
-    """
-    file = args.file.absolute()
-    if args.simulate:
-        found = places.as_told(args.runtime_dir) or places.by_hand(file)
-    else:
-        found = runtime.find(file, args.runtime_dir)
-    places.own(found)
-    return runtime.RuntimeDirectory(found, file, serves=True)
 
 
 def _serve(

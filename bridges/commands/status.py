@@ -50,25 +50,25 @@ LEVEL_OF: Final = {
 }
 
 
-class FaultTold(msgspec.Struct):
+class FaultStatus(msgspec.Struct):
     """A fault in a status file."""
 
     code: str
     detail: str
 
 
-class DeviceTold(msgspec.Struct):
+class DeviceStatus(msgspec.Struct):
     """What every device's status has; its other keys are the kind's own."""
 
-    faults: list[FaultTold] = []
+    faults: list[FaultStatus] = []
     input_age_s: float | None = None
 
 
-class Told(msgspec.Struct):
+class StatusFile(msgspec.Struct):
     """What `status` relies on in a status file."""
 
-    devices: dict[str, DeviceTold] = {}
-    faults: list[FaultTold] = []
+    devices: dict[str, DeviceStatus] = {}
+    faults: list[FaultStatus] = []
     heard_by: dict[str, int] = {}
     hears: dict[str, int] = {}
 
@@ -181,7 +181,7 @@ def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
     try:
         written_at = path.stat().st_mtime
         text = path.read_bytes()
-        msgspec.json.decode(text, type=Told)
+        msgspec.json.decode(text, type=StatusFile)
         found = msgspec.json.decode(text, type=dict[str, Any])
     except (FileNotFoundError, msgspec.MsgspecError):
         return {}, None

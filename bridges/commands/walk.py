@@ -20,7 +20,7 @@ from bridges import log
 from bridges.commands.by_hand import NoDevice, device_of, guarded
 from bridges.commands.completion import completed_by, device_names
 from bridges.serve import directory as runtime
-from bridges.serve import guard, places, signals
+from bridges.serve import guard, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import Bus, HalError
 
@@ -65,9 +65,8 @@ def run(args: argparse.Namespace) -> int:
         return os.EX_USAGE
     end = signals.End()
     signals.ignore_reset()
-    file = args.file.absolute()
     try:
-        held = runtime.RuntimeDirectory(_places(args), file, serves=False)
+        held = runtime.held(args.file, args.runtime_dir, serves=False, simulated=args.simulate)
     except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
         print(f"walk needs the device for itself: {error}", file=sys.stderr)
         return os.EX_UNAVAILABLE
@@ -86,16 +85,6 @@ def _no_screen() -> str:
     if importlib.util.find_spec("rich") is None:
         return "walk needs rich to draw: pip install 'rmf-bridges[laptop]'"
     return ""
-
-
-def _places(args: argparse.Namespace) -> places.Places:
-    """The directories of this file's daemon, so that neither starts beside the other."""
-    file = args.file.absolute()
-    if args.simulate:
-        return places.as_told(args.runtime_dir) or places.by_hand(file)
-    found = runtime.find(file, args.runtime_dir)
-    places.own(found)
-    return found
 
 
 def _walk(

@@ -11,7 +11,6 @@ from typing import Final
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
-from bridges.rmf.topics import AnyTopic
 from bridges.rmf_rules import NEVER, Party, Said
 from bridges.rmf_rules.robot import Phase, Robot
 
@@ -99,8 +98,8 @@ class Play:
         """Everybody sets out."""
         return self._go_on(now)
 
-    def hear(self, topic: AnyTopic, message: d.Message, now: float) -> list[Said]:
-        """A message of the graph, ours not among them."""
+    def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
+        """A message of the graph, ours not among them. `topic`: its name."""
         if isinstance(message, words.Stated) and words.device(message) != self.device:
             return []
         said = self._spread(topic, message, now)
@@ -150,18 +149,18 @@ class Play:
             out.append((topic, message))
             if topic == topics.ADAPTER_LIFT_REQUESTS:
                 self._retained.append(message)
-            out += self._spread(topic, message, now)
+            out += self._spread(topic.name, message, now)
         return out
 
-    def _spread(self, topic: AnyTopic, message: d.Message, now: float) -> list[Said]:
+    def _spread(self, topic: str, message: d.Message, now: float) -> list[Said]:
         said: list[Said] = []
         for party in self._parties():
             deaf = party is self._supervisor and now < self._deaf_until
             deaf = deaf and isinstance(message, d.LiftState)
-            if topic.name in (heard.name for heard in party.subscribes) and not deaf:
+            if topic in (heard.name for heard in party.subscribes) and not deaf:
                 said += self._say(party.hear(message, now), now)
         bare = isinstance(message, d.LiftRequest) and not message.destination_floor
-        if bare and topic == topics.LIFT_REQUESTS:
+        if bare and topic == topics.LIFT_REQUESTS.name:
             self._deaf_until = now + DEAF_S
         return said
 

@@ -69,7 +69,7 @@ class Performance:
         """It begins."""
         return self.play.begin(now)
 
-    def hear(self, topic: AnyTopic, message: d.Message, now: float) -> list[Said]:
+    def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
         """A message of the graph."""
         return self.play.hear(topic, message, now)
 
@@ -145,7 +145,7 @@ class Ride(Performance):
             return busy(state)
         return f"{', '.join(missing)}: it serves {', '.join(map(shown, served[:MOST_FLOORS]))}"
 
-    def hear(self, topic: AnyTopic, message: d.Message, now: float) -> list[Said]:
+    def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
         """States, until somebody else has the lift."""
         if isinstance(message, d.LiftState) and message.lift_name == self.lift:
             self._state = message
@@ -229,7 +229,7 @@ class Passages(Performance):
                 return
             yield 1.0
 
-    def hear(self, topic: AnyTopic, message: d.Message, now: float) -> list[Said]:
+    def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
         """States and heartbeats. A restart comes with the first state after the OPEN."""
         if isinstance(message, d.DoorState) and message.door_name == self.door:
             self._mode = message.current_mode.value
@@ -297,7 +297,7 @@ class Charge(Performance):
         request = d.ChargerRequest(self.charger, self._fleet, self._robot, timeout, self._id)
         return [(topics.CHARGER_REQUESTS, request)]
 
-    def hear(self, topic: AnyTopic, message: d.Message, now: float) -> list[Said]:
+    def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
         """Its states, and a refusal."""
         if isinstance(message, d.DiagnosticStatus) and message.hardware_id == self.charger:
             if any((v.key, v.value) == ("request_id", self._id) for v in message.values):

@@ -1,6 +1,5 @@
 """The verdict as a person, a program and a CI server read it."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Final
@@ -8,7 +7,7 @@ from xml.etree import ElementTree
 
 import msgspec
 
-from bridges.judge.judge import Judge, Kind
+from bridges.judge.judge import LAWS, Judge, Kind
 from bridges.judge.law import Evidence, Judged, Verdict, shown
 from bridges.rmf import words
 
@@ -173,7 +172,10 @@ def _case(suite: ElementTree.Element, report: Report, judged: Judged) -> None:
         ElementTree.SubElement(case, "skipped", message="not seen")
 
 
-def markdown(laws: Sequence[Judged]) -> str:
-    """The table of docs/judge.md."""
-    rows = [f"| `{j.law.id}` | {j.law.sentence} | {j.law.reason} | {j.law.source} |" for j in laws]
+def markdown(kind: Kind) -> str:
+    """A kind's laws as the table of docs/judge.md; * marks those that a wire can break too."""
+    rows = [
+        f"| `{law.id}`{'*' if law.sensed else ''} | {law.sentence} | {law.reason} | {law.source} |"
+        for law in LAWS[kind]
+    ]
     return "\n".join(["| law | | why | source |", "|---|---|---|---|", *rows])

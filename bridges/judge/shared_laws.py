@@ -77,30 +77,30 @@ def fresh(claims: Callable[[Any], bool], stale_s: float = STALE_S) -> Callable[[
 
 RATE: Final[Law[AnyScene]] = Law(
     "RATE",
-    "States come at least every 2 s, whether the hardware answers or not",
+    "States go on coming, whether the hardware answers or not: never 5 s without one",
     "A fleet adapter asks and releases once for each state: without states it waits for ever",
-    "rmf_ros2 RobotContext.cpp:1700-1735; contract L2, D1, C4",
+    "rmf_ros2 agv/RobotContext.cpp:1700-1735",
     rate,
 )
 ANSWERED: Final[Law[AnyScene]] = Law(
     "ANSWER",
     "No request causes a state: states come by timer and by change",
     "RMF repeats its request at each state: a state for each request is a loop without end",
-    "rmf_ros2 RobotContext.cpp:1732-1735, lift_supervisor/Node.cpp:58-140; contract L2",
+    "rmf_ros2 agv/RobotContext.cpp:1732-1735, lift_supervisor/Node.cpp:58-140",
     answers,
 )
 ONE: Final[Law[AnyScene]] = Law(
     "ONE",
     "One node alone speaks under this name",
     "RMF believes the latest state, so two nodes make a device that jumps between two truths",
-    "contract b0, identity on the network",
+    "follows from RequestLift.cpp and DoorOpen.cpp, which keep one state",
     one_node,
 )
 STAMP: Final[Law[AnyScene]] = Law(
     "STAMP",
     "A state that claims anything has the time of its reading",
     "Without it nobody can tell a sensor's word from a memory; 0 means: never read",
-    "LiftState.msg, DoorState.msg, ChargerState.msg; contract b0, time",
+    "LiftState.msg, DoorState.msg, ChargerState.msg: the time of the state",
     stamped(lambda state: True),
 )
 

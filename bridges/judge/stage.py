@@ -12,8 +12,6 @@ from bridges.judge.judge import Judge
 from bridges.judge.plays import LEAVES_S, REPEAT_S, Performance
 from bridges.judge.shared_laws import BURST_WITHIN_S
 from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf.topics import AnyTopic
 from bridges.rmf_rules import NEVER, Said
 
 LISTENS_S: Final = 4.0
@@ -56,6 +54,7 @@ class Stage:
         self._until = NEVER
         self._leave_until = NEVER
         self._epoch = 0.0
+        self._in_haste = False
         self._last: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -69,15 +68,15 @@ class Stage:
         self._epoch = wall - at
         self._last = (at, wall)
 
-    def hear(self, topic: AnyTopic, message: d.Message, at: float, wall: float) -> list[Said]:
+    def hear(self, heard: Heard) -> list[Said]:
         """A message of the graph, ours not among them."""
-        self._last = (at, wall)
-        self.judge.hear(Heard(at, wall, topic.name, message))
+        self._last = (heard.at, heard.wall)
+        self.judge.hear(heard)
         if self._performance is None or self.act not in (Act.PLAY, Act.LEAVE):
             return []
-        if topic.name not in (heard.name for heard in self._performance.hears):
+        if heard.topic not in (topic.name for topic in self._performance.hears):
             return []
-        said = self._performance.hear(topic, message, self._now)
+        said = self._performance.hear(heard.topic, heard.message, self._now)
         if self.act is not Act.PLAY:
             return []
         if self.judge.scene.burst_s < BURST_WITHIN_S:
@@ -106,12 +105,13 @@ class Stage:
         return NEVER if self.act is Act.DONE else self._until
 
     def stop(self) -> list[Said]:
-        """Enough: let go of the device first, if we have it."""
+        """Enough: let go of the device first, if we have it. May be called again."""
         if self.act is Act.PLAY:
-            self.note = "interrupted"
+            self.note, self._in_haste = "interrupted", True
             return self._begin_leaving()
         if self.act is not Act.LEAVE:
             self.act = Act.DONE
+        self._in_haste = True
         return []
 
     @property
@@ -165,7 +165,8 @@ class Stage:
         return self._told(self._performance.leave(self._now))
 
     def _settle(self) -> None:
-        self.act, self._until = Act.SETTLE, self._last[0] + SETTLES_S
+        self.act = Act.DONE if self._in_haste else Act.SETTLE
+        self._until = self._last[0] + SETTLES_S
 
     def _told(self, said: list[Said]) -> list[Said]:
         """Ours is judged as everybody's is: what the device is asked."""

@@ -192,18 +192,22 @@ def _ask(memory: Memory, request: Requested, now: float, limits: LiftLimits) -> 
 
 def _heed(memory: Memory, session: Session, request: Requested, now: float) -> Session:
     """The session once `lift_requests` asks for it."""
-    doubted = replayed.doubt(session, request, memory.relays.hold.on is not None, now)
+    own = memory.own.get(session.id, "")
+    held_open = memory.relays.hold.on is not None
+    doubted = replayed.doubt(session, request, own, held_open, now)
     heeded = replace(session, asked_at=now) if doubted else _refresh(session, request, now)
     return replace(heeded, forgotten=None, doubted=doubted)
 
 
 def _hear_adapter(memory: Memory, event: FromAdapter, now: float, limits: LiftLimits) -> Memory:
-    """A robot's own request: it counts for the session that has the lift, and only if forgotten."""
+    """A robot's own request: it counts for the session that has the lift, if that is forgotten, or if
+    it settles a doubt."""
     held, asked = memory.session, event.asked
+    memory = replace(memory, own=replayed.noted(memory.own, asked))
     if held is None or held.id != asked.session_id:
         return memory
     session, obeyed = forgotten.heard(held, event)
-    if not (obeyed or replayed.confirmed(session)):
+    if not (obeyed or replayed.confirmed(session, asked)):
         return replace(memory, session=session)
     if isinstance(asked, Requested):
         return replace(memory, session=_refresh(session, asked, now))
@@ -227,7 +231,6 @@ def _anew(session: Session, now: float) -> Session:
         now,
         boarded=session.boarded,
         own_stamp=session.own_stamp,
-        own=session.own,
     )
 
 

@@ -21,7 +21,7 @@ from msgspec.structs import replace
 from bridges.core.decision import Fault
 from bridges.core.durations import NEVER
 from bridges.lift.memory import Forgotten, Session
-from bridges.lift.signals import Ended, FromAdapter, Requested
+from bridges.lift.signals import Ended, FromAdapter
 
 NAMED_AFTER_S: Final = 3.0
 """At a handover the supervisor may ask for the next robot for a moment."""
@@ -47,8 +47,7 @@ def heard(session: Session, event: FromAdapter) -> tuple[Session, bool]:
     newer = event.stamp > session.own_stamp or (ends and event.stamp == 0)
     if not newer:
         return session, False
-    own = event.asked.destination if isinstance(event.asked, Requested) else ""
-    session = replace(session, own_stamp=max(session.own_stamp, event.stamp), own=own)
+    session = replace(session, own_stamp=max(session.own_stamp, event.stamp))
     forgotten = session.forgotten
     if forgotten is None:
         return session, False

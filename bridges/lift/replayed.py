@@ -6,26 +6,41 @@ lift_supervisor/Node.cpp). Some are of earlier rides: the door would be let go b
 heard. What the robot itself asks on `adapter_lift_requests` is heard here as it is said, and never
 again. Rules:
 1. While the door is held, a request for another destination is doubted if the robot's own last request
-   was for the present one.
+   was for the present one; also if that was before it got the lift, as of a robot that was cut off.
 2. It counts when the robot itself asks for that destination too, or when nothing else has been asked
    for during LASTS_S.
 3. An END counts as always. A request within the grace resumes the session as it was; then rule 1
    decides.
 """
 
+from collections.abc import Mapping
 from typing import Final
 
 from bridges.lift.memory import Doubted, Session
-from bridges.lift.signals import Requested
+from bridges.lift.signals import Ended, Requested
 
 LASTS_S: Final = 3.0
 """What is heard again comes within a second, and the robot's own repeats come at 1 Hz."""
+MOST: Final = 100
+"""More robots than any site has: of more, those are forgotten that were heard first."""
 
 
-def doubt(session: Session, request: Requested, held_open: bool, now: float) -> Doubted | None:
-    """The doubt about a request of this session; None if it counts."""
+def noted(own: Mapping[str, str], asked: Requested | Ended) -> Mapping[str, str]:
+    """Session -> destination, once a robot itself has asked for this."""
+    others = {session: floor for session, floor in own.items() if session != asked.session_id}
+    if isinstance(asked, Ended):
+        return others
+    if len(others) == MOST:
+        del others[next(iter(others))]
+    return {**others, asked.session_id: asked.destination}
+
+
+def doubt(
+    session: Session, request: Requested, own: str, held_open: bool, now: float
+) -> Doubted | None:
+    """The doubt about a request of this session; None if it counts. `own`: where its robot would go."""
     other = request.destination != session.destination
-    if not (held_open and other and request.agv and session.own == session.destination):
+    if not (held_open and other and request.agv and own == session.destination):
         return None
     before = session.doubted
     if before is None or before.destination != request.destination:
@@ -33,6 +48,8 @@ def doubt(session: Session, request: Requested, held_open: bool, now: float) -> 
     return before if now < before.since + LASTS_S else None
 
 
-def confirmed(session: Session) -> bool:
+def confirmed(session: Session, asked: Requested | Ended) -> bool:
     """Does the robot itself ask for the destination that was doubted?"""
-    return session.doubted is not None and session.own == session.doubted.destination
+    if session.doubted is None or isinstance(asked, Ended):
+        return False
+    return asked.destination == session.doubted.destination

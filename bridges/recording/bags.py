@@ -107,7 +107,7 @@ def _parts(path: Path) -> list[Path]:
 def _number(path: Path) -> tuple[int, str]:
     """rosbag2 numbers the files of a recording: name_2 comes before name_10."""
     number = path.stem.rpartition("_")[2]
-    return int(number) if number.isdecimal() and len(number) < 10 else 0, path.name
+    return int(number) if number.isdecimal() and len(number) < 7 else 0, path.name
 
 
 def _raw_of(part: Path, noted: Notes) -> Iterator[Raw]:

@@ -1,4 +1,4 @@
-"""What can be replayed: a file that our recorder wrote, or a daemon's ring itself."""
+"""What can be replayed: a file that our recorder wrote, a directory of such files, or a ring itself."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +11,10 @@ from bridges.recording.sources import BagError, Notes
 
 
 def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """The run of a daemon that a file is of, and its entries. Raises BagError."""
+    """The run of a daemon that a file is of, and its entries. Of a directory: the first run, and the
+    entries of all files, in the order of their names. Raises BagError."""
+    if path.is_dir():
+        return _of_all(sorted(path.glob("*.mcap")), path, notes)
     try:
         begins = user_files.read(path, len(MAGIC)).content
     except OSError as error:
@@ -27,3 +30,10 @@ def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
     except ImportError as error:
         raise BagError(f"to read {path}, {error.name} is needed: {INSTALL}") from None
     return incidents.head_of(path), incidents.entries_in(path, notes)
+
+
+def _of_all(files: list[Path], folder: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
+    if not files:
+        raise BagError(f"{folder} holds no recording: no .mcap file is in it")
+    head, _ = opened(files[0], notes)
+    return head, (entry for file in files for entry in opened(file, notes)[1])

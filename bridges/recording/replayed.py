@@ -14,10 +14,12 @@ from typing import Any, Final
 from bridges.core.decision import Decision, IoFailed, Sampled
 from bridges.core.graph_kind import GraphKind
 from bridges.log import plain
-from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Known, Same, Step, Told
+from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Head, Known, Same, Step, Told
 from bridges.recording.trees import Tree, UnknownValue, tree, value
 from bridges.settings.config import Config
+from bridges.settings.load import understood
 from bridges.settings.names import kind_called
+from drivers.profiles import texts
 
 AnyDecision = Decision[Any, Any, Any]
 Parts = tuple[str, Tree, Tree]
@@ -69,6 +71,12 @@ class Course:
             self.offset_s = entry.wall - entry.at
         self.ended = entry.at + self.offset_s
         self.began = self.began or self.ended
+
+
+def of_head(head: Head) -> Config:
+    """The settings that a daemon ran with. Raises SettingsError, if today's rules refuse them."""
+    texts.give(head.texts)
+    return understood(head.file, head.yaml)
 
 
 class Cores:

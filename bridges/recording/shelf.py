@@ -1,6 +1,7 @@
 """Where recordings lie on a disk: their names, and the bounds that an SD card survives."""
 
 import os
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Final
@@ -23,6 +24,12 @@ class Shelf:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+
+    def tidy(self) -> None:
+        """Remove what a recorder that died has begun and not ended."""
+        for begun in self.folder.glob(f".*{SUFFIX}.part"):
+            with suppress(OSError):
+                begun.unlink()
 
     def name(self, head: Head, wall: float, code: str) -> str:
         """`<file>_<day>_<time>_<why>_<run>.mcap`, in the machine's own time."""

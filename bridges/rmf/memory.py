@@ -29,6 +29,7 @@ class MemoryTransport:
     """One node on a MemoryNetwork. Callbacks run on the thread that publishes."""
 
     speaks = "memory"
+    domain_id = 0
 
     def __init__(self, network: MemoryNetwork, node_name: str, release: Release = NEWEST) -> None:
         self.name = node_name

@@ -80,7 +80,7 @@ class Ros2Transport(Threaded):
         loopback: bool,
         ros_args: Sequence[str] = (),
     ) -> None:
-        super().__init__(node_name, installed())
+        super().__init__(node_name, domain_id, installed())
         self._pause = threading.Event()
         self._publishers: list[_Publisher] = []
         self._deaf: list[_Subscription] = []

@@ -117,7 +117,7 @@ class Robot(Party):
         return self.lift_arrived and at is not None and (at.lift, at.floor) == (lift, floor)
 
     def release_lift(self) -> list[Said]:
-        """Forgets; END_SESSION goes out when a LiftState shows our session, of Jazzy's now too."""
+        """Forget the lift. END goes out once a LiftState shows our session; Jazzy sends one now too."""
         said = []
         if self.jazzy and self.destination is not None:
             said = [self._end(self.destination.lift, self.destination.floor, 0.0)]

@@ -18,7 +18,7 @@ from bridges import __version__
 from bridges.log import pairs
 from bridges.recording.entries import Head
 from bridges.recording.ring import Ring
-from bridges.rmf.choose import domain_id, open_transport
+from bridges.rmf.choose import open_transport
 from bridges.rmf.definitions import DiagnosticArray
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import DIAGNOSTICS
@@ -74,7 +74,6 @@ class Daemon:
             self._predecessor = Predecessor(runtime.records, ours, outputs_off)
             unsafe = self._predecessor.make_safe(end.wait)
         node_name = f"rmf_bridge_{config.path.stem}"
-        self._domain_id = domain_id(config.rmf, os.environ)
         self._transport = open_transport(
             config.rmf, node_name, localhost=localhost, ros_args=ros_args
         )
@@ -208,7 +207,7 @@ class Daemon:
             **self._about(),
             "transport": self._transport.speaks,
             "release": self._transport.release.name,
-            "domain_id": self._domain_id,
+            "domain_id": self._transport.domain_id,
             "samples_dropped": dict(self._transport.dropped),
             "predecessor_not_off": self._left(),
             **service,

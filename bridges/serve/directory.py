@@ -28,6 +28,7 @@ from bridges.serve.places import (
     by_hand,
     everywhere,
     named,
+    own,
     owner_of,
     state_base,
 )
@@ -316,3 +317,16 @@ class RuntimeDirectory:
             self._once.failed("record", error)
         else:
             self._once.works("record")
+
+
+def held(
+    file: Path, given: str | None, *, serves: bool, simulated: bool = False
+) -> RuntimeDirectory:
+    """The directories for this file, locked by us. A simulation never takes a service's.
+
+    Raises AlreadyRunning, Unknown or PermissionError.
+    """
+    file = file.absolute()
+    found = (as_told(given) or by_hand(file)) if simulated else find(file, given)
+    own(found)
+    return RuntimeDirectory(found, file, serves=serves)

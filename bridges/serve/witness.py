@@ -130,11 +130,11 @@ class Witness(Nobody):
 
     def died(self, reason: str) -> None:
         self._dead = True
-        self._waiting.append((self._put, entries.Died(self._clock.monotonic(), reason)))
+        self._waiting.append((self._last, entries.Died(self._clock.monotonic(), reason)))
         self.flush()
 
     def ended(self, *, safe: bool) -> None:
-        self._waiting.append((self._put, entries.Ended(self._clock.monotonic(), safe)))
+        self._waiting.append((self._last, entries.Ended(self._clock.monotonic(), safe)))
         self.flush()
         with self._lock, suppress(OSError):
             ring, self._ring = self._ring, None
@@ -183,7 +183,6 @@ class Witness(Nobody):
         self._subjects: dict[str, _Subject] = {}
         self._out = bytearray()
         self._same: dict[str, _Subject] = {}
-        self._lost = 0
         self._known_at = AGES_AGO
         self._offset_s = 0.0
 
@@ -264,12 +263,21 @@ class Witness(Nobody):
         sample = cdr.encode(kind, message, release)
         self._put(Spoken(now, sent, topic, type_name(kind), release.name, sample))
 
+    def _last(self, entry: AnyEntry) -> None:
+        """Append what is said at an end, after all that has come again."""
+        self._say_all_same()
+        self._put(entry)
+
+    def _say_all_same(self) -> None:
+        for name in list(self._same):
+            self._say_same(name)
+
     def _put(self, entry: AnyEntry) -> None:
         """Append an entry; in the next segment, after all that is known, if this one is full."""
         assert self._ring is not None
         content = entries.encode(entry)
         if len(content) > self._ring.room // 2:
-            self._lost += 1
+            self._put(entries.Lost(entry.at, 1))
             return
         if not self._fits(len(content)):
             self._next_segment(entry.at)
@@ -289,8 +297,7 @@ class Witness(Nobody):
 
     def _know(self, now: float) -> None:
         """Write down all that is known: here if there is room, else in the next segment."""
-        for name in list(self._same):
-            self._say_same(name)
+        self._say_all_same()
         known = self._all_known(now)
         if not self._fits(sum(len(content) + FRAME.size for content in known)):
             self._next_segment(now)
@@ -302,8 +309,7 @@ class Witness(Nobody):
     def _next_segment(self, now: float) -> None:
         """Begin it with all that is known; of very many subjects, with those that half of it holds."""
         assert self._ring is not None
-        for name in list(self._same):
-            self._say_same(name)
+        self._say_all_same()
         self._write()
         self._ring.begin_segment()
         self._known_at, room = now, self._ring.room // 2

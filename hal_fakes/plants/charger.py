@@ -232,7 +232,10 @@ class ChargerPlant(Machine):
             self._range = "failed" if lost else "in" if self._couples() else "out"
         if self.now >= self._until:
             self._end()
-        self._react()
+        before = None
+        while before is not self.activity:
+            before = self.activity
+            self._react()
         heat = UNCOOLED_C if "fan" in self.failures else COOLED_C
         self._coil.tend(self.now, heat if self.activity in CURRENT_FLOWS else AMBIENT_C)
 

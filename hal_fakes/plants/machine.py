@@ -8,7 +8,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from typing import Literal
 
-from bridges.core.durations import AGES_AGO
 from drivers.hal.points import Wire
 from hal_fakes.plants.contact import Contact
 from hal_fakes.plants.plant import FAILURE_MODES, Edge, FailureMode
@@ -17,7 +16,7 @@ EDGES_KEPT = 100_000
 
 
 class Machine(ABC):
-    """A plant (`hal_fakes.plants.plant.Plant`) but for its physics.
+    """What every plant (`hal_fakes.plants.plant.Plant`) has besides its physics.
 
     `wires`: the driver's wiring table of this device; empty where the controller has no contacts.
     `parts`: what can fail besides wires (`car`, `door_operator`); the plant looks at `failures`.
@@ -36,7 +35,7 @@ class Machine(ABC):
         self.edges: list[Edge] = []
         self.on_edge: Callable[[Edge], None] | None = None
         self.now = 0.0
-        self._settled_at = AGES_AGO
+        self._settled = False
         self.failures: dict[str, FailureMode] = {}
         self.pressed = dict.fromkeys(buttons, False)
         contacts = [Contact(w, f"{name} {w.signal}") for w in wires]
@@ -80,12 +79,15 @@ class Machine(ABC):
             self._settle()
 
     def advance(self, now: float) -> None:
-        """Let everything due until `now` happen, each at its own time. Time never goes back."""
+        """Let everything due until `now` happen, each at its own time. Time never goes back.
+
+        Between two events nothing changes that anybody can see.
+        """
         while (at := self.next_at()) <= now:
             self.now = max(self.now, at)
             self._settle()
         self.now = max(self.now, now)
-        if self.now > self._settled_at:
+        if not self._settled:
             self._settle()
 
     def sense(self, signal: str) -> bool:
@@ -148,7 +150,7 @@ class Machine(ABC):
 
     def _settle(self) -> None:
         """Relays reach the controller, its physics runs, its contacts reach us."""
-        self._settled_at = self.now
+        self._settled = True
         for signal, relay in self._relays.items():
             relay.feed(self._driven[signal], self.now)
             if relay.shows != self._sees[signal]:

@@ -76,8 +76,8 @@ class Coil:
         return self._goal + (self._celsius - self._goal) * rest
 
     def trips_at(self) -> float:
-        """When it gets too hot: s, or inf."""
-        if self._goal <= TRIP_C or self._celsius >= TRIP_C:
+        """When it gets too hot, or is cool enough again: s, or inf."""
+        if (self._goal > TRIP_C) == (self._celsius >= TRIP_C):
             return NEVER
         rest = (self._goal - TRIP_C) / (self._goal - self._celsius)
         return self._at - WARMS_IN_S * math.log(rest) + 1e-6

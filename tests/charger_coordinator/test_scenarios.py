@@ -297,6 +297,7 @@ def test_4_a_robot_at_the_wrong_station_is_sent_to_its_own(finishing: Finishing)
         (12.25, "AMR01 -> CHARGE charger_a"),
         (18.25, "charger_a: CHARGING AMR01"),
     ]
+    assert site.faults == []
 
 
 @EACH

@@ -92,21 +92,6 @@ def test_stacked_robots_go_to_both_stations_and_the_third_waits_until_it_is_call
     ]
 
 
-def test_a_robot_at_the_wrong_station_is_refused_and_named_and_the_right_one_waits() -> None:
-    site = yard()
-    site.fleet.charge("AMR01", site.now)
-    site.run(8.5)
-    site.fleet.robots["AMR01"].goes_to = "dock_b"
-    assert site.run(20.0) == [
-        (11.25, "charger_b: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)"),
-        (11.25, "AMR01 -> WAIT wait_1"),
-        (11.5, "charger_b: IDLE"),
-        (12.25, "AMR01 -> CHARGE charger_a"),
-        (18.25, "charger_a: CHARGING AMR01"),
-    ]
-    assert site.faults == []
-
-
 def test_a_robot_that_does_not_leave_the_wrong_station_is_told_twice_and_then_a_person_is() -> None:
     site = yard()
     site.fleet.charge("AMR01", site.now)

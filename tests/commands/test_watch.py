@@ -256,7 +256,7 @@ def test_a_simulation_is_marked_and_a_simulated_supervisor_does_not_make_its_lif
     assert not row.simulated
 
 
-def test_running_seconds_are_no_change_but_a_new_word_is() -> None:
+def test_counting_seconds_are_not_a_change_and_a_new_word_is_one() -> None:
     def said(detail: str) -> list[Row]:
         status = {"faults": [{"code": "OVERLOAD", "detail": detail}], "waiting": "fleet/b (3 s)"}
         told = diagnosis("node", "lift_supervisor", {}, {"Lift1": status}, d.Time())

@@ -7,6 +7,7 @@ from bridges.judge.judge import Judge, Kind
 from bridges.judge.law import Verdict
 from bridges.judge.plays import Charge, Passages, Performance, Ride
 from bridges.judge.stage import Stage
+from bridges.recording.heard import Heard
 from bridges.rmf import topics
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import AnyTopic
@@ -102,7 +103,8 @@ class World:
 
         def hear(topic: AnyTopic, message: Message) -> None:
             if not stage.done:
-                say(stage.hear(topic, message, self.timeline.now, EPOCH + self.timeline.now))
+                now = self.timeline.now
+                say(stage.hear(Heard(now, EPOCH + now, topic.name, message)))
 
         def turn() -> None:
             if not stage.done:

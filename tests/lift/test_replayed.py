@@ -1,13 +1,16 @@
 """Requests of earlier rides that RMF's supervisor hears again: by RMF's own rules, and rule by rule."""
 
+from collections.abc import Mapping
+
 import pytest
 
-from bridges.lift.replayed import LASTS_S
+from bridges.lift.replayed import LASTS_S, MOST, noted
+from bridges.lift.signals import Ended, Requested
 from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
 from tests.lift.story import AGV, END
 from tests.lift.test_forgotten import Overheard
-from tests.lift.test_with_rmf import A, ons, sessions, world
+from tests.lift.test_with_rmf import A, B, ons, sessions, world
 
 OPEN_FOR_A = "AGV, open at L2, fleet/a to L2"
 
@@ -48,6 +51,27 @@ def test_a_supervisor_that_restarts_and_hears_an_earlier_ride_lets_no_door_go_ei
     rmf.run(rmf.story.now + 5.0)
     assert rmf.story.edges == before
     assert sessions(rmf.story)[-3:] == [A, "", A]
+
+
+def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_found_again() -> (
+    None
+):
+    """It was cut off at 12.6 h of that day, and had the lift only afterwards."""
+    first, robot = Robot(B), Robot(A)
+    rmf = world(first, robot)
+    rmf.rides(robot, "L2", "L1")
+    rmf.asks(first, "L1")
+    rmf.until_done(first)
+    rmf.asks(robot, "L3")
+    rmf.run(rmf.story.now + 3.0)
+    rmf.robots.remove(robot)
+    rmf.releases(first)
+    rmf.supervisor.slots["Lift1"] = rmf.asked_by(robot)[-1]
+    rmf.story.until(lambda: rmf.story.state == "AGV, open at L3, fleet/a to L3")
+    before = list(rmf.story.edges)
+    rmf.finds_again(robot)
+    rmf.run(rmf.story.now + 1.0)
+    assert rmf.story.edges == before
 
 
 def test_a_floor_that_only_the_supervisor_asks_for_counts_after_a_while() -> None:
@@ -100,3 +124,12 @@ def test_a_robot_that_has_ended_or_was_never_heard_raises_no_doubt() -> None:
         lift.story.asks(A, "L4")
         lift.story.run(lift.story.now + 0.2)
         assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
+
+
+def test_of_more_robots_than_any_site_has_those_heard_first_are_forgotten() -> None:
+    own: Mapping[str, str] = {}
+    for number in range(MOST + 1):
+        own = noted(own, Requested(f"robot{number}", True, "L1"))
+    own = noted(noted(own, Requested("robot1", True, "L2")), Ended("robot2"))
+    assert list(own) == [*(f"robot{n}" for n in range(3, MOST + 1)), "robot1"]
+    assert own["robot1"] == "L2"

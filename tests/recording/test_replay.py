@@ -6,12 +6,11 @@ import pytest
 import yaml
 from msgspec.structs import replace
 
-from bridges.commands.replay import of_head
 from bridges.core.decision import Fault
 from bridges.lift import core as lift_core
 from bridges.recording.entries import Known, Step
 from bridges.recording.files import opened
-from bridges.recording.replayed import CONTEXT, Cores, Difference, Replay
+from bridges.recording.replayed import CONTEXT, Cores, Difference, Replay, of_head
 from bridges.recording.ring import Read
 from bridges.recording.sources import Notes
 from bridges.recording.trees import value

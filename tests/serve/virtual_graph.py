@@ -146,6 +146,7 @@ class WorldTransport:
     """A node's place in the world (`bridges.rmf.transport.Transport`)."""
 
     speaks = "memory"
+    domain_id = 0
     release = NEWEST
 
     def __init__(self, world: World, name: str) -> None:

@@ -28,8 +28,8 @@ from msgspec.inspect import (
 )
 from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
+from bridges.commands.sheets.findings import findings
 from bridges.commands.sheets.text import lines
-from bridges.commands.sheets.told import told
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.examples import device_yamls
@@ -150,7 +150,7 @@ def test_there_are_shipped_files() -> None:
 
 def test_a_shipped_file_is_right_and_has_something_to_show(config: Path) -> None:
     loaded = load(config)
-    assert len(lines(told(loaded))) > 4
+    assert len(lines(findings(loaded))) > 4
     assert loaded.text == config.read_bytes()
 
 

@@ -337,7 +337,7 @@ class Laws:
             return
         seen = plant.contact("obstruction") and plant.sense("obstruction")
         since = max(self._ills.well_since(name), self._ills.obstructed_since(name))
-        if seen and plant.position > 0.0:
+        if seen and not plant.contact("closed"):
             early = since + AT_ONCE_S > self._timeline.now
             self.require(early, f"{name} lets go onto an obstruction")
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 from bridges.commands.by_hand import guarded, not_off
 from bridges.commands.walking.core import Step
 from bridges.commands.walking.steps import steps
-from bridges.serve import directory, guard, places, signals
+from bridges.serve import directory, guard, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers import Driver, DriverError
 from drivers.hal import Bus
@@ -26,9 +26,7 @@ def main(file: Path, device: str, step: str, runtime_dir: str | None) -> int:
     signals.End()
     try:
         config = load(file)
-        found = directory.find(file, runtime_dir)
-        places.own(found)
-        held = directory.RuntimeDirectory(found, file, serves=False)
+        held = directory.held(file, runtime_dir, serves=False)
     except (SettingsError, directory.AlreadyRunning, directory.Unknown, PermissionError) as error:
         return _say(f"{error}")
     try:

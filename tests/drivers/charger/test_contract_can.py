@@ -131,14 +131,14 @@ class CanContract(ChargerContract):
         pad.press("robot")
         assert [pad.in_range() for _ in range(3)] == [False] * 3
 
-    def test_a_fault_of_the_station_is_an_error_of_its_side(self, pad: PadBench) -> None:
+    def test_a_fault_of_the_station_is_blamed_on_the_station(self, pad: PadBench) -> None:
         pad.press("robot")
         pad.until(Activity.CHARGING, ON)
         pad.press("transmitter_fault")
         sample = pad.fault()
         assert (sample.side, sample.error_text != "") == ("station", True)
 
-    def test_a_fault_of_the_robot_is_an_error_of_its_side_and_over_when_it_is_gone(
+    def test_a_fault_of_the_robot_is_blamed_on_the_robot_and_over_when_it_has_gone(
         self, pad: PadBench
     ) -> None:
         pad.press("robot")

@@ -212,6 +212,27 @@ def test_a_part_that_fails_ends_in_its_error(failure: tuple[str, FailureMode], s
     assert (reading.activity, reading.faults) == (Activity.ERROR, frozenset({shown}))
 
 
+def test_a_station_that_is_too_hot_says_when_it_will_have_cooled_and_is_well_then() -> None:
+    plant = ChargerPlant("a", cleared=False)
+    plant.fail("fan", "off")
+    plant.press("robot", True, 1.0)
+    at(plant, 4.0)
+    hot_at = plant.next_at()
+    shown = [at(plant, hot_at).activity]
+    plant.press("robot", False, hot_at)
+    shown += [plant.reading().activity, at(plant, plant.next_at()).activity]
+    assert shown == [Activity.ERROR, Activity.ERROR, Activity.IDLE]
+    assert plant.next_at() == float("inf")
+
+
+def test_a_station_that_recovers_serves_the_robot_on_its_pad_without_another_event() -> None:
+    plant = ChargerPlant("a", cleared=False)
+    plant.press("robot", True, 1.0)
+    plant.press("foreign_object", True, 6.0)
+    plant.press("foreign_object", False, 7.0)
+    assert [state for _, state in states(plant, 8.0)][-2:] == ["idle", "handshake"]
+
+
 def test_a_fault_of_the_robot_is_over_when_it_leaves() -> None:
     plant = parked(("receiver", "wrong"))
     plant.press("robot", False, 10.0)

@@ -1,4 +1,4 @@
-"""An slcan adapter on a pseudo-terminal: the way onto the bus with all that serial ports do."""
+"""An slcan adapter on a pseudo-terminal: frames on a serial port, and how a port fails."""
 
 import os
 import threading

@@ -1,34 +1,54 @@
 """The far side of every bus, in virtual time: what the drivers talk to instead of `drivers/hal/`.
 
-A bus that is down raises HalError, as the HAL does after its timeout. The module behind it drops its
-outputs after WATCHDOG_S, as those with a watchdog do; the GPIO header has no bus to lose.
+A bus that is `down` raises HalError with that text, as the HAL does after its timeout. The module
+behind it drops its outputs after WATCHDOG_S, as those with a watchdog do; the GPIO header has no bus
+to lose.
 """
 
 import json
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Protocol
 
 from drivers.hal import HalError, points
 from drivers.hal.modbus.points import Point
 from drivers.hal.points import Pull, Wire
 from hal_fakes.http_charger import HttpCharger
-from hal_fakes.modbus.register_door import RegisterDoor
 from hal_fakes.plants.charger import ChargerPlant
-from hal_fakes.plants.machine import Machine
+from hal_fakes.plants.plant import Plant
 from hal_fakes.wiring import Wiring
-from tests.site.timeline import Timeline
 
 WATCHDOG_S = 2.0
+
+
+class Clocked(Protocol):
+    """Whose time it is."""
+
+    @property
+    def now(self) -> float:
+        """Virtual seconds."""
+
+
+class Cells(Protocol):
+    """A station's registers (`hal_fakes.modbus.units`)."""
+
+    outputs: frozenset[Point]
+
+    def get(self, point: Point, now: float) -> int:
+        """What is read there."""
+
+    def set(self, point: Point, value: int, now: float) -> bool:
+        """A write; False where nothing can be written."""
 
 
 class PointsFar:
     """Contacts and relays on a header or at a module (`drivers.hal.points.PointsBus`)."""
 
-    def __init__(self, timeline: Timeline, plant: Machine, wires: Iterable[Wire]) -> None:
-        self.down = False
-        self._timeline = timeline
+    def __init__(self, clock: Clocked, plant: Plant, wires: Iterable[Wire]) -> None:
+        self.down = ""
+        self._clock = clock
         self._wiring = Wiring(plant, wires, str)
         self._safe: dict[str, bool] = {}
+        self._levels: dict[str, bool] = {}
 
     def canonical(self, point: str) -> str:
         return point
@@ -46,15 +66,20 @@ class PointsFar:
 
     def levels(self) -> dict[str, bool]:
         self.check()
-        return self._wiring.levels(self._timeline.now)
+        return self._wiring.levels(self._clock.now)
+
+    def outputs(self) -> dict[str, bool]:
+        self.check()
+        return dict(self._levels)
 
     def drive(self, levels: Mapping[str, bool]) -> None:
         for point, level in levels.items():
-            self._wiring.drive(point, level, self._timeline.now)
+            self._levels[point] = level
+            self._wiring.drive(point, level, self._clock.now)
 
     def check(self) -> None:
         if self.down:
-            raise HalError("the module does not answer")
+            raise HalError(self.down)
 
 
 class _Lines:
@@ -72,8 +97,8 @@ class _Lines:
         self._far.check()
         self._far.drive(levels)
 
-    def outputs(self) -> None:
-        return None
+    def outputs(self) -> Mapping[str, int]:
+        return self._far.outputs()
 
     def close(self) -> None:
         if not self._far.down:
@@ -81,14 +106,13 @@ class _Lines:
 
 
 class RegisterFar:
-    """A door operator's registers (the part of `drivers.hal.modbus.ModbusBus` that its driver uses)."""
+    """A controller's registers (the part of `drivers.hal.modbus.ModbusBus` that its driver uses)."""
 
-    def __init__(self, timeline: Timeline, door: RegisterDoor) -> None:
-        self.down = False
-        self._timeline = timeline
-        self.now = lambda: timeline.now
-        self._door = door
-        self._first = {p: door.get(p, 0.0) for p in door.outputs}
+    def __init__(self, clock: Clocked, cells: Cells) -> None:
+        self.down = ""
+        self.now: Callable[[], float] = lambda: clock.now
+        self._cells = cells
+        self._first = {p: cells.get(p, 0.0) for p in cells.outputs}
 
     def guard(self, units: Iterable[int]) -> "RegisterFar":
         return self
@@ -100,30 +124,30 @@ class RegisterFar:
         """There is no pause to break off."""
 
     def watchdog(self) -> None:
-        """The operator has not been spoken to for too long."""
+        """The controller has not been spoken to for too long."""
         if self.down:
             for point, value in self._first.items():
-                self._door.set(point, value, self._timeline.now)
+                self._cells.set(point, value, self.now())
 
     def read(self, asked: Any, safe: bool = False) -> dict[Point, int]:
         self._answers()
-        return {p: self._door.get(p, self._timeline.now) for p in asked.points()}
+        return {p: self._cells.get(p, self.now()) for p in asked.points()}
 
     def write(self, point: Point, value: int, safe: bool = False) -> None:
         self._answers()
-        self._door.set(point, int(value), self._timeline.now)
+        assert self._cells.set(point, int(value), self.now())
 
     def _answers(self) -> None:
         if self.down:
-            raise HalError("the operator does not answer")
+            raise HalError(self.down)
 
 
 class HttpFar:
     """A charging station's HTTP (`drivers.charger.http.Calls`)."""
 
-    def __init__(self, timeline: Timeline, plant: ChargerPlant, settings: Any) -> None:
-        self.down = False
-        self._timeline = timeline
+    def __init__(self, clock: Clocked, plant: ChargerPlant, settings: Any) -> None:
+        self.down = ""
+        self._clock = clock
         self._plant = plant
         self._station = HttpCharger(plant, settings)
 
@@ -131,7 +155,7 @@ class HttpFar:
         """For a station's own timeout, which this one does not have."""
 
     def get_json(self, path: str) -> dict[str, Any]:
-        self._plant.advance(self._timeline.now)
+        self._plant.advance(self._clock.now)
         reading = self._plant.reading()
         self._answers(reading.failures)
         found: dict[str, Any] = json.loads(self._station.body(reading))
@@ -141,7 +165,7 @@ class HttpFar:
         self, path: str, method: str = "POST", body: str | None = None, safe: bool = False
     ) -> None:
         self._answers(self._plant.failures)
-        self._plant.drive("clear_error", True, self._timeline.now)
+        self._plant.drive("clear_error", True, self._clock.now)
 
     def _answers(self, failures: Mapping[str, Any]) -> None:
         """All that ends in a deadline, a refusal or nonsense is the same to the driver."""

@@ -33,7 +33,7 @@ class Part(msgspec.Struct, frozen=True, kw_only=True):
     tables: list[Table]
 
 
-class BusTold(msgspec.Struct, frozen=True, kw_only=True):
+class BusShown(msgspec.Struct, frozen=True, kw_only=True):
     """One bus and how it is set."""
 
     name: str
@@ -41,7 +41,7 @@ class BusTold(msgspec.Struct, frozen=True, kw_only=True):
     settings: dict[str, str]
 
 
-class Told(msgspec.Struct, frozen=True, kw_only=True):
+class Findings(msgspec.Struct, frozen=True, kw_only=True):
     """One file: its contents if it is valid, and its errors and warnings.
 
     `sha256`: of its bytes, so that a signed sheet identifies the file. `notes`: what else a user should
@@ -52,21 +52,21 @@ class Told(msgspec.Struct, frozen=True, kw_only=True):
     kind: str = ""
     driver: str = ""
     sha256: str = ""
-    buses: list[BusTold] = []
+    buses: list[BusShown] = []
     parts: list[Part] = []
     notes: list[str] = []
     errors: list[Problem] = []
     warnings: list[Problem] = []
 
 
-def wrong(file: str, errors: Sequence[Problem]) -> Told:
+def wrong(file: str, errors: Sequence[Problem]) -> Findings:
     """The findings about an invalid file."""
-    return Told(file=file, errors=list(errors))
+    return Findings(file=file, errors=list(errors))
 
 
-def told(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = ()) -> Told:
+def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = ()) -> Findings:
     """The findings about a valid file. `errors`: from comparing it with RMF's map."""
-    return Told(
+    return Findings(
         file=str(config.path),
         kind=config.kind,
         driver=config.driver,
@@ -90,9 +90,9 @@ def _lacking(config: Config) -> list[str]:
     return list(dict.fromkeys(lines))
 
 
-def _bus(config: Config, name: str) -> BusTold:
+def _bus(config: Config, name: str) -> BusShown:
     settings = {key: text for key, text, _ in plain(config.buses[name]) if text != "-"}
-    return BusTold(name=name, type=config.bus_types[name], settings=settings)
+    return BusShown(name=name, type=config.bus_types[name], settings=settings)
 
 
 def _graph(config: Config) -> Part:
