@@ -14,7 +14,7 @@ from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from bridges.rmf.cyclone import LOOPBACK
+from bridges.rmf.cyclone import LOOPBACK, for_ros
 
 ON_LOOPBACK: Final = {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -36,7 +36,7 @@ class Stay:
     ) -> None:
         self._context = Context()
         try:
-            with _environment(ON_LOOPBACK if loopback else {}):
+            with _environment(ON_LOOPBACK if loopback else {"CYCLONEDDS_URI": for_ros(os.environ)}):
                 self._join(name, domain_id, ros_args)
         except REFUSALS:
             self._context.try_shutdown()

@@ -16,7 +16,7 @@ from tests.rmf.joining import joining
 from tests.waiting import wait_until
 
 AUTO = (
-    "<CycloneDDS><Domain><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+    f"<CycloneDDS><Domain>{cyclone.LEAVING}<Discovery><ParticipantIndex>auto</ParticipantIndex>"
     "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>{}</Discovery></Domain></CycloneDDS>"
 )
 ALARM = FIRE_ALARM_TRIGGER.named("ping_fire_alarm_trigger")
@@ -35,8 +35,7 @@ PEERS = '<Peers><Peer address="10.0.0.5"/><Peer address="rmf.local"/></Peers>'
             AUTO.format(
                 '<Peers><Peer address="localhost"/><Peer address="10.0.0.5"/></Peers>'
             ).replace(
-                "<Discovery>",
-                "<General><AllowMulticast>false</AllowMulticast></General><Discovery>",
+                "<Domain>", "<Domain><General><AllowMulticast>false</AllowMulticast></General>"
             ),
         ),
         ({"CYCLONEDDS_URI": "file:///c.xml"}, AUTO.format("") + ",file:///c.xml"),
