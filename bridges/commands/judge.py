@@ -185,7 +185,9 @@ def _recorded(args: argparse.Namespace) -> int:
     judge, span = Judge(args.kind, args.name), Span(args.from_, args.to)
     last: Heard | None = None
     for heard in heard_between(args.recording, span, "judge"):
-        if args.from_ is None or heard.at >= span.begins_at > NEVER_YET:
+        if isinstance(heard, Heard) and (
+            args.from_ is None or heard.at >= span.begins_at > NEVER_YET
+        ):
             judge.hear(heard)
             last = heard
     if last is None or judge.first is None:
