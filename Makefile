@@ -6,7 +6,7 @@ BIN := .venv/bin
 # compiles every file again.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo demo-charging test deep test-ros lint man deb format bench flood soak torture mutate clean
+.PHONY: help demo demo-charging test suite deep test-ros lint style types man deb format bench flood soak torture mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
@@ -41,8 +41,12 @@ demo-charging: .venv/ready
 # Many tests wait for a process or a wire: more of them than there are cores run side by side.
 # Each test goes to the next free worker, in the order of conftest.py: long ones first. Tests that share a
 # process stay together (mark xdist_group).
-SIDE_BY_SIDE := -n 8 --dist loadgroup --no-loadscope-reorder
-test: .venv/ready lint
+SIDE_BY_SIDE := -n 4 --dist loadgroup --no-loadscope-reorder
+# mypy uses one core only, so it runs beside the tests.
+test: .venv/ready style
+	@$(MAKE) --no-print-directory -j 2 types suite
+
+suite: .venv/ready
 	$(BIN)/pytest $(SIDE_BY_SIDE)
 
 # Walks to their full depth and every example. Run it before a release and after a change to a core.
@@ -60,17 +64,21 @@ test-ros:
 	  $(ROS_BIN)/pip install --quiet --disable-pip-version-check -e '.[dev]' && touch .venv-ros/ready; }
 	$(ROS_BIN)/python -m pytest -m ros
 
-lint: .venv/ready
+lint: style types
+
+style: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+types: .venv/ready
+	$(BIN)/mypy
 
 man: .venv/ready
 	@mkdir -p build
 	$(BIN)/argparse-manpage --module bridges.cli --function whole_parser --prog rmf-bridge \
 	  --project-name rmf-bridges --description "connect Open-RMF to lifts, doors and chargers" \
-	  --manual-section 1 --output build/rmf-bridge.1
+	  --manual-section 1 --manual-title "rmf-bridges manual" --output build/rmf-bridge.1
 
 # Built here for every machine; nothing of it runs here.
 ARCHS ?= amd64 arm64

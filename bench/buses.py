@@ -16,7 +16,7 @@ import can
 import requests
 
 from bench.charger_servers import PERIOD_S, TIMEOUT_S, chargers_at, http_chargers
-from bench.daemons import SETTLE_S, Content, PlantSocket, daemon, graph, ready
+from bench.daemons import SETTLE_S, Content, daemon, graph, ready
 from bench.figures import Row, Rows, Tables, percentiles
 from bench.idle import doors
 from bridges.rmf.definitions import ChargerState, DoorState
@@ -26,6 +26,7 @@ from bridges.settings.load import Config, load
 from drivers.door.dry_contact import create
 from drivers.hal.can import CanBus, Frame, Settings, Wanted
 from drivers.hal.modbus import ModbusBus
+from hal_fakes.caller import Caller
 from hal_fakes.simulate import Simulation
 
 
@@ -109,7 +110,7 @@ def _many_doors(scratch: Path) -> Rows:
         many = _ages(_door_states())
     with _doors(scratch, DEAD_OF) as plant:
         before = _ages(_door_states())
-        plant.say(f"fail door_{DEAD_OF} unit off")
+        plant.order(f"fail door_{DEAD_OF} unit off")
         time.sleep(SETTLE_S)
         states = _door_states()
     states.pop(f"door_{DEAD_OF}")
@@ -117,13 +118,12 @@ def _many_doors(scratch: Path) -> Rows:
 
 
 @contextmanager
-def _doors(scratch: Path, many: int) -> Iterator[PlantSocket]:
+def _doors(scratch: Path, many: int) -> Iterator[Caller]:
     directory = scratch / f"doors_{many}"
     with ready(daemon(doors(many), directory), scratch / f"doors_{many}.log"):
         time.sleep(SETTLE_S)
-        plant = PlantSocket(directory / "plant.sock")
-        yield plant
-        plant.close()
+        with Caller(directory / "plant.sock") as plant:
+            yield plant
 
 
 def _door_states() -> States:

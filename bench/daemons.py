@@ -1,9 +1,7 @@
 """Starting and stopping what is measured, hearing and asking it, and what it costs."""
 
-import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -93,36 +91,6 @@ def wait_for_log(log: Path, word: str, deadline_s: float = 20.0) -> None:
         if time.monotonic() > until:
             raise SystemExit(f"no {word!r} within {deadline_s} s in {log}:\n{log.read_text()}")
         time.sleep(0.002)
-
-
-class PlantSocket:
-    """A simulation's control socket."""
-
-    def __init__(self, path: Path) -> None:
-        self._socket = socket.socket(socket.AF_UNIX)
-        self._socket.settimeout(5.0)
-        self._socket.connect(str(path))
-        self._lines = self._socket.makefile("rw")
-
-    def say(self, line: str) -> None:
-        """One command; its answer must be `ok`."""
-        self._lines.write(line + "\n")
-        self._lines.flush()
-        answer = self._lines.readline().strip()
-        if answer != "ok":
-            raise SystemExit(f"{line}: {answer}")
-
-    def edge(self, signal_name: str, value: bool) -> float:
-        """Wait for this edge to come after `follow`; its monotonic time (s)."""
-        while True:
-            edge = json.loads(self._lines.readline())
-            if (edge["signal"], edge["value"]) == (signal_name, value):
-                return float(edge["at"])
-
-    def close(self) -> None:
-        """Hang up."""
-        self._lines.close()
-        self._socket.close()
 
 
 def cost(command: list[str], log: Path, watched_s: float = 10.0) -> Row:

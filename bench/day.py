@@ -4,8 +4,8 @@ import time
 from pathlib import Path
 
 from bench.figures import Tables
-from hal_fakes.rmf.phases import EndLiftSession, RequestLift
-from hal_fakes.rmf.robot import Phase
+from bridges.rmf_rules.phases import EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Phase
 from tests.lift_supervisor.world import LiftNode, OurSupervisor, Rider
 from tests.serve.virtual_graph import World
 

@@ -17,7 +17,6 @@ from bench.daemons import (
     DOMAIN,
     WIRES,
     Content,
-    PlantSocket,
     daemon,
     graph,
     memory_mb,
@@ -32,6 +31,7 @@ from bridges.rmf.transport import Transport
 from bridges.settings.load import load
 from drivers.hal.gpio import canonical
 from drivers.lift.dry_contact import Settings, wires
+from hal_fakes.caller import Caller
 from hal_fakes.gpio import WiredFactory
 from hal_fakes.plants.lift import build
 from hal_fakes.wire import Wire
@@ -51,7 +51,7 @@ def measure(scratch: Path) -> Tables:
     latencies: Rows = {}
     for wire in reversed(WIRES):  # the hazard's figures are those of the last, dds
         round_trips = _bare_round_trips(scratch, wire)
-        relay, state, off, _ = _daemon_paths(scratch, wire, wire)
+        relay, state, off, _ = daemon_paths(scratch, wire, wire)
         latencies |= {
             f"bare round trip on {wire}": compared(round_trips, round_trips),
             f"LiftRequest to relay edge on {wire}": compared(relay, round_trips),
@@ -78,7 +78,7 @@ def _with_ros(scratch: Path) -> Tables:
     relays: Rows = {"minimal rclpy node": {**compared(bare_relay, bare_relay), "RSS MB": bare_mb}}
     states: Rows = {"minimal rclpy node": compared(bare_state, bare_state)}
     for transport in ("ros2", "dds"):
-        relay, state, _, rss_mb = _daemon_paths(scratch, transport)
+        relay, state, _, rss_mb = daemon_paths(scratch, transport)
         name = f"lift daemon on {transport}"
         relays[name] = {**compared(relay, bare_relay), "RSS MB": rss_mb}
         states[name] = compared(state, bare_state)
@@ -153,28 +153,27 @@ def _contacts(part: Any) -> list[dict[str, Any]]:
     return [contact for each in parts for contact in _contacts(each)]
 
 
-def _daemon_paths(
-    scratch: Path, transport: str, ours: Wire = "dds"
+def daemon_paths(
+    scratch: Path, transport: str, ours: Wire = "dds", *, keep: str = ""
 ) -> tuple[Times, Times, Times, float]:
     """Seconds of each request to the relay, edge to RMF and hazard to all off, and memory (MB).
 
-    `ours`: the wire of this end.
+    `ours`: the wire of this end. `keep`: what is recorded; the default where not given.
     """
-    directory = scratch / f"quick_{transport}"
-    command = daemon(_quick_lift(), directory, transport)
+    directory = scratch / f"quick_{transport}{keep}"
+    recording = {"recording": {"keep": keep}} if keep else {}
+    command = daemon({**_quick_lift(), **recording}, directory, transport)
     with ready(command, directory.with_suffix(".log")) as child, graph(ours) as node:
-        far = Graph(node)
-        plant, hand = PlantSocket(directory / "plant.sock"), PlantSocket(directory / "plant.sock")
-        plant.say("follow")
-        relay = _measured(lambda: _to_relay(far, plant))
-        state = _measured(lambda: _to_state(far, plant, hand))
-        off = _measured(lambda: _to_outputs_off(far, plant, hand), HAZARDS)
-        for end in (plant, hand):
-            end.close()
+        far, sock = Graph(node), directory / "plant.sock"
+        with Caller(sock) as plant, Caller(sock) as hand:
+            plant.order("follow")
+            relay = _measured(lambda: _to_relay(far, plant))
+            state = _measured(lambda: _to_state(far, plant, hand))
+            off = _measured(lambda: _to_outputs_off(far, plant, hand), HAZARDS)
         return relay, state, off, memory_mb(child.pid)
 
 
-def _to_relay(far: Graph, plant: PlantSocket) -> float:
+def _to_relay(far: Graph, plant: Caller) -> float:
     sent_at = far.send("bench", LiftRequestType.REQUEST_AGV_MODE, "L1")
     took = plant.edge("agv_mode_request", True) - sent_at
     far.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
@@ -183,28 +182,28 @@ def _to_relay(far: Graph, plant: PlantSocket) -> float:
     return took
 
 
-def _to_state(far: Graph, plant: PlantSocket, hand: PlantSocket) -> float:
+def _to_state(far: Graph, plant: Caller, hand: Caller) -> float:
     emergency = LiftMode.MODE_EMERGENCY
-    hand.say("press Lift1 code_blue on")
+    hand.order("press Lift1 code_blue on")
     edge_at = plant.edge("code_blue", True)
     took = far.state(edge_at, lambda s: s.current_mode == emergency) - edge_at
-    hand.say("press Lift1 code_blue off")
+    hand.order("press Lift1 code_blue off")
     over_at = plant.edge("code_blue", False)
     far.state(over_at, lambda s: s.current_mode != emergency)
     time.sleep(PAUSE_S)
     return took
 
 
-def _to_outputs_off(far: Graph, plant: PlantSocket, hand: PlantSocket) -> float:
+def _to_outputs_off(far: Graph, plant: Caller, hand: Caller) -> float:
     far.send("bench", LiftRequestType.REQUEST_AGV_MODE, "L1")
     plant.edge("agv_mode_request", True)
-    hand.say("press Lift1 fire_alarm on")
+    hand.order("press Lift1 fire_alarm on")
     at = plant.edge("fire_alarm", True)
     took = plant.edge("agv_mode_request", False) - at
     # While it burns: a session that outlived the fire would have its relay back at once.
     ended_at = far.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
     far.state(ended_at, lambda state: not state.session_id)
-    hand.say("press Lift1 fire_alarm off")
+    hand.order("press Lift1 fire_alarm off")
     plant.edge("fire_alarm", False)
     time.sleep(PAUSE_S)
     return took

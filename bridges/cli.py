@@ -3,8 +3,10 @@
 import argparse
 import importlib
 import os
+import re
 import sys
 from collections.abc import Container
+from typing import NoReturn
 
 from bridges import __version__
 
@@ -39,9 +41,21 @@ COMMANDS = {
         "look for what keeps a bridge from working on this machine; nothing is switched",
         "doctor my_lift.yaml --scan",
     ),
+    "explain": (
+        "say why a robot waits for a lift, door or charger: live, or from a recording",
+        "explain --live Lift1 --localhost",
+    ),
+    "plot": (
+        "draw what happened to a lift, door or charger, from a recording",
+        "plot incident.mcap --device Lift1 -o ride.html",
+    ),
     "send": (
         "send a request as RMF does, and wait for its effect",
         "send lift Lift1 L3 --session me --direct --localhost",
+    ),
+    "judge": (
+        "hold any lift, door or charger node against RMF's contract",
+        "judge lift Lift1 --active --ride L1 L3 --localhost",
     ),
     "release": ("end the session of whoever holds a lift", "release Lift1"),
     "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
@@ -58,9 +72,21 @@ COMMANDS = {
         "fail my_lift.yaml door_opened stuck",
     ),
     "log": ("show the log of a device's service", "log my_lift.yaml --follow --event fault"),
+    "incident": (
+        "make a recording of a daemon's last minutes, for whoever looks into it",
+        'incident my_lift.yaml --note "the robot waits before an open door"',
+    ),
+    "recorder": (
+        "make recordings of this machine's daemons when something goes wrong",
+        "recorder --output /var/lib/rmf-bridge-recorder",
+    ),
+    "replay": (
+        "let today's core decide again on what was recorded, and compare",
+        "replay my_lift_2026-11-22_10-00-00.mcap --config other.yaml",
+    ),
     "completion": (
         "print the completion script for bash, zsh or fish",
-        "completion bash > /etc/bash_completion.d/rmf",
+        "completion fish > ~/.config/fish/completions/rmf-bridge.fish",
     ),
     "outputs-off": (
         "switch off every output of a device whose daemon is dead",
@@ -86,11 +112,25 @@ def main(argv: list[str] | None = None) -> int:
         return EX_PIPE
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """Also name the choice that is nearest to a wrong one."""
+        wrong = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
+        if wrong and (near := _nearest(wrong[1], wrong[2])):
+            message = f"{message[: wrong.start()]}there is no '{wrong[1]}'; did you mean '{near}'?"
+        super().error(message)
+
+
+def _nearest(typed: str, listed: str) -> str:
+    from difflib import get_close_matches
+
+    known = [one.strip(" '") for one in listed.split(",")]
+    return next(iter(get_close_matches(typed.lower(), known, n=1)), "")
+
+
 def parser(whole: Container[str]) -> argparse.ArgumentParser:
     """The command line's parser. `whole`: the subcommands with options; only they are imported."""
-    top = argparse.ArgumentParser(
-        prog="rmf-bridge", description="Connect Open-RMF to lifts, doors and chargers."
-    )
+    top = _Parser(prog="rmf-bridge", description="Connect Open-RMF to lifts, doors and chargers.")
     top.add_argument("--version", action="version", version=f"rmf-bridge {__version__}")
     subparsers = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, (text, example) in COMMANDS.items():

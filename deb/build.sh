@@ -24,7 +24,7 @@ mkdir -p "$root/DEBIAN" "$root/$lib/bin" "$work/wheel"
 extra=--extra=gpio; [ "$python" = 3.13 ] && extra=--extra=
 "$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work/wheel" "$here"
 "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
-  --target "$root/$lib/lib/python$python/site-packages" $extra
+  --target "$root/$lib/lib/python$python/site-packages" $extra --extra=recording
 rm -rf "$root/$lib/lib/python$python/site-packages/bin"
 
 # A virtual environment that sees the system's packages (rclpy, lgpio), on the system's own Python.
@@ -50,10 +50,15 @@ put systemd/60-rmf-bridges.rules usr/lib/udev/rules.d/60-rmf-bridges.rules
 put systemd/80-rmf-can0.network usr/share/doc/rmf-bridges/examples/80-rmf-can0.network
 sed 's#/opt/rmf-bridges/.venv/bin/#/usr/lib/rmf-bridges/bin/#' "$here/systemd/rmf-bridge@.service" \
   > "$root/usr/lib/systemd/system/rmf-bridge@.service"
+sed 's#/opt/rmf-bridges/.venv/bin/#/usr/lib/rmf-bridges/bin/#' "$here/systemd/rmf-bridge-recorder.service" \
+  > "$root/usr/lib/systemd/system/rmf-bridge-recorder.service"
 for file in "$here"/config/*.yaml; do put "config/${file##*/}" "usr/share/doc/rmf-bridges/examples/${file##*/}"; done
-mkdir -p "$root/usr/share/man/man1" "$root/usr/share/bash-completion/completions"
+mkdir -p "$root/usr/share/man/man1" "$root/usr/share/bash-completion/completions" \
+  "$root/usr/share/zsh/vendor-completions" "$root/usr/share/fish/vendor_completions.d"
 gzip -9nc "$here/build/rmf-bridge.1" > "$root/usr/share/man/man1/rmf-bridge.1.gz"
 "$bin/rmf-bridge" completion bash > "$root/usr/share/bash-completion/completions/rmf-bridge"
+"$bin/rmf-bridge" completion zsh > "$root/usr/share/zsh/vendor-completions/_rmf-bridge"
+"$bin/rmf-bridge" completion fish > "$root/usr/share/fish/vendor_completions.d/rmf-bridge.fish"
 printf 'rmf-bridges (%s+%s) unstable; urgency=medium\n\n  * See CHANGELOG.md of the project.\n\n -- rmf-bridges maintainers <rmf-bridges@localhost>  %s\n' \
   "$version" "$release" "$(date -Rud "@$SOURCE_DATE_EPOCH")" | gzip -9nc > "$root/usr/share/doc/rmf-bridges/changelog.gz"
 { printf 'Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/\n\nFiles: *\nCopyright: the authors of rmf-bridges\nLicense: Apache-2.0\n On Debian systems the text is in /usr/share/common-licenses/Apache-2.0.\n'

@@ -9,11 +9,13 @@ died. It ignores SIGINT: Ctrl-C in a terminal reaches both, and the daemon has t
 
 import argparse
 import json
+import logging
 import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from bridges import log
 from bridges.settings.load import SettingsError, load
 from drivers import DriverError
 from hal_fakes.control import Control
@@ -27,8 +29,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("file", type=Path)
     parser.add_argument("bus")
     parser.add_argument("--socket", type=Path, required=True)
+    parser.add_argument(
+        "--log-format", choices=("text", "json"), help="say what is pressed, on standard error"
+    )
     arguments = parser.parse_args(argv)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if arguments.log_format:
+        log.start("WARNING", json=arguments.log_format == "json")
+        logging.getLogger("hal_fakes").setLevel(logging.INFO)
     try:
         _serve(arguments.file, arguments.bus, arguments.socket)
     except (SettingsError, DriverError) as error:

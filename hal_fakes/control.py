@@ -11,17 +11,22 @@ AF_UNIX, lines of text, words with spaces in quotes. Each line is answered `ok` 
 
 import contextlib
 import json
+import logging
 import shlex
 import socket
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import cast
 
+import msgspec
+
+from bridges.log import pairs
 from drivers import DriverError
 from hal_fakes.plants.plant import Edge, FailureMode, Plant
+
+log = logging.getLogger(__name__)
 
 
 class Control:
@@ -98,8 +103,11 @@ class Control:
             case ["fail", device, part, mode]:
                 chosen = None if mode == "ok" else cast(FailureMode, mode)
                 self._plant(device).fail(part, chosen)
+                event = "mended" if chosen is None else "failed"
+                log.info(pairs(event, device=device, part=part, mode=mode))
             case ["press", device, signal, "on" | "off" as how]:
                 self._plant(device).press(signal, how == "on", time.monotonic())
+                log.info(pairs("pressed", device=device, signal=signal, to=how))
             case _:
                 raise ValueError(
                     "not understood; say: follow | names | fail DEVICE PART"
@@ -112,7 +120,7 @@ class Control:
         return self._plants[device]
 
     def _tell(self, edge: Edge) -> None:
-        line = json.dumps(asdict(edge)).encode() + b"\n"
+        line = msgspec.json.encode(edge) + b"\n"
         with self._lock:
             for follower in list(self._followers):
                 if not _sent(follower, line):

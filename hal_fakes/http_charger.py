@@ -15,14 +15,20 @@ from drivers.charger.state_codes import ROBOT_ERROR
 from drivers.json_fields import Value, found, put, value_of
 from hal_fakes.charger_values import NEAREST, values
 from hal_fakes.fake import Fake
-from hal_fakes.plants.charger import CAUSES, ROBOTS_FAULTS, ChargerPlant, Reading
+from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import Plant
 
 
 def build(name: str, settings: Settings) -> ChargerPlant:
     """The station that these settings speak to, with the robots that it knows."""
-    asked = settings.range_check is not None
-    return ChargerPlant(name, settings.receivers, settings.can_stop(), asked)
+    return ChargerPlant(
+        name,
+        settings.receivers,
+        commanded=settings.can_stop(),
+        asked=settings.range_check is not None,
+        cleared=settings.clear_error_path is not None,
+        links=("server", "headers", "body"),
+    )
 
 
 class HttpCharger:
@@ -55,12 +61,9 @@ class HttpCharger:
         self.plant.drive(signal, asserted, now)
 
     def tick(self) -> None:
-        """Switch the power off when its timer has run out. Clear errors that have no clear command."""
+        """Switch the power off when its timer has run out."""
         if time.monotonic() >= self._off_at:
             self.obey("power", False)
-        faulty = self._settings.clear_error_path is None and self.reading().error_text
-        if faulty and not any(map(self.plant.sense, CAUSES)):
-            self.obey("clear_error", True)
 
     def answer(self) -> bytes:
         """The answer to `GET state_path` now."""
@@ -107,15 +110,14 @@ class HttpCharger:
     def _by_rules(self, reading: Reading, answer: dict[str, object]) -> dict[str, Value]:
         """What the places of rules and errors hold."""
         said = self._settings
-        robots = reading.error_text in ROBOTS_FAULTS
-        wanted = ROBOT_ERROR if robots else (reading.activity, "")
+        wanted = ROBOT_ERROR if reading.robots else (reading.activity, "")
         shown = {at: found(answer, at) for _, at in places(said.rules)}
         natural = {at: value for at, value in shown.items() if isinstance(value, Value)}
         return values(said.rules, said.errors, wanted, natural) or {}
 
     def _code(self, reading: Reading) -> int:
         own = self._settings.codes
-        if own and own.robot_error and reading.error_text in ROBOTS_FAULTS:
+        if own and own.robot_error and reading.robots:
             return own.robot_error[0]
         nearest = NEAREST.get(reading.activity, Activity.ERROR)
         codes = self._lists[reading.activity] or self._lists[nearest] or [self._unknown()]

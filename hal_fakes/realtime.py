@@ -23,6 +23,7 @@ class RealTime:
         self._plain = list(plants.values())
         self._due = threading.Condition(self.lock)
         self._stirred = True
+        self._next_at = float("inf")
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="plants", daemon=True)
         self._thread.start()
@@ -34,9 +35,10 @@ class RealTime:
             self._due.notify()
 
     def show(self) -> None:
-        """Show moved contacts at once, in the caller's thread."""
+        """Show moved contacts at once, in the caller's thread; wake ours if it would wake too late."""
         with self.lock:
-            self._step()
+            if self._step() < self._next_at:
+                self.stir()
 
     def close(self) -> None:
         """Stop time. May be called twice."""
@@ -49,9 +51,9 @@ class RealTime:
         with self.lock:
             while not self._closed:
                 self._stirred = False
-                next_at = self._step()
+                self._next_at = self._step()
                 if not self._stirred and not self._closed:
-                    self._due.wait(_timeout(next_at))
+                    self._due.wait(_timeout(self._next_at))
 
     def _step(self) -> float:
         now = time.monotonic()
@@ -132,4 +134,3 @@ class _Serialised:
         with self._world.lock:
             self._plant.press(signal, asserted, now)
             self._world.show()
-            self._world.stir()

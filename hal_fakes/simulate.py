@@ -12,6 +12,7 @@ import selectors
 import subprocess
 import sys
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 
@@ -21,6 +22,7 @@ from hal_fakes.control import Control
 from hal_fakes.fake import Inside, far_side, plants_on, stations_on
 from hal_fakes.realtime import RealTime
 
+LogFormat = Literal["text", "json"]
 READY_S = 15.0
 """How long a child may take to serve (a busy Raspberry Pi imports slowly)."""
 
@@ -31,7 +33,11 @@ class Simulation:
     Made before the daemon leaves the directory that a relative path of the file is relative to.
     """
 
-    def __init__(self, config: Config, runtime_dir: Path) -> None:
+    def __init__(
+        self, config: Config, runtime_dir: Path, *, log_format: LogFormat | None = None
+    ) -> None:
+        """`log_format`: how a child says what is pressed; None where nobody reads its log."""
+        self._log = ["--log-format", log_format] if log_format else []
         self._config = config
         self._file = str(Path(config.path).resolve())
         self._runtime_dir = runtime_dir.resolve()
@@ -75,7 +81,16 @@ class Simulation:
     def _start(self, name: str) -> "subprocess.Popen[bytes]":
         socket = self.socket_path(name)
         child = subprocess.Popen(
-            [sys.executable, "-m", "hal_fakes", self._file, name, "--socket", str(socket)],
+            [
+                sys.executable,
+                "-m",
+                "hal_fakes",
+                self._file,
+                name,
+                "--socket",
+                str(socket),
+                *self._log,
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C in a terminal is for the daemon alone

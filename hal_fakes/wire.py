@@ -11,13 +11,16 @@ Wire = Literal["dds", "zenoh"]
 
 
 def wire() -> Wire:
-    """TRANSPORT in the environment, else dds where cyclonedds imports, else zenoh."""
-    named = os.environ.get("TRANSPORT", "")
-    if named not in ("", "dds", "zenoh"):
+    """TRANSPORT in the environment, else what runs here."""
+    named = os.environ.get("TRANSPORT") or runs_here()
+    if named not in ("dds", "zenoh"):
         raise TransportError(f"TRANSPORT is {named!r}: dds or zenoh")
-    if named == "zenoh" or (not named and missing_of_dds()):
-        return "zenoh"
-    return "dds"
+    return "zenoh" if named == "zenoh" else "dds"
+
+
+def runs_here() -> Wire:
+    """dds where cyclonedds imports, else zenoh: as `auto` has it on a machine without ROS."""
+    return "zenoh" if missing_of_dds() else "dds"
 
 
 def join(name: str, domain_id: int) -> Transport:

@@ -1,17 +1,24 @@
 import logging
+import os
 import signal
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
-from bridges.rmf.choose import missing_of_dds
+from bridges.rmf.choose import missing_of_dds, missing_of_ros
 from hal_fakes.domain import domain_for_a_while
+from tests.depth import DEEP
 
 ON_WIRES = ("commands", "drivers", "hal_fakes", "rmf", "serve", "site")
 """The folders whose tests have threads, processes and sockets. In the others time is virtual."""
 WIRES_HANG_AFTER_S = 900
 """No test that passes takes so long, however busy the machine is."""
+
+if not DEEP and missing_of_ros():
+    os.environ.setdefault("TRANSPORT", "zenoh")
+"""The wire between processes, where a story is not about it: zenoh, as on a Raspberry Pi. A daemon
+starts on it with half the CPU. In `make deep`, and beside ROS, these stories run on dds where it is."""
 
 signal.signal(
     signal.SIGHUP, signal.SIG_DFL

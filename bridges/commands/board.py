@@ -18,6 +18,8 @@ from bridges.rmf import words
 from bridges.serve import diagnostics
 
 KINDS: Final = {d.LiftState: "lift", d.DoorState: "door", d.ChargerState: "charger"}
+SETTLES_S: Final = 1.5
+"""A daemon's diagnostics come at 1 Hz."""
 COORDINATOR: Final = "charger_coordinator"
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
 SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
@@ -95,6 +97,7 @@ class Board:
 
     def __init__(self) -> None:
         self._latest: dict[tuple[str, str], Heard[words.Stated]] = {}
+        self._first_at: dict[tuple[str, str], float] = {}
         self._requesters: dict[str, str] = {}
         self._places: dict[str, str] = {}
         self._diagnoses: dict[str, Diagnosis] = {}
@@ -117,6 +120,13 @@ class Board:
             case d.LiftState() | d.DoorState() | d.ChargerState() as state:
                 key = (KINDS[type(state)], words.device(state))
                 self._latest[key] = Heard(state, heard.at)
+                self._first_at.setdefault(key, heard.at)
+
+    def unsettled(self, now: float) -> set[tuple[str, str]]:
+        """Kind and name of devices heard only just now, whose daemon may yet say that it simulates."""
+        known = {(one.kind, one.status.hardware_id) for one in self._current(now)}
+        young = {key for key, at in self._first_at.items() if now - at < SETTLES_S}
+        return {(kind, words.printable(name)) for kind, name in young - known}
 
     def rows(self, now: float, wall: float) -> list[Row]:
         """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
@@ -268,13 +278,25 @@ def repaint(
     """The text that redraws a terminal showing `lines_before` lines of the table, and the new number
     of lines. No line wraps and nothing scrolls away.
     """
-    shown = table(rows)
+    shown = list(_fitting(rows, columns - 1))
     if len(shown) >= lines:
-        shown = [*shown[: lines - 2], f"… and {len(shown) - lines + 2} more"]
-    marked = {i for i, row in enumerate(rows, start=1) if row.wrong}
+        more = len(shown) - lines + 2
+        shown = [*shown[: lines - 2], (f"… and {more} more", False)]
     text = f"\x1b[{lines_before}A" if lines_before else ""
-    for i, line in enumerate(shown):
+    for line, wrong in shown:
         line = line[: columns - 1]
-        red = coloured and i in marked
+        red = coloured and wrong
         text += f"\r\x1b[K\x1b[31m{line}\x1b[0m\n" if red else f"\r\x1b[K{line}\n"
     return text + "\x1b[J", len(shown)
+
+
+def _fitting(rows: list[Row], width: int) -> Iterator[tuple[str, bool]]:
+    """Each line of the table, and whether it needs attention. Where it is too long for a terminal, its
+    marks and faults follow on a line of their own."""
+    heading, *lines = table(rows)
+    yield heading, False
+    for row, line in zip(rows, lines, strict=True):
+        yield line, row.wrong
+        told = " ".join(filter(None, row.cells()[-2:]))
+        if told and len(line) > width:
+            yield f"  {told}", row.wrong

@@ -1,7 +1,7 @@
 """`rmf-bridge check FILE...`: what is wrong with device YAMLs, or all that an electrician signs.
 
 Each file is read and checked, then all of them together (`bridges/settings/across.py`). The findings
-about a file are gathered once (`sheets/told.py`), and printed as text, as JSON or as a sheet.
+about a file are gathered once (`sheets/findings.py`), and printed as text, as JSON or as a sheet.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from bridges.commands.sheets import text
-from bridges.commands.sheets.told import Told, told, wrong
+from bridges.commands.sheets.findings import Findings, findings, wrong
 from bridges.settings.across import Found, across
 from bridges.settings.load import Config, Problem, SettingsError, load
 
@@ -87,17 +87,17 @@ def _building(file: str | None) -> "BuildingMap | None":
 
 def _read(
     files: Sequence[str], building: "BuildingMap | None"
-) -> tuple[dict[str, tuple[Config, Told]], dict[str, Told]]:
+) -> tuple[dict[str, tuple[Config, Findings]], dict[str, Findings]]:
     """Each file, once: (the readable ones, the findings of all)."""
-    right: dict[str, tuple[Config, Told]] = {}
-    found: dict[str, Told] = {}
+    right: dict[str, tuple[Config, Findings]] = {}
+    found: dict[str, Findings] = {}
     for file in dict.fromkeys(files):
         try:
             config = load(file)
         except SettingsError as error:
             found[file] = wrong(file, error.problems)
         else:
-            found[file] = told(config, *_against(config, building))
+            found[file] = findings(config, *_against(config, building))
             right[file] = config, found[file]
     return right, found
 
@@ -119,10 +119,10 @@ def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Probl
 
 def _beside_fleet(
     file: str,
-    right: Mapping[str, tuple[Config, Told]],
-    found: Mapping[str, Told],
+    right: Mapping[str, tuple[Config, Findings]],
+    found: Mapping[str, Findings],
     building: "BuildingMap | None",
-) -> dict[str, Told]:
+) -> dict[str, Findings]:
     """What is told of each coordinator, with what was found beside this fleet's configuration."""
     from bridges.settings.fleet_config import load_fleet
     from bridges.settings.fleet_names import compared
@@ -144,11 +144,11 @@ def _beside_fleet(
 
 
 def _more(
-    file: Told,
+    file: Findings,
     errors: Sequence[Problem] = (),
     warnings: Sequence[Problem] = (),
     notes: Sequence[str] = (),
-) -> Told:
+) -> Findings:
     return msgspec.structs.replace(
         file,
         errors=[*file.errors, *errors],
@@ -157,7 +157,7 @@ def _more(
     )
 
 
-def _with(file: Told, together: Found) -> Told:
+def _with(file: Findings, together: Found) -> Findings:
     """A file with what was found about it among the others."""
     return _more(
         file,
@@ -166,7 +166,7 @@ def _with(file: Told, together: Found) -> Told:
     )
 
 
-def _tell(files: Sequence[Told], args: argparse.Namespace) -> int:
+def _tell(files: Sequence[Findings], args: argparse.Namespace) -> int:
     """Print the findings and write the sheet. Returns the exit code."""
     errors = sum(len(file.errors) for file in files)
     code = os.EX_CONFIG if errors else 0
@@ -181,11 +181,11 @@ def _tell(files: Sequence[Told], args: argparse.Namespace) -> int:
     return _write_sheet(files, args.sheet) or code if args.sheet and not errors else code
 
 
-def _counts(files: Sequence[Told]) -> tuple[int, int]:
+def _counts(files: Sequence[Findings]) -> tuple[int, int]:
     return sum(len(f.errors) for f in files), sum(len(f.warnings) for f in files)
 
 
-def _print(file: Told, quiet: bool) -> None:
+def _print(file: Findings, quiet: bool) -> None:
     if not quiet:
         _complain(map(str, file.warnings))
         if file.kind:
@@ -193,7 +193,7 @@ def _print(file: Told, quiet: bool) -> None:
     _complain(map(str, file.errors))
 
 
-def _verdict(files: Sequence[Told], quiet: bool) -> None:
+def _verdict(files: Sequence[Findings], quiet: bool) -> None:
     """The last line: `OK`, or the number of errors."""
     errors, warnings = _counts(files)
     also = f", {_many(warnings, 'warning')}" if warnings else ""
@@ -213,7 +213,7 @@ def _complain(lines: Iterable[str]) -> None:
     sys.stderr.writelines(f"{line}\n" for line in lines)
 
 
-def _write_sheet(files: Sequence[Told], path: str) -> int:
+def _write_sheet(files: Sequence[Findings], path: str) -> int:
     """Write the commissioning sheet. Returns 0, or another exit code if that fails."""
     from bridges.commands.sheets.html import page
 

@@ -22,7 +22,6 @@ from bridges.settings.config import Config
 from bridges.settings.problems import SettingsError
 
 TIMEOUT_S = 5.0
-EX_UNAVAILABLE, EX_CONFIG = 69, 78
 
 
 def switch_off(args: argparse.Namespace) -> int:
@@ -34,7 +33,7 @@ def switch_off(args: argparse.Namespace) -> int:
         places = _places(file, args.runtime_dir)
     except (runtime.Unknown, PermissionError) as error:
         logging.error(str(error))
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     work_somewhere(places or by_hand(file))
     if places is None:
         return _off_by_yaml(file, {})
@@ -44,8 +43,8 @@ def switch_off(args: argparse.Namespace) -> int:
     try:
         held = runtime.RuntimeDirectory(places, file, serves=False)
     except runtime.AlreadyRunning as error:
-        logging.error("%s: stop it instead, it switches its outputs off", error)
-        return EX_UNAVAILABLE
+        logging.error("%s. That switches its outputs off", error)
+        return os.EX_UNAVAILABLE
     try:
         if held.records.unreleased():
             return _off_by_records(held.records, answered)
@@ -84,7 +83,7 @@ def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
         config = load(file)
     except SettingsError as error:
         _say(error)
-        return EX_CONFIG
+        return os.EX_CONFIG
     if not config.buses:
         logging.info(pairs("nothing_to_switch_off", file=file, kind=config.kind))
         return 0

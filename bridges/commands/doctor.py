@@ -9,13 +9,17 @@ import json
 import os
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TextIO
 
 import msgspec
 
 from bridges import log
+from bridges.commands.by_hand import NoDevice, device_of
+from bridges.commands.completion import completed_by, device_names
 from bridges.commands.doctoring.finding import Finding, exit_code
+from bridges.commands.graph import TRANSPORTS, interruptible, overridden
 from bridges.commands.paint import bold, red
 from bridges.rmf.words import printable
 from bridges.settings.load import Config, SettingsError, load
@@ -23,7 +27,6 @@ from bridges.settings.load import Config, SettingsError, load
 if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
 
-EX_USAGE: Final = 64
 INTERRUPTED: Final = 130
 LISTEN_S: Final = 3.0
 
@@ -47,6 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="how long to hear RMF's graph (default 3; 0: do not join it)",
     )
     parser.add_argument("--localhost", action="store_true", help="join the graph on loopback alone")
+    parser.add_argument("--domain-id", type=int, metavar="N", help="overrides the YAML's domain_id")
+    parser.add_argument("--transport", choices=TRANSPORTS, help="overrides the YAML's transport")
     parser.add_argument(
         "--building-map", metavar="MAP", help="compare the names with RMF's, as check does"
     )
@@ -56,7 +61,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="hold one output on, kill the process that does, and see that it goes off",
     )
-    kill.add_argument("--device", metavar="NAME", help="whose output (default: the first device)")
+    device = kill.add_argument(
+        "--device", metavar="NAME", help="whose output (default: the first device)"
+    )
+    completed_by(device, device_names)
     kill.add_argument("--output", metavar="NAME", help="which output, as walk names it")
     kill.add_argument("--yes", action="store_true", help="do not ask again")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
@@ -74,18 +82,17 @@ def _seconds(text: str) -> float:
 
 def run(args: argparse.Namespace) -> int:
     """0 all well, 1 warnings, 2 something is wrong, 64 not confirmed, 78 a YAML that is wrong."""
-    from bridges.commands.graph import interruptible
-
     log.start("CRITICAL")  # what the buses would log is told as findings
     try:
         config = load(args.file)
+        config = replace(config, rmf=overridden(config.rmf, args))
         building = _building(args.building_map)
     except SettingsError as error:
         print("\n".join(map(str, error.problems)), file=sys.stderr)
         return os.EX_CONFIG
     if args.kill_test and (why := _not_confirmed(config, args)):
         print(why, file=sys.stderr)
-        return EX_USAGE
+        return os.EX_USAGE
     found: list[Finding] = []
     show = Page(sys.stdout).show if not args.json else _nothing
     try:
@@ -112,11 +119,10 @@ def _not_confirmed(config: Config, args: argparse.Namespace) -> str:
     """Why no output may be switched on; "" if it may."""
     from bridges.commands.doctoring.victim import step_called
 
-    if not config.devices:
-        return f"a {config.kind} has no output to test"
-    args.device = args.device or next(iter(config.devices))
-    if args.device not in config.devices:
-        return f"the file has no device '{args.device}'; it has {', '.join(config.devices)}"
+    try:
+        args.device = device_of(config, args.device or next(iter(config.devices), None))
+    except NoDevice as error:
+        return str(error)
     step = step_called(config, args.device, args.output)
     if step is None:
         return f"{args.device} has no such output: rmf-bridge walk shows those that it has"
@@ -132,10 +138,10 @@ def _not_confirmed(config: Config, args: argparse.Namespace) -> str:
 def _examined(
     config: Config, building: "BuildingMap | None", args: argparse.Namespace
 ) -> Iterator[Finding]:
-    from bridges.commands.doctoring.examination import Asked, examined
+    from bridges.commands.doctoring.examination import Options, examined
     from bridges.commands.doctoring.machine import Machine
 
-    asked = Asked(
+    asked = Options(
         runtime_dir=args.runtime_dir,
         whole_scan=args.scan,
         listen_s=args.listen,

@@ -15,7 +15,9 @@ from bridges.rmf import words
 
 REPEAT_S: Final = 1.0
 PATIENCE_S: Final = 2.0
-"""States come at 1 Hz. After two seconds of silence `send` gives a hint."""
+"""States come at 1 Hz. After two seconds of silence a request is sent all the same."""
+HINT_AFTER_S: Final = 3.0
+"""A node that starts needs a second or two to find the others. Then `send` says what it waits for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,9 @@ def step(request: Request, seen: Seen, now: float) -> Step:
     over = request.outcome(seen)
     if over is not None:
         return Step(outcome=over)
+    late = now >= seen.began_at + min(HINT_AFTER_S, seen.timeout_s)
+    if late and (wrong_kind := request.misnamed(seen)):
+        return Step(outcome=Failed(wrong_kind))
     if now >= seen.began_at + seen.timeout_s:
         return Step(outcome=Failed(_reason(request, seen, now)))
     hint, direct = _hint(request, seen, now), request.goes_direct(seen, now)
@@ -51,12 +56,10 @@ def _may_send(request: Request, seen: Seen, now: float, *, direct: bool) -> bool
 
 def _hint(request: Request, seen: Seen, now: float) -> str:
     """What the user can do, before the timeout."""
-    if now < seen.began_at + PATIENCE_S:
+    if now < seen.began_at + HINT_AFTER_S:
         return ""
-    if seen.first_sent_at is None and seen.listeners == 0:
-        return _said(request.nobody())
-    if not seen.states:
-        return _said(request.unheard(seen.names))
+    if missed := _missed(request, seen):
+        return _said(missed)
     if seen.first_sent_at is None or now < seen.first_sent_at + PATIENCE_S:
         return ""
     obstacle = _first(request.obstacles(seen))
@@ -65,16 +68,29 @@ def _hint(request: Request, seen: Seen, now: float) -> str:
 
 def _reason(request: Request, seen: Seen, now: float) -> str:
     """Why the request timed out, and where to look next."""
-    if seen.first_sent_at is None and seen.listeners == 0:
-        return _said(request.nobody())
-    if not seen.states:
-        return _said(request.unheard(seen.names))
+    if missed := _missed(request, seen):
+        return _given_up("", seen) if _said(missed) in seen.hinted else _said(missed)
     silent_s = now - seen.states[-1].at
     if silent_s > SILENT_AFTER_S:
         return f"{request.name} fell silent {silent_s:.0f} s ago: is its daemon still running?"
     obstacle = _first(request.obstacles(seen))
     state = words.described(seen.states[-1].message)
-    return _said(obstacle._replace(text=f"{obstacle.text} (last state: {state})"))
+    whole = _said(obstacle._replace(text=f"{obstacle.text} (last state: {state})"))
+    return (
+        whole if _said(obstacle) not in seen.hinted else _given_up(f"; last state: {state}", seen)
+    )
+
+
+def _missed(request: Request, seen: Seen) -> Obstacle | None:
+    """Who is not on the graph: whoever takes the request, or the device."""
+    if seen.first_sent_at is None and seen.listeners == 0:
+        return request.nobody(seen)
+    return None if seen.states else request.unheard(seen)
+
+
+def _given_up(more: str, seen: Seen) -> str:
+    """The end of a wait whose reason was said when it began."""
+    return f"gave up after {seen.timeout_s:g} s{more}"
 
 
 def _first(obstacles: Iterable[Obstacle]) -> Obstacle:

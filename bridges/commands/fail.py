@@ -2,7 +2,8 @@
 
 import argparse
 
-from bridges.commands.plants import add_simulation, names, obey
+from bridges.commands.completion import completed_by
+from bridges.commands.plants import add_simulation, names, obey, tell
 
 MODES = ("off", "stuck", "slow", "garbage", "wrong", "ok")
 
@@ -11,12 +12,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `fail`."""
     add_simulation(parser)
     part = parser.add_argument(
-        "part", metavar="PART", help="a signal of the file, or a part such as car, unit or server"
+        "part",
+        metavar="PART",
+        nargs="?",
+        help="a signal of the file, or a part such as car; without one: print what there is",
     )
-    part.completer = names("fail")  # type: ignore[attr-defined]  # argcomplete's way
-    parser.add_argument("mode", choices=MODES, help="how it fails; ok mends it")
+    completed_by(part, names("fail"))
+    parser.add_argument("mode", nargs="?", choices=MODES, help="how it fails; ok mends it")
+    parser.set_defaults(usage=parser.error)
 
 
 def run(args: argparse.Namespace) -> int:
     """0; 1 if it cannot fail like this; 69 if no simulation of the file runs."""
+    if args.part is None:
+        return tell(args, "fail")
+    if args.mode is None:
+        args.usage(f"how does {args.part} fail? {', '.join(MODES[:-1])}; ok mends it")
     return obey(args, "fail", args.part, args.mode)

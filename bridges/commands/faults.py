@@ -3,12 +3,16 @@
 `python -m bridges.commands.faults > docs/faults.md` writes the page.
 """
 
+import re
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
 import msgspec
 import yaml
 
+QUOTED: Final = re.compile(r"`([^`]*)`")
 HEAD: Final = """\
 # Faults, by name
 
@@ -32,6 +36,37 @@ def remedies() -> dict[str, Remedy]:
     """Each fault's remedy, by its code."""
     text = Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
     return msgspec.convert(yaml.safe_load(text), dict[str, Remedy])
+
+
+def values(file: str, device: str) -> dict[str, str]:
+    """What the YAML of a daemon sets for its device: key -> value; nothing if it cannot be read."""
+    from bridges.settings.load import SettingsError, load
+
+    try:
+        settings = load(Path(file)).devices.get(device)
+    except (SettingsError, OSError):
+        return {}
+    parts = [settings, getattr(settings, "limits", None)]
+    found = {k: v for part in parts if part for k, v in msgspec.structs.asdict(part).items()}
+    return {
+        key: f"{value:g} s" if key.endswith("_s") else f"{value}"
+        for key, value in found.items()
+        if isinstance(value, int | float | str)
+    }
+
+
+def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Remedy:
+    """The remedy for this device: its name, its file and its settings where only a word stood."""
+    names = {"FILE": shlex.quote(file)} if file else {}
+    names |= (
+        dict.fromkeys(("NAME", "LIFT", "DOOR", "CHARGER"), shlex.quote(device)) if device else {}
+    )
+
+    def named(quoted: re.Match[str]) -> str:
+        text = re.sub(r"\b[A-Z]+\b", lambda word: names.get(word[0], word[0]), quoted[1])
+        return f"`{text}` ({known[text]})" if text in known else f"`{text}`"
+
+    return Remedy(*(QUOTED.sub(named, text) for text in (remedy.cause, remedy.do)))
 
 
 def page() -> str:

@@ -1,6 +1,7 @@
 """What `watch` and `send` share: the options that name a graph, joining it, and listening."""
 
 import argparse
+import os
 import shlex
 import signal
 import sys
@@ -64,6 +65,16 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
     return Renamed(joined, rmf.topics) if rmf.topics else joined
 
 
+def graph_of(args: argparse.Namespace, speaks: str) -> str:
+    """Where the joined graph is, for people: `dds in domain 7, on this machine alone`."""
+    from bridges.rmf.choose import domain_id, stays_on_loopback
+
+    rmf = overridden(_configured(args.config), args)
+    alone = args.localhost or stays_on_loopback(rmf, os.environ)
+    where = f"{speaks} in domain {domain_id(rmf, os.environ)}"
+    return f"{where}, on this machine alone" if alone else where
+
+
 def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
     """A YAML's `rmf:` section, changed by the options of the command line."""
     if args.domain_id is not None:
@@ -120,8 +131,9 @@ class CommandLine:
         return shlex.join(("rmf-bridge", *self.typed, option))
 
     def other(self, *command: str) -> str:
-        """Another command, on the same graph."""
-        return shlex.join(("rmf-bridge", *command, *self.options))
+        """Another command, on the same graph. Only `send` knows `--direct`."""
+        options = [one for one in self.options if one != "--direct" or command[0] == "send"]
+        return shlex.join(("rmf-bridge", *command, *options))
 
 
 def command_line(args: argparse.Namespace) -> CommandLine:

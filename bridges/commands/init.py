@@ -122,7 +122,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--address", help="host, serial port or CAN interface")
     parser.add_argument("--unit", help="unit id of a Modbus module")
     parser.add_argument("--floors", help="such as L1,L2,L3, from below")
-    parser.add_argument("--signals", help=f"of {','.join(LIFT_INPUTS)}")
+    parser.add_argument("--signals", help=f"some of: {', '.join(LIFT_INPUTS)}")
     parser.add_argument("--encoding", choices=get_args(Encoding), help="of the floor lines")
     parser.add_argument("--contacts", choices=get_args(Level), help="level of a closed contact")
     parser.add_argument("--relays", choices=get_args(Level), help="level that switches a relay on")
@@ -140,6 +140,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """0; 64: answers are missing or do not go together; 66: the map; 73: the file is there already."""
+    if os.path.lexists(args.file):  # before anything is asked
+        return _there_already(args.file)
     try:
         given = answered(args, load_map(args.map) if args.map else None)
     except SettingsError as error:
@@ -152,6 +154,11 @@ def run(args: argparse.Namespace) -> int:
         print(f"rmf-bridge init: {error}", file=sys.stderr)
         return EX_USAGE
     return _written(args.file, given)
+
+
+def _there_already(file: Path) -> int:
+    print(f"{file} is there already, and stays: choose another name", file=sys.stderr)
+    return EX_CANTCREAT
 
 
 def _written(file: Path, given: Given) -> int:
@@ -167,6 +174,8 @@ def _written(file: Path, given: Given) -> int:
     except Impossible as error:
         print(f"rmf-bridge init: {error}", file=sys.stderr)
         return EX_USAGE
+    except FileExistsError:
+        return _there_already(file)
     except OSError as error:
         print(f"{file} is not written: {error.strerror}", file=sys.stderr)
         return EX_CANTCREAT

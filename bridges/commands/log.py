@@ -4,34 +4,69 @@ import argparse
 import os
 import shutil
 import sys
+import time
 from pathlib import Path
 from typing import NoReturn
 
+from bridges.commands.completion import completed_by, device_names, service_names
+from bridges.commands.services import CONFIG
+from bridges.commands.status import daemons, units
 from bridges.log import pairs
+from bridges.serve.places import runtimes
 
 EX_UNAVAILABLE = 69
+ETC = Path("/") / CONFIG
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `log`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML, or its name")
+    file = parser.add_argument(
+        "file", type=Path, metavar="FILE", help="the device YAML, or its service's name"
+    )
+    completed_by(file, service_names)
     parser.add_argument("-f", "--follow", action="store_true", help="go on with what comes")
     parser.add_argument("-n", "--lines", type=int, default=100, metavar="N", help="default: 100")
     parser.add_argument("--since", metavar="TIME", help="such as today, '1 hour ago', '09:30'")
-    parser.add_argument("--device", metavar="NAME", help="only what is about this device")
+    device = parser.add_argument("--device", metavar="NAME", help="only what is about this device")
+    completed_by(device, device_names)
     parser.add_argument("--event", metavar="WORD", help="only this event: state, fault, refused …")
     parser.add_argument("--json", action="store_true", help="the journal's JSON, a line each")
 
 
 def run(args: argparse.Namespace) -> int:
-    """journalctl's exit code; 69 where there is no journal."""
+    """journalctl's exit code; 69 where there is no journal, or the daemon does not log to it."""
+    name = args.file.stem
+    known = services()
+    if name not in known and _runs_by_hand(name):
+        print(
+            f"{name} was started by hand: its log is on the terminal where it runs, or where"
+            f" `rmf-bridge run {args.file} 2> LOG` sends it",
+            file=sys.stderr,
+        )
+        return EX_UNAVAILABLE
     if shutil.which("journalctl") is None:
         print(
             "no journalctl here: a daemon without systemd logs to its own terminal", file=sys.stderr
         )
         return EX_UNAVAILABLE
+    if name not in known:
+        there = ", ".join(sorted(known)) or "none"
+        print(
+            f"{name} is no service here (services: {there}); what the journal still has of it:",
+            file=sys.stderr,
+        )
     sys.stdout.flush()
     return _become(command(args))
+
+
+def services() -> set[str]:
+    """The services of this machine: each has a YAML in /etc/rmf-bridges, or a unit."""
+    return {file.stem for file in ETC.glob("*.yaml")} | set(units())
+
+
+def _runs_by_hand(name: str) -> bool:
+    found = daemons(runtimes(), {}, time.time())
+    return any(one.name == name and one.state in ("serving", "old") for one in found)
 
 
 def _become(words: list[str]) -> NoReturn:

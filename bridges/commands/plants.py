@@ -2,25 +2,26 @@
 
 import argparse
 import json
+import os
 import shlex
 import socket
 import sys
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from bridges.commands.completion import Completer, completed_by, device_names
 from bridges.serve.places import as_told, by_hand
 
-EX_UNAVAILABLE = 69
 ANSWER_S = 5.0
-Completer = Callable[..., list[str]]
-"""As argcomplete calls it: with the prefix and what was typed so far."""
 
 
 def add_simulation(parser: argparse.ArgumentParser) -> None:
     """The options that name a simulation and one of its devices."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the YAML that is simulated")
-    parser.add_argument("--device", metavar="NAME", help="which device, if the file has several")
+    device = parser.add_argument(
+        "--device", metavar="NAME", help="which device, if the file has several"
+    )
+    completed_by(device, device_names)
     parser.add_argument("--runtime-dir", metavar="DIR", help="the simulation's runtime directory")
 
 
@@ -47,37 +48,60 @@ def _folder(args: argparse.Namespace) -> Path:
     return (as_told(args.runtime_dir) or by_hand(args.file.absolute())).runtime
 
 
-def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
-    """Send one command. 0; 1 if the simulation refuses it; 69 if there is none."""
+def tell(args: argparse.Namespace, verb: str) -> int:
+    """Print what can `press` or `fail` in each device. 0; 69 if no simulation runs."""
     try:
-        answers = [_ask(path, [verb, *_device(args), *words]) for path in _sockets(args)]
+        answers = [json.loads(_ask(path, ["names"])) for path in _sockets(args)]
+    except (OSError, ValueError) as error:
+        return _silent(args, error)
+    if not answers:
+        return _nobody(args)
+    for answer in answers:
+        for device, known in answer.items():
+            if args.device in (None, device):
+                print(f"{device}: {', '.join(known[verb]) or 'nothing'}")
+    return 0
+
+
+def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
+    """Send one command and say what was done.
+
+    0; 1 if it is refused; 69 without a simulation; 64 for no such device; 78 for a wrong YAML.
+    """
+    from bridges.commands.by_hand import NoDevice, device_of
+    from bridges.settings.load import SettingsError, load
+
+    try:
+        device = args.device or device_of(load(args.file), None)
+    except (NoDevice, SettingsError) as error:
+        print(error, file=sys.stderr)
+        return os.EX_USAGE if isinstance(error, NoDevice) else os.EX_CONFIG
+    try:
+        answers = [_ask(path, [verb, device, *words]) for path in _sockets(args)]
     except OSError as error:
-        print(f"the simulation of {args.file} does not answer: {error}", file=sys.stderr)
-        return EX_UNAVAILABLE
+        return _silent(args, error)
     if "ok" in answers:
+        print(f"{device}: {' '.join(words)}")
         return 0
     if not answers:
-        print(
-            f"no simulation of {args.file} runs: there is no plant.sock in {_folder(args)}."
-            f" Start one with rmf-bridge run {args.file} --simulate",
-            file=sys.stderr,
-        )
-        return EX_UNAVAILABLE
+        return _nobody(args)
     known = [one for one in answers if "no device" not in one] or answers
     print("\n".join(one.removeprefix("error ") for one in known), file=sys.stderr)
     return 1
 
 
-def _device(args: argparse.Namespace) -> list[str]:
-    """The device's name; the file's only one if none is given."""
-    if args.device:
-        return [args.device]
-    from bridges.settings.load import load
+def _silent(args: argparse.Namespace, error: Exception) -> int:
+    print(f"the simulation of {args.file} does not answer: {error}", file=sys.stderr)
+    return os.EX_UNAVAILABLE
 
-    devices = list(load(args.file).devices)
-    if len(devices) > 1:
-        raise SystemExit(f"--device is needed: {args.file} has {', '.join(devices)}")
-    return devices
+
+def _nobody(args: argparse.Namespace) -> int:
+    print(
+        f"no simulation of {args.file} runs: there is no plant.sock in {_folder(args)}."
+        f" Start one with rmf-bridge run {args.file} --simulate",
+        file=sys.stderr,
+    )
+    return os.EX_UNAVAILABLE
 
 
 def _ask(path: Path, words: list[str]) -> str:

@@ -2,19 +2,22 @@
 
 import argparse
 
-from bridges.commands.plants import add_simulation, names, obey
+from bridges.commands.completion import completed_by
+from bridges.commands.plants import add_simulation, names, obey, tell
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `press`."""
     add_simulation(parser)
     signal = parser.add_argument(
-        "signal", metavar="SIGNAL", help="a wrong one is answered with what there is"
+        "signal", metavar="SIGNAL", nargs="?", help="without one: print what there is"
     )
-    signal.completer = names("press")  # type: ignore[attr-defined]  # argcomplete's way
+    completed_by(signal, names("press"))
     parser.add_argument("how", nargs="?", choices=("on", "off"), default="on", help="default: on")
 
 
 def run(args: argparse.Namespace) -> int:
     """0; 1 if there is no such signal; 69 if no simulation of the file runs."""
+    if args.signal is None:
+        return tell(args, "press")
     return obey(args, "press", args.signal, args.how)

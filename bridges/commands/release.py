@@ -2,8 +2,9 @@
 
 It is `send lift LIFT --end` under the name that an operator looks for: it sends the holder's
 END_SESSION to the lift supervisor until the lift shows that the session is over. If the supervisor does
-not obey within seconds, it goes to the lift's own daemon; where a robot may be in the car, only with
-`--car-empty`. A robot that keeps requesting the lift goes to the end of the queue.
+not obey within seconds, or there is none, it goes to the lift's own daemon by itself; where a robot may
+be in the car, only with `--car-empty`. A robot that keeps requesting the lift goes to the end of the
+queue.
 """
 
 import argparse
@@ -22,9 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="somebody has looked: no robot is in the car, so its own daemon may be asked to let go",
     )
-    parser.set_defaults(falls_back=True)
+    parser.set_defaults(falls_back=True, direct=False)
     parser.set_defaults(kind="lift", end=True, floor=None, granted_only=False)
-    send.add_shared_arguments(parser, direct=True)
+    send.add_shared_arguments(parser, direct=False)
 
 
 def run(args: argparse.Namespace) -> int:

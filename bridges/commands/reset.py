@@ -9,8 +9,6 @@ from bridges.serve import directory as runtime
 from bridges.serve.places import Places, act_as_owner
 from bridges.serve.signals import RESET
 
-EX_UNAVAILABLE = 69
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `reset`."""
@@ -20,16 +18,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """0 when the daemon was told, 1 when none runs, 69 if this user may not see or signal it."""
-    if not args.file.exists() and not args.runtime_dir:
-        print(f"{args.file} does not exist", file=sys.stderr)
-        return 1
     try:
+        if not args.runtime_dir and not args.file.exists():
+            print(f"{args.file} does not exist", file=sys.stderr)
+            return 1
         places = runtime.find(args.file.absolute(), args.runtime_dir)
         act_as_owner(places)
         return _reset(args.file, places)
     except (runtime.Unknown, PermissionError) as error:
         print(error, file=sys.stderr)
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
 
 
 def _reset(file: Path, places: Places) -> int:

@@ -17,8 +17,6 @@ from bridges.serve.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError
 
-EX_USAGE, EX_UNAVAILABLE, EX_CONFIG = 64, 69, 78
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `run`."""
@@ -52,32 +50,32 @@ def run(args: argparse.Namespace) -> int:
     log.start(args.log_level.upper(), json=args.log_format == "json")
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: --simulate is refused where RMF_BRIDGE_SERVICE=1")
-        return EX_USAGE
+        return os.EX_USAGE
     if args.expose and not args.simulate:
         logging.error("--expose needs --simulate: a real device is on the network anyway")
-        return EX_USAGE
+        return os.EX_USAGE
     try:
         config = load(args.file)
         config = replace(config, rmf=overridden(config.rmf, args))
     except SettingsError as error:
         for problem in error.problems:
             logging.error(str(problem))
-        return EX_CONFIG
+        return os.EX_CONFIG
     if wrong := drop_in.misfit(config, os.environ) or too_slow(config, watchdog_s()):
         logging.error(wrong)
-        return EX_CONFIG
+        return os.EX_CONFIG
     end = signals.End()  # before the lock names our pid, which others then signal
     signals.ignore_reset()
     try:
-        held = _held(args)
+        held = runtime.held(args.file, args.runtime_dir, serves=True, simulated=args.simulate)
     except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
         logging.error(str(error))
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     try:
         return _serve(config, held, end, args)
     except (TransportError, HalError) as error:
         logging.error(str(error))
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     finally:
         held.close()
 
@@ -94,20 +92,6 @@ def too_slow(config: Config, watchdog: float | None) -> str:
     return ""
 
 
-def _held(args: argparse.Namespace) -> runtime.RuntimeDirectory:
-    """Our directories, locked. A simulation never takes a service's.
-
-    Raises AlreadyRunning, Unknown or PermissionError.
-    """
-    file = args.file.absolute()
-    if args.simulate:
-        found = places.as_told(args.runtime_dir) or places.by_hand(file)
-    else:
-        found = runtime.find(file, args.runtime_dir)
-    places.own(found)
-    return runtime.RuntimeDirectory(found, file, serves=True)
-
-
 def _serve(
     config: Config, held: runtime.RuntimeDirectory, end: signals.End, args: argparse.Namespace
 ) -> int:
@@ -122,7 +106,7 @@ def _serve(
     from hal_fakes.simulate import Simulation
 
     logging.warning("SIMULATED: no hardware moves, and RMF is told simulated states")
-    simulation = Simulation(config, held.path)
+    simulation = Simulation(config, held.path, log_format=args.log_format)
     from bridges.serve.daemon import Daemon  # imported while the fakes start
 
     try:

@@ -19,6 +19,7 @@ from bridges.commands.graph import (
     add_graph_arguments,
     command_line,
     complain,
+    graph_of,
     interruptible,
     open_graph,
 )
@@ -33,6 +34,8 @@ from bridges.rmf.transport import Publisher, Transport, TransportError
 
 NODE_NAME = "rmf_bridge_send"
 LOOK_EVERY_S = 0.1
+STATES = (topics.LIFT_STATES, topics.DOOR_STATES, topics.CHARGER_STATES)
+"""Also those of other kinds: a name may be another kind's."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> None:
-    """Which graph, how long, and (of lifts and doors) whom to ask."""
+    """Which graph, how long, and with `direct` whom to ask."""
     add_graph_arguments(parser)
     parser.add_argument(
         "--timeout",
@@ -174,18 +177,33 @@ def run(args: argparse.Namespace) -> int:
     request = request_of(args)
     try:
         with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
-            return send(transport, request, args.timeout, sys.stdout)
+            return send(
+                transport,
+                request,
+                args.timeout,
+                sys.stdout,
+                command=args.command,
+                graph=graph_of(args, transport.speaks),
+            )
     except TransportError as error:
-        complain("send", error)
+        complain(args.command, error)
         return 1
     except KeyboardInterrupt:
-        complain("send", "interrupted; the last request remains in effect")
+        complain(args.command, "interrupted; the last request remains in effect")
         return 130
 
 
-def send(transport: Transport, request: Request, timeout_s: float, out: TextIO) -> int:
-    """0 when the effect was seen within `timeout_s`, else 1."""
-    exchange = _Exchange(transport, request, timeout_s, out)
+def send(
+    transport: Transport,
+    request: Request,
+    timeout_s: float,
+    out: TextIO,
+    *,
+    command: str = "send",
+    graph: str = "",
+) -> int:
+    """0 when the effect was seen within `timeout_s`, else 1. `graph`: where we are, for people."""
+    exchange = _Exchange(transport, request, timeout_s, out, command, graph)
     while True:
         code = exchange.look()
         if code is not None:
@@ -196,19 +214,25 @@ class _Exchange:
     """Calls `exchange.step` with the clock, the transport and the terminal."""
 
     def __init__(
-        self, transport: Transport, request: Request, timeout_s: float, out: TextIO
+        self,
+        transport: Transport,
+        request: Request,
+        timeout_s: float,
+        out: TextIO,
+        command: str = "send",
+        graph: str = "",
     ) -> None:
+        self.command = command
         self.request, self.out, self.transport = request, out, transport
         self.publishers: dict[str, Publisher[d.Message]] = {}
         self.publisher = self._publisher(request.topic)
-        self.inbox = Inbox(transport, request.states, *request.answers, topics.DIAGNOSTICS)
+        self.inbox = Inbox(transport, *STATES, *request.answers, topics.DIAGNOSTICS)
         self.supervisor = (
             None
             if request.supervisor is None
             else transport.subscribe(request.supervisor, lambda message: None)
         )
-        self.seen = Seen(began_at=time.monotonic(), timeout_s=timeout_s)
-        self.said: set[str] = set()
+        self.seen = Seen(began_at=time.monotonic(), timeout_s=timeout_s, graph=graph)
         self.asked: set[str] = set()
         self.described = ""
 
@@ -221,9 +245,10 @@ class _Exchange:
         todo = step(self.request, self.seen, now)
         if todo.outcome is not None:
             return self._finish(todo.outcome)
-        if todo.hint and todo.hint not in self.said:
-            self.said.add(todo.hint)
-            complain("send", todo.hint)
+        if todo.hint and todo.hint not in self.seen.hinted:
+            left_s = max(0.0, self.seen.began_at + self.seen.timeout_s - now)
+            self.seen = replace(self.seen, hinted=self.seen.hinted | {todo.hint})
+            complain(self.command, f"waits {left_s:.0f} s more: {todo.hint}")
         if todo.send is not None:
             self._send(todo.send, now, self.request.own if todo.direct else self.request.topic)
         return None
@@ -265,7 +290,7 @@ class _Exchange:
         if isinstance(outcome, Done):
             self._line(time.monotonic(), "done", outcome.text)
             return 0
-        complain("send", outcome.text)
+        complain(self.command, outcome.text)
         return 1
 
     def _line(self, at: float, what: str, text: str) -> None:

@@ -17,7 +17,7 @@ from typing import Any, Final, TextIO, cast
 
 import msgspec
 
-from bridges.commands.faults import Remedy, remedies
+from bridges.commands.faults import Remedy, here, remedies, values
 from bridges.commands.paint import bold, red
 from bridges.rmf.words import printable
 from bridges.serve import directory
@@ -50,25 +50,25 @@ LEVEL_OF: Final = {
 }
 
 
-class FaultTold(msgspec.Struct):
+class FaultStatus(msgspec.Struct):
     """A fault in a status file."""
 
     code: str
     detail: str
 
 
-class DeviceTold(msgspec.Struct):
+class DeviceStatus(msgspec.Struct):
     """What every device's status has; its other keys are the kind's own."""
 
-    faults: list[FaultTold] = []
+    faults: list[FaultStatus] = []
     input_age_s: float | None = None
 
 
-class Told(msgspec.Struct):
+class StatusFile(msgspec.Struct):
     """What `status` relies on in a status file."""
 
-    devices: dict[str, DeviceTold] = {}
-    faults: list[FaultTold] = []
+    devices: dict[str, DeviceStatus] = {}
+    faults: list[FaultStatus] = []
     heard_by: dict[str, int] = {}
     hears: dict[str, int] = {}
 
@@ -116,7 +116,10 @@ def run(args: argparse.Namespace) -> int:
     folders = [Path(args.runtime_dir)] if args.runtime_dir else list(runtimes())
     found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
     if args.name:
+        there = [one.name for one in found if one.state != "stopped" or one.unit]
         found = [one for one in found if one.name == Path(args.name).stem]
+        if there and not found:
+            print(f"no daemon {Path(args.name).stem}; there is {', '.join(there)}", file=sys.stderr)
     else:  # what was started by hand once is no news
         found = [one for one in found if one.state != "stopped" or one.unit]
     if args.json:
@@ -178,7 +181,7 @@ def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
     try:
         written_at = path.stat().st_mtime
         text = path.read_bytes()
-        msgspec.json.decode(text, type=Told)
+        msgspec.json.decode(text, type=StatusFile)
         found = msgspec.json.decode(text, type=dict[str, Any])
     except (FileNotFoundError, msgspec.MsgspecError):
         return {}, None
@@ -231,10 +234,11 @@ def _serving(one: Daemon, known: Mapping[str, Remedy], out: TextIO) -> Iterator[
         yield f"  {topic}: " + ("nobody listens" if not nodes else f"heard by {_nodes(nodes)}")
     for topic, nodes in one.status.get("hears", {}).items():
         yield f"  {topic}: " + ("nobody sends" if not nodes else f"from {_nodes(nodes)}")
-    yield from _fault_lines(one.status, known, out)
+    file = str(one.status.get("file", ""))
+    yield from _fault_lines(one.status, known, out, file)
     for name, device in one.devices.items():
         yield f"  {printable(name)}: {_told(device)}; {_age(device, one.age_s or 0.0)}"
-        yield from _fault_lines(device, known, out)
+        yield from _fault_lines(device, known, out, file, name)
 
 
 def _state(one: Daemon) -> str:
@@ -281,10 +285,15 @@ def _faults(one: Daemon) -> bool:
     return any(part.get("faults") for part in (one.status, *one.devices.values()))
 
 
-def _fault_lines(part: Status, known: Mapping[str, Remedy], out: TextIO) -> Iterator[str]:
-    for fault in part.get("faults", ()):
+def _fault_lines(
+    part: Status, known: Mapping[str, Remedy], out: TextIO, file: str, name: str = ""
+) -> Iterator[str]:
+    faults = part.get("faults", ())
+    settings = values(file, name) if faults and name else {}
+    for fault in faults:
         detail = printable(": ".join(filter(None, (fault["code"], fault["detail"]))))
         yield "    " + red(detail, out)
-        if remedy := known.get(fault["code"]):
-            yield f"      cause: {remedy.cause}"
-            yield f"      do: {remedy.do}"
+        if fault["code"] in known:
+            remedy = here(known[fault["code"]], file, name, settings)
+            yield f"      cause: {printable(remedy.cause)}"
+            yield f"      do: {printable(remedy.do)}"

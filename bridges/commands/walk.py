@@ -17,19 +17,24 @@ from datetime import datetime
 from pathlib import Path
 
 from bridges import log
+from bridges.commands.by_hand import NoDevice, device_of, guarded
+from bridges.commands.completion import completed_by, device_names
 from bridges.serve import directory as runtime
-from bridges.serve import guard, places, record, signals
+from bridges.serve import guard, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import Bus, HalError
 
-NOT_OFF, EX_USAGE, EX_UNAVAILABLE, EX_CONFIG = 1, 64, 69, 78
+NOT_OFF = 1
 DRAW_S = 0.05
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `walk`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
-    parser.add_argument("--device", metavar="NAME", help="which device, if the file has several")
+    device = parser.add_argument(
+        "--device", metavar="NAME", help="which device, if the file has several"
+    )
+    completed_by(device, device_names)
     parser.add_argument(
         "--by", metavar="NAME", help="who does it, for the record (default: the user)"
     )
@@ -44,30 +49,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: all off; 1: not verified off; 64: no terminal; 69: in use; 73: no record; 78: the YAML."""
+    """0: all off; 1: not verified off; 64: no terminal, device; 69: in use; 73: no record; 78: YAML."""
     log.start("WARNING")
     if why := _no_screen():
         print(why, file=sys.stderr)
-        return EX_USAGE
+        return os.EX_USAGE
     try:
         config = load(args.file)
-        device = _device(config, args.device)
+        device = device_of(config, args.device)
     except SettingsError as error:
         print("\n".join(map(str, error.problems)), file=sys.stderr)
-        return EX_CONFIG
+        return os.EX_CONFIG
+    except NoDevice as error:
+        print(error, file=sys.stderr)
+        return os.EX_USAGE
     end = signals.End()
     signals.ignore_reset()
-    file = args.file.absolute()
     try:
-        held = runtime.RuntimeDirectory(_places(args), file, serves=False)
+        held = runtime.held(args.file, args.runtime_dir, serves=False, simulated=args.simulate)
     except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
-        print(f"{error}: stop it first, a device has one master", file=sys.stderr)
-        return EX_UNAVAILABLE
+        print(f"walk needs the device for itself: {error}", file=sys.stderr)
+        return os.EX_UNAVAILABLE
     try:
         return _walk(args, config, device, held, end)
     except HalError as error:
         print(error, file=sys.stderr)
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     finally:
         held.close()
 
@@ -80,28 +87,6 @@ def _no_screen() -> str:
     return ""
 
 
-def _device(config: Config, name: str | None) -> str:
-    """The device to walk. Raises SystemExit with what to write instead."""
-    names = list(config.devices)
-    if not names:
-        raise SystemExit(f"a {config.kind} has no wires to walk")
-    if name is None and len(names) > 1:
-        raise SystemExit(f"--device is needed: the file has {', '.join(names)}")
-    if name is not None and name not in names:
-        raise SystemExit(f"the file has no device '{name}'; it has {', '.join(names)}")
-    return name or names[0]
-
-
-def _places(args: argparse.Namespace) -> places.Places:
-    """The directories of this file's daemon, so that neither starts beside the other."""
-    file = args.file.absolute()
-    if args.simulate:
-        return places.as_told(args.runtime_dir) or places.by_hand(file)
-    found = runtime.find(file, args.runtime_dir)
-    places.own(found)
-    return found
-
-
 def _walk(
     args: argparse.Namespace,
     config: Config,
@@ -111,7 +96,7 @@ def _walk(
 ) -> int:
     if held.records.unreleased():
         print(f"a dead daemon may have left outputs on: rmf-bridge outputs-off {args.file}")
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     with ExitStack() as stack:
         bus_name = config.bus_of(device)
         path = _record_path(args, device).absolute()
@@ -121,13 +106,10 @@ def _walk(
             simulation = Simulation(config, held.path)
             stack.callback(simulation.close)
             return _on(args, config, device, simulation.open_bus(bus_name), path, end)
-        held.claim(record.of(config))
-        watching = guard.Guard(guard.command(args.file, args.runtime_dir))
-        places.work_somewhere(held.places)
+        all_off = guarded(config, held, guard.command(args.file, args.runtime_dir))
         code = _on(args, config, device, config.open_bus(bus_name), path, end)
         if code != NOT_OFF:
-            held.released()
-            watching.dismiss()
+            all_off()
         return code
 
 

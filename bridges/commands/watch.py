@@ -92,6 +92,12 @@ def show_once(inbox: Inbox, seconds: float, out: TextIO, *, as_json: bool = Fals
     return 0
 
 
+def settled(board: Board, now: float, wall: float) -> list[Row]:
+    """The rows without those that might not say yet that they are simulated."""
+    young = board.unsettled(now)
+    return [row for row in board.rows(now, wall) if (row.kind, row.name) not in young]
+
+
 def show(
     inbox: Inbox, out: TextIO, *, live: bool, line: Callable[[Row, float], str] = change_line
 ) -> None:
@@ -102,7 +108,7 @@ def show(
         for heard in inbox.listen(REDRAW_S):
             board.take(heard)
         now, wall = time.monotonic(), time.time()
-        before, rows = rows, board.rows(now, wall)
+        before, rows = rows, settled(board, now, wall)
         if not live:
             out.writelines(line(row, wall) + "\n" for row in changes(before, rows))
         elif now >= next_at:

@@ -9,7 +9,8 @@ Rules, in the order in which they are applied:
    sends END for a robot that is still inside, and that robot must get out.
    If RMF's supervisor asks for another session than the one that has the lift, its robot's own
    requests and END count as well (`bridges/lift/forgotten.py`).
-3. A request sets the destination and the mode. `bridges/lift/drive.py` says what may be energised.
+3. A request sets the destination and the mode. While the door is held, another destination may have
+   to wait (`bridges/lift/replayed.py`). `bridges/lift/drive.py` says what may be energised.
 4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and its
    latch, if an operator must reset it), code blue, earthquake, emergency, out of service, manual mode,
    a second node for this lift, inputs that cannot be believed, outputs that cannot be written. A gap
@@ -39,7 +40,7 @@ from bridges.core.decision import (
     WriteFailed,
 )
 from bridges.core.durations import NEVER, RIVAL_QUIET_S
-from bridges.lift import drive, forgotten
+from bridges.lift import drive, forgotten, replayed
 from bridges.lift.memory import Grace, LiftLimits, Memory, Session
 from bridges.lift.report import NOT_FRESH, LiftReport, report
 from bridges.lift.sensing import HAZARDS, View, gap, look, take, trust, unsure
@@ -174,43 +175,63 @@ def _ask(memory: Memory, request: Requested, now: float, limits: LiftLimits) -> 
         session = forgotten.overruled(held, request.session_id, now)
         return replace(memory, session=session), f"held by another session: {held.id}"
     if held:
-        session = replace(_refresh(held, request, now), forgotten=None)
-        return replace(memory, session=session), ""
+        return replace(memory, session=_heed(memory, held, request, now)), ""
     if grace and now < grace.until:
         if grace.session.id != request.session_id:
             return memory, f"{RELEASED_LATELY}: by {grace.session.id}"
-        return replace(memory, session=_grant(request, now, grace.session.boarded), grace=None), ""
+        session = _heed(memory, _anew(grace.session, now), request, now)
+        return replace(memory, session=session, grace=None), ""
     view = look(memory.senses, now, limits)
     why_not = obstacles(memory, view, now, limits)
     if why_not:
         starting = view.settling and not memory.io_fault and why_not[0].code == NOT_FRESH
         return memory, STARTING if starting else why_not[0].code
-    return replace(memory, session=_grant(request, now, boarded=False), grace=None), ""
+    session = Session(request.session_id, request.agv, request.destination, now)
+    return replace(memory, session=session, grace=None), ""
+
+
+def _heed(memory: Memory, session: Session, request: Requested, now: float) -> Session:
+    """The session once `lift_requests` asks for it."""
+    own = memory.own.get(session.id, "")
+    held_open = memory.relays.hold.on is not None
+    doubted = replayed.doubt(session, request, own, held_open, now)
+    heeded = replace(session, asked_at=now) if doubted else _refresh(session, request, now)
+    return replace(heeded, forgotten=None, doubted=doubted)
 
 
 def _hear_adapter(memory: Memory, event: FromAdapter, now: float, limits: LiftLimits) -> Memory:
-    """A robot's own request: it counts for the session that has the lift, and only if forgotten."""
+    """A robot's own request: it counts for the session that has the lift, if that is forgotten, or if
+    it settles a doubt."""
     held, asked = memory.session, event.asked
+    memory = replace(memory, own=replayed.noted(memory.own, asked))
     if held is None or held.id != asked.session_id:
         return memory
     session, obeyed = forgotten.heard(held, event)
-    if not obeyed:
+    if not (obeyed or replayed.confirmed(session, asked)):
         return replace(memory, session=session)
     if isinstance(asked, Requested):
         return replace(memory, session=_refresh(session, asked, now))
     return _end(memory, asked.session_id, now, limits)[0]
 
 
-def _grant(request: Requested, now: float, boarded: bool) -> Session:
-    return Session(request.session_id, request.agv, request.destination, now, boarded=boarded)
-
-
 def _refresh(session: Session, request: Requested, now: float) -> Session:
     """A repeat only shows that RMF is alive; another destination or mode is a new request."""
     if (request.agv, request.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
-    fresh = _grant(request, now, session.boarded)
-    return replace(fresh, forgotten=session.forgotten, own_stamp=session.own_stamp)
+    fresh = replace(_anew(session, now), agv=request.agv, destination=request.destination)
+    return replace(fresh, forgotten=session.forgotten)
+
+
+def _anew(session: Session, now: float) -> Session:
+    """The session as if it were granted now, but for what is known of its robot."""
+    return Session(
+        session.id,
+        session.agv,
+        session.destination,
+        now,
+        boarded=session.boarded,
+        own_stamp=session.own_stamp,
+    )
 
 
 def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tuple[Memory, str]:

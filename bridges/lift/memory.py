@@ -106,6 +106,13 @@ class Forgotten(msgspec.Struct, frozen=True):
     ended: bool = False
 
 
+class Doubted(msgspec.Struct, frozen=True):
+    """A destination, asked for `since`, that may be of an earlier ride (`bridges/lift/replayed.py`)."""
+
+    destination: str
+    since: float
+
+
 class Session(msgspec.Struct, frozen=True):
     """Who holds the lift, what was requested, and how far the ride has come.
 
@@ -114,7 +121,7 @@ class Session(msgspec.Struct, frozen=True):
     `call_at`: when the present call began. `waiting`, `since`: what we wait for, and since when.
     `tries`: how often that has failed. `retry_at`: outputs stay off until then (inf: latched).
     `forgotten`: RMF's supervisor asks for another session. `own_stamp`: the newest stamp (ns) of the
-    robot's own requests, as its adapter sent them.
+    robot's own requests, as its adapter sent them. `doubted`: a destination that does not count yet.
     """
 
     id: str
@@ -132,6 +139,7 @@ class Session(msgspec.Struct, frozen=True):
     fault: Fault | None = None
     forgotten: Forgotten | None = None
     own_stamp: int = 0
+    doubted: Doubted | None = None
 
 
 class Grace(msgspec.Struct, frozen=True):
@@ -217,7 +225,8 @@ class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives a scan.
 
     `io_fault`: why the last read or write failed; "" if both succeeded. `unwritten_since`: since when
-    writes have failed in every scan. `write_failed`: the last scan's write failed.
+    writes have failed in every scan. `write_failed`: the last scan's write failed. `own`: where each
+    robot itself last asked the lift to go, by its session.
     """
 
     senses: Senses = Senses()
@@ -230,3 +239,4 @@ class Memory(msgspec.Struct, frozen=True):
     io_fault: str = ""
     unwritten_since: float | None = None
     write_failed: bool = False
+    own: Mapping[str, str] = {}

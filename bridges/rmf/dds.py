@@ -71,13 +71,12 @@ class DdsTransport(Threaded):
     def __init__(
         self, node_name: str, domain_id: int, *, loopback: bool, release: Release | None = None
     ) -> None:
-        super().__init__(node_name, release)
+        super().__init__(node_name, domain_id, release)
         self._failed = False
         self._entities: list[core.Entity] = []
         self._topics: dict[str, DdsTopic] = {}
         self._ends: tuple[DdsPublisher | DdsSubscription, ...] = ()
         self._subscriptions: tuple[DdsSubscription, ...] = ()
-        self._domain_id = domain_id
         self._loopback = loopback
         self._stop = threading.Event()
         self._joined = False
@@ -128,9 +127,9 @@ class DdsTransport(Threaded):
     def _join(self) -> None:
         self._addresses = addresses.addresses()
         wanted = cyclone.LOOPBACK if self._loopback else cyclone.configuration(os.environ)
-        self._domain = _shared_domain(self._domain_id, wanted)
+        self._domain = _shared_domain(self.domain_id, wanted)
         userdata = Qos(Policy.Userdata(b"enclave=/;"))
-        self._participant = self._keep(DomainParticipant(self._domain_id, qos=userdata))
+        self._participant = self._keep(DomainParticipant(self.domain_id, qos=userdata))
         self._waitset = self._keep(core.WaitSet(self._participant))
         self._leaving = self._keep(core.GuardCondition(self._participant))
         self._waitset.attach(self._leaving)

@@ -7,7 +7,7 @@ publishers that retain them.
 """
 
 import time
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable
 
 from bridges.rmf import cdr, notices
@@ -18,17 +18,18 @@ from bridges.rmf.transport import M, Receive, TransportError, any_type
 
 
 class MemoryNetwork:
-    """The network of one test: the publishers and subscriptions of all its nodes."""
+    """The network of one test: the publishers and subscriptions of all its nodes, by topic."""
 
     def __init__(self) -> None:
-        self.publishers: list[_Publisher] = []
-        self.subscriptions: list[_Subscription] = []
+        self.publishers: dict[str, list[_Publisher]] = defaultdict(list)
+        self.subscriptions: dict[str, list[_Subscription]] = defaultdict(list)
 
 
 class MemoryTransport:
     """One node on a MemoryNetwork. Callbacks run on the thread that publishes."""
 
     speaks = "memory"
+    domain_id = 0
 
     def __init__(self, network: MemoryNetwork, node_name: str, release: Release = NEWEST) -> None:
         self.name = node_name
@@ -41,7 +42,7 @@ class MemoryTransport:
         """Declare a publisher with `topic.publish` QoS."""
         self._require_open()
         publisher = _Publisher(self, self._network, topic)
-        self._network.publishers.append(publisher)
+        self._network.publishers[topic.name].append(publisher)
         return publisher
 
     def subscribe(
@@ -50,7 +51,7 @@ class MemoryTransport:
         """Declare a subscription with `topic.subscribe` QoS. Retained messages arrive at once."""
         self._require_open()
         subscription = _Subscription(self, self._network, topic, any_type(received), others_only)
-        self._network.subscriptions.append(subscription)
+        self._network.subscriptions[topic.name].append(subscription)
         subscription.catch_up()
         return subscription
 
@@ -70,9 +71,10 @@ class MemoryTransport:
     def close(self) -> None:
         """Leave the network; what this node has retained is gone."""
         self._closed = True
-        network = self._network
-        network.publishers = [end for end in network.publishers if end.node is not self]
-        network.subscriptions = [end for end in network.subscriptions if end.node is not self]
+        for ends in self._network.publishers.values():
+            ends[:] = [end for end in ends if end.node is not self]
+        for hears in self._network.subscriptions.values():
+            hears[:] = [end for end in hears if end.node is not self]
 
     def _require_open(self) -> None:
         if self._closed:
@@ -84,28 +86,28 @@ class _Publisher:
         self.node = node
         self.topic = topic
         self.retained: deque[Message] = deque(maxlen=topic.publish.depth)
-        self._network = network
+        self._ends = network.publishers[topic.name]
+        self._heard_by = network.subscriptions[topic.name]
 
     def publish(self, message: Message) -> None:
         """Deliver at once. Raises CdrError for a message that no wire could carry."""
-        if self not in self._network.publishers:
+        if self not in self._ends:
             raise TransportError(f"topic {self.topic.name}: the node has left the graph")
         cdr.encode(self.topic.type, message, self.node.release)
         if self.topic.publish.durability == "transient_local":
             self.retained.append(message)
-        for subscription in self._network.subscriptions:
+        for subscription in list(self._heard_by):
             if subscription.hears(self):
                 subscription.hand_on(message)
 
     def matched(self) -> int:
         """How many subscriptions are reached; 0 after close."""
-        open_here = self in self._network.publishers
-        return sum(open_here and end.hears(self) for end in self._network.subscriptions)
+        return sum(end.hears(self) for end in self._heard_by) if self in self._ends else 0
 
     def close(self) -> None:
         """Take this end off the graph."""
-        if self in self._network.publishers:
-            self._network.publishers.remove(self)
+        if self in self._ends:
+            self._ends.remove(self)
 
 
 class _Subscription:
@@ -119,15 +121,16 @@ class _Subscription:
     ) -> None:
         self.node = node
         self.received = received
-        self._network = network
-        self._topic = topic
+        self._ends = network.subscriptions[topic.name]
+        self._hears = network.publishers[topic.name]
+        self.topic = topic
         self._others_only = others_only
 
     def hears(self, publisher: _Publisher) -> bool:
-        """Whether DDS would match the two."""
-        theirs, ours = publisher.topic, self._topic
+        """Whether DDS would match the two, which have the same name."""
+        theirs, ours = publisher.topic, self.topic
         return (
-            (theirs.name, theirs.type) == (ours.name, ours.type)
+            theirs.type == ours.type
             and (ours.subscribe.durability, theirs.publish.durability)
             != ("transient_local", "volatile")
             and not (self._others_only and publisher.node is self.node)
@@ -135,18 +138,17 @@ class _Subscription:
 
     def hand_on(self, message: Message) -> None:
         """Deliver a message. As on a wire, a subscriber's exception does not reach the publisher."""
-        notices.hand_on(self.node.dropped, self._topic, self.received, message)
+        notices.hand_on(self.node.dropped, self.topic, self.received, message)
 
     def catch_up(self) -> None:
         """Receive what each publisher has retained, the newest `depth` of each."""
-        if self._topic.subscribe.durability == "volatile":
+        if self.topic.subscribe.durability == "volatile":
             return
-        for publisher in self._network.publishers:
+        for publisher in self._hears:
             if self.hears(publisher):
-                for message in list(publisher.retained)[-self._topic.subscribe.depth :]:
+                for message in list(publisher.retained)[-self.topic.subscribe.depth :]:
                     self.hand_on(message)
 
     def matched(self) -> int:
         """How many publishers are heard; 0 after close."""
-        open_here = self in self._network.subscriptions
-        return sum(open_here and self.hears(end) for end in self._network.publishers)
+        return sum(self.hears(end) for end in self._hears) if self in self._ends else 0

@@ -73,7 +73,7 @@ class Peers:
         self._ends.clear()
 
     def settle(self) -> bool:
-        """Follow RMF's release. True if ours has changed by that."""
+        """Take over the release that RMF's nodes speak. True if ours has changed."""
         heard = self._heard()
         self._name_mixed(heard)
         if not self._auto or len(heard) != 1 or self.release in heard:

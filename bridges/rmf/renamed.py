@@ -16,6 +16,7 @@ class Renamed:
 
     def __init__(self, transport: Transport, names: Mapping[str, str]) -> None:
         self.name, self.speaks, self.dropped = transport.name, transport.speaks, transport.dropped
+        self.domain_id = transport.domain_id
         self.wall, self.close = transport.wall, transport.close
         self._transport = transport
         self._names = names

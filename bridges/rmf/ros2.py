@@ -52,9 +52,8 @@ class Ros2Transport(Threaded):
         loopback: bool,
         ros_args: Sequence[str] = (),
     ) -> None:
-        super().__init__(node_name, installed())
+        super().__init__(node_name, domain_id, installed())
         self._asked_name = node_name
-        self._domain_id = domain_id
         self._loopback = loopback
         self._ros_args = ros_args
         self._pause = threading.Event()
@@ -129,7 +128,7 @@ class Ros2Transport(Threaded):
         """Raises one of REFUSALS."""
         self._addresses = addresses.addresses()
         self._stay = Stay(
-            self._asked_name, self._domain_id, loopback=self._loopback, ros_args=self._ros_args
+            self._asked_name, self.domain_id, loopback=self._loopback, ros_args=self._ros_args
         )
         self._clock = self._stay.node.get_clock()
 

@@ -29,8 +29,9 @@ class Threaded:
 
     refusals: ClassVar[tuple[type[Exception], ...]]
 
-    def __init__(self, node_name: str, release: Release | None = None) -> None:
+    def __init__(self, node_name: str, domain_id: int, release: Release | None = None) -> None:
         self.name = node_name
+        self.domain_id = domain_id
         self._peers = Peers(release)
         self.dropped: dict[str, int] = {}
         self._lock = threading.Lock()

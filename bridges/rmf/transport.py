@@ -51,7 +51,7 @@ class Subscription(Protocol):
 
 
 class Transport(Protocol):
-    """One node on the RMF graph. `speaks`: the transport's name in a YAML.
+    """One node on the RMF graph. `speaks`: the transport's name in a YAML. `domain_id`: its ROS domain.
 
     `received` is called on the transport's own thread. A callback must only append to an inbox and
     must not raise. Samples that do not decode, or whose callback raises, are dropped, counted in
@@ -60,6 +60,7 @@ class Transport(Protocol):
 
     name: str
     speaks: str
+    domain_id: int
     dropped: dict[str, int]
 
     @property

@@ -16,6 +16,8 @@ Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel
 
 def printable(text: str) -> str:
     """The text on one line, with control characters escaped, so that no name can move the cursor."""
+    if text.isprintable():
+        return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -36,6 +38,17 @@ def device(message: Stated | Requested) -> str:
             return message.door_name
         case _:
             return message.charger_name
+
+
+def kind(state: Stated) -> str:
+    """The kind of device that a state is of: `lift`, `door` or `charger`."""
+    match state:
+        case d.LiftState():
+            return "lift"
+        case d.DoorState():
+            return "door"
+        case d.ChargerState():
+            return "charger"
 
 
 def stamped_at(state: Stated) -> float:

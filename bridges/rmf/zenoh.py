@@ -62,9 +62,8 @@ class ZenohTransport(Threaded):
         settings: Zenoh | None = None,
         release: Release | None = None,
     ) -> None:
-        super().__init__(node_name, release)
+        super().__init__(node_name, domain_id, release)
         self._settings = settings or Zenoh()
-        self._domain_id = domain_id
         self._loopback = loopback
         self._failed = False
         self._ends: tuple[ZenohEnd, ...] = ()
@@ -139,7 +138,7 @@ class ZenohTransport(Threaded):
         """Open a session if possible. A client has none before its router answers."""
         self._addresses = addresses.addresses()
         if self._loopback:
-            ways = zenoh_config.on_loopback(self._domain_id)
+            ways = zenoh_config.on_loopback(self.domain_id)
         else:
             ways = [zenoh_config.on_the_site(self._settings)]
         try:
@@ -150,7 +149,7 @@ class ZenohTransport(Threaded):
             ]  # a place in zenoh's source follows
             return
         way, name = WAYS[self._settings.keys], str(session.zid())
-        self._keys: Keys = way(self._domain_id, name, self.name, self.release)
+        self._keys: Keys = way(self.domain_id, name, self.name, self.release)
         self._numbers = count(1)
         self._presence = session.liveliness().declare_token(self._keys.presence())
         self._neighbours = {}

@@ -5,6 +5,8 @@ RMF's graph.
 
 import logging
 import os
+import platform
+import secrets
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -14,7 +16,9 @@ import msgspec
 
 from bridges import __version__
 from bridges.log import pairs
-from bridges.rmf.choose import domain_id, open_transport
+from bridges.recording.entries import Head
+from bridges.recording.ring import Ring
+from bridges.rmf.choose import open_transport
 from bridges.rmf.definitions import DiagnosticArray
 from bridges.rmf.stamps import stamp
 from bridges.rmf.topics import DIAGNOSTICS
@@ -25,7 +29,9 @@ from bridges.serve.directory import KEPT, KeptFile, Once, RuntimeDirectory, stat
 from bridges.serve.guard import Guard
 from bridges.serve.notify import notify, watchdog_s
 from bridges.serve.predecessor import Predecessor
-from bridges.serve.service import OpenBus, named_by, service
+from bridges.serve.record import Record
+from bridges.serve.service import OpenBus, clock_of, named_by, service
+from bridges.serve.witness import NOBODY, Nobody, Witness
 from bridges.settings.load import Config
 
 log = logging.getLogger(__name__)
@@ -68,7 +74,6 @@ class Daemon:
             self._predecessor = Predecessor(runtime.records, ours, outputs_off)
             unsafe = self._predecessor.make_safe(end.wait)
         node_name = f"rmf_bridge_{config.path.stem}"
-        self._domain_id = domain_id(config.rmf, os.environ)
         self._transport = open_transport(
             config.rmf, node_name, localhost=localhost, ros_args=ros_args
         )
@@ -77,11 +82,34 @@ class Daemon:
             self._guard = Guard(outputs_off) if guard.needed() else None
         kept = None if simulated else KeptFile(state_file(config.path), runtime.path / KEPT)
         open_bus = open_bus or config.open_bus
-        self._service = service(config, self._transport, open_bus, kept, unsafe)
+        self._witness = self._witness_of(ours)
+        self._service = service(config, self._transport, open_bus, kept, unsafe, self._witness)
         self._loops = self._service.loops
+        self._health_topic = named_by(config, DIAGNOSTICS)
+        self._told = 0
         self._diagnostics: Publisher[DiagnosticArray] | None = None
         if config.rmf.diagnostics:
-            self._diagnostics = self._transport.publisher(named_by(config, DIAGNOSTICS))
+            self._diagnostics = self._transport.publisher(self._health_topic)
+
+    def _witness_of(self, record: Record) -> Nobody:
+        """Keeps what happens in a ring, unless the YAML says otherwise."""
+        keep = self._config.recording
+        if keep.keep == "nothing":
+            return NOBODY
+        head = Head(
+            run=secrets.token_hex(8),
+            pid=os.getpid(),
+            version=__version__,
+            kind=self._config.kind,
+            file=record.file,
+            yaml=record.yaml,
+            texts=record.texts,
+            simulated=self._simulated,
+            versions={"python": platform.python_version(), "transport": self._transport.speaks},
+            recording=keep,
+        )
+        make = partial(Ring, self._runtime.path, head, int(keep.ring_mb * 1e6))
+        return Witness(make, clock_of(self._transport), lambda: self._transport.release)
 
     def serve(self) -> int:
         """Run until a signal, and return the exit code: 0 when every output is off and verified."""
@@ -92,6 +120,9 @@ class Daemon:
         log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
         try:
             self._watch()
+        except Exception as error:
+            self._witness.died(f"{type(error).__name__}: {error}")
+            raise
         finally:
             safe = self._shut_down()
         return 0 if safe else 1
@@ -116,20 +147,25 @@ class Daemon:
             if told_ready and time.monotonic() >= tell_at:
                 tell_at = time.monotonic() + STATUS_EVERY_S - period_s / 2
                 self._convenience("graph", self._service.look)
+                self._witness.look()
                 self._convenience("status", self._tell)
 
     def _require_life(self) -> None:
         """What has died cannot be restarted in here; systemd starts us again."""
         if not self._transport.lives:
             log.critical(pairs("died", transport=self._transport.name))
+            self._witness.died(f"transport {self._transport.name}")
         elif all(loop.alive for loop in self._loops):
             return
-        raise SystemExit(70)
+        else:
+            self._witness.died("; ".join(loop.died for loop in self._loops if loop.died))
+        raise SystemExit(os.EX_SOFTWARE)
 
     def _shut_down(self) -> bool:
         self._convenience("sd_notify", partial(notify, "STOPPING=1"))
         deadline = time.monotonic() + STOP_WITHIN_S
         safe = [loop.stop(max(0.1, deadline - time.monotonic())) for loop in self._loops]
+        self._witness.ended(safe=all(safe))
         self._convenience("transport", self._transport.close)
         if self._predecessor is not None:
             self._predecessor.close()
@@ -173,7 +209,7 @@ class Daemon:
             **self._about(),
             "transport": self._transport.speaks,
             "release": self._transport.release.name,
-            "domain_id": self._domain_id,
+            "domain_id": self._transport.domain_id,
             "samples_dropped": dict(self._transport.dropped),
             "predecessor_not_off": self._left(),
             **service,
@@ -187,6 +223,9 @@ class Daemon:
             at = stamp(self._transport.wall())
             found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
             self._diagnostics.publish(found)
+            self._told += 1
+            if self._told % max(1, len(devices)) == 0:  # their size grows with the devices
+                self._witness.spoken(self._health_topic.name, found, sent=True)
         except (
             TransportError
         ) as error:  # when states cannot be published, that is logged as an error

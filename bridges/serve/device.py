@@ -33,6 +33,7 @@ from bridges.serve.clock import Clock, Pace
 from bridges.serve.contained import Contained
 from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Publish, Status, Subject
+from bridges.serve.witness import NOBODY, Nobody
 from drivers import Driver, DriverError
 
 log = logging.getLogger(__name__)
@@ -50,6 +51,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         driver: Driver[X, O],
         publish: Publish,
         clock: Clock,
+        witness: Nobody = NOBODY,
     ) -> None:
         self.name = name
         self.wake_at = AGES_AGO
@@ -66,7 +68,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             lambda report, now: kind.summary(report),
             self._identity,
         )
-        self.subject = Subject(name, memory, core, publish, self._refusals, clock)
+        self.subject = Subject(name, memory, core, publish, self._refusals, clock, witness)
         self._pace = Pace()
         self._answers = Answers()
         self._open = False
@@ -178,7 +180,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         if now >= self._pace.due_at(news):
             self._send(report)
             self._pace.told(news, now)
-            subject.memory = self._kind.published(subject.memory, report)
+            subject.told(self._kind.published(subject.memory, report))
         self.wake_at = min(subject.wake_at, self._pace.due_at(news))
 
     def _answer(self) -> None:

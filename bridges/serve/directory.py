@@ -20,7 +20,18 @@ import msgspec
 
 from bridges.log import pairs
 from bridges.serve.files import replace, show
-from bridges.serve.places import Places, as_told, by_hand, everywhere, named, owner_of, state_base
+from bridges.serve.places import (
+    SERVICE_RUN,
+    SERVICE_STATE,
+    Places,
+    as_told,
+    by_hand,
+    everywhere,
+    named,
+    own,
+    owner_of,
+    state_base,
+)
 from bridges.serve.record import Record, Records, paths, read
 
 log = logging.getLogger(__name__)
@@ -117,6 +128,19 @@ def _what_to_do(folder: Path, error: OSError) -> str:
     return (
         f"whether a daemon runs there cannot be seen: {folder}: {error.strerror}. It belongs to"
         f" {owner}: use sudo, or give another directory with --runtime-dir"
+    )
+
+
+def _in_use(folder: Path, found: LockHolder) -> str:
+    if not found.serves:
+        used = "a walk, a kill test or outputs-off" if found.pid else "another program"
+        return f"{folder} is in use by {found} ({used}): wait for its end"
+    stop = f"Ctrl-C where it runs, or kill {found.pid}"
+    if folder.parent in (SERVICE_RUN, SERVICE_STATE):
+        stop = f"sudo systemctl stop rmf-bridge@{folder.name}"
+    return (
+        f"{Path(found.file).name} is already running: {found}; rmf-bridge status shows it."
+        f" A device has one daemon. To stop it: {stop}"
     )
 
 
@@ -236,7 +260,7 @@ class RuntimeDirectory:
             found = _written(folder / LOCK)
             if found.serves or time.monotonic() >= deadline:
                 self.close()
-                raise AlreadyRunning(f"{folder} is in use by {found}")
+                raise AlreadyRunning(_in_use(folder, found))
             time.sleep(LOOK_EVERY_S)
 
     def _lock(self, folder: Path) -> bool:
@@ -293,3 +317,16 @@ class RuntimeDirectory:
             self._once.failed("record", error)
         else:
             self._once.works("record")
+
+
+def held(
+    file: Path, given: str | None, *, serves: bool, simulated: bool = False
+) -> RuntimeDirectory:
+    """The directories for this file, locked by us. A simulation never takes a service's.
+
+    Raises AlreadyRunning, Unknown or PermissionError.
+    """
+    file = file.absolute()
+    found = (as_told(given) or by_hand(file)) if simulated else find(file, given)
+    own(found)
+    return RuntimeDirectory(found, file, serves=serves)

@@ -26,6 +26,7 @@ from bridges.serve.outlet import Named, Outlet
 from bridges.serve.presence import Presence
 from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Status, Subject
+from bridges.serve.witness import NOBODY, Nobody
 
 log = logging.getLogger(__name__)
 
@@ -69,6 +70,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         clock: Clock,
         named: Named = _same,
         kept: Kept | None = None,
+        witness: Nobody = NOBODY,
     ) -> None:
         self.name = f"graph-{kind.name}"
         self.inbox: Inbox[tuple[Topic[Message], E]] = Inbox()
@@ -82,7 +84,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._transport = transport
         self._clock = clock
         self._named = named
-        self._outlet = Outlet(transport, named)
+        self._witness = witness
+        self._outlet = Outlet(transport, named, witness)
         self._refusals = Refusals()
         self._answers = Answers()
         self._keeper = Keeper(kind, kept, self._publish)
@@ -149,6 +152,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         if self.presence.may_speak:
             self._answers.say(now, self._kind.answer, self._publish)
         self._keeper.tell(memories, now, self.presence.may_speak)
+        self._witness.flush()
 
     def end(self) -> bool:
         """Nothing to switch off."""
@@ -178,7 +182,10 @@ class GraphNode(Generic[S, L, M, E, R]):
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
         """A callback for the transport's thread. Only what is accepted waits: it is not endless."""
 
+        heard_on = self._named(topic).name
+
         def put(message: Message) -> None:
+            self._witness.spoken(heard_on, message, sent=False)
             with self._counting(topic.name, message):
                 event = self._kind.requests[topic](message, self._settings, self._clock.wall())
                 self.inbox.put(self._kind.device_name(message), (topic, event))
@@ -239,6 +246,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             if self._kind.idle(subject.memory, now):
                 self._requesters -= self._remembered(subject)
                 del self.subjects[subject.name]
+                self._witness.forgotten(subject.name, now)
                 self._shown.discard(subject.name)
 
     def _receive(self, name: str, topic: Topic[Message], event: E) -> None:
@@ -285,7 +293,8 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _add(self, name: str, memory: M) -> Subject[M, GraphEvent[E], None, R]:
         refusals, clock = self._refusals, self._clock
-        subject = Subject(name, memory, self._core, self._will_say, refusals, clock)
+        say, witness = self._will_say, self._witness
+        subject = Subject(name, memory, self._core, say, refusals, clock, witness)
         self.subjects[name] = subject
         self._requesters += self._remembered(subject)
         self._decide(subject, self._may)

@@ -17,14 +17,14 @@ from bridges.log import pairs
 
 log = logging.getLogger(__name__)
 
-SCRIPT = """
+SCRIPT = f"""
 trap '' HUP INT QUIT TERM TSTP TTIN TTOU USR1 USR2
 read -r word
 [ "$word" = off ] && exit 0
 "$@"
-[ $? = 69 ] && sleep 1 && "$@"
+[ $? = {os.EX_UNAVAILABLE} ] && sleep 1 && "$@"
 """
-"""Exit code 69: the dead daemon's lock was not free yet; one more try."""
+"""EX_UNAVAILABLE: the dead daemon's lock was not free yet; one more try."""
 
 
 def command(file: Path, runtime_dir: str | None) -> list[str]:

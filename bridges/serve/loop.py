@@ -17,6 +17,7 @@ from bridges.serve.clock import Clock
 from bridges.serve.device import AnyNode
 from bridges.serve.inbox import Inbox
 from bridges.serve.serving import LEAST_GAP_S
+from bridges.serve.witness import NOBODY, Nobody
 from drivers.hal import Bus
 
 log = logging.getLogger(__name__)
@@ -29,7 +30,13 @@ class Loop:
     """Scans the nodes of one bus, each every `scan_s` (s) and whenever it asks to be woken."""
 
     def __init__(
-        self, bus_name: str, bus: Bus, nodes: Sequence[AnyNode], scan_s: float, clock: Clock
+        self,
+        bus_name: str,
+        bus: Bus,
+        nodes: Sequence[AnyNode],
+        scan_s: float,
+        clock: Clock,
+        witness: Nobody = NOBODY,
     ) -> None:
         self.name = f"bus-{bus_name}"
         self.nodes = nodes
@@ -38,6 +45,7 @@ class Loop:
         self._bus = bus
         self._scan_s = scan_s
         self._clock = clock
+        self._witness = witness
         self._due = dict.fromkeys((node.name for node in nodes), AGES_AGO)
         self._edge = False
         self._ran_at = NEVER
@@ -65,6 +73,7 @@ class Loop:
         self._notice_suspension()
         self._take_edge()
         self._scan_in_turn(self.inbox.waiting())
+        self._witness.flush()
         if self.inbox.closed:
             return
         self._bus.scanned()

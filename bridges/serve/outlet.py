@@ -9,6 +9,7 @@ from bridges.rmf.definitions import Message
 from bridges.rmf.instead import INSTEAD, converted
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Transport, TransportError
+from bridges.serve.witness import NOBODY, Nobody
 
 log = logging.getLogger(__name__)
 
@@ -23,9 +24,10 @@ class Outlet:
     and its end take the same way, whatever is learnt of the release between.
     """
 
-    def __init__(self, transport: Transport, named: Named) -> None:
+    def __init__(self, transport: Transport, named: Named, witness: Nobody = NOBODY) -> None:
         self._transport = transport
         self._named = named
+        self._witness = witness
         self._ends: dict[str, Publisher[Message]] = {}
         self._instead: set[str] = set()
         self._lock = threading.Lock()
@@ -45,6 +47,8 @@ class Outlet:
             self._end(way).publish(wanted)
         except TransportError as error:
             log.error(pairs("not_published", topic=topic.name, reason=error))
+        else:
+            self._witness.spoken(self._named(way).name, wanted, sent=True)
 
     def _way(
         self, topic: Topic[Message], message: Message

@@ -11,7 +11,7 @@ import grp
 import os
 import pwd
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,12 +43,12 @@ def named(file: Path) -> str:
     return os.path.realpath(file)
 
 
-def as_told(given: str | None, environ: Mapping[str, str] = os.environ) -> Places | None:
+def as_told(given: str | None) -> Places | None:
     """The directories that the command line or systemd's unit gives; None if neither does."""
     if given:
         return Places(Path(given).absolute(), Path(given).absolute())
-    runtime = environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
-    state = environ.get("STATE_DIRECTORY", "").split(":")[0]
+    runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
+    state = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Places(Path(runtime), Path(state or runtime)) if runtime else None
 
 
@@ -57,17 +57,17 @@ def of_service(file: Path) -> Places:
     return Places(SERVICE_RUN / file.stem, SERVICE_STATE / file.stem)
 
 
-def by_hand(file: Path, environ: Mapping[str, str] = os.environ) -> Places:
+def by_hand(file: Path) -> Places:
     """The directories of a daemon that this user starts by hand."""
-    runtime = Path(environ.get("XDG_RUNTIME_DIR") or TMP / f"rmf-bridge-{os.getuid()}")
-    return Places(runtime / "rmf-bridge" / file.stem, state_base(environ) / file.stem)
+    runtime = Path(os.environ.get("XDG_RUNTIME_DIR") or TMP / f"rmf-bridge-{os.getuid()}")
+    return Places(runtime / "rmf-bridge" / file.stem, state_base() / file.stem)
 
 
-def state_base(environ: Mapping[str, str] = os.environ) -> Path:
+def state_base() -> Path:
     """This user's state directory; one below /tmp if there is no home."""
     home = os.path.expanduser("~")
     default = Path(home) / ".local/state" if os.path.isabs(home) else TMP / f"rmf-{os.getuid()}"
-    return Path(environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
+    return Path(os.environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
 
 
 def everywhere(file: Path) -> Iterator[Places]:

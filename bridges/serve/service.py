@@ -26,6 +26,7 @@ from bridges.serve.outlet import Named, Outlet
 from bridges.serve.predecessor import SafeFirst
 from bridges.serve.serving import Serving
 from bridges.serve.subject import Status
+from bridges.serve.witness import NOBODY, Nobody
 from bridges.settings.load import Config
 from bridges.settings.names import kind_called
 from drivers.hal import Bus
@@ -63,24 +64,31 @@ def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
     return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
 
+def clock_of(transport: Transport) -> Clock:
+    """Durations by the machine's clock, stamps by RMF's."""
+    return Clock(machine_s, transport.wall)
+
+
 def service(
     config: Config,
     transport: Transport,
     open_bus: OpenBus,
     kept: Kept | None = None,
     unsafe: Collection[str] = (),
+    witness: Nobody = NOBODY,
 ) -> Service:
     """The service for this YAML. Raises HalError when a bus cannot be opened.
 
     `kept`: where a kind without hardware keeps its memory across restarts; None to keep nothing.
-    `unsafe`: devices that a dead daemon may have left on.
+    `unsafe`: devices that a dead daemon may have left on. `witness`: is told what happens.
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
-    clock = Clock(machine_s, transport.wall)  # durations by the machine's, stamps by RMF's
+    clock = clock_of(transport)
     if isinstance(kind, GraphKind):
-        return GraphService(GraphNode(kind, config.section, transport, clock, named, kept), clock)
-    return Devices(config, kind, transport, open_bus, named, clock, unsafe)
+        node = GraphNode(kind, config.section, transport, clock, named, kept, witness)
+        return GraphService(node, clock)
+    return Devices(config, kind, transport, open_bus, named, clock, unsafe, witness)
 
 
 class GraphService:
@@ -109,15 +117,17 @@ class Devices:
         named: Named,
         clock: Clock,
         unsafe: Collection[str] = (),
+        witness: Nobody = NOBODY,
     ) -> None:
         self._config = config
+        self._witness = witness
         self._unsafe = unsafe
         self._kind = kind
         self._transport = transport
         self._clock = clock
         self._named = named
         self._strangers: Counter[str] = Counter()
-        self._outlet = Outlet(transport, named)
+        self._outlet = Outlet(transport, named, witness)
         self._outlet.open(self._topics())
         self._hears: dict[str, Subscription] = {}
         self._attended: bool | None = None
@@ -171,7 +181,7 @@ class Devices:
         settings = self._config.buses[bus_name]
         bus = open_bus(bus_name)
         nodes = [self._node(name, bus) for name in self._config.devices_on(bus_name)]
-        return Loop(bus_name, bus, nodes, settings.scan_s, self._clock)
+        return Loop(bus_name, bus, nodes, settings.scan_s, self._clock, self._witness)
 
     def _node(self, name: str, bus: Bus) -> AnyNode:
         device = self._config.devices[name]
@@ -180,15 +190,18 @@ class Devices:
         driver = driver_type.create(name, device, bus)
         if name in self._unsafe:
             driver = SafeFirst(name, driver)
-        return Node(name, self._kind, device, limits, driver, self._outlet.publish, self._clock)
+        publish, clock = self._outlet.publish, self._clock
+        return Node(name, self._kind, device, limits, driver, publish, clock, self._witness)
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
         """A callback for the transport's thread. States of others' devices are not counted."""
         states = topic == self._kind.states
+        heard_on = self._named(topic).name
 
         def put(message: Message) -> None:
             device = self._kind.device_name(message)
             if device in self._placed:
+                self._witness.spoken(heard_on, message, sent=False)
                 node, loop = self._placed[device]
                 event = node.event(topic, message)
                 if event is not None:

@@ -59,13 +59,14 @@ class Rounds(Protocol):
 
 
 class Serving:
-    """One thread of a service, as the daemon sees it."""
+    """One thread of a service, as the daemon sees it. `died`: of what it has died; "" if it has not."""
 
     def __init__(self, serves: Rounds, clock: Clock) -> None:
         self._rounds = 0
         self._serves = serves
         self._clock = clock
         self._safe = False
+        self.died = ""
         self._thread = threading.Thread(target=self._run, name=serves.name, daemon=True)
 
     def start(self) -> None:
@@ -102,8 +103,10 @@ class Serving:
                 serves.round()
                 self._rounds += 1
         except LeftOn as error:
+            self.died = f"{serves.name}: {error}"
             log.critical(pairs("died", thread=serves.name, reason=error))
         except Exception as error:  # a defect of ours: the daemon ends, and is started again
+            self.died = f"{serves.name}: {type(error).__name__}: {error}"
             log.critical(pairs("died", thread=serves.name, reason=error), exc_info=True)
         finally:
             self._safe = serves.end()

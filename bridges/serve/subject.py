@@ -13,6 +13,7 @@ from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.serve.clock import Clock
 from bridges.serve.refusals import Refusals
+from bridges.serve.witness import NOBODY, Nobody
 
 log = logging.getLogger(__name__)
 
@@ -52,6 +53,7 @@ class Subject(Generic[M, V, O, R]):
         publish: Publish,
         refusals: Refusals,
         clock: Clock,
+        witness: Nobody = NOBODY,
     ) -> None:
         self.name = name
         self.memory = memory
@@ -62,13 +64,16 @@ class Subject(Generic[M, V, O, R]):
         self._publish = publish
         self._refusals = refusals
         self._clock = clock
+        self._witness = witness
         self._logged_news: object = None
         self._logged: Mapping[str, str] = {}
         self._faults: Mapping[object, Fault] = {}
 
     def decide(self, event: V) -> Decision[M, O, R]:
         """One step of the core."""
-        decision = self._core.decide(self.memory, event, self._clock.monotonic())
+        before, now = self.memory, self._clock.monotonic()
+        decision = self._core.decide(before, event, now)
+        self._witness.decided(self.name, before, event, now, decision)
         self.memory, self.wake_at, self.decision = decision.memory, decision.wake_at, decision
         for topic, message in decision.publish:
             self._publish(topic, message)
@@ -77,6 +82,12 @@ class Subject(Generic[M, V, O, R]):
             asked = plain(event)
             self._refusals.add(kind, f"{detail}; {asked}" if detail else asked, **self._whose)
         return decision
+
+    def told(self, memory: M) -> None:
+        """Its report has gone out; `memory` with what the core notes of that."""
+        if memory is not self.memory:
+            self.memory = memory
+            self._witness.told(self.name, memory, self._clock.monotonic())
 
     def log(self, report: R) -> None:
         """Log what has changed since the last report."""

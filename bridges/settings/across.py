@@ -8,10 +8,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from bridges.core.graph_kind import GraphKind
+from bridges.core.spelling import unknown
 from bridges.settings import names as named
 from bridges.settings.load import Config
-from bridges.settings.nodes import Page, Problem, compose, unknown
-from bridges.settings.values import Spot, locate
+from bridges.settings.nodes import Page, Problem, compose
+from bridges.settings.spots import Spot, locate
 from drivers.hal import Where
 
 Path = tuple[str, ...]

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 from yaml import MappingNode, ScalarNode
 
+from bridges.core.spelling import either, nearest, unknown
 from bridges.settings import names as named
-from bridges.settings.nodes import Page, either, nearest, unknown
+from bridges.settings.nodes import Page
+from bridges.settings.spots import Entry, below
 from bridges.settings.top import word
-from bridges.settings.values import BROKEN, Entry, Values, below
+from bridges.settings.values import BROKEN, Values
 from drivers.hal import AnyBus, Remark
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from bridges.recording.settings import Recording
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.problems import Problem
@@ -35,6 +36,7 @@ class Config:
     warnings: tuple[Problem, ...] = ()
     notes: tuple[Problem, ...] = ()
     section: Any = None
+    recording: Recording = Recording()
 
     def bus_of(self, device_name: str) -> str:
         """The name of the bus that a device is on."""

@@ -13,12 +13,13 @@ from typing import Literal
 from yaml import MappingNode
 
 from bridges.charger_coordinator.settings import Fleet, Settings, Waypoint
+from bridges.core.spelling import unknown
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.config import Config
 from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
-from bridges.settings.nodes import Page, Problem, compose, unknown
+from bridges.settings.nodes import Page, Problem, compose
 from bridges.settings.similarity import Point, Similarity, estimate
-from bridges.settings.values import Spot, locate
+from bridges.settings.spots import Spot, locate
 
 Transforms = Mapping[str, Similarity]
 """Level -> RMF's map to the robot's; EVERY_LEVEL for all."""

@@ -26,7 +26,8 @@ from msgspec.inspect import (
 )
 from yaml import Node, ScalarNode, SequenceNode
 
-from bridges.settings.nodes import either, is_plain, nearest, short
+from bridges.core.spelling import either, nearest, short
+from bridges.settings.nodes import is_plain
 from bridges.settings.scalars import TRUTHS, number, reads_as, whole_number
 from bridges.settings.slips import has_unit, number_meant
 

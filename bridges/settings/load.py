@@ -4,9 +4,10 @@
     driver: dry_contact     a file of drivers/<kind>/; a device may name another as its own `driver:`
     rmf: {...}              bridges.rmf.settings.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
+    recording: {...}        bridges.recording.settings.Recording
     lifts: {name: {...}}    the kind's own key; what each holds is the driver's `settings`
 
-A kind without hardware has only `kind`, `rmf` and one section of its own.
+A kind without hardware has only `kind`, `rmf`, `recording` and one section of its own.
 
 Structs define what a section may contain (`values.py`); this file and `wiring.py` check what concerns
 several sections. The daemon takes nothing else from the file, and checks nothing again.
@@ -19,23 +20,18 @@ from yaml import MappingNode, Node, ScalarNode
 
 from bridges.core.fields import DeviceSettings, Name
 from bridges.core.graph_kind import AnyGraphKind, AnyKind, GraphKind
+from bridges.core.spelling import either, unknown
+from bridges.recording.settings import Recording
 from bridges.rmf import topics
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
-from bridges.settings.nodes import (
-    Page,
-    Problem,
-    SettingsError,
-    compose,
-    either,
-    read,
-    unknown,
-)
+from bridges.settings.nodes import Page, Problem, SettingsError, compose, read
 from bridges.settings.plausible import milliseconds, out_of_step
+from bridges.settings.spots import Entry, Spot, below, is_none, locate
 from bridges.settings.top import MAPPING, keys_below, top_keys, word
-from bridges.settings.values import BROKEN, Broken, Entry, Spot, Values, below, is_none, locate
+from bridges.settings.values import BROKEN, Broken, Values
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
 from drivers.driver_type import AnyDriver
 from drivers.hal.points import Wire
@@ -74,6 +70,7 @@ class _Reading:
         self._driver_name = ""
         self._own_drivers: dict[str, AnyDriver | None] = {}
         self._rmf = Rmf()
+        self._recording = Recording()
         self._buses: dict[str, BusRead] = {}
         self._devices: dict[str, DeviceSettings] = {}
         self._uses: list[Use] = []
@@ -95,6 +92,7 @@ class _Reading:
             warnings=tuple(sorted(self._warnings)),
             notes=tuple(sorted(self._notes)),
             section=self._section,
+            recording=self._recording,
         )
 
     def all(self) -> None:
@@ -110,6 +108,9 @@ class _Reading:
             self._read_own_drivers(sections[self._kind.devices_key].value)
         if "rmf" in sections:
             self._read_rmf(sections["rmf"].spot())
+        if "recording" in sections:
+            read = self._values.make(Recording, sections["recording"].spot())
+            self._recording = self._recording if read is BROKEN else read
         if "buses" in sections:
             self._read_buses(sections["buses"].spot())
         if isinstance(self._kind, GraphKind):

@@ -9,11 +9,12 @@ from pathlib import Path
 
 from bridges.core.graph_kind import GraphKind
 from bridges.core.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT, Place
+from bridges.core.spelling import nearest, short
 from bridges.settings import names as named
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.load import Config
-from bridges.settings.nodes import Page, Problem, compose, nearest, short
-from bridges.settings.values import Spot, locate
+from bridges.settings.nodes import Page, Problem, compose
+from bridges.settings.spots import Spot, locate
 
 
 def places(config: Config) -> list[Place]:

@@ -7,6 +7,7 @@ a driver or a bus by its name.
 import importlib
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -41,13 +42,17 @@ def bus_types() -> list[str]:
 def _found(
     package: ModuleType, pattern: str, record: str, name: Callable[[Path], str]
 ) -> list[str]:
-    """Names of the files that hold such a record.
+    """Names of the files that hold such a record."""
+    return sorted({name(path) for path in _holding(tuple(package.__path__), pattern, record)})
 
-    The files are searched, not imported: some need a vendor's library.
-    """
-    found = (path for root in package.__path__ for path in Path(root).glob(pattern))
+
+@cache
+def _holding(roots: tuple[str, ...], pattern: str, record: str) -> list[Path]:
+    """The files that hold such a record. They are read, once, and not imported: some need a vendor's
+    library."""
+    found = (path for root in roots for path in Path(root).glob(pattern))
     holds = re.compile(rf"^{record}(:| =)", re.MULTILINE).search
-    return sorted({name(path) for path in found if holds(path.read_text("utf-8"))})
+    return [path for path in found if holds(path.read_text("utf-8"))]
 
 
 def kind_called(name: str) -> "AnyKind":

@@ -4,9 +4,8 @@ It uses PyYAML's pure Python loader: its messages say more, and libyaml's compos
 a limit, so a deeply nested file would crash the interpreter instead of raising.
 """
 
-import difflib
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import cast
@@ -59,31 +58,6 @@ class Page:
         """Raise SettingsError if anything was recorded."""
         if self.problems:
             raise SettingsError(self.problems)
-
-
-def short(text: str) -> str:
-    """A text, shortened to 40 characters for a message."""
-    return text if len(text) <= 40 else f"{text[:37]}..."
-
-
-def either(names: Iterable[str]) -> str:
-    """`a, b or c`."""
-    *others, last = list(names) or ["nothing"]
-    return f"{', '.join(others)} or {last}" if others else last
-
-
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that was probably meant; None if none is similar."""
-    return next(iter(difflib.get_close_matches(name, list(known), n=1)), None)
-
-
-def unknown(what: str, name: str, known: Iterable[str]) -> str:
-    """The error text for an unknown name, with the nearest known one and all of them."""
-    names = list(dict.fromkeys(known))
-    near = nearest(name, names)
-    meant = f"did you mean '{short(near)}'? " if near else ""
-    there = f"known here: {', '.join(map(short, names))}" if names else "there is none"
-    return f"unknown {what} '{short(name)}': {meant}{there}"
 
 
 class _Refused(MarkedYAMLError):

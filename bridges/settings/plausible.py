@@ -3,9 +3,10 @@
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from msgspec import inspect
+from msgspec.inspect import StructType
 
 from bridges.core.fields import DeviceSettings
+from bridges.settings.values import described
 from drivers.hal import Remark
 
 RENEWED: Final = 3
@@ -17,8 +18,9 @@ LONG_S: Final = 1000.0
 def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Iterator[Remark]:
     """A remark (path, text) on each suspiciously long duration that is not a default."""
     for path, struct in structs:
-        info = inspect.type_info(type(struct))
-        assert isinstance(info, inspect.StructType)
+        cls: object = type(struct)
+        info = described(cls)
+        assert isinstance(info, StructType)
         for field in info.fields:
             value = getattr(struct, field.name)
             if field.name.endswith("_s") and isinstance(value, float) and value != field.default:

@@ -6,10 +6,12 @@ from msgspec.inspect import LiteralType
 from msgspec.structs import fields
 
 from bridges.core.graph_kind import AnyKind, GraphKind
+from bridges.core.spelling import either
+from bridges.recording.settings import Recording
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
-from bridges.settings.nodes import either
-from bridges.settings.values import BROKEN, Entry, Values
+from bridges.settings.spots import Entry
+from bridges.settings.values import BROKEN, Values
 from drivers.driver_type import AnyDriver
 
 MAPPING: Final = "a mapping (key: value)"
@@ -19,7 +21,7 @@ def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
     """Key -> what its value must be, or None if it is optional. `kind`: None while it is not known."""
     first = {"kind": either(named.kind_names())}
     if isinstance(kind, GraphKind):
-        return {**first, "rmf": None, kind.devices_key: None}
+        return {**first, "rmf": None, "recording": None, kind.devices_key: None}
     if kind is None:
         all_kinds = map(named.kind_called, named.kind_names())
         sections = dict.fromkeys(found.devices_key for found in all_kinds)
@@ -27,11 +29,13 @@ def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
             **first,
             "driver": "a driver of that kind",
             "rmf": None,
+            "recording": None,
             "buses": MAPPING,
             **sections,
         }
     driver = either(named.driver_names(kind.name))
-    return {**first, "driver": driver, "rmf": None, "buses": MAPPING, kind.devices_key: MAPPING}
+    shared = {"rmf": None, "recording": None, "buses": MAPPING}
+    return {**first, "driver": driver, **shared, kind.devices_key: MAPPING}
 
 
 def word(values: Values, entry: Entry | None, words: list[str]) -> str | None:
@@ -45,6 +49,7 @@ def word(values: Values, entry: Entry | None, words: list[str]) -> str | None:
 def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]:
     """Keys that belong below the top: key -> what it stands below."""
     below_top = {field.encode_name: "rmf" for field in fields(Rmf)}
+    below_top |= {field.encode_name: "recording" for field in fields(Recording)}
     if isinstance(kind, GraphKind):
         below_top |= {field.encode_name: kind.devices_key for field in fields(kind.settings)}
     elif kind and driver:

@@ -4,9 +4,9 @@
 The structs, with their bounds and units, remain the only description of a file's contents.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Mapping
 from enum import Enum
+from functools import cache
 from typing import Final, TypeVar, overload
 
 from msgspec import inspect
@@ -22,14 +22,22 @@ from msgspec.inspect import (
 )
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
+from bridges.core.spelling import either, nearest, short, unknown
 from bridges.settings.leaves import Extra, Wrong, leaf, looks, wanted_text
-from bridges.settings.nodes import Page, either, is_plain, nearest, short, unknown
-from bridges.settings.scalars import is_null, is_null_word
+from bridges.settings.nodes import Page, is_plain
+from bridges.settings.scalars import is_null
+from bridges.settings.spots import Entry, Spot, is_none, locate
 
 VERBS = ("is", "has", "needs", "must", "says")
 """A problem that begins with one of these words gets its key as the subject."""
 
 T = TypeVar("T")
+
+
+@cache
+def described(cls: Hashable) -> Type:
+    """msgspec's description of a type. It takes a millisecond, and every file needs the same ones."""
+    return inspect.type_info(cls)
 
 
 class Broken(Enum):
@@ -42,67 +50,6 @@ BROKEN: Final = Broken.BROKEN
 
 _LISTS = (ListType, VarTupleType)
 _MAPPINGS = (DictType, StructType)
-
-
-@dataclass(frozen=True, slots=True)
-class Spot:
-    """A node that is to become a value.
-
-    `at`: the node that an error about the whole value points to (its key). `label`: the value's name
-    in errors. `path`: its path below the top struct.
-    """
-
-    node: Node
-    at: Node
-    label: str
-    path: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """One `key: value` of a mapping."""
-
-    name: str
-    key: Node
-    value: Node
-
-    def spot(self, path: tuple[str, ...] = ()) -> Spot:
-        """The value, below `path`."""
-        return Spot(self.value, self.key, f"'{short(self.name)}'", (*path, self.name))
-
-    def where(self) -> Node:
-        """The node that an error about the value points to: a scalar itself, else the key."""
-        node = self.value
-        if isinstance(node, ScalarNode) and (node.value or not is_plain(node)):
-            return node
-        return self.key
-
-
-def below(node: Node, part: str) -> Entry | None:
-    """The entry of a mapping, or the item of a list, that `part` names."""
-    if isinstance(node, MappingNode):
-        for key, value in node.value:
-            if isinstance(key, ScalarNode) and key.value == part:
-                return Entry(part, key, value)
-    if isinstance(node, SequenceNode) and part.isdecimal() and int(part) < len(node.value):
-        return Entry(part, node.value[int(part)], node.value[int(part)])
-    return None
-
-
-def locate(spot: Spot, path: Iterable[object]) -> Entry:
-    """The entry at `path` below a value, or its nearest existing parent."""
-    found = Entry("", spot.at, spot.node)
-    for part in path:
-        entry = below(found.value, str(part))
-        if entry is None:
-            break
-        found = entry
-    return found
-
-
-def is_none(node: Node) -> bool:
-    """Whether `null` or `~` is written. An empty value does not count: it was probably forgotten."""
-    return isinstance(node, ScalarNode) and is_plain(node) and is_null_word(node.value)
 
 
 def _node_of(wanted: Type) -> type[Node]:
@@ -140,7 +87,7 @@ class Values:
 
         `besides`: keys that the caller reads itself.
         """
-        wanted = cls if isinstance(cls, Type) else inspect.type_info(cls)
+        wanted = cls if isinstance(cls, Type) else described(cls)
         if isinstance(wanted, StructType):
             return self._struct(wanted, spot, besides)
         return self._value(wanted, spot)

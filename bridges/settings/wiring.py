@@ -9,8 +9,10 @@ from dataclasses import dataclass
 
 from yaml import Node
 
-from bridges.settings.nodes import Page, unknown
-from bridges.settings.values import BROKEN, Check, Spot, below, locate
+from bridges.core.spelling import unknown
+from bridges.settings.nodes import Page
+from bridges.settings.spots import Spot, below, locate
+from bridges.settings.values import BROKEN, Check
 from drivers.hal import AnyBus
 from drivers.hal.points import Input, Output, Wire
 

@@ -15,8 +15,8 @@ import msgspec
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
 from bridges.core.fields import Name
+from bridges.core.spelling import unknown
 from bridges.core.table import Table
-from bridges.settings.nodes import unknown
 from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows, tables

@@ -182,5 +182,4 @@ DRIVER = DriverType(
     wires=wires,
     tables=tables,
     warnings=warnings,
-    fake="hal_fakes.plants.contact_charger",
 )

@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from bridges.core.fields import Name
-from bridges.settings.nodes import unknown
+from bridges.core.spelling import unknown
 from drivers.charger import rules as by_rules
 from drivers.charger.rules import Errors, Rule
 from drivers.charger.state_codes import Codes
@@ -97,8 +97,10 @@ class Power(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         """A place that cannot be written; values that it cannot hold."""
         if reason := misplaced(self.at, WRITABLE):
             yield ("at",), reason
-        elif misplaced(self.at, ("coil",)) is None and max(self.start, self.stop) > 1:
-            yield ("start",), "a coil is 0 or 1"
+        elif misplaced(self.at, ("coil",)) is None:
+            for key in ("start", "stop"):
+                if getattr(self, key) > 1:
+                    yield (key,), "a coil is 0 or 1"
         if self.start == self.stop:
             yield ("stop",), "is the value of start"
 

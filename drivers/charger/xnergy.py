@@ -161,7 +161,7 @@ RANGE_SETTLE_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Written:
     """What was last written to the receiver. `enabled`: the last ENABLE; None while unknown.
 
     `range_checks`: how many checks were requested; `asked_at`: when the last one was (monotonic s), inf
@@ -181,30 +181,32 @@ class Orders:
     check_range: bool = False
 
 
-def settled(told: Told, now: float) -> bool:
+def settled(written: Written, now: float) -> bool:
     """Does the range result belong to the last range check?"""
-    return now - told.asked_at >= RANGE_SETTLE_S
+    return now - written.asked_at >= RANGE_SETTLE_S
 
 
-def steer(told: Told, outputs: ChargerOutputs, code: int, now: float) -> tuple[Told, Orders]:
+def steer(
+    written: Written, outputs: ChargerOutputs, code: int, now: float
+) -> tuple[Written, Orders]:
     """What to write in state `code`, and the record of it once it is written.
 
     A start and a range check are written only in state idle, each once. A stop is written once, and
     again while the receiver still charges. `power` None writes neither start nor stop.
     """
-    ask = outputs.range_checks != told.range_checks
+    ask = outputs.range_checks != written.range_checks
     if ask and code == IDLE:
-        told = replace(told, range_checks=outputs.range_checks, asked_at=now)
+        written = replace(written, range_checks=outputs.range_checks, asked_at=now)
     elif ask:
-        told = replace(told, asked_at=float("inf"))
+        written = replace(written, asked_at=float("inf"))
     enable = None
-    if outputs.power and code == IDLE and not ask and not told.enabled:
+    if outputs.power and code == IDLE and not ask and not written.enabled:
         enable = True
-    elif outputs.power is False and (told.enabled is not False or _charges(code)):
+    elif outputs.power is False and (written.enabled is not False or _charges(code)):
         enable = False
     if enable is not None:
-        told = replace(told, enabled=enable)
-    return told, Orders(enable, check_range=ask and code == IDLE)
+        written = replace(written, enabled=enable)
+    return written, Orders(enable, check_range=ask and code == IDLE)
 
 
 def _charges(code: int) -> bool:
@@ -243,7 +245,7 @@ class Receiver:
     def __init__(self, settings: ChargerSettings, wire: Wire) -> None:
         self._settings = settings
         self._wire = wire
-        self._told = Told()
+        self._written = Written()
         self._code = -1
         self._touched = False
 
@@ -253,22 +255,24 @@ class Receiver:
     def read(self) -> ChargerSample:
         """Read and decode the receiver's numbers. Raises DriverError."""
         if self._wire.alive():
-            self._told = replace(self._told, enabled=None)
+            self._written = replace(self._written, enabled=None)
         words = self._wire.read(self._wire.reads)
         if activity(words["state"]) is Activity.ERROR:
             words |= self._wire.read(IN_ERROR)
         self._code = words["state"]
-        return sample(words, settled(self._told, self._wire.now()))
+        return sample(words, settled(self._written, self._wire.now()))
 
     def write(self, outputs: ChargerOutputs) -> None:
         """Start, stop or check the range, if it is due (`steer`). Raises DriverError."""
-        told, orders = steer(self._told, outputs, self._code, self._wire.now())
+        written, orders = steer(self._written, outputs, self._code, self._wire.now())
         if orders.enable is not None:
             self._enable(orders.enable)
         if orders.check_range:
-            self._told = replace(self._told, range_checks=told.range_checks, asked_at=told.asked_at)
+            self._written = replace(
+                self._written, range_checks=written.range_checks, asked_at=written.asked_at
+            )
             self._wire.write(CHECK_RANGE, 1)
-        self._told = told
+        self._written = written
 
     def make_safe(self) -> None:
         """Stop the receiver and have it acknowledged; with `on_death: keep` do nothing."""
@@ -277,7 +281,7 @@ class Receiver:
 
     def close(self) -> None:
         """Do what `make_safe` does, if the receiver was ever driven and may be on. Does not raise."""
-        if self._touched and self._told.enabled is not False:
+        if self._touched and self._written.enabled is not False:
             self._wire.insist()
             try:
                 self.make_safe()
@@ -286,9 +290,9 @@ class Receiver:
 
     def _enable(self, on: bool) -> None:
         self._touched = True
-        self._told = replace(self._told, enabled=None)
+        self._written = replace(self._written, enabled=None)
         self._wire.write(ENABLE, int(on), safe=not on)
-        self._told = replace(self._told, enabled=on)
+        self._written = replace(self._written, enabled=on)
 
 
 def rows(settings: ChargerSettings, where: Mapping[str, str]) -> list[tuple[str, str]]:

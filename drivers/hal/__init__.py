@@ -14,7 +14,7 @@ import msgspec
 
 from drivers.hal.points import HalError, Wire
 
-__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Kept", "Needs", "Remark", "Where"]
+__all__ = ["AnyBus", "Bus", "BusType", "HalError", "KeptOutputs", "Needs", "Remark", "Where"]
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
@@ -49,7 +49,7 @@ class Needs(NamedTuple):
     host: str = ""
 
 
-class Kept(NamedTuple):
+class KeptOutputs(NamedTuple):
     """Remarks on outputs that keep their value when the daemon's machine or the network dies."""
 
     warnings: Sequence[Remark] = ()
@@ -107,7 +107,7 @@ class BusType(Generic[Settings]):
     where: Callable[[Settings], Where | None] = lambda settings: None
     needs: Callable[[Settings], Needs] = lambda settings: Needs()
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
-    kept: Callable[[Settings, Iterable[str]], Kept] = lambda settings, places: Kept()
+    kept: Callable[[Settings, Iterable[str]], KeptOutputs] = lambda settings, places: KeptOutputs()
     fake: str = ""
     fake_inside: bool = False
     canonical: Callable[[str], str] = str

@@ -18,6 +18,7 @@ import msgspec
 from msgspec.inspect import LiteralType
 
 from bridges.core.fields import Name
+from bridges.core.spelling import either, unknown
 from bridges.settings.problems import SettingsError
 from drivers.profiles import texts
 from drivers.profiles.texts import FOLDER
@@ -65,7 +66,8 @@ def _understood(
     file: str, text: bytes, reader: str, key: str, content: type[msgspec.Struct]
 ) -> dict[str, object]:
     from bridges.settings.nodes import Page, compose
-    from bridges.settings.values import BROKEN, Spot, Values
+    from bridges.settings.spots import Spot
+    from bridges.settings.values import BROKEN, Values
 
     page = Page(file)
     root = compose(page, text)
@@ -87,8 +89,6 @@ def profile_problems(
     sort: Profile[msgspec.Struct], name: str | None, inline: object
 ) -> Iterator[tuple[tuple[str, ...], str]]:
     """Problems of `profile:` and of the key that may replace it (`map`)."""
-    from bridges.settings.nodes import either
-
     if name is None and inline is None:
         text = f"needs '{sort.key}', or a profile: {either(sort.names())}"
         yield ("profile",), text
@@ -99,8 +99,6 @@ def profile_problems(
 
 
 def _named(sort: Profile[msgspec.Struct], name: str) -> Iterator[tuple[tuple[str, ...], str]]:
-    from bridges.settings.nodes import unknown
-
     if name not in sort.names():
         yield ("profile",), unknown("profile", name, sort.names())
         return

@@ -6,7 +6,7 @@ Failing parts, beside those of the plant and the bus:
 | node      | silent | no SDO is answered | answers come late | of five bytes  | about another object |
 | heartbeat | none   | none               | each second       | of three bytes | it says `stopped`    |
 
-A node that is switched off loses `enable`, and says that it starts when it is back.
+A node that is switched off loses its power, and says that it starts when it is back.
 """
 
 import time
@@ -19,9 +19,9 @@ from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 from drivers.charger.canopen import HEARTBEAT_S, OBJECTS, Settings
 from hal_fakes.can.side import Send
 from hal_fakes.fake import Fake
-from hal_fakes.plants.pad import PadPlant, PadReading
+from hal_fakes.plants.charger import Reading
 from hal_fakes.plants.plant import Plant
-from hal_fakes.plants.xnergy_rcu import SIGNALS, words
+from hal_fakes.plants.xnergy_rcu import SIGNALS, rcu_plant, words
 
 TYPES: Final = {1: datatypes.UNSIGNED8, 2: datatypes.UNSIGNED16}
 BEAT: Final = {None: HEARTBEAT_S, "slow": 1.0}
@@ -56,7 +56,7 @@ class CanOpenRcu:
         """The heartbeat."""
         off = self.plant.failures.get("node") == "off"
         if off and not self._was_off:
-            self.plant.drive("enable", False, now)
+            self.plant.drive("power", False, now)
         if off:
             self._was_off = True
             return
@@ -79,10 +79,10 @@ class CanOpenRcu:
         assert self._send  # it answers nobody but who asks
         self._send(frame(can_id, answer), late=mode == "slow")
 
-    def _reading(self) -> PadReading:
+    def _reading(self) -> Reading:
         self.plant.advance(time.monotonic())
         reading = self.plant.reading()
-        assert isinstance(reading, PadReading)
+        assert isinstance(reading, Reading)
         return reading
 
     def _read(self, index: int, subindex: int, od: object) -> int | None:
@@ -95,8 +95,8 @@ class CanOpenRcu:
         return found[name]
 
     def _write(self, index: int, subindex: int, od: object, data: bytes) -> None:
-        if (name := NAMES.get((index, subindex))) in SIGNALS:
-            self.plant.drive(name, bool(data[0]), time.monotonic())
+        if (name := NAMES.get((index, subindex), "")) in SIGNALS:
+            self.plant.drive(SIGNALS[name], bool(data[0]), time.monotonic())
 
 
 class _Network(canopen.Network):
@@ -131,6 +131,6 @@ def dictionary() -> canopen.ObjectDictionary:
 
 
 FAKE = Fake[Settings](
-    plant=lambda name, settings, wires: PadPlant(name),
+    plant=lambda name, settings, wires: rcu_plant(name, "node", "heartbeat", "bus"),
     station=lambda plant, settings: CanOpenRcu(plant, settings.node),
 )

@@ -23,15 +23,12 @@ from drivers.charger.rules import UNKNOWN, Errors
 from hal_fakes.can.side import Send
 from hal_fakes.charger_values import NEAREST, values
 from hal_fakes.fake import Fake
-from hal_fakes.plants.pad import PadPlant, PadReading
+from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import Plant
 
 STATUS_S: Final = 0.1
 SLOW_S: Final = 2.0
 PERIODS: Final = 3
-RECEIVER: Final = 4711
-STRANGER: Final = 815
-"""The receivers of `robot` (the first of the YAML's `receivers`, if there are any) and `stranger`."""
 FLAGS: Final = {
     "authentication": "CommTimeout",
     "contact_lost": "CommTimeout",
@@ -54,8 +51,6 @@ class FrameCharger:
         self._map: FrameMap = frame_map(settings)
         self._dbc = dbc.load(self._map.dbc)
         self._setpoints: Mapping[str, float] = settings.setpoints
-        known = (int(receiver) for receiver in settings.receivers if receiver.isdecimal())
-        self._receiver = next(known, RECEIVER)
         self._wanted = {self._dbc.id(sent.frame): sent for sent in self._map.send}
         self._fed_at: dict[str, float] = {}
         self._looked_at = float("-inf")
@@ -74,13 +69,13 @@ class FrameCharger:
             self._fed_at[sent.frame] = self._watched_s
         elif self._says(sent, bytes(message.data), on=False):
             self._fed_at.clear()
-        self.plant.drive("enable", self._fed(), now)
+        self.plant.drive("power", self._fed(), now)
 
     def tick(self, now: float, send: Send) -> None:
         """Stop when the frames that keep it charging stay away, and send the status."""
         self._look(now)
         mode = self.plant.failures.get("node")
-        self.plant.drive("enable", self._fed() and mode != "off", now)
+        self.plant.drive("power", self._fed() and mode != "off", now)
         period_s = SLOW_S if mode == "slow" else STATUS_S
         if mode == "off" or now < self._status_at + period_s:
             return
@@ -109,7 +104,7 @@ class FrameCharger:
     def _message(self, frame: str, wrong: bool) -> can.Message:
         self.plant.advance(time.monotonic())
         reading = self.plant.reading()
-        assert isinstance(reading, PadReading)
+        assert isinstance(reading, Reading)
         values = dict.fromkeys(self._dbc.signals(frame), 0.0) | {
             signal.split(".")[1]: value
             for signal, value in self._values(reading, wrong).items()
@@ -122,7 +117,7 @@ class FrameCharger:
             data=self._dbc.encode(frame, values),
         )
 
-    def _values(self, reading: PadReading, wrong: bool) -> dict[str, float]:
+    def _values(self, reading: Reading, wrong: bool) -> dict[str, float]:
         known = self._map
         shown = {FLAGS[fault] for fault in reading.faults}
         said: dict[str, float] = {}
@@ -132,26 +127,26 @@ class FrameCharger:
         for signal, value in (
             (known.volts, reading.volts),
             (known.amps, reading.amps),
-            (known.receiver, float(self._seen(reading))),
+            (known.receiver, reading.number),
         ):
             if signal:
                 said[signal] = round(value, 1)
         for signal in (*known.errors.station, *known.errors.robot):
             said[signal] = float(signal.split(".")[1] in shown)
         for signal in known.temperatures.values():
-            said[signal] = round(reading.coil_c)
+            said[signal] = round(reading.celsius)
         for flag, holds in (
-            (known.range_ok, reading.in_range),
+            (known.range_ok, reading.range_ok),
             (known.at_height, reading.at_height),
         ):
             if flag:
                 said[flag] = float(holds)
         if known.out_of_range:
-            said[known.out_of_range] = float(reading.robot and not reading.in_range)
+            said[known.out_of_range] = float(reading.here and not reading.couples)
         return said | self._by_rules(reading, said, wrong)
 
     def _by_rules(
-        self, reading: PadReading, natural: Mapping[str, float], wrong: bool
+        self, reading: Reading, natural: Mapping[str, float], wrong: bool
     ) -> dict[str, float]:
         """What the signals of rules, error numbers and error flags hold."""
         known = self._map
@@ -164,11 +159,7 @@ class FrameCharger:
         found = values(known.rules, numbers, UNKNOWN, natural) if found is None else found
         return {at: float(value) for at, value in (found or {}).items() if at not in flags}
 
-    def _seen(self, reading: PadReading) -> int:
-        """The id of the receiver on the pad; 0 if there is none."""
-        return STRANGER if reading.stranger else self._receiver if reading.robot else 0
-
-    def _code(self, state: State, reading: PadReading) -> int:
+    def _code(self, state: State, reading: Reading) -> int:
         """The first code of the plant's activity, or of the nearest one that the map has."""
         lists = state.codes.lists()
         codes = lists[reading.activity] or lists[NEAREST.get(reading.activity, Activity.ERROR)]
@@ -188,6 +179,12 @@ def _short(message: can.Message) -> can.Message:
 
 
 FAKE = Fake[Settings](
-    plant=lambda name, settings, wires: PadPlant(name),
+    plant=lambda name, settings, wires: ChargerPlant(
+        name,
+        settings.receivers,
+        commanded=True,
+        cleared=False,
+        links=("node", "bus"),
+    ),
     station=lambda plant, settings: FrameCharger(plant, settings),
 )

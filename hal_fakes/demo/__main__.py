@@ -23,12 +23,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         metavar=("DEVICE", "PART", "MODE"),
         help="let a part fail first: off, stuck, slow, garbage or wrong; the demo then exits 1",
     )
+    parser.add_argument(
+        "--patience",
+        type=float,
+        default=1.0,
+        metavar="N",
+        help="wait N times as long for each step: for a slow or busy machine",
+    )
     args = parser.parse_args(argv)
     demo = DEMOS[args.demo]
     for device, _, _ in args.fail:
         if device not in demo.files:
             parser.error(f"no device '{device}'; there are {', '.join(demo.files)}")
-    return Stage(demo, args.fail).play()
+    return Stage(demo, args.fail, args.patience).play()
 
 
 if __name__ == "__main__":

@@ -1,9 +1,7 @@
 """The demo's daemons: real processes, and the control sockets of the plants behind them."""
 
-import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -12,11 +10,13 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from hal_fakes.caller import Caller, Refused
 from hal_fakes.plants.plant import Edge
 from hal_fakes.wire import wire
 
-STOP_WITHIN_S = 5.0
-CONNECT_WITHIN_S = 15.0
+STOP_WITHIN_S = 20.0
+CONNECT_WITHIN_S = 60.0
+TAIL = 15
 
 
 class Wrong(Exception):
@@ -33,7 +33,6 @@ class Daemon:
         self.name = file.stem
         self.log = directory / f"{self.name}.log"
         self.runtime_dir = directory / self.name
-        self._plant: socket.socket | None = None
         command = [sys.executable, "-m", "bridges.cli", "run", str(file), "--simulate"]
         command += ["--runtime-dir", str(self.runtime_dir)]
         command += ["--domain-id", str(domain_id), "--transport", wire()]
@@ -55,26 +54,26 @@ class Daemon:
 
     def follow(self, tell: Callable[[Edge], None]) -> None:
         """Call `tell`, on a thread, with every edge of its plants from now on."""
-        connection = self._connect()
-        connection.sendall(b"follow\n")
-        threading.Thread(target=_read, args=(connection, tell), daemon=True).start()
+        caller = self._caller()
+        caller.order("follow")
+        threading.Thread(target=_read, args=(caller, tell), daemon=True).start()
 
     def order(self, line: str) -> None:
         """Give its plants one order. Raises Wrong when they refuse it."""
-        with self._connect() as connection, connection.makefile("r", encoding="utf-8") as answers:
-            connection.sendall(line.encode() + b"\n")
-            answer = answers.readline().strip()
-        if answer != "ok":
-            raise Wrong(f"{line}: {answer or 'no answer'}")
+        with self._caller() as caller:
+            try:
+                caller.order(line)
+            except Refused as error:
+                raise Wrong(str(error)) from None
 
     def reset(self) -> None:
         """As `rmf-bridge reset` does."""
         if not self._exited():
             os.kill(self._process.pid, signal.SIGUSR1)
 
-    def tail(self, lines: int = 15) -> str:
+    def tail(self) -> str:
         """The end of its log."""
-        return "\n".join(self.log.read_text(errors="replace").splitlines()[-lines:])
+        return "\n".join(self.log.read_text(errors="replace").splitlines()[-TAIL:])
 
     def ask_to_stop(self) -> None:
         """SIGTERM: outputs off, and off the graph."""
@@ -96,28 +95,22 @@ class Daemon:
         look = os.WEXITED | os.WNOHANG | os.WNOWAIT
         return os.waitid(os.P_PID, self._process.pid, look) is not None
 
-    def _connect(self) -> socket.socket:
+    def _caller(self) -> Caller:
         path, deadline = self.runtime_dir / "plant.sock", time.monotonic() + CONNECT_WITHIN_S
         while True:
             self.check()
-            connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             try:
-                connection.connect(str(path))
+                return Caller(path, patience_s=None)
             except (FileNotFoundError, ConnectionRefusedError):
-                connection.close()
                 if time.monotonic() > deadline:
                     raise Wrong(f"{self.name} made no {path.name}") from None
                 time.sleep(0.05)
-            else:
-                connection.settimeout(None)
-                return connection
 
 
-def _read(connection: socket.socket, tell: Callable[[Edge], None]) -> None:
-    with suppress(OSError), connection, connection.makefile("r", encoding="utf-8") as lines:
-        for line in lines:
-            if line.startswith("{"):
-                tell(Edge(**json.loads(line)))
+def _read(caller: Caller, tell: Callable[[Edge], None]) -> None:
+    with suppress(OSError), caller:
+        for edge in caller.edges():
+            tell(edge)
 
 
 def stop_all(daemons: Iterable[Daemon], within_s: float = STOP_WITHIN_S) -> None:

@@ -9,12 +9,12 @@ from typing import Final
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.stamps import duration
+from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Phase, Robot
+from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.stage import Demo
 from hal_fakes.demo.world import World
-from hal_fakes.rmf.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from hal_fakes.rmf.robot import Phase, Robot
-from hal_fakes.rmf.supervisors import DoorSupervisor, LiftSupervisor
 
 FLEET, ROBOT = "demo", "robot"
 SESSION = f"{FLEET}/{ROBOT}"

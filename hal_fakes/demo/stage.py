@@ -50,11 +50,15 @@ class Demo:
 
 
 class Stage:
-    """One performance of a demo; `failures` happen before its day begins."""
+    """One performance of a demo; `failures` happen before its day begins.
 
-    def __init__(self, demo: Demo, failures: Sequence[Failure] = ()) -> None:
+    `patience`: how many times as long as usual each step may take.
+    """
+
+    def __init__(self, demo: Demo, failures: Sequence[Failure] = (), patience: float = 1.0) -> None:
         self.demo = demo
         self.failures = failures
+        self._patience = patience
         self.daemons: dict[str, Daemon] = {}
         self.journal = Journal(time.monotonic(), sys.stdout.write, colour=sys.stdout.isatty())
         self._interrupted = False
@@ -90,7 +94,7 @@ class Stage:
         return 0, False
 
     def _live(self, transport: Transport) -> None:
-        world = World(transport, self.daemons, self.journal, self._check)
+        world = World(transport, self.daemons, self.journal, self._check, self._patience)
         for device, file in self.demo.files.items():
             if load(file).buses:
                 self.daemons[device].follow(world.edge)

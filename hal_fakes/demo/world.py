@@ -15,10 +15,10 @@ from bridges.rmf import topics, words
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Publisher, Transport
 from bridges.rmf.words import Requested, Stated
+from bridges.rmf_rules import Party, Said
 from hal_fakes.demo.daemons import Daemon, Wrong
 from hal_fakes.demo.journal import SETTLES_S, Journal
 from hal_fakes.plants.plant import Edge
-from hal_fakes.rmf import Party, Said
 
 TO_DAEMONS: Final[tuple[AnyTopic, ...]] = (
     topics.LIFT_REQUESTS,
@@ -54,14 +54,17 @@ class World:
         daemons: Mapping[str, Daemon],
         journal: Journal,
         check: Callable[[], None],
+        patience: float = 1.0,
     ) -> None:
-        """`check` is called all the time, and raises when there is no point in going on."""
+        """`check` is called all the time, and raises when there is no point in going on. `patience`
+        multiplies how long `until` waits."""
         self.daemons = daemons
         self.journal = journal
         self.places: dict[str, str] = {}
         self.alerts: list[d.Alert] = []
         self._parties: list[Party] = []
         self._check = check
+        self._patience = patience
         self._transport = transport
         self._inbox: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._publishers: dict[str, Publisher[d.Message]] = {
@@ -149,8 +152,9 @@ class World:
     ) -> None:
         """Go on until `ready`. `repeat` is published now and every second meanwhile.
 
-        Raises Wrong, with `what`, when it takes longer than `within_s`.
+        Raises Wrong, with `what`, when it takes longer than `within_s`, times the patience.
         """
+        within_s *= self._patience
         deadline = time.monotonic() + within_s
         repeat_at = time.monotonic() if repeat else float("inf")
         while not ready():

@@ -13,8 +13,8 @@ from bridges.charger.settings import Robot
 from bridges.charger_coordinator.settings import Settings
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import CHARGING_ASSIGNMENTS, DIAGNOSTICS, AnyTopic
+from bridges.rmf_rules import Party, Said
 from hal_fakes.demo.world import World
-from hal_fakes.rmf import Party, Said
 from hal_fakes.rmf.fleet import Finishing, Fleet, FleetRobot
 from hal_fakes.rmf.tutorial import tutorial_fleet
 

@@ -16,11 +16,11 @@ one unit, or the server with all units, is
 import asyncio
 import itertools
 import random
+import sys
 import threading
 from collections.abc import Coroutine, Iterable, Sequence
 from typing import Any, Final
 
-from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from drivers.hal.modbus import Settings
@@ -29,6 +29,15 @@ from hal_fakes.modbus.dead_man import DeadMan
 from hal_fakes.modbus.flash import CoilRequest
 from hal_fakes.modbus.rtu import RtuLine
 from hal_fakes.modbus.units import FarSide, Units
+
+_aiohttp = sys.modules.get("aiohttp")
+sys.modules["aiohttp"] = None  # type: ignore[assignment]  # as if it were not installed
+try:  # pymodbus would import it for a page that is not served; that takes half of a far side's start
+    from pymodbus.server import ModbusTcpServer
+finally:
+    del sys.modules["aiohttp"]
+    if _aiohttp:
+        sys.modules["aiohttp"] = _aiohttp
 
 TRANSACTION: Final = 0
 UNIT: Final = 6

@@ -1,7 +1,5 @@
 """A charging station on registers: its plant in the numbers of its map."""
 
-from typing import Final
-
 from bridges.charger.signals import Activity
 from drivers.charger.register import POWER, Settings, cells, charger_map, orders
 from drivers.charger.rules import UNKNOWN
@@ -10,10 +8,8 @@ from drivers.hal.modbus.points import Point
 from drivers.json_fields import Value
 from hal_fakes.charger_values import NEAREST, values
 from hal_fakes.fake import Fake
-from hal_fakes.plants.charger import ROBOTS_FAULTS, ChargerPlant, Reading
+from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import Plant
-
-PARTS: Final = ("receiver", "unit", "server")
 
 
 class RegisterCharger:
@@ -56,14 +52,13 @@ class RegisterCharger:
         return True
 
     def _values(self, reading: Reading) -> dict[str, Value]:
-        robots = reading.error_text in ROBOTS_FAULTS
-        wanted = ROBOT_ERROR if robots else (reading.activity, "")
+        wanted = ROBOT_ERROR if reading.robots else (reading.activity, "")
         measured: dict[str, Value] = {
             "volts": reading.volts,
             "amps": reading.amps,
             "battery_percent": 100 * (reading.battery or 0.0),
             "time_to_full_s": reading.time_to_full_s or 0.0,
-            "receiver": float(reading.receiver or 0),
+            "receiver": reading.number,
             "in_range": bool(reading.in_range),
             "range_ok": reading.range_ok,
             "at_height": reading.at_height,
@@ -85,8 +80,14 @@ class RegisterCharger:
 def build(name: str, settings: Settings) -> ChargerPlant:
     """The station that this map speaks of."""
     found = charger_map(settings)
-    commanded, asked = found.power is not None, found.range_check is not None
-    return ChargerPlant(name, settings.receivers, commanded, asked, parts=PARTS)
+    return ChargerPlant(
+        name,
+        settings.receivers,
+        commanded=found.power is not None,
+        asked=found.range_check is not None,
+        cleared=found.clear_error is not None,
+        links=("unit", "server"),
+    )
 
 
 FAKE = Fake[Settings](

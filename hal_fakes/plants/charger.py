@@ -1,67 +1,87 @@
-"""A wireless charging station with its pad: it charges whoever is parked on it, if it can.
+"""A wireless charger: its pad, the robot on it, battery and heat, whatever wire its controller is on.
 
 To press: `robot` (one stands on the pad), or a robot of the YAML's `receivers` by its name
 (`tiny/AMR02`), or a `stranger`; whoever comes pushes nobody away, and the last one to come is seen.
-`out_of_range`: whoever stands there stands badly. `pad_down`: the pad, which otherwise rises to
-whoever comes, stays down or sinks. `foreign_object` (something lies on the pad),
-`over_temperature`. A robot comes with its battery 40 % full; the station shakes hands, charges, ramps
-down when it is full, waits, and is idle again until another robot comes. An error stays until it is
-cleared after its cause has gone, one of the robot's (ROBOTS_FAULTS) until the robot leaves.
+`misparked`: whoever stands there stands beside the middle. `foreign_object` (something lies on the
+pad), `over_temperature`, `transmitter_fault`. A robot comes with its battery 40 % full. The pad rises
+to it; the station shakes hands, charges, ramps down when the battery is full, waits, and is idle again
+until another robot comes. Current warms the coil, and a fan cools it. An error stays until its cause
+has gone and it is cleared, or, where nothing clears it, the power is off; one of the robot's
+(ROBOTS_FAULTS) until the robot leaves.
 
 To drive: `clear_error`, and where the station can be commanded `power` (without it, it charges nobody)
-and `range_check` (its result is there a moment later; a station that needs none knows at once).
+and `range_check` (its result is there a moment later; a station that needs none knows at once). On
+contacts: the relay `enable`; `charging` while current flows, `ready` while it could, `fault` in an
+error, `at_height` and `range_ok` of the pad.
 
-Failing part `receiver` (on the robot): `off` never answers, `stuck` hangs in the handshake, `slow`
-takes ten times as long for it, `wrong` fails it, `garbage` loses contact while charging. The parts
-`server`, `headers` and `body` fail on the wire (`hal_fakes/http.py`).
+Failing parts and what `off`, `stuck`, `slow`, `garbage` and `wrong` do to them; `pad` is in `pad.py`:
+
+|          | off              | stuck            | slow         | garbage          | wrong         |
+| receiver | never answers    | in the handshake | 10 x as long | contact is lost  | wrong answer  |
+| battery  | draws no current | never fills      | fills slowly | draws no current | comes full    |
+
+A failing `fan` lets the coil heat up, and a failing `thermometer` is an error, whatever the mode.
+The parts of the wire (`server`, `node`, ...) fail at its far side.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
+from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import CURRENT_FLOWS, Activity
 from drivers.hal.points import Wire
+from hal_fakes.fake import Fake
 from hal_fakes.plants.machine import Machine
+from hal_fakes.plants.pad import AMBIENT_C, GAP_MM, NEVER, SLOWNESS, TRIP_C, Coil, Pad
 from hal_fakes.plants.plant import FailureMode
 
-HANDSHAKE_S: Final = 2.0
-SLOWNESS: Final = 10.0
+LASTS_S: Final = {Activity.HANDSHAKE: 2.0, Activity.STOPPING: 1.0, Activity.RELEASED: 1.5}
 FILL_S: Final = 60.0
 ARRIVES_WITH: Final = 0.4
 LOST_AFTER_S: Final = 1.0
-RAMP_DOWN_S: Final = 1.0
-RESTART_DELAY_S: Final = 1.5
 RANGE_CHECK_S: Final = 0.3
-VOLTS_EMPTY: Final = 44.0
-VOLTS_FULL: Final = 54.0
-AMPS: Final = 12.0
-AMBIENT_C: Final = 25.0
-WARM_C: Final = 48.0
-HOT_C: Final = 97.0
-NEVER: Final = float("inf")
+EMPTY_V, FULL_V, CURRENT_A = 24.0, 29.2, 30.0
+HOT_C, COOLED_C, UNCOOLED_C = 97.0, 60.0, 140.0
+FIRST, STRANGER = "4711", "815"
+"""The receivers of `robot`, if the YAML lists none, and of a `stranger`."""
 
-CAUSES: Final = {
+PARTS: Final = ("pad", "receiver", "fan", "battery", "thermometer")
+CAUSES: Final = ("foreign_object", "over_temperature", "transmitter_fault")
+ROBOTS_FAULTS: Final = frozenset({"authentication", "too_far", "too_near", "contact_lost"})
+TEXTS: Final = {
     "foreign_object": "foreign object detected",
     "over_temperature": "over temperature",
+    "transmitter_fault": "transmitter fault",
+    "thermometer": "temperature sensor broken",
+    "authentication": "authentication timeout",
+    "too_far": "the gap is too wide",
+    "too_near": "the gap is too narrow",
+    "contact_lost": "communication lost while charging",
 }
-ROBOTS_FAULTS: Final = ("authentication timeout", "communication lost while charging")
-PARTS: Final = ("receiver", "server", "headers", "body")
+NOT_READY: Final = (Activity.ERROR, Activity.RELEASED)
+RANGES: Final = {"in": True, "out": False, "failed": False}
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What a controller without contacts can tell at one instant. `progress`: of the handshake, 0-1.
+    """What a controller without contacts can tell at one instant.
 
-    `receiver`: whom it sees, "" for nobody. `battery`: 0-1. `time_to_full_s`: while current flows.
+    `progress`: of the activity, 0-1. `faults`: keys of TEXTS. `here`: is anybody? `receiver`: whom it
+    sees, "" for nobody. `couples`: could current flow now? `range_result`: of the last range check,
+    `none`, `ongoing`, `in`, `out` or `failed`; `in_range`: the same, or `couples` where nobody asks.
+    `range_ok`: does whoever is there stand well? `battery`: 0-1. `time_to_full_s`: while current flows.
     """
 
     activity: Activity
-    progress: float
-    error_text: str
-    failures: Mapping[str, FailureMode]
+    progress: float = 0.0
+    faults: frozenset[str] = frozenset()
+    failures: Mapping[str, FailureMode] = field(default_factory=dict)
+    here: bool = False
     receiver: str = ""
+    couples: bool = False
+    range_result: str = "none"
     in_range: bool | None = None
     range_ok: bool = False
     at_height: bool = False
@@ -71,193 +91,261 @@ class Reading:
     amps: float = 0.0
     time_to_full_s: float | None = None
 
+    @property
+    def error_text(self) -> str:
+        """What is wrong, in the station's words."""
+        return ", ".join(text for fault, text in TEXTS.items() if fault in self.faults)
+
+    @property
+    def robots(self) -> bool:
+        """Is it the robot's fault?"""
+        return bool(self.faults & ROBOTS_FAULTS)
+
+    @property
+    def number(self) -> float:
+        """The receiver's number; 0 where it has none."""
+        return float(self.receiver) if self.receiver.isdecimal() else 0.0
+
 
 class ChargerPlant(Machine):
     """`battery`: 0-1, of the robot on the pad; nobody's when there is none.
 
     `receivers`: id -> robot. `commanded`: it charges only while `power` is on. `asked`: it knows
-    whether a robot is in range only by a range check. `pace`: how many times as fast it is.
-    `wires`: its contacts, where it has any (`contact_charger.py`). `parts`: what of it can fail.
+    whether a robot is in range only by a range check. `cleared`: an error stays until it is cleared.
+    `pace`: how many times as fast as a real one it shakes hands, moves and stops. `wires`: its
+    contacts, where it has any. `links`: what of its wire can fail.
     """
 
     def __init__(
         self,
         name: str,
         receivers: Mapping[str, str] = MappingProxyType({}),
+        *,
         commanded: bool = False,
         asked: bool = False,
-        pace: float = 1.0,
+        cleared: bool = True,
         wires: Iterable[Wire] = (),
-        parts: Iterable[str] = PARTS,
+        links: Iterable[str] = (),
     ) -> None:
-        self._receivers = {robot: receiver for receiver, robot in receivers.items()}
-        buttons = sorted(
-            ("out_of_range", "pad_down", *CAUSES, "robot", "stranger", *self._receivers)
-        )
-        super().__init__(name, wires, parts, buttons)
-        self._pace = pace
+        robots = {robot: receiver for receiver, robot in receivers.items()}
+        first = next(iter(receivers), FIRST)
+        self._receivers = {"robot": first, "stranger": STRANGER, **robots}
+        buttons = sorted((*CAUSES, "misparked", *self._receivers))
+        super().__init__(name, wires, (*PARTS, *links), buttons)
+        self._commanded, self._asked, self._cleared = commanded, asked, cleared
+        self.pace = 1.0
         self.activity = Activity.IDLE
-        self.error_text = ""
+        self.faults: frozenset[str] = frozenset()
         self.battery = 0.0
         self.power = not commanded
-        self._asked = asked
-        self._checked_at = NEVER
+        self.pad = Pad()
+        self._coil = Coil()
         self._here: list[str] = []
-        self._since = 0.0
-        self._until = NEVER
+        self._since, self._until = 0.0, NEVER
+        self._range, self._range_until = "none", NEVER
 
-    def sense(self, signal: str) -> bool:
-        """Is `robot` or a cause there?"""
-        return self.contact(signal)
+    # ---- what a controller sees and does
 
     def reading(self) -> Reading:
         """Everything at once."""
         lasts = self._until - self._since
-        progress = 0.0 if lasts == NEVER else (self.now - self._since) / lasts
         flows = self.activity in CURRENT_FLOWS
-        battery = self._battery()
+        draws = flows and self.failures.get("battery") not in ("off", "garbage")
+        here, filled, rate = bool(self._here), self._filled(), self._fills()
+        silent = self.failures.get("receiver") == "off"
         return Reading(
-            self.activity,
-            progress,
-            self.error_text,
-            dict(self.failures),
-            self._receiver(),
-            self._in_range(),
-            self.coupled(),
-            self.risen(),
-            HOT_C if self.pressed["over_temperature"] else WARM_C if flows else AMBIENT_C,
-            battery if self._here else None,
-            VOLTS_EMPTY + battery * (VOLTS_FULL - VOLTS_EMPTY) if self._here else 0.0,
-            AMPS if flows else 0.0,
-            (1.0 - battery) * FILL_S if flows else None,
+            activity=self.activity,
+            progress=0.0 if lasts in (0.0, NEVER) else (self.now - self._since) / lasts,
+            faults=self.faults,
+            failures=dict(self.failures),
+            here=here,
+            receiver=self._receivers[self._here[-1]] if here and not silent else "",
+            couples=self._couples(),
+            range_result=self._range,
+            in_range=RANGES.get(self._range) if self._asked else self._couples(),
+            range_ok=self._parked_well(),
+            at_height=self.pad.at_height(),
+            celsius=self._celsius(),
+            battery=filled if here else None,
+            volts=EMPTY_V + (FULL_V - EMPTY_V) * filled if here else 0.0,
+            amps=CURRENT_A if draws else 0.0,
+            time_to_full_s=(1.0 - filled) / rate if flows and rate else None,
         )
 
-    def _receiver(self) -> str:
-        """The id of who came last, unless the receiver is silent."""
-        if not self._here or self.failures.get("receiver") == "off":
-            return ""
-        first = next(iter(self._receivers.values()), "1")
-        return {"robot": first, "stranger": "9999"}.get(
-            self._here[-1], self._receivers.get(self._here[-1], "")
-        )
+    def contact(self, signal: str) -> bool:
+        """Is this contact asserted, in truth?"""
+        return {
+            "charging": self.activity in CURRENT_FLOWS,
+            "fault": self.activity is Activity.ERROR,
+            "ready": self.activity not in NOT_READY,
+            "at_height": self.pad.at_height(),
+            "range_ok": self._parked_well(),
+        }[signal]
 
-    def _in_range(self) -> bool | None:
-        """None while a check is under way, or where nobody has asked for one."""
-        if self._asked and not self._checked_at <= self.now:
-            return None
-        return self.coupled()
-
-    def coupled(self) -> bool:
-        """Does whoever is there stand where it can be charged?"""
-        return bool(self._here) and not self.pressed["out_of_range"]
-
-    def risen(self) -> bool:
-        """Is the pad where it charges?"""
-        return bool(self._here) and not self.pressed["pad_down"]
-
-    def _battery(self) -> float:
-        if self.activity is not Activity.CHARGING or self._until == NEVER:
-            return self.battery
-        return min(1.0, 1.0 - (self._until - self.now) * self._pace / FILL_S)
+    def actuate(self, signal: str, energised: bool) -> None:
+        """The enable relay has reached the station."""
+        self.power = energised
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
-        """A command reaches the station. `clear_error`: it looks again whether the cause has gone."""
+        """A command, or the relay. `power` is a level, the others are asked for by True."""
+        if signal in self._relays:
+            super().drive(signal, asserted, now)
+            return
         if signal not in ("clear_error", "power", "range_check"):
             raise KeyError(signal)
         self.advance(now)
-        if signal != "power" or asserted != self.power:
-            self.note("relay", signal, asserted)
+        if signal == "power" and asserted == self.power:
+            return
+        self.note("relay", signal, asserted)
         if signal == "power":
             self.power = asserted
         elif signal == "range_check":
-            self._checked_at = self.now + RANGE_CHECK_S / self._pace
-        elif self.activity is Activity.ERROR and not any(self.pressed[c] for c in CAUSES):
-            self.error_text = ""
-            self._enter(Activity.IDLE)
+            self._range, self._range_until = "ongoing", self.now + RANGE_CHECK_S / self.pace
+        elif not self._causes():
+            self._recover()
         self._settle()
 
-    def contact(self, signal: str) -> bool:
-        """Is the robot, or what is pressed, there?"""
-        return self.pressed[signal]
+    # ---- physics
 
     def event_at(self) -> float:
-        """When the activity under way ends by itself."""
-        return self._until
+        """When something under way ends by itself."""
+        return min(self._until, self.pad.rises_until, self._range_until, self._coil.trips_at())
 
     def act(self, signal: str, asserted: bool) -> None:
         """A robot comes or leaves."""
-        if signal in ("out_of_range", *CAUSES):
+        if signal not in self._receivers:
             return
         if asserted and signal not in self._here:
             self._here.append(signal)
-            self.battery = ARRIVES_WITH
+            self.battery = 1.0 if self.failures.get("battery") == "wrong" else ARRIVES_WITH
         elif not asserted and signal in self._here:
             self._here.remove(signal)
+            self.battery = self.battery if self._here else 0.0
 
     def run(self) -> None:
-        """What is due ends, and what the pad and the causes demand begins."""
+        """What is due ends, and what pad, heat and causes demand begins."""
+        if self.pad.follow(self.now, bool(self._here), self.failures.get("pad"), self.pace):
+            self.note("sensor", "gap_mm", self.pad.gap_mm())
+        if self.now >= self._range_until:
+            self._range_until = NEVER
+            lost = self.failures.get("receiver") == "off"
+            self._range = "failed" if lost else "in" if self._couples() else "out"
         if self.now >= self._until:
             self._end()
-        if self.error_text in ROBOTS_FAULTS and not self._here:
-            self.error_text = ""
-            self._enter(Activity.IDLE)
-        cause = next((c for c in CAUSES if self.pressed[c]), None)
+        before = None
+        while before is not self.activity:
+            before = self.activity
+            self._react()
+        heat = UNCOOLED_C if "fan" in self.failures else COOLED_C
+        self._coil.tend(self.now, heat if self.activity in CURRENT_FLOWS else AMBIENT_C)
+
+    def _react(self) -> None:
         busy = self.activity in (*CURRENT_FLOWS, Activity.HANDSHAKE)
-        if cause and busy:
-            self._fault(CAUSES[cause])
-        elif busy and not self._here:
-            self._leave()
-        elif busy and not self.power:
-            self._ramp_down()
-        elif self.activity is Activity.IDLE and self._here and self.power and self.battery < 1.0:
+        causes = self._causes()
+        if causes and (busy or self._wants()):
+            self._fault(*causes)
+        elif busy and not (self._here and self.power):
+            self._stop()
+        elif self.activity is Activity.ERROR and not causes and self._forgets():
+            self._recover()
+        elif self._wants():
             self._shake_hands()
 
-    def _enter(self, activity: Activity, lasts_s: float = NEVER) -> None:
-        self._since, self._until = self.now, self.now + lasts_s / self._pace
+    def _wants(self) -> bool:
+        """Is there somebody to be charged?"""
+        there = bool(self._here) and self.failures.get("receiver") != "off"
+        return self.activity is Activity.IDLE and there and self.power and self._filled() < 1.0
+
+    def _causes(self) -> list[str]:
+        found = {cause for cause in CAUSES if self.pressed[cause]}
+        found |= {"over_temperature"} if self._celsius() >= TRIP_C else set()
+        return [*found, *({"thermometer"} & self.failures.keys())]
+
+    def _forgets(self) -> bool:
+        """Does an error without a cause end by itself?"""
+        left = self.faults <= ROBOTS_FAULTS and not self._here
+        return left or not (self._cleared or (self._commanded and self.power))
+
+    def _recover(self) -> None:
+        if self.activity is Activity.ERROR:
+            self.faults = frozenset()
+            self._enter(Activity.IDLE)
+
+    def _fault(self, *faults: str) -> None:
+        self.battery = self._filled()
+        self.faults = frozenset(faults)
+        self._enter(Activity.ERROR)
+
+    def _enter(self, activity: Activity, lasts_s: float | None = None) -> None:
+        if lasts_s is None:
+            lasts_s = LASTS_S.get(activity, NEVER) / self.pace
+        self._since, self._until = self.now, self.now + lasts_s
         if activity is not self.activity:
             self.activity = activity
             self.note("sensor", "state", str(activity))
 
-    def _fault(self, text: str) -> None:
-        self.error_text = text
-        self._enter(Activity.ERROR)
-
-    def _ramp_down(self) -> None:
-        """The power is off: a current ramps down, any other activity ends."""
-        if self.activity is Activity.CHARGING:
-            self.battery = self._battery()
-            self._enter(Activity.STOPPING, RAMP_DOWN_S)
-        elif self.activity is Activity.HANDSHAKE:
+    def _stop(self) -> None:
+        """The robot or the power has gone: a handshake ends, a current ramps down if it still can."""
+        if self.activity is Activity.HANDSHAKE:
             self._enter(Activity.IDLE)
-
-    def _leave(self) -> None:
-        charged = self.activity in CURRENT_FLOWS
-        self._enter(*((Activity.RELEASED, RESTART_DELAY_S) if charged else (Activity.IDLE,)))
+        elif not self._here:
+            self._enter(Activity.RELEASED)
+        elif self.activity is Activity.CHARGING:
+            self.battery = self._filled()
+            self._enter(Activity.STOPPING)
 
     def _shake_hands(self) -> None:
-        receiver = self.failures.get("receiver")
-        slowness = {"slow": SLOWNESS, "stuck": NEVER}.get(receiver or "", 1.0)
-        if receiver != "off":
-            self._enter(Activity.HANDSHAKE, HANDSHAKE_S * slowness)
+        slowness = {"slow": SLOWNESS, "stuck": NEVER}.get(self.failures.get("receiver", ""), 1.0)
+        self._enter(Activity.HANDSHAKE, LASTS_S[Activity.HANDSHAKE] / self.pace * slowness)
 
     def _end(self) -> None:
         """The activity under way has run its time."""
         receiver = self.failures.get("receiver")
         match self.activity:
             case Activity.HANDSHAKE if receiver == "wrong":
-                self._fault("authentication timeout")
-            case Activity.HANDSHAKE if self.pressed["out_of_range"]:
-                self._fault("the gap is too wide")
-            case Activity.HANDSHAKE if receiver == "garbage":
-                self._enter(Activity.CHARGING, LOST_AFTER_S)
+                self._fault("authentication")
+            case Activity.HANDSHAKE if not self._couples():
+                near = self._parked_well() and self.pad.gap_mm() < GAP_MM[0]
+                self._fault("too_near" if near else "too_far")
             case Activity.HANDSHAKE:
-                self._enter(Activity.CHARGING, (1.0 - self.battery) * FILL_S)
+                rate = self._fills()
+                full_s = (1.0 - self.battery) / rate if rate else NEVER
+                self._enter(Activity.CHARGING, LOST_AFTER_S if receiver == "garbage" else full_s)
             case Activity.CHARGING if receiver == "garbage":
-                self._fault("communication lost while charging")
+                self._fault("contact_lost")
             case Activity.CHARGING:
                 self.battery = 1.0
-                self._enter(Activity.STOPPING, RAMP_DOWN_S)
+                self._enter(Activity.STOPPING)
             case Activity.STOPPING:
-                self._enter(Activity.RELEASED, RESTART_DELAY_S)
+                self._enter(Activity.RELEASED)
             case _:
                 self._enter(Activity.IDLE)
+
+    def _parked_well(self) -> bool:
+        return bool(self._here) and not self.pressed["misparked"]
+
+    def _couples(self) -> bool:
+        return self._parked_well() and self.pad.couples()
+
+    def _celsius(self) -> float:
+        return HOT_C if self.pressed["over_temperature"] else self._coil.celsius(self.now)
+
+    def _fills(self) -> float:
+        """How much of the battery fills in a second."""
+        mode = self.failures.get("battery")
+        slowness = SLOWNESS if mode == "slow" else 1.0
+        return 0.0 if mode in ("stuck", "off", "garbage") else 1.0 / FILL_S / slowness
+
+    def _filled(self) -> float:
+        """The battery now."""
+        if self.activity is not Activity.CHARGING:
+            return self.battery
+        return min(1.0, self.battery + (self.now - self._since) * self._fills())
+
+
+def build(name: str, settings: ChargerSettings, wires: Iterable[Wire]) -> ChargerPlant:
+    """A station on these contacts."""
+    return ChargerPlant(name, commanded=True, cleared=False, wires=wires)
+
+
+FAKE = Fake(plant=build)

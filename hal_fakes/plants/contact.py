@@ -51,7 +51,7 @@ class Contact:
         self._settle(now)
 
     def next_at(self) -> float:
-        """When `shows` may change though nothing is fed: s, or inf."""
+        """When `shows` may change though nothing is fed: s, or inf, as always for a sound wire."""
         if self._late:
             return self._late[0][0]
         return self._noise_at if self._noisy() else float("inf")

@@ -16,7 +16,7 @@ EDGES_KEPT = 100_000
 
 
 class Machine(ABC):
-    """A plant (`hal_fakes.plants.plant.Plant`) but for its physics.
+    """What every plant (`hal_fakes.plants.plant.Plant`) has besides its physics.
 
     `wires`: the driver's wiring table of this device; empty where the controller has no contacts.
     `parts`: what can fail besides wires (`car`, `door_operator`); the plant looks at `failures`.
@@ -35,6 +35,7 @@ class Machine(ABC):
         self.edges: list[Edge] = []
         self.on_edge: Callable[[Edge], None] | None = None
         self.now = 0.0
+        self._settled = False
         self.failures: dict[str, FailureMode] = {}
         self.pressed = dict.fromkeys(buttons, False)
         contacts = [Contact(w, f"{name} {w.signal}") for w in wires]
@@ -42,6 +43,7 @@ class Machine(ABC):
         self._parts = frozenset((*parts, *(("unit", "server") if at_module else ())))
         self._sensors = {c.wire.signal: c for c in contacts if c.wire.direction == "in"}
         self._relays = {c.wire.signal: c for c in contacts if c.wire.direction == "out"}
+        self._broken: list[Contact] = []
         self._sees = dict.fromkeys(self._relays, False)
         self._driven = dict.fromkeys(self._relays, False)
         self._shown: dict[str, bool] = {}
@@ -74,16 +76,19 @@ class Machine(ABC):
         if asserted != self._driven[signal]:
             self._driven[signal] = asserted
             self.note("relay", signal, asserted)
-        self._relays[signal].feed(asserted, self.now)
-        self._settle()
+            self._settle()
 
     def advance(self, now: float) -> None:
-        """Let everything due until `now` happen, each at its own time. Time never goes back."""
+        """Let everything due until `now` happen, each at its own time. Time never goes back.
+
+        Between two events nothing changes that anybody can see.
+        """
         while (at := self.next_at()) <= now:
             self.now = max(self.now, at)
             self._settle()
         self.now = max(self.now, now)
-        self._settle()
+        if not self._settled:
+            self._settle()
 
     def sense(self, signal: str) -> bool:
         """Is this contact asserted, as the wire shows it?"""
@@ -95,8 +100,7 @@ class Machine(ABC):
 
     def next_at(self) -> float:
         """When something will change if nothing is driven: s, or inf."""
-        contacts = (*self._sensors.values(), *self._relays.values())
-        return min([self.event_at(), *(c.next_at() for c in contacts)])
+        return min([self.event_at(), *(contact.next_at() for contact in self._broken)])
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
         """Make a wire or part fail from now on; None mends it. ValueError names what there is."""
@@ -112,6 +116,8 @@ class Machine(ABC):
         self._settle()
         if contact is not None:
             contact.fail(mode, self.now)
+            contacts = (*self._sensors.values(), *self._relays.values())
+            self._broken = [each for each in contacts if each.mode is not None]
         self._settle()
 
     def names(self) -> dict[str, list[str]]:
@@ -144,6 +150,7 @@ class Machine(ABC):
 
     def _settle(self) -> None:
         """Relays reach the controller, its physics runs, its contacts reach us."""
+        self._settled = True
         for signal, relay in self._relays.items():
             relay.feed(self._driven[signal], self.now)
             if relay.shows != self._sees[signal]:

@@ -7,11 +7,12 @@ from drivers.charger.modbus import Settings, points
 from drivers.charger.xnergy import CHECK_RANGE, ENABLE, IN_RANGE, TICKS_PER_UNIT
 from drivers.hal.modbus.points import Point
 from hal_fakes.fake import Fake
-from hal_fakes.plants.pad import AMBIENT_C, PadPlant, PadReading
+from hal_fakes.plants.charger import ChargerPlant, Reading
+from hal_fakes.plants.pad import AMBIENT_C
 from hal_fakes.plants.plant import Plant
 
-SIGNALS: Final = (ENABLE, CHECK_RANGE)
-"""What is written; the plant has the same names for it."""
+SIGNALS: Final = {ENABLE: "power", CHECK_RANGE: "range_check"}
+"""What is written, and what it does to the plant."""
 HANDSHAKE: Final = (1, 2, 3, 4)
 STATES: Final = {
     Activity.IDLE: 0,
@@ -33,7 +34,7 @@ ERRORS: Final = {
 RANGES: Final = {"none": 0, "ongoing": 0, "in": IN_RANGE, "out": 2, "failed": 240}
 
 
-def words(reading: PadReading, latched: int = 0) -> dict[str, int]:
+def words(reading: Reading, latched: int = 0) -> dict[str, int]:
     """The words by the names of `drivers.charger.xnergy`. `latched`: errors before this one."""
     now = sum(ERRORS[fault] for fault in reading.faults)
     shadow = now | latched
@@ -46,16 +47,21 @@ def words(reading: PadReading, latched: int = 0) -> dict[str, int]:
         "volts": round(reading.volts * TICKS_PER_UNIT),
         "amps": round(reading.amps * TICKS_PER_UNIT),
         "device_c": round(AMBIENT_C),
-        "coil_c": round(reading.coil_c),
+        "coil_c": round(reading.celsius),
         "range": RANGES[reading.range_result],
     }
 
 
-def state(reading: PadReading) -> int:
+def state(reading: Reading) -> int:
     """The state code; a handshake has four."""
     if reading.activity is Activity.HANDSHAKE:
         return HANDSHAKE[min(int(reading.progress * len(HANDSHAKE)), len(HANDSHAKE) - 1)]
     return STATES[reading.activity]
+
+
+def rcu_plant(name: str, *links: str) -> ChargerPlant:
+    """A charger with this receiver; `links` are the parts of its wire."""
+    return ChargerPlant(name, commanded=True, cleared=False, links=links)
 
 
 class ModbusRcu:
@@ -79,7 +85,7 @@ class ModbusRcu:
             return self._coils[point]
         self.plant.advance(now)
         reading = self.plant.reading()
-        assert isinstance(reading, PadReading)
+        assert isinstance(reading, Reading)
         found = words(reading, self._latched)
         self._latched = found["latched_high"] << 16 | found["latched_low"]
         return found[self._names[point]] & 0xFFFF
@@ -89,11 +95,11 @@ class ModbusRcu:
         if point not in self._coils:
             return False
         self._coils[point] = value
-        self.plant.drive(self._names[point], bool(value), now)
+        self.plant.drive(SIGNALS[self._names[point]], bool(value), now)
         return True
 
 
 FAKE = Fake[Settings](
-    plant=lambda name, settings, wires: PadPlant(name),
+    plant=lambda name, settings, wires: rcu_plant(name, "unit", "server"),
     station=lambda plant, settings: ModbusRcu(plant, settings),
 )

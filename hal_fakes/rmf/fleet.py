@@ -19,7 +19,7 @@ from typing import Final, Literal
 
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import CHARGING_ASSIGNMENTS, FLEET_STATES, AnyTopic
-from hal_fakes.rmf import Party, Said
+from bridges.rmf_rules import Party, Said
 
 EVERY_S: Final = 1.0
 RECHARGE_PERCENT: Final = 100.0

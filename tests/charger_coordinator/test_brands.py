@@ -14,7 +14,7 @@ from tests.charger_coordinator.yard import PLACES, Yard, settings, two_brands
 
 def yard() -> Yard:
     """Both fleets are up; nobody wants anything yet."""
-    site = Yard(settings=two_brands(), finishing="charge")
+    site = Yard(two_brands(), finishing="charge")
     assert [what for _, what in site.run(5.0)][-4:] == [
         "B01 -> WAIT bay_1",
         "AMR01 -> WAIT wait_1",
@@ -80,7 +80,7 @@ def test_a_robots_own_receiver_is_never_asked_and_its_errors_are_shown() -> None
     states.publish(d.ChargerState(charger_name="rcu_b01", state=1))
     states.publish(d.ChargerState(charger_name="rcu_b01", state=200, error_message="robot: NTC"))
     assert site.run(8.0) == [
-        (5.25, "ALERT RECEIVER_ERROR: the receiver on big/B01: robot: NTC"),
+        (5.0, "ALERT RECEIVER_ERROR: the receiver on big/B01: robot: NTC"),
     ]
     assert (site.node.refused, site.faults) == (
         {},

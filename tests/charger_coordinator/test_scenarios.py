@@ -132,7 +132,7 @@ def test_0_a_robot_called_in_vain_gives_way_at_once_and_is_called_again_later(
 @EACH
 def test_1_the_schedule_calls_the_robots_that_it_names_and_is_shown(finishing: Finishing) -> None:
     night = Charging(at="13:47", until="13:50", robots=["tiny/AMR01"], percent=95.0)
-    site = yard(finishing, settings=settings(schedule=[night], timezone="UTC"))
+    site = yard(finishing, site=settings(schedule=[night], timezone="UTC"))
     for who in ("AMR01", "AMR02"):
         site.fleet.robots[who].battery_percent = 92.0
     told = site.run(25.0)
@@ -297,6 +297,7 @@ def test_4_a_robot_at_the_wrong_station_is_sent_to_its_own(finishing: Finishing)
         (12.25, "AMR01 -> CHARGE charger_a"),
         (18.25, "charger_a: CHARGING AMR01"),
     ]
+    assert site.faults == []
 
 
 @EACH

@@ -1,6 +1,6 @@
 """Every history to a depth, and drawn ones: what must hold whatever fleets, stations and time do.
 
-The walk: all 9^4 = 6561 histories of four moves (of three but for `make deep`), a second and more
+The walk: all histories of three moves (in `make deep` of four: 9^4 = 6561), a second and more
 apart, of two robots and two stations that do as RMF's charger messages say. Whoever speaks then is
 heard to the end.
 """

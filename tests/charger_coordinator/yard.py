@@ -1,7 +1,6 @@
 """A charging yard in virtual time: our coordinator as the daemon runs it, charger daemons' own cores
 with a plant under each, and a fleet adapter whose robots obey. The network is the memory transport."""
 
-from dataclasses import dataclass, field
 from typing import Any
 
 from bridges.charger import core as charger
@@ -17,12 +16,10 @@ from bridges.charger_coordinator.settings import RobotSettings, Settings, Statio
 from bridges.core.decision import IoFailed, RequestRefused, Sampled
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
-from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.stamps import duration
-from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from hal_fakes.rmf.fleet import Finishing, Fleet
-from tests.serve.virtual_graph import Disk
+from tests.serve.virtual_graph import EPOCH, Disk, Served, Ticking, World, in_order
 
 STEP_S = 0.25
 GRAPH = {
@@ -163,26 +160,28 @@ class Charger:
             self.activity = Activity.CHARGING
 
 
-@dataclass
 class Yard:
     """All of them. `story`: (s, what) of everything worth telling, in order; `fills`: % per second."""
 
-    settings: Settings = field(default_factory=settings)
-    knows: bool = True
-    fills: float = 5.0
-    drive_s: float = 4.0
-    finishing: Finishing = "nothing"
-    now: float = 0.0
-    story: list[tuple[float, str]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.network, self.kept = MemoryNetwork(), Disk()
-        self.rmf = MemoryTransport(self.network, "rmf")
-        self.chargers = {name: Charger(name, self.knows) for name in PLACES}
+    def __init__(
+        self,
+        site: Settings | None = None,
+        *,
+        knows: bool = True,
+        fills: float = 5.0,
+        drive_s: float = 4.0,
+        finishing: Finishing = "nothing",
+    ) -> None:
+        self.world = World(in_order)
+        self.settings = site or settings()
+        self.fills = fills
+        self.story: list[tuple[float, str]] = []
+        self.chargers = {name: Charger(name, knows) for name in PLACES}
         homes = {f"AMR0{i}": f"wait_{i}" for i in (1, 2, 3)}
-        self.fleet = Fleet("tiny", GRAPH, homes, self.drive_s, self.finishing)
-        self.big = Fleet("big", BIG_GRAPH, {"B01": "bay_1"}, self.drive_s, self.finishing)
+        self.fleet = Fleet("tiny", GRAPH, homes, drive_s, finishing)
+        self.big = Fleet("big", BIG_GRAPH, {"B01": "bay_1"}, drive_s, finishing)
         self.adapters = [self.fleet, self.big][: len(self.settings.fleets)]
+        self.rmf = Ticking(self.world, "rmf", STEP_S, self._step).transport
         self.states = self.rmf.publisher(topics.CHARGER_STATES)
         self.fleets: Any = self.rmf.publisher(topics.FLEET_STATES)
         self.wishes = self.rmf.publisher(topics.ADAPTER_CHARGER_REQUESTS)
@@ -195,32 +194,35 @@ class Yard:
         self.assignments = 0
         self.request_ids: dict[str, str] = {}
         self._shown: dict[str, str] = {}
-        self.starts()
+        self.disk = Disk()
+        self.coordinator = self.serves("ours", self.disk)
 
-    def starts(self) -> None:
-        """The coordinator's daemon."""
-        self.transport = MemoryTransport(self.network, "ours")
-        clock = Clock(lambda: self.now, lambda: 1e6 + self.now)
-        self.node = GraphNode(KIND, self.settings, self.transport, clock, kept=self.kept)
-        self.node.subscribe()
+    def serves(self, name: str, disk: Disk | None = None) -> Served:
+        """A coordinator's daemon. Its wall clock shows 13:46:40 at 0 s."""
+        return Served(self.world, KIND, self.settings, name, 1e6 - EPOCH, disk)
 
-    def dies(self) -> None:
-        """It is killed."""
-        self.transport.close()
-        self.node.round = lambda: None  # type: ignore[method-assign]
+    @property
+    def node(self) -> GraphNode[Any, Any, Any, Any, Any]:
+        """The coordinator."""
+        return self.coordinator.node
+
+    @property
+    def now(self) -> float:
+        """Monotonic s."""
+        return self.world.now
 
     def run(self, until: float) -> list[tuple[float, str]]:
         """Let time pass; what was told meanwhile."""
         told = len(self.story)
-        while self.now < until:
-            self.now += STEP_S
-            for adapter in self.adapters:
-                for _, message in adapter.tick(self.now):
-                    self.fleets.publish(message)
-            for charger_ in self.chargers.values():
-                self._scan(charger_)
-            self.node.round()
+        self.world.run(until)
         return self.story[told:]
+
+    def _step(self) -> None:
+        for adapter in self.adapters:
+            for _, message in adapter.tick(self.now):
+                self.fleets.publish(message)
+        for charger_ in self.chargers.values():
+            self._scan(charger_)
 
     def tell(self, what: str) -> None:
         """One line of the story."""

@@ -38,7 +38,10 @@ class Terminal:
                 self._read()
 
     def _read(self) -> None:
-        chunk = os.read(self._end, 65536)
+        try:
+            chunk = os.read(self._end, 65536)
+        except OSError as error:  # Linux says so when the program has ended
+            raise AssertionError(f"it has ended: {self.screen[-2000:]!r}") from error
         self.screen += chunk
         if b"\x1b[6n" in chunk:  # it asks where the cursor is
             os.write(self._end, b"\x1b[1;1R")

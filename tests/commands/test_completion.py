@@ -46,6 +46,13 @@ def test_commands_options_and_choices_are_completed(
     assert completed(line, tmp_path) == offered
 
 
+def test_the_devices_of_the_file_are_completed(tmp_path: Path) -> None:
+    file = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
+    for command in ("press", "fail", "walk", "doctor", "log"):
+        assert completed(f"rmf-bridge {command} {file} --device ", tmp_path) == ["Lift1"]
+        assert completed(f"rmf-bridge {command} no_such.yaml --device ", tmp_path) == []
+
+
 def test_the_buttons_of_a_running_simulation_are_completed(tmp_path: Path) -> None:
     running = RealTime({"Lift1": LiftPlant("Lift1", shipped())})
     control = Control(tmp_path / "plant.sock", running.plants)

@@ -133,7 +133,7 @@ def test_pins_that_another_service_has_are_refused_by_place(
 ) -> None:
     main(["enable", str(LIFT), "--root", str(tmp_path)])
     other = CONFIG / "lift_relay_board.yaml"
-    assert main(["enable", str(other), "--root", str(tmp_path)]) == 78
+    assert main(["enable", str(other), "--root", str(tmp_path)]) == os.EX_CONFIG
     told = capsys.readouterr().err
     assert f"BCM16 of the header is used in {tmp_path / TARGET} too, on line" in told
     assert [path.name for path in (tmp_path / "etc/rmf-bridges").iterdir()] == [LIFT.name]
@@ -145,7 +145,7 @@ def test_a_file_that_cannot_name_a_service_is_refused(
 ) -> None:
     file = tmp_path / name
     file.write_bytes(LIFT.read_bytes())
-    assert enable.run(_told(file, tmp_path)) == 78
+    assert enable.run(_told(file, tmp_path)) == os.EX_CONFIG
     assert "is no name of a service" in capsys.readouterr().err
 
 
@@ -157,8 +157,8 @@ def test_only_root_changes_a_running_system(
     monkeypatch: pytest.MonkeyPatch, calls: list[list[str]]
 ) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    assert main(["enable", str(LIFT)]) == 77
-    assert main(["disable", "lift_dry_contact"]) == 77
+    assert main(["enable", str(LIFT)]) == os.EX_NOPERM
+    assert main(["disable", "lift_dry_contact"]) == os.EX_NOPERM
     assert calls == []
 
 
@@ -176,7 +176,7 @@ def test_a_relay_that_is_not_verified_off_keeps_its_drop_in(
     live.dry_run = False
     assert carry_out([off], live) == 0  # no record: nothing to switch off
     left.touch()
-    assert carry_out([off, Remove(kept)], live) == 69
+    assert carry_out([off, Remove(kept)], live) == os.EX_UNAVAILABLE
     told = capsys.readouterr().err
     assert "what ward had claimed is not verified off" in told
     assert f"rm {left}" in told

@@ -7,6 +7,7 @@ import shlex
 import pytest
 
 from bridges import cli
+from bridges.commands.drafts.answers import LIFT_INPUTS
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS)
@@ -40,3 +41,34 @@ def test_the_help_of_each_request_ends_with_an_example(
         cli.main(["send", kind, "--help"])
     words = " ".join(capsys.readouterr().out.split())
     assert f"example: rmf-bridge send {kind} " in words
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("chek", "error: argument COMMAND: there is no 'chek'; did you mean 'check'?"),
+        ("send lft", "there is no 'lft'; did you mean 'lift'?"),
+        (
+            "fail lift.yaml car stuk",
+            "error: argument mode: there is no 'stuk'; did you mean 'stuck'?",
+        ),
+        ("xyzzy", "invalid choice: 'xyzzy' (choose from "),
+    ],
+)
+def test_a_word_that_is_nearly_right_is_answered_with_the_right_one(
+    line: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        cli.main(line.split())
+    assert left.value.code == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_no_word_of_a_help_is_broken(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        cli.main(["init", "--help"])
+    said = capsys.readouterr().out.replace(",", " ").split()
+    assert {*LIFT_INPUTS} <= {*said}

@@ -96,6 +96,7 @@ def test_a_file_that_is_there_is_never_overwritten(tmp_path: Path) -> None:
     file = tmp_path / "device.yaml"
     file.write_text("mine")
     assert cli.main(["init", str(file), "--kind", "door", "--yes"]) == 73
+    assert cli.main(["init", str(file)]) == 73  # before a question is asked
     assert file.read_text() == "mine"
 
 

@@ -1,12 +1,20 @@
 """`rmf-bridge log`: the command line that it hands to journalctl, and what its pattern finds."""
 
 import argparse
+import os
 import re
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
 
 import pytest
 
+from bridges import cli
 from bridges.commands import log
 from bridges.log import pairs
+from bridges.serve.directory import RuntimeDirectory
+from bridges.serve.places import by_hand
 
 LINES = [
     pairs("state", device="Lift1", mode="AGV"),
@@ -51,3 +59,32 @@ def test_it_finds_only_what_is_about_this_event_or_device(
     (grep,) = [word for word in command("lift_a.yaml", *words) if word.startswith("--grep=")]
     pattern = re.compile(grep.removeprefix("--grep="))
     assert [i for i, line in enumerate(LINES) if pattern.search(line)] == found
+
+
+def test_a_daemon_that_was_started_by_hand_has_its_log_where_it_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    file = tmp_path / "lift_by_hand.yaml"
+    with closing(RuntimeDirectory(by_hand(file), file, serves=True)):
+        assert cli.main(["log", str(file)]) == 69
+    assert capsys.readouterr().err == (
+        "lift_by_hand was started by hand: its log is on the terminal where it runs, or where"
+        f" `rmf-bridge run {file} 2> LOG` sends it\n"
+    )
+
+
+def test_a_name_that_is_no_service_is_said_before_what_the_journal_has(tmp_path: Path) -> None:
+    journal = tmp_path / "journalctl"
+    journal.write_text("#!/bin/sh\necho asked for $1\n")
+    journal.chmod(0o755)
+    told = subprocess.run(
+        [sys.executable, "-m", "bridges.cli", "log", "no_such_lift"],
+        env={**os.environ, "PATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert told.stderr.startswith("no_such_lift is no service here (services: ")
+    assert told.stdout == "asked for --unit=rmf-bridge@no_such_lift\n"

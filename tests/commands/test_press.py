@@ -1,5 +1,6 @@
 """`rmf-bridge press` and `fail`, against the plants of a simulated lift."""
 
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -65,8 +66,51 @@ def test_what_is_not_there_is_answered_with_what_is(
     assert capsys.readouterr().err.startswith(answer)
 
 
-def test_without_a_simulation_the_answer_is_how_to_start_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_what_was_done_is_said_and_stands_in_the_simulations_log(
+    plant: LiftPlant,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
-    assert say(tmp_path, "press", "fire_alarm") == 69
+    caplog.set_level(logging.INFO, "hal_fakes")
+    say(tmp_path, "press", "fire_alarm")
+    say(tmp_path, "fail", "car", "stuck")
+    say(tmp_path, "fail", "car", "ok")
+    assert capsys.readouterr().out.splitlines() == [
+        "Lift1: fire_alarm on",
+        "Lift1: car stuck",
+        "Lift1: car ok",
+    ]
+    assert caplog.messages == [
+        "pressed device=Lift1 signal=fire_alarm to=on",
+        "failed device=Lift1 part=car mode=stuck",
+        "mended device=Lift1 part=car mode=ok",
+    ]
+
+
+def test_without_a_name_the_names_are_printed(
+    plant: LiftPlant, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (say(tmp_path, "press"), say(tmp_path, "fail")) == (0, 0)
+    known = plant.names()
+    assert capsys.readouterr().out.splitlines() == [
+        f"Lift1: {', '.join(known['press'])}",
+        f"Lift1: {', '.join(known['fail'])}",
+    ]
+
+
+def test_a_part_without_a_failure_is_answered_with_the_failures(
+    plant: LiftPlant, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        say(tmp_path, "fail", "car")
+    assert left.value.code == 2
+    assert "how does car fail? off, stuck, slow, garbage, wrong; ok" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [("press",), ("press", "fire_alarm")])
+def test_without_a_simulation_the_answer_is_how_to_start_one(
+    words: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert say(tmp_path, *words) == 69
     assert f"rmf-bridge run {FILE} --simulate" in capsys.readouterr().err

@@ -32,7 +32,7 @@ def told(
     seen = Seen(0.0, 10.0, listeners, boarded=boarded)
     sent, hints = list[tuple[int, str]](), list[str]()
     for now, state in enumerate(states):
-        seen = replace(seen, states=(*seen.states, Heard(state, now)))
+        seen = seen.hears(Heard(state, now), request.about)
         todo = step(request, seen, now)
         if todo.outcome is not None:
             return sent, hints, todo.outcome
@@ -62,8 +62,12 @@ def test_while_a_robot_may_be_inside_somebody_must_say_that_the_car_is_empty(boa
 
 
 def test_without_any_supervisor_the_lifts_own_daemon_is_asked_as_well() -> None:
-    sent, *_ = told(RELEASE, [GRANTED] * 6 + [LIFT], boarded="no", listeners=0)
+    sent, hints, _ = told(RELEASE, [GRANTED] * 6 + [LIFT], boarded="no", listeners=0)
     assert sent == [(5, "direct")]
+    assert hints == [
+        "no lift supervisor runs in this domain: no node publishes lift_requests;"
+        " lifts heard: Lift1; the lift's own daemon is asked instead"
+    ]
 
 
 def test_send_end_never_goes_past_the_supervisor() -> None:
@@ -108,5 +112,5 @@ def test_without_a_supervisor_and_with_a_robot_that_may_be_inside_the_car_is_to_
     _, hints, _ = told(RELEASE, [GRANTED] * 11, boarded="", listeners=0)
     assert hints == [
         "no lift supervisor runs in this domain: no node publishes lift_requests;"
-        " if the car is empty: rmf-bridge release Lift1 --car-empty"
+        " lifts heard: Lift1; if the car is empty: rmf-bridge release Lift1 --car-empty"
     ]

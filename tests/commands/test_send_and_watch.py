@@ -33,7 +33,7 @@ from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
 from bridges.settings.load import load
-from hal_fakes.wire import Wire, wire
+from hal_fakes.wire import Wire, runs_here
 from tests.rmf.zenoh_programs import Router
 from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 
@@ -44,7 +44,7 @@ LIFT = d.LiftState(
 )
 
 
-class Told(MemoryTransport):
+class Command(MemoryTransport):
     """A node that is told a device's state as soon as it subscribes, and after each request."""
 
     def __init__(self, device: "Device") -> None:
@@ -119,7 +119,7 @@ def test_a_request_reaches_the_device_once_and_its_effect_ends_the_command(
     states: Topic[Any], state: d.Message, wanted: Request
 ) -> None:
     device, out = Device(states, wanted.topic, state), io.StringIO()
-    assert send.send(Told(device), wanted, 10.0, out) == 0
+    assert send.send(Command(device), wanted, 10.0, out) == 0
     assert [line.split()[2] for line in out.getvalue().splitlines()] == [
         *("state", "request", "state", "done")
     ]
@@ -145,7 +145,7 @@ def test_a_refused_request_for_a_charger_ends_with_who_has_it(
 
     device = Refusing(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, BUSY)
     wanted = Charge("a", "fleet", "robot", "r2", 30)
-    assert send.send(Told(device), wanted, 60.0, io.StringIO()) == 1
+    assert send.send(Command(device), wanted, 60.0, io.StringIO()) == 1
     assert capsys.readouterr().err == (
         "rmf-bridge send: a refuses the request: charger occupied: fleet/other has it"
         " (request r1); to cancel that: rmf-bridge send charger a --cancel r1\n"
@@ -169,7 +169,9 @@ def test_send_and_watch_use_the_topic_names_of_the_sites_yaml() -> None:
 
 def test_a_request_carries_the_time_at_which_it_was_sent() -> None:
     device = Device(topics.DOOR_STATES, topics.DOOR_REQUESTS, DOOR)
-    assert send.send(Told(device), DoorMove("ward", True, ME, direct=True), 10, io.StringIO()) == 0
+    assert (
+        send.send(Command(device), DoorMove("ward", True, ME, direct=True), 10, io.StringIO()) == 0
+    )
     assert device.requests[0].request_time.sec > 1_700_000_000
 
 
@@ -180,7 +182,9 @@ def test_what_comes_from_the_network_cannot_move_the_cursor(
     device = Device(
         topics.LIFT_STATES, topics.LIFT_REQUESTS, replace(LIFT, available_floors=floors)
     )
-    assert send.send(Told(device), LiftRide("Lift1", "L3", ME, direct=True), 10, io.StringIO()) == 1
+    assert (
+        send.send(Command(device), LiftRide("Lift1", "L3", ME, direct=True), 10, io.StringIO()) == 1
+    )
     assert "\x1b" not in capsys.readouterr().err
 
 
@@ -189,7 +193,7 @@ def test_the_reason_goes_to_standard_error_and_the_exit_code_is_1(
 ) -> None:
     device, out = Device(topics.LIFT_STATES, topics.LIFT_REQUESTS, LIFT), io.StringIO()
     request = LiftRide("Lift1", "L33", ME, direct=True)
-    assert send.send(Told(device), request, 10.0, out) == 1
+    assert send.send(Command(device), request, 10.0, out) == 1
     assert capsys.readouterr().err == (
         "rmf-bridge send: Lift1 serves L1, L3, not 'L33'; did you mean 'L3'?\n"
     )
@@ -200,12 +204,12 @@ def test_once_prints_the_table_or_says_that_nothing_is_there(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     device, out = Device(topics.LIFT_STATES, topics.LIFT_REQUESTS, HELD), io.StringIO()
-    assert watch.show_once(watch.listen_on(Told(device)), 0.01, out) == 0
+    assert watch.show_once(watch.listen_on(Command(device)), 0.01, out) == 0
     assert out.getvalue().splitlines()[1].split()[:6] == [
         *("lift", "Lift1", "car", "at", "L1,", "door")
     ]
     told = io.StringIO()
-    assert watch.show_once(watch.listen_on(Told(device)), 0.01, told, as_json=True) == 0
+    assert watch.show_once(watch.listen_on(Command(device)), 0.01, told, as_json=True) == 0
     (row,) = json.loads(told.getvalue())
     assert (row["kind"], row["name"], row["held_by"]) == ("lift", "Lift1", HELD.session_id)
     nobody = MemoryTransport(MemoryNetwork(), "alone")
@@ -274,7 +278,7 @@ def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
 # --- as processes ------------------------------------------------------------------------------
 
 
-@pytest.fixture(params=sorted({wire(), "zenoh"}))
+@pytest.fixture(params=sorted({runs_here(), "zenoh"}))
 def speaks(request: pytest.FixtureRequest) -> Wire:
     """The transport of the daemon and of the command."""
     speaks: Wire = request.param

@@ -81,6 +81,24 @@ def test_a_fault_is_shown_with_its_cause_and_what_to_do(tmp_path: Path) -> None:
     ]
 
 
+def test_a_remedy_names_the_device_its_file_and_what_the_file_sets() -> None:
+    file = str(Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml")
+    known = faults.values(file, "Lift1")
+    told = faults.remedies()
+    assert faults.here(told["RMF_SILENT"], file, "Lift1", known).cause == (
+        "no request for `request_timeout_s` (30 s)"
+    )
+    assert faults.here(told["FIRE_LATCHED"], file, "Lift1", known).do == (
+        f"when it is safe: `rmf-bridge reset {file}`"
+    )
+    held = faults.here(told["HOLDER_SILENT"], "/x/lift a.yaml", "Lift 1", {})
+    assert held.do == (
+        "look into the car; then `rmf-bridge release 'Lift 1'`, or set `holder_ttl_s` to have this"
+        " done automatically"
+    )
+    assert faults.values("/no/such.yaml", "Lift1") == faults.values(file, "Lift9") == {}
+
+
 def test_a_daemon_whose_status_is_old_hangs(tmp_path: Path) -> None:
     with served(tmp_path / "lift_a", lift()) as folder:
         found = seen(folder, age_s=6.0)
@@ -169,3 +187,13 @@ def test_each_fault_of_the_source_has_a_remedy_and_each_remedy_a_fault() -> None
 def test_the_page_of_faults_is_the_table_itself() -> None:
     """`python -m bridges.commands.faults > docs/faults.md` brings it up to date."""
     assert (ROOT / "docs" / "faults.md").read_text() == faults.page()
+
+
+def test_a_name_that_nobody_has_is_answered_with_the_names_there_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "rmf-bridge").mkdir()
+    with served(tmp_path / "rmf-bridge" / "lift_named", lift()):
+        assert cli.main(["status", "no_such_lift"]) == NONE
+    assert re.search(r"^no daemon no_such_lift; there is .*\blift_named\b", capsys.readouterr().err)

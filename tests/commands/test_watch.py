@@ -126,6 +126,31 @@ def test_faults_have_a_column_when_there_are_any_and_are_a_change() -> None:
     assert (line["at"], line["name"], line["faults"]) == (WALL, "ward", "DOOR_SILENT")
 
 
+def test_a_device_is_shown_once_it_is_known_whether_it_is_simulated() -> None:
+    """A real one's daemon may be another's, and never say so: it is not waited for long."""
+    young = board(LIFT)
+    assert watch.settled(young, 100.0, WALL) == []
+    assert [row.simulated for row in watch.settled(young, 101.5, WALL)] == [False]
+    young.take(Heard(told("lift_supervisor", "Lift1"), 100.0))
+    assert watch.settled(young, 100.0, WALL) == []
+    young.take(Heard(told("lift", "Lift1"), 100.0))
+    assert [row.name for row in watch.settled(young, 100.0, WALL)] == ["Lift1"]
+
+
+def test_what_a_narrow_terminal_would_cut_off_follows_on_a_line_of_its_own() -> None:
+    faulty = board(LIFT, DOOR, told("door", "ward", "DOOR_SILENT")).rows(100.0, WALL)
+    text, lines = repaint(faulty, 0, columns=40, lines=24, coloured=False)
+    assert (lines, text.replace("\r\x1b[K", "").replace("\x1b[J", "").splitlines()) == (
+        4,
+        [
+            "kind  name   state                     ",
+            "lift  Lift1  car at L1, door open, mode",
+            "door  ward   closed                    ",
+            "  DOOR_SILENT",
+        ],
+    )
+
+
 def test_a_pipe_gets_a_line_for_a_change_and_none_for_an_age() -> None:
     opened = replace(DOOR, current_mode=d.DoorMode(2))
     first = board(DOOR, LIFT).rows(100.0, WALL)
@@ -231,7 +256,7 @@ def test_a_simulation_is_marked_and_a_simulated_supervisor_does_not_make_its_lif
     assert not row.simulated
 
 
-def test_running_seconds_are_no_change_but_a_new_word_is() -> None:
+def test_counting_seconds_are_not_a_change_and_a_new_word_is_one() -> None:
     def said(detail: str) -> list[Row]:
         status = {"faults": [{"code": "OVERLOAD", "detail": detail}], "waiting": "fleet/b (3 s)"}
         told = diagnosis("node", "lift_supervisor", {}, {"Lift1": status}, d.Time())

@@ -6,8 +6,8 @@ from bridges.door import messages
 from bridges.rmf import topics
 from bridges.rmf.definitions import DoorModeValue, DoorRequest
 from bridges.rmf.stamps import stamp
-from hal_fakes.rmf import door_request
-from hal_fakes.rmf.supervisors import DoorSupervisor
+from bridges.rmf_rules import door_request
+from bridges.rmf_rules.supervisors import DoorSupervisor
 from tests.door.virtual import FIRE, OBSTRUCTION, SCAN_S, Door
 
 

@@ -1,6 +1,5 @@
 """A door in virtual time: its core alone, or with driver, wires and plant, scanned as the loop does."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import msgspec
@@ -13,9 +12,8 @@ from bridges.door.signals import CloseRequested, DoorOutputs, DoorSample, Event,
 from bridges.rmf.definitions import DoorModeValue
 from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires
-from drivers.hal.points import HalError, Pull
 from hal_fakes.plants.door import build
-from hal_fakes.wiring import Wiring
+from tests.drivers.far import PointsFar
 
 SCAN_S = 0.125
 DEBOUNCE_S = 0.0625
@@ -69,57 +67,6 @@ class CoreAlone:
         return tuple(str(fault) for fault in self.last.report.faults)
 
 
-class MemoryBus:
-    """A bus of points without a wire: levels go straight to the plant. `down` breaks it."""
-
-    def __init__(self, wiring: Wiring) -> None:
-        self.wiring = wiring
-        self.now = 0.0
-        self.down = ""
-        self.written: list[dict[str, bool]] = []
-
-    def canonical(self, point: str) -> str:
-        return point
-
-    def lines(
-        self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]
-    ) -> "MemoryLines":
-        return MemoryLines(self, dict(outputs))
-
-
-class MemoryLines:
-    """The points of one device on the bus."""
-
-    def __init__(self, bus: MemoryBus, safe: dict[str, bool]) -> None:
-        self._bus = bus
-        self._safe = safe
-        self._levels = dict(safe)
-
-    def claim(self) -> None:
-        self.write(self._safe)
-
-    def read(self) -> dict[str, bool]:
-        self._check()
-        return self._bus.wiring.levels(self._bus.now)
-
-    def write(self, levels: Mapping[str, bool]) -> None:
-        self._check()
-        self._bus.written.append(dict(levels))
-        for point, level in levels.items():
-            self._levels[point] = level
-            self._bus.wiring.drive(point, level, self._bus.now)
-
-    def outputs(self) -> dict[str, bool]:
-        return dict(self._levels)
-
-    def close(self) -> None:
-        self.write(self._safe)
-
-    def _check(self) -> None:
-        if self._bus.down:
-            raise HalError(self._bus.down)
-
-
 def settings(**changes: Any) -> Settings:
     """A door on a Modbus module, as its YAML would have it, with these keys changed."""
     inputs = changes.pop("inputs", {})
@@ -152,7 +99,7 @@ class Door:
         self.settings = settings(**changes)
         self.limits = DoorLimits.of(self.settings, debounce(self.settings))
         self.plant = build("door", self.settings, wires(self.settings))
-        self.bus = MemoryBus(Wiring(self.plant, wires(self.settings), str))
+        self.bus = PointsFar(self, self.plant, wires(self.settings))
         self.now = 0.0
         self.told: list[tuple[float, str]] = []
         self.faults: list[tuple[float, tuple[str, ...]]] = []
@@ -163,7 +110,6 @@ class Door:
         """A new daemon on the same door: outputs off, nothing remembered."""
         self.driver: DryContactDoor = create("door", self.settings, self.bus)
         self.memory = initial(self.limits, self.now)
-        self.bus.now = self.now
         self.driver.open()
         self.scan()
 
@@ -176,7 +122,6 @@ class Door:
     def scan(self, *requests: Event) -> None:
         """Read, decide, write; the requests come after the reading."""
         self.scans += 1
-        self.bus.now = self.now
         decided = self._decide(self._read())
         for request in requests:
             decided = self._decide(request)

@@ -29,7 +29,7 @@ DURATIONS: dict[str, float] = {"stale_after_s": 60.0, "max_hold_s": 30.0}
 
 
 def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:
-    """The default durations, but for these."""
+    """The default durations, except these."""
     return DoorLimits(t=Durations(**{**DURATIONS, **(durations or {})}), **facts)
 
 

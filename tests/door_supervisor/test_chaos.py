@@ -17,9 +17,8 @@ from tests.door_supervisor.world import (
     OurSupervisor,
     Walker,
     holds,
-    in_order,
 )
-from tests.serve.virtual_graph import Disk, World
+from tests.serve.virtual_graph import Disk, World, in_order
 
 ROBOTS = ("fleet/a", "fleet/b", "other/c")
 STORM_S = 120.0

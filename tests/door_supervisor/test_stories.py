@@ -3,17 +3,16 @@
 from bridges.door_supervisor import keep
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
-from hal_fakes.rmf import NEVER, door_request
+from bridges.rmf_rules import NEVER, door_request
 from tests.door_supervisor.world import (
     WARD,
     DoorDaemon,
     OurSupervisor,
     RmfsSupervisor,
     Walker,
-    in_order,
     to_door,
 )
-from tests.serve.virtual_graph import EPOCH, Disk, World
+from tests.serve.virtual_graph import EPOCH, Disk, World, in_order
 
 A, B = "fleet/a", "fleet/b"
 

@@ -3,7 +3,7 @@
 The supervisor is ours as it is served, or the stand-in for RMF's.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 from bridges.door import messages as door_messages
@@ -12,18 +12,13 @@ from bridges.door_supervisor.settings import Settings
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
-from hal_fakes.rmf.phases import DoorClose, DoorOpen
-from hal_fakes.rmf.robot import Phase, Robot
-from hal_fakes.rmf.supervisors import DoorSupervisor
+from bridges.rmf_rules.phases import DoorClose, DoorOpen
+from bridges.rmf_rules.robot import Phase, Robot
+from bridges.rmf_rules.supervisors import DoorSupervisor
 from tests.door.virtual import SCAN_S, Door
 from tests.serve.virtual_graph import EPOCH, NEVER, Disk, Served, StandIn, World, say
 
 WARD = "ward"
-
-
-def in_order(sender: str, receiver: str) -> Sequence[float]:
-    """A network that takes no time."""
-    return (0.0,)
 
 
 def holds(disk: Disk, who: str) -> bool:

@@ -1,48 +1,23 @@
 """The control socket, with a running world behind it."""
 
-import json
 import socket
 import time
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from drivers import DriverError
+from hal_fakes.caller import Caller
 from hal_fakes.control import Control
 from hal_fakes.plants.lift import LiftPlant, Pace
+from hal_fakes.plants.plant import Edge
 from hal_fakes.realtime import RealTime
 from tests.hal_fakes.virtual_lift import shipped
-from tests.waiting import PATIENCE_S
 
 QUICK = Pace(floor_s=0.02, door_s=0.02, agv_s=0.02, dwell_s=0.02)
-
-
-class Caller:
-    """One connection to a control socket."""
-
-    def __init__(self, path: Path) -> None:
-        self._end = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._end.settimeout(PATIENCE_S)
-        self._end.connect(str(path))
-        self._lines = self._end.makefile("r", encoding="utf-8")
-
-    def say(self, line: str) -> str:
-        """Send a line, and return the next one that comes."""
-        self._end.sendall(line.encode() + b"\n")
-        return self.hear()
-
-    def hear(self) -> str:
-        return self._lines.readline().rstrip("\n")
-
-    def edge(self) -> dict[str, Any]:
-        edge: dict[str, Any] = json.loads(self.hear())
-        return edge
-
-    def close(self) -> None:
-        self._lines.close()
-        self._end.close()
 
 
 class World:
@@ -74,13 +49,12 @@ def test_a_follower_hears_every_edge_from_then_on(world: World) -> None:
     assert caller.say("follow") == "ok"
     before = time.monotonic()
     world.running.plants["Lift1"].drive("agv_mode_request", True, before)
-    relay, sensor = caller.edge(), caller.edge()
-    times = [relay.pop("at"), sensor.pop("at")]
-    assert [relay, sensor] == [
-        {"device": "Lift1", "what": "relay", "signal": "agv_mode_request", "value": True},
-        {"device": "Lift1", "what": "sensor", "signal": "agv_mode", "value": True},
+    edges = list(islice(caller.edges(), 2))
+    assert [replace(edge, at=0.0) for edge in edges] == [
+        Edge(0.0, "Lift1", "relay", "agv_mode_request", True),
+        Edge(0.0, "Lift1", "sensor", "agv_mode", True),
     ]
-    assert times == pytest.approx([before, before + QUICK.agv_s])
+    assert [edge.at for edge in edges] == pytest.approx([before, before + QUICK.agv_s])
 
 
 def test_presses_and_failures_are_made_on_command(world: World) -> None:
@@ -135,7 +109,7 @@ def test_a_caller_who_leaves_or_never_reads_does_not_stop_the_plants(world: Worl
     while told < 2000:  # many times what a socket keeps for a caller who does not read
         for i in range(50):
             plant.drive("door_open", i % 2 == 0, time.monotonic())
-        told += len([well.edge() for _ in range(50)])
+        told += len(list(islice(well.edges(), 50)))
     assert len(list(iter(deaf.hear, ""))) < told
 
 

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,8 @@ from bridges.door.signals import DoorOutputs, DoorSample
 from bridges.settings.load import Config, load
 from drivers.door.dry_contact import create
 from drivers.hal import HalError
+from hal_fakes.caller import Caller
 from hal_fakes.simulate import Simulation
-from tests.hal_fakes.test_control import Caller
 from tests.hal_fakes.virtual_lift import SHIPPED
 from tests.waiting import PATIENCE_S, wait_until
 
@@ -43,8 +44,7 @@ def test_a_real_bus_is_pointed_at_the_fake_and_moves_the_plant(
     assert driver.read() == DoorSample(opened=False, closed=True)
     assert story.say("follow") == "ok"
     driver.write(DoorOutputs(hold_open=True))
-    edges = [story.edge() for _ in range(3)]
-    assert [(e["what"], e["signal"], e["value"]) for e in edges] == [
+    assert [(e.what, e.signal, e.value) for e in islice(story.edges(), 3)] == [
         ("relay", "hold_open", True),
         ("sensor", "closed", False),
         ("sensor", "opened", True),

@@ -6,7 +6,7 @@ import msgspec
 from bridges.charger.signals import ChargerOutputs
 from drivers.charger.can_frames import Settings, create
 from hal_fakes.can.frame_charger import PERIODS, STATUS_S, FrameCharger
-from hal_fakes.plants.pad import PadPlant
+from hal_fakes.plants.charger import ChargerPlant
 from tests.drivers.hal.can.far_end import Reactive
 
 SETTINGS = msgspec.convert(
@@ -20,7 +20,7 @@ class Bench:
 
     def __init__(self) -> None:
         self.far = Reactive()
-        self.plant = PadPlant("a")
+        self.plant = ChargerPlant("a", commanded=True)
         self.station = FrameCharger(self.plant, SETTINGS)
         self.far.react = self._hear
         bus = self.far.bus()
@@ -46,7 +46,7 @@ class Bench:
         self.far.coming.append(message)
 
     def enabled(self) -> list[object]:
-        return [edge.value for edge in self.plant.edges if edge.signal == "enable"]
+        return [edge.value for edge in self.plant.edges if edge.signal == "power"]
 
 
 def test_it_charges_while_it_is_fed_and_stops_three_periods_after_the_last_frame() -> None:

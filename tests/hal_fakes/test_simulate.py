@@ -10,9 +10,9 @@ from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Side
 from bridges.settings.load import Config, load
 from drivers.hal.gpio import GpioBus
 from drivers.lift.dry_contact import LiftDryContact, create
+from hal_fakes.caller import Caller
 from hal_fakes.plants import lift as lift_plant
 from hal_fakes.simulate import Simulation
-from tests.hal_fakes.test_control import Caller
 from tests.hal_fakes.virtual_lift import SHIPPED
 from tests.waiting import PATIENCE_S
 

@@ -1,4 +1,4 @@
-"""RMF around one lift: its supervisor and fleet adapters, stood in for, talking to the real node."""
+"""RMF around one lift: stand-ins for its supervisor and its fleet adapters talk to the real node."""
 
 from collections.abc import Callable, Sequence
 
@@ -10,10 +10,10 @@ from bridges.rmf.topics import (
     LIFT_STATES,
     AnyTopic,
 )
-from hal_fakes.rmf import Party, Said
-from hal_fakes.rmf.phases import EndLiftSession, RequestLift
-from hal_fakes.rmf.robot import Robot
-from hal_fakes.rmf.supervisors import LiftSupervisor
+from bridges.rmf_rules import Party, Said
+from bridges.rmf_rules.phases import EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Robot
+from bridges.rmf_rules.supervisors import LiftSupervisor
 from tests.lift.story import WALL, Story
 
 STEP_S = 0.25
@@ -23,8 +23,8 @@ REPLAYED = 100
 
 
 class World:
-    """`fate` says when a LiftRequest reaches the node (s from now; none: lost; two: doubled), and
-    `hears` whether RMF gets a LiftState. By default all arrives at once and in order.
+    """`fate` gives the delays (s) after which a LiftRequest reaches the node: none loses it, two double
+    it. `hears` says whether RMF gets a LiftState. By default all arrives at once and in order.
 
     The robots hear each state before the supervisor when `adapters_first`.
     """
@@ -87,6 +87,17 @@ class World:
             for request in history[-REPLAYED:]:
                 self._deliver(self.supervisor.hear(request, self._now))
         self._arrive()
+
+    def finds_again(self, robot: Robot, apart_s: float = 0.02) -> None:
+        """The supervisor finds an adapter again that was cut off, and hears what it has retained."""
+        for request in self.asked_by(robot):
+            self._deliver(self.supervisor.hear(request, self._now))
+            self._arrive()
+            self.run(self.story.now + apart_s)
+
+    def asked_by(self, robot: Robot) -> list[LiftRequest]:
+        """What its adapter has retained."""
+        return self._history[robot.requester_id][-REPLAYED:]
 
     def restart_adapter(self, robot: Robot) -> Robot:
         """A new fleet adapter for the same robot, which has no task and holds no lift."""

@@ -10,10 +10,10 @@ import pytest
 
 from bridges.lift.signals import LiftOutputs
 from bridges.rmf.definitions import LiftState
+from bridges.rmf_rules.robot import Robot
 from drivers.lift.dry_contact import wires
 from hal_fakes.plants.lift import FAILS
 from hal_fakes.plants.plant import FailureMode
-from hal_fakes.rmf.robot import Robot
 from tests.depth import part
 from tests.lift.rmf_world import World
 from tests.lift.wired import WiredStory, shipped

@@ -32,7 +32,7 @@ def in_service(name: str) -> Story:
 
 
 def told(story: Story) -> list[str]:
-    """What RMF was told, but for the car on its way."""
+    """What RMF was told, without the states between floors."""
     return [words for _, words in story.states if "moving" not in words and "at ?" not in words]
 
 

@@ -12,7 +12,7 @@ from bridges.lift.messages import OWN_REQUESTS
 from bridges.lift.signals import LiftOutputs
 from bridges.rmf.definitions import LiftRequest
 from bridges.rmf.stamps import stamp
-from hal_fakes.rmf.robot import Robot
+from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
 from tests.lift.story import AGV, END, WALL, Controller, Story
 from tests.lift.test_with_rmf import A, B, ons, sessions, world

@@ -35,7 +35,7 @@ AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
 ASKED = Requested("A", True, "L1")
 
 
-class Told:
+class Alone:
     """A core alone, told one event after the other; `decision`: the last."""
 
     def __init__(self, debounce: dict[str, float] | None = None, **limits: Any) -> None:
@@ -44,7 +44,7 @@ class Told:
         self.limits = LiftLimits.of(settings, debounce or {})
         self.memory = Memory()
 
-    def __call__(self, now: float, *events: Any) -> "Told":
+    def __call__(self, now: float, *events: Any) -> "Alone":
         for event in events:
             event = Sampled(event) if isinstance(event, LiftSample) else event
             self.decision = decide(self.memory, event, now, self.limits)
@@ -127,24 +127,24 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
 def test_a_fault_says_what_is_wrong(what: str) -> None:
     happenings, fault = FAULTS[what]
     debounce = {"rear_door": 0.5, "agv_mode": 0.5} if "still" in what else {}
-    told = Told(debounce, agv_timeout_s=0.5, floor_timeout_s=0.6, door_timeout_s=0.7)
+    alone = Alone(debounce, agv_timeout_s=0.5, floor_timeout_s=0.6, door_timeout_s=0.7)
     if debounce:
         settled = replace(AT_L1, rear_door=Door.CLOSED)
-        told(-0.5, settled)(0.0, settled)
+        alone(-0.5, settled)(0.0, settled)
     for now, event in happenings:
-        told(now, event)
-    assert told.faults == (fault,)
+        alone(now, event)
+    assert alone.faults == (fault,)
 
 
 @pytest.mark.parametrize("event", [Ended("A"), IoFailed("timeout"), OperatorReset(), RivalSeen()])
 def test_an_event_that_is_not_a_request_is_not_refused(event: Any) -> None:
-    assert Told()(0.0, AT_L1, event).decision.refused == ""
+    assert Alone()(0.0, AT_L1, event).decision.refused == ""
 
 
 def test_a_reading_no_longer_counts_in_the_instant_in_which_it_is_too_old() -> None:
     burning = replace(AT_L1, door=Door.BOTH, hazards=frozenset({Hazard.EMERGENCY}))
-    told = Told(stale_after_s=2.0)(0.0, burning)(2.0, IoFailed("timeout"))
-    assert told.faults == (Fault("INPUTS_NOT_FRESH", "timeout"),)
+    alone = Alone(stale_after_s=2.0)(0.0, burning)(2.0, IoFailed("timeout"))
+    assert alone.faults == (Fault("INPUTS_NOT_FRESH", "timeout"),)
 
 
 def test_each_input_has_its_own_debounce_and_the_core_wakes_when_it_is_over() -> None:
@@ -156,14 +156,14 @@ def test_each_input_has_its_own_debounce_and_the_core_wakes_when_it_is_over() ->
         ({"agv": False}, 0.05),
         ({"hazards": frozenset({Hazard.FIRE})}, 0.06),
     ):
-        told = Told(DEBOUNCE)(0.0, settled)(1.0 - 0.5, settled)(1.0, replace(settled, **change))
-        assert told.decision.wake_at == 1.0 + due_s
+        alone = Alone(DEBOUNCE)(0.0, settled)(1.0 - 0.5, settled)(1.0, replace(settled, **change))
+        assert alone.decision.wake_at == 1.0 + due_s
 
 
 def test_a_hazard_that_goes_wakes_the_core_when_it_is_gone() -> None:
     burning = replace(AT_L1, hazards=frozenset({Hazard.EMERGENCY}))
-    told = Told(hazard_clear_s=0.7)(0.0, burning)(0.5, AT_L1)
-    assert told.decision.wake_at == 0.5 + 0.7
+    alone = Alone(hazard_clear_s=0.7)(0.0, burning)(0.5, AT_L1)
+    assert alone.decision.wake_at == 0.5 + 0.7
 
 
 @pytest.mark.parametrize("where", ["door", "rear_door"])
@@ -171,61 +171,61 @@ def test_a_door_with_one_contact_wakes_the_core_when_it_has_come_to_its_other_en
     where: str,
 ) -> None:
     sample = replace(AT_L1, door=Door.CLOSED, rear_door=Door.CLOSED)
-    told = Told(door_travel_s=3.0, stale_after_s=60.0)(0.0, sample)
-    told(1.0, replace(sample, **{where: Door.NOT_CLOSED}))
-    assert told.decision.wake_at == 4.0
+    alone = Alone(door_travel_s=3.0, stale_after_s=60.0)(0.0, sample)
+    alone(1.0, replace(sample, **{where: Door.NOT_CLOSED}))
+    assert alone.decision.wake_at == 4.0
 
 
 def test_the_core_wakes_for_rmfs_silence_and_for_the_next_try() -> None:
-    told = Told(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED)
-    assert told.decision.wake_at == 31.0
-    told = Told(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
-    told(0.0, CLOSED)(1.0, ASKED)(5.0, CLOSED)
-    assert told.decision.outputs == LiftOutputs()
-    assert told.decision.wake_at == 15.0
+    alone = Alone(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED)
+    assert alone.decision.wake_at == 31.0
+    alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
+    alone(0.0, CLOSED)(1.0, ASKED)(5.0, CLOSED)
+    assert alone.decision.outputs == LiftOutputs()
+    assert alone.decision.wake_at == 15.0
 
 
 def test_the_end_of_a_wait_for_the_lift_wakes_the_core() -> None:
-    told = Told(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
-    told(0.0, CLOSED)(1.0, ASKED)
-    assert told.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
-    assert told.decision.wake_at == 5.0
+    alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
+    alone(0.0, CLOSED)(1.0, ASKED)
+    assert alone.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
+    assert alone.decision.wake_at == 5.0
 
 
 def test_a_pulsed_call_that_a_hazard_cut_short_is_given_again_when_it_is_over() -> None:
-    told = Told(stale_after_s=900.0, call_pulse_s=2.0, hazard_clear_s=1.0)
-    told(0.0, CLOSED)(1.0, Requested("A", True, "L3"))
-    assert told.decision.outputs.call == "L3"
-    told(2.0, replace(CLOSED, hazards=frozenset({Hazard.EMERGENCY})))
-    assert told.decision.outputs == LiftOutputs()
-    told(10.0, CLOSED)(11.0, CLOSED)
-    assert told.decision.outputs.call == "L3"
+    alone = Alone(stale_after_s=900.0, call_pulse_s=2.0, hazard_clear_s=1.0)
+    alone(0.0, CLOSED)(1.0, Requested("A", True, "L3"))
+    assert alone.decision.outputs.call == "L3"
+    alone(2.0, replace(CLOSED, hazards=frozenset({Hazard.EMERGENCY})))
+    assert alone.decision.outputs == LiftOutputs()
+    alone(10.0, CLOSED)(11.0, CLOSED)
+    assert alone.decision.outputs.call == "L3"
 
 
 def test_an_event_that_is_only_noted_is_not_refused() -> None:
-    told = Told(release_grace_s=2.0)(0.0, AT_L1)(0.1, WriteFailed("timeout"))
-    assert told.decision.refused == ""
-    told(0.2, AT_L1, ASKED)(1.0, AT_L1, Ended("A"))(1.5, ASKED)
-    assert (told.decision.refused, told.decision.report.session) == ("", "A")
+    alone = Alone(release_grace_s=2.0)(0.0, AT_L1)(0.1, WriteFailed("timeout"))
+    assert alone.decision.refused == ""
+    alone(0.2, AT_L1, ASKED)(1.0, AT_L1, Ended("A"))(1.5, ASKED)
+    assert (alone.decision.refused, alone.decision.report.session) == ("", "A")
 
 
 def test_even_a_short_grace_lasts_its_time() -> None:
-    told = Told(release_grace_s=0.5)(0.0, AT_L1)(0.1, ASKED)(1.0, AT_L1, Ended("A"))
-    assert told.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
-    assert told(1.5, AT_L1).decision.outputs == LiftOutputs()
+    alone = Alone(release_grace_s=0.5)(0.0, AT_L1)(0.1, ASKED)(1.0, AT_L1, Ended("A"))
+    assert alone.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
+    assert alone(1.5, AT_L1).decision.outputs == LiftOutputs()
 
 
 def test_anybody_may_have_the_lift_in_the_instant_in_which_the_grace_ends() -> None:
-    told = Told(release_grace_s=2.0)(0.0, AT_L1)(0.1, ASKED)(1.0, Ended("A"))
-    told(2.9, AT_L1)
-    told(3.0, Requested("B", True, "L1"))
-    assert told.decision.refused == ""
-    assert told.decision.report.session == "B"
+    alone = Alone(release_grace_s=2.0)(0.0, AT_L1)(0.1, ASKED)(1.0, Ended("A"))
+    alone(2.9, AT_L1)
+    alone(3.0, Requested("B", True, "L1"))
+    assert alone.decision.refused == ""
+    assert alone.decision.report.session == "B"
 
 
 def test_after_a_reset_the_shown_floor_is_believed_at_once() -> None:
-    told = Told()(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))
-    assert (told.decision.report.floor, told(0.1, OperatorReset()).decision.report.floor) == (
+    alone = Alone()(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))
+    assert (alone.decision.report.floor, alone(0.1, OperatorReset()).decision.report.floor) == (
         "",
         "L3",
     )
@@ -233,73 +233,73 @@ def test_after_a_reset_the_shown_floor_is_believed_at_once() -> None:
 
 def test_a_door_that_is_not_shown_open_is_not_marked_as_estimated() -> None:
     sample = replace(AT_L1, door=Door.NOT_CLOSED, motion=Motion.UP)
-    told = Told(door_travel_s=1.0, stale_after_s=60.0)(0.0, sample)(2.0, sample)
-    shown = told.decision.report
+    alone = Alone(door_travel_s=1.0, stale_after_s=60.0)(0.0, sample)(2.0, sample)
+    shown = alone.decision.report
     assert (shown.door.name, shown.estimated) == ("DOOR_MOVING", False)
 
 
 def test_a_floor_may_change_up_to_its_debounce_after_the_cars_last_movement() -> None:
     moving = replace(AT_L1, motion=Motion.UP)
-    told = Told({"floor": 0.5}, stale_after_s=60.0)(0.0, moving)(1.0, moving)
-    told(1.1, AT_L1)(2.9, replace(AT_L1, level="L2"))(3.45, replace(AT_L1, level="L2"))
-    assert (told.decision.report.floor, told.faults) == ("L2", ())
+    alone = Alone({"floor": 0.5}, stale_after_s=60.0)(0.0, moving)(1.0, moving)
+    alone(1.1, AT_L1)(2.9, replace(AT_L1, level="L2"))(3.45, replace(AT_L1, level="L2"))
+    assert (alone.decision.report.floor, alone.faults) == ("L2", ())
 
 
 def test_the_next_floor_is_believed_in_the_last_instant_in_which_a_movement_is_remembered() -> None:
-    told = Told(stale_after_s=60.0)(0.0, AT_L1)(1.0, replace(AT_L1, motion=Motion.UP))
-    told(1.0 + MOTION_MEMORY_S, replace(AT_L1, level="L2"))
-    assert (told.decision.report.floor, told.faults) == ("L2", ())
+    alone = Alone(stale_after_s=60.0)(0.0, AT_L1)(1.0, replace(AT_L1, motion=Motion.UP))
+    alone(1.0 + MOTION_MEMORY_S, replace(AT_L1, level="L2"))
+    assert (alone.decision.report.floor, alone.faults) == ("L2", ())
 
 
 def test_a_car_may_pass_a_floor_unseen_in_exactly_its_least_travel_time() -> None:
     moving = replace(AT_L1, motion=Motion.UP)
-    told = Told(stale_after_s=60.0, floor_travel_min_s=2.0)(0.0, moving)
-    told(2.0, replace(moving, level="L3"))
-    assert (told.decision.report.floor, told.faults) == ("L3", ())
+    alone = Alone(stale_after_s=60.0, floor_travel_min_s=2.0)(0.0, moving)
+    alone(2.0, replace(moving, level="L3"))
+    assert (alone.decision.report.floor, alone.faults) == ("L3", ())
 
 
 def test_unwritten_outputs_are_judged_by_their_age_when_a_request_comes() -> None:
-    told = Told(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
-    assert told(1.0, ASKED).decision.refused == ""
-    told = Told(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
-    told(1.9, AT_L1, WriteFailed("timeout"))
-    assert told(2.0, ASKED).decision.refused == "OUTPUTS_NOT_WRITTEN"
+    alone = Alone(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
+    assert alone(1.0, ASKED).decision.refused == ""
+    alone = Alone(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
+    alone(1.9, AT_L1, WriteFailed("timeout"))
+    assert alone(2.0, ASKED).decision.refused == "OUTPUTS_NOT_WRITTEN"
 
 
 def test_the_core_wakes_when_another_node_has_gone() -> None:
-    told = Told(stale_after_s=60.0)(0.0, AT_L1)(1.0, RivalSeen())
-    assert told.decision.wake_at == 6.0
+    alone = Alone(stale_after_s=60.0)(0.0, AT_L1)(1.0, RivalSeen())
+    assert alone.decision.wake_at == 6.0
 
 
 def test_the_core_wakes_when_its_first_reading_has_settled() -> None:
-    assert Told(DEBOUNCE)(1.0, AT_L1).decision.wake_at == 1.03
+    assert Alone(DEBOUNCE)(1.0, AT_L1).decision.wake_at == 1.03
 
 
 def test_a_floor_that_was_not_believed_is_believed_when_the_car_really_goes_there() -> None:
-    told = Told(stale_after_s=60.0)(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))(0.2, AT_L1)
+    alone = Alone(stale_after_s=60.0)(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))(0.2, AT_L1)
     moving = replace(AT_L1, motion=Motion.UP)
     for now, level in ((1.0, None), (2.0, "L2"), (3.0, None), (4.0, "L3")):
-        told(now, replace(moving, level=level))
-    assert (told.decision.report.floor, told.faults) == ("L3", ())
+        alone(now, replace(moving, level=level))
+    assert (alone.decision.report.floor, alone.faults) == ("L3", ())
 
 
 def test_a_reading_in_the_instant_in_which_the_last_one_expires_starts_afresh() -> None:
-    told = Told(DEBOUNCE)(0.0, AT_L1)(0.5, AT_L1)(1.5, AT_L1)
-    shown = told.decision.report
-    assert (shown.mode, shown.floor, told.faults) == (LiftMode.MODE_OFFLINE, "", ())
-    told(1.6, AT_L1)
-    assert told.decision.report.floor == "L1"
+    alone = Alone(DEBOUNCE)(0.0, AT_L1)(0.5, AT_L1)(1.5, AT_L1)
+    shown = alone.decision.report
+    assert (shown.mode, shown.floor, alone.faults) == (LiftMode.MODE_OFFLINE, "", ())
+    alone(1.6, AT_L1)
+    assert alone.decision.report.floor == "L1"
 
 
 def test_after_a_sleep_everything_is_forgotten_but_the_last_landing() -> None:
-    told = Told()(0.0, AT_L1)(1.0, AT_L1)(2.0, Suspended("the machine slept"))
-    assert told.decision.refused == ""
-    assert told.faults == (Fault("INPUTS_NOT_FRESH", "the machine slept"),)
-    position = told.memory.senses.position
+    alone = Alone()(0.0, AT_L1)(1.0, AT_L1)(2.0, Suspended("the machine slept"))
+    assert alone.decision.refused == ""
+    assert alone.faults == (Fault("INPUTS_NOT_FRESH", "the machine slept"),)
+    position = alone.memory.senses.position
     assert (position.trusted, position.moved_at) == ("L1", 2.0)
-    assert told.memory.senses == type(told.memory.senses)(position=position)
+    assert alone.memory.senses == type(alone.memory.senses)(position=position)
 
 
 def test_an_illegal_door_number_names_the_rear_door() -> None:
-    told = Told()(0.0, replace(AT_L1, rear_door=Door.UNKNOWN))
-    assert told.faults == (Fault("DOOR_CODE_ILLEGAL", "the rear door's number means nothing"),)
+    alone = Alone()(0.0, replace(AT_L1, rear_door=Door.UNKNOWN))
+    assert alone.faults == (Fault("DOOR_CODE_ILLEGAL", "the rear door's number means nothing"),)

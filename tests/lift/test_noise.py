@@ -5,8 +5,8 @@ import logging
 import pytest
 
 from bridges.rmf.definitions import LiftRequest
-from hal_fakes.rmf.robot import Robot
-from hal_fakes.rmf.supervisors import LiftSupervisor
+from bridges.rmf_rules.robot import Robot
+from bridges.rmf_rules.supervisors import LiftSupervisor
 from tests.lift.rmf_world import World
 from tests.lift.story import END, Controller, Story
 from tests.lift.test_with_rmf import A, B, world

@@ -15,7 +15,7 @@ OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarding(**inputs: object) -> Story:
-    """A waits at L1, where the lift stands open, but for these inputs."""
+    """A waits at L1, where the lift stands open. `inputs` replace parts of what it reads."""
     story = Story(Building(replace(OPEN_AT_L1, **inputs)))
     story.run(1.0)
     story.asks("A", "L1")

@@ -4,7 +4,7 @@ import pytest
 
 from bridges.lift.signals import Hazard, LiftOutputs
 from bridges.rmf.definitions import LiftRequest, Time
-from hal_fakes.rmf.robot import Robot
+from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
 from tests.lift.story import AGV, END, Controller, Story
 

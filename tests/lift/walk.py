@@ -35,7 +35,7 @@ LONG_S = 55.0
 def limits_of(
     debounce: dict[str, float] | None = None, agv_mode: Any = "requested", **changes: Any
 ) -> LiftLimits:
-    """The default durations, but for the age of readings, which costs scans."""
+    """The default durations, but readings stay fresh for a minute: the walk then needs fewer scans."""
     settings = LiftSettings(
         floors=["L1", "L2", "L3"],
         limits=Durations(**{"stale_after_s": 60.0, **changes}),
@@ -288,6 +288,7 @@ def key(world: World) -> tuple[Any, ...]:
         (senses.position, memory.session, memory.grace, memory.relays, memory.fire_latched),
         (memory.alarmed, memory.rival_at, memory.io_fault, memory.unwritten_since),
         (memory.write_failed, world.sample, world.readable, world.writable),
+        tuple(sorted(memory.own.items())),
     )
 
 

@@ -12,11 +12,11 @@ from bridges.lift_supervisor import KIND as SUPERVISOR
 from bridges.lift_supervisor.settings import Settings
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.rmf_rules.phases import EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Phase, Robot
+from bridges.rmf_rules.supervisors import LiftSupervisor
 from bridges.serve.clock import Clock
 from bridges.serve.device import Node
-from hal_fakes.rmf.phases import EndLiftSession, RequestLift
-from hal_fakes.rmf.robot import Phase, Robot
-from hal_fakes.rmf.supervisors import LiftSupervisor
 from tests.lift.story import Controller
 from tests.lift_supervisor.alone import words
 from tests.serve.virtual_graph import EPOCH, NEVER, Served, StandIn, World, say

@@ -13,7 +13,8 @@ from bridges.settings import names as named
 from bridges.settings import reference
 from bridges.settings.examples import example
 from bridges.settings.nodes import Page
-from bridges.settings.values import Spot, Values
+from bridges.settings.spots import Spot
+from bridges.settings.values import Values
 
 
 def structs() -> list[type]:

@@ -68,7 +68,7 @@ def join_ros() -> Iterator[Join]:
 
 @pytest.fixture
 def observer(join_dds: Join) -> Iterator[Any]:
-    """A participant that is none of ours, in the same process and so in the same domain."""
+    """A DDS participant from outside this project, in the same process and domain."""
     join_dds("keeps_the_domain")
     from cyclonedds.domain import DomainParticipant
 

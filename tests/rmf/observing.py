@@ -1,4 +1,4 @@
-"""A participant that is none of ours and looks at what the others announce."""
+"""A DDS participant from outside this project that sees what the others announce."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What `ros2` takes from installed packages and from ROS's graph; ROS itself is stood in for."""
+"""What `ros2` takes from installed packages and from ROS's graph. ROS itself is a stand-in."""
 
 import sys
 from dataclasses import dataclass, field

@@ -13,8 +13,8 @@ from tests.rmf.zenoh_hostile import FLOOD, GOOD, arguments
 from tests.waiting import wait_until
 
 BY_HAND = 8
-"""Without attachment, with two that are none, cut short, empty, two of 10 MB, a deletion. Then comes a
-wrong hash, which is another key, and a wildcard, which is counted too."""
+"""Without an attachment, with two malformed ones, cut short, empty, two of 10 MB, a deletion. Then
+comes a wrong hash, which is another key, and a wildcard, which is counted too."""
 
 
 def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arrive(

@@ -27,7 +27,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-class Told:
+class Written:
     """What a program has written, line by line."""
 
     def __init__(self) -> None:
@@ -39,18 +39,18 @@ class Told:
 
 
 @contextmanager
-def reading(endpoint: str, *orders: str) -> Iterator[Told]:
+def reading(endpoint: str, *orders: str) -> Iterator[Written]:
     """The reader that knows nothing of our code, until the end of the block."""
-    told = Told()
+    written = Written()
     command = [sys.executable, str(READER), endpoint, *orders]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as child:
         assert child.stdout is not None
-        thread = threading.Thread(target=_collect, args=(child.stdout, told))
+        thread = threading.Thread(target=_collect, args=(child.stdout, written))
         thread.start()
         try:
-            yield told
+            yield written
         finally:
             assert child.stdin is not None
             child.stdin.close()
@@ -58,15 +58,15 @@ def reading(endpoint: str, *orders: str) -> Iterator[Told]:
             thread.join()
 
 
-def _collect(lines: Any, told: Told) -> None:
+def _collect(lines: Any, written: Written) -> None:
     for line in lines:
-        told.lines.append(json.loads(line))
+        written.lines.append(json.loads(line))
 
 
 class Router:
     """A zenoh router: this library's own, in a process that can be killed and started again.
 
-    `config`: what it is told besides where it listens.
+    `config`: what it is written besides where it listens.
     """
 
     def __init__(self, endpoint: str | None = None, **config: Any) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
+from hal_fakes.caller import Caller
 from hal_fakes.wire import join, wire
 from tests.waiting import PATIENCE_S, wait_until
 
@@ -77,10 +78,8 @@ class Module:
 
     def tell(self, *words: str) -> None:
         """Have the plant do something, as `fail ward_door opened off`."""
-        with socket.socket(socket.AF_UNIX) as control:
-            control.connect(str(self.directory / "plant.sock"))
-            control.sendall(" ".join(words).encode() + b"\n")
-            assert control.recv(100) == b"ok\n"
+        with Caller(self.directory / "plant.sock") as control:
+            control.order(" ".join(words))
 
     def hang(self) -> None:
         """The module answers nobody, and its relay stays as it is."""

@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
-
 from bridges.commands import reset
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.loop import SUSPENDED_S
@@ -21,21 +19,6 @@ from tests.waiting import wait_until
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 WATCHDOG = {**SERVICE, "WATCHDOG_USEC": "600000"}
 HURT = "tests.serve.hurt"
-EX_SOFTWARE = 70
-
-
-@pytest.fixture
-def module(domain: int, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, domain)
-    yield standing
-    standing.close()
-
-
-@pytest.fixture
-def graph(module: Module) -> Iterator[Graph]:
-    joined = Graph(module.domain)
-    yield joined
-    joined.transport.close()
 
 
 class Systemd:
@@ -71,15 +54,19 @@ def _state(pid: int) -> str:
 def test_after_sigstop_no_state_of_before_is_shown_as_new(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
+    scan_s = 2.0
+    module.file.write_text(module.yaml.replace("modbus,", f"modbus, scan_s: {scan_s},"))
     with daemon(module.file, tmp_path / "run", **SERVICE) as running:
         hold_open(module, graph, running)
         wait_until(lambda: graph.last() is DoorModeValue.MODE_OPEN, "the door shows OPEN")
+        shown = len(graph.states)
+        wait_until(lambda: len(graph.states) > shown, "a scan has ended, and the next is far")
         pid = running.process.pid
         os.kill(pid, signal.SIGSTOP)
         wait_until(lambda: _state(pid) == "T", "the daemon is suspended")
         module.tell("fail", "ward_door", "opened", "off")
         stopped = time.monotonic()
-        wait_until(lambda: time.monotonic() > stopped + 2 * SUSPENDED_S, "that takes a while")
+        wait_until(lambda: time.monotonic() > stopped + scan_s + 2 * SUSPENDED_S, "a while")
         resumed = time.time()
         os.kill(pid, signal.SIGCONT)
         wait_until(lambda: _since(graph, resumed), "states go on")
@@ -122,7 +109,7 @@ def test_a_transport_that_cannot_be_restarted_ends_the_daemon_with_the_relay_off
             return running.process.poll() is not None
 
         wait_until(ended, "the daemon has ended")
-        assert running.process.returncode == EX_SOFTWARE
+        assert running.process.returncode == os.EX_SOFTWARE
         assert [*heard, *manager.heard()][-1] == b"STOPPING=1"
         said = running.log.read_text()
     assert said.count("reader_failed") == 1

@@ -208,7 +208,7 @@ def test_reset_and_outputs_off_as_typed_find_the_daemon_started_by_hand(
     wait_until(held, "the relay holds the door")
     assert _told("reset", module.file, **user).returncode == 0
     refused = _told("outputs-off", module.file, **user)
-    assert (refused.returncode, "stop it instead" in refused.stderr) == (69, True)
+    assert (refused.returncode, "stop it instead" in refused.stderr) == (os.EX_UNAVAILABLE, True)
     assert module.relay() == [True]
     run.terminate()
     assert run.wait(PATIENCE_S) == 0
@@ -265,7 +265,7 @@ def test_root_acts_as_the_owner_of_a_directory_and_so_signals_no_one_elses_proce
         with lock.open() as planted:
             fcntl.flock(planted, fcntl.LOCK_EX)
             told = _told("reset", tmp_path / "x.yaml", "--runtime-dir", run)
-        assert (told.returncode, roots.poll()) == (69, None)
+        assert (told.returncode, roots.poll()) == (os.EX_UNAVAILABLE, None)
         roots.kill()
 
 
@@ -347,7 +347,7 @@ def test_a_removed_directory_and_a_full_disk_end_no_daemon_nor_its_shutdown(
         shutil.rmtree(run)
         wait_until((run / "status.json").exists, "the directory is there again")
         refused = _told("outputs-off", module.file, "--runtime-dir", run)
-        assert (refused.returncode, module.relay()) == (69, [True])
+        assert (refused.returncode, module.relay()) == (os.EX_UNAVAILABLE, [True])
         full, before = (0, resource.RLIM_INFINITY), (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
         resource.prlimit(running.process.pid, resource.RLIMIT_FSIZE, full)
         _states_go_on(graph)
@@ -381,7 +381,10 @@ def test_by_hand_nothing_is_switched_where_it_cannot_be_known_who_lives_and_as_e
     (tmp_path / "run").chmod(0o777)
     off = ("outputs-off", module.file, "--runtime-dir", tmp_path / "run")
     by_hand = _told(*off)
-    assert (by_hand.returncode, "can be written by others" in by_hand.stderr) == (69, True)
+    assert (by_hand.returncode, "can be written by others" in by_hand.stderr) == (
+        os.EX_UNAVAILABLE,
+        True,
+    )
     assert module.relay() == [True]
     stopped = _told(*off, SERVICE_RESULT="signal")
     assert (stopped.returncode, "Traceback" in stopped.stderr) == (0, False), stopped.stderr
@@ -417,9 +420,29 @@ def test_a_user_without_permission_is_told_what_to_do_and_switches_nothing(
                     user=65534 if os.geteuid() == 0 else None,
                 )
                 if os.geteuid() == 0:
-                    assert (stranger.returncode, "sudo" in stranger.stderr) == (69, True)
+                    assert (stranger.returncode, "sudo" in stranger.stderr) == (
+                        os.EX_UNAVAILABLE,
+                        True,
+                    )
                 assert "Traceback" not in stranger.stderr
             assert module.relay() == [True]
+
+
+@pytest.mark.skipif(
+    os.geteuid() != 0 or not _runs_for_others(), reason="no other user can run this Python"
+)
+def test_reset_of_a_file_in_a_folder_that_others_may_not_read_says_so(tmp_path: Path) -> None:
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o700)
+    told = subprocess.run(
+        command("reset", closed / "door.yaml"),
+        env=environment(),
+        capture_output=True,
+        text=True,
+        user=65534,
+    )
+    assert (told.returncode, "Permission denied" in told.stderr) == (69, True)
+    assert "Traceback" not in told.stderr
 
 
 @pytest.mark.skipif(

@@ -2,22 +2,15 @@
 
 import signal
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from bridges.serve.last_mark import MARK, leave, says_off
 from tests.serve.site import Module, command, daemon, environment
+from tests.waiting import PATIENCE_S
 
 RUN = {"INVOCATION_ID": "4f5e", "SERVICE_RESULT": "success"}
-
-
-@pytest.fixture
-def module(domain: int, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, domain)
-    yield standing
-    standing.close()
 
 
 @pytest.mark.parametrize(
@@ -75,7 +68,7 @@ def test_after_a_clean_stop_outputs_off_asks_the_module_nothing_and_after_a_kill
         with daemon(module.file, run, **unit) as running:
             running.wait_for("ready")
             running.process.send_signal(number)
-            running.process.wait(20)
+            running.process.wait(PATIENCE_S)
         result = "success" if number is signal.SIGTERM else "signal"
         done = subprocess.run(
             command("outputs-off", module.file),

@@ -52,7 +52,7 @@ def test_at_the_end_every_output_is_switched_off_before_anything_is_let_go() -> 
     assert [what for _, what in corridor.story] == off
 
 
-def test_one_device_that_cannot_be_switched_off_keeps_no_other_on_and_is_told() -> None:
+def test_one_device_that_cannot_be_switched_off_keeps_no_other_on_and_is_reported() -> None:
     corridor = Corridor()
     corridor.doors["ward"].lost = True
     assert not corridor.loop.end()

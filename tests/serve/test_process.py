@@ -12,7 +12,7 @@ import pytest
 
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.daemon import STARTING
-from hal_fakes.wire import wire
+from hal_fakes.wire import runs_here
 from tests.rmf.conftest import ROS2
 from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment, hold_open
 from tests.waiting import LEASE_S, PATIENCE_S, wait_until
@@ -20,18 +20,17 @@ from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(params=[wire(), ROS2])
-def module(domain: int, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Module]:
+@pytest.fixture(params=[runs_here(), ROS2])
+def module(
+    domain: int,
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Iterator[Module]:
+    monkeypatch.setenv("TRANSPORT", runs_here())
     standing = Module(tmp_path, domain, request.param)
     yield standing
     standing.close()
-
-
-@pytest.fixture
-def graph(module: Module) -> Iterator[Graph]:
-    joined = Graph(module.domain)
-    yield joined
-    joined.transport.close()
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -43,7 +42,7 @@ def test_a_signal_releases_the_relay_and_leaves_the_graph_at_once(
         assert running.end(number) == 0
         wait_until(lambda: graph.heard.matched() == 0, "it has left the graph", LEASE_S)
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
-    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["lock"]
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["lock", "ring"]
 
 
 def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_the_yaml_says_now(
@@ -53,7 +52,7 @@ def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_th
         hold_open(module, graph, running)
         off = command("outputs-off", module.file, "--runtime-dir", tmp_path / "run")
         refused = subprocess.run(off, env=environment(), capture_output=True, text=True)
-        assert (refused.returncode, module.relay()) == (69, [True])
+        assert (refused.returncode, module.relay()) == (os.EX_UNAVAILABLE, [True])
         assert "stop it instead" in refused.stderr
         running.end(signal.SIGKILL)
     module.file.write_text("kind: lift\n")
@@ -63,7 +62,7 @@ def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_th
 
 
 def test_outputs_that_cannot_be_verified_off_are_reported(module: Module, tmp_path: Path) -> None:
-    module.file.write_text(YAML.format(domain=module.domain, transport=wire(), port=1))
+    module.file.write_text(YAML.format(domain=module.domain, transport=runs_here(), port=1))
     done = subprocess.run(
         command("outputs-off", module.file, "--runtime-dir", tmp_path / "run"),
         env=environment(),
@@ -90,7 +89,7 @@ def test_one_runtime_directory_has_one_daemon(module: Module, tmp_path: Path) ->
     with daemon(module.file, tmp_path / "run") as first:
         first.wait_for("ready")
         second = Daemon(module.file, tmp_path / "run")
-        assert second.process.wait(PATIENCE_S) == 69
+        assert second.process.wait(PATIENCE_S) == os.EX_UNAVAILABLE
 
 
 def test_systemd_hears_ready_then_finished_scans_then_stopping(
@@ -137,7 +136,7 @@ def test_a_configuration_that_cannot_be_right_never_starts(tmp_path: Path) -> No
         capture_output=True,
         text=True,
     )
-    assert refused.returncode == 78
+    assert refused.returncode == os.EX_CONFIG
     assert f"{file}:1:7" in refused.stderr
     assert not (tmp_path / "run").exists()
 
@@ -159,7 +158,7 @@ def test_a_service_never_simulates_and_a_real_device_needs_no_expose(
         capture_output=True,
         text=True,
     )
-    assert refused.returncode == 64
+    assert refused.returncode == os.EX_USAGE
     assert why in refused.stderr
 
 

@@ -72,5 +72,5 @@ def test_ros2_without_its_setup_file_does_not_start(tmp_path: Path) -> None:
     wanted = "rmf: {transport: ros2, ros_setup: /opt/ros/none/setup.bash}\n\n"
     file.write_text(shipped[:begin] + wanted + shipped[end:])
     with daemon(file, tmp_path / "run", "--simulate") as running:
-        assert running.process.wait(PATIENCE_S) == 69
+        assert running.process.wait(PATIENCE_S) == os.EX_UNAVAILABLE
     assert "ros_setup: /opt/ros/none/setup.bash does not exist" in running.log.read_text()

@@ -9,6 +9,7 @@ import pytest
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.serve.service import service
 from bridges.settings.load import load
+from tests.depth import depth
 from tests.drivers.hal.modbus.line import SerialModule
 from tests.drivers.hal.modbus.module import Module, door
 from tests.serve.corridor import SCAN_S, Corridor
@@ -90,7 +91,7 @@ kind: door
 driver: dry_contact
 rmf: {{transport: dds, network: localhost, domain_id: 0}}
 buses:
-  line: {{type: modbus, {place}, timeout_s: 0.05, scan_s: 0.02}}
+  line: {{type: modbus, {place}, timeout_s: 0.5, retries: 0, scan_s: 0.02}}
 doors:
 """
 DOOR = """
@@ -103,7 +104,9 @@ DOOR = """
 """
 
 
-@pytest.fixture(params=[(Module, 30), (SerialModule, 16)], ids=["30 on tcp", "16 on rtu"])
+@pytest.fixture(
+    params=[(Module, depth(8, 30)), (SerialModule, depth(8, 16))], ids=["on tcp", "on rtu"]
+)
 def line(request: pytest.FixtureRequest) -> Iterator[tuple[Module, int]]:
     """A module with one live unit, and how many silent units are there beside it."""
     make, silent = request.param
@@ -114,6 +117,7 @@ def line(request: pytest.FixtureRequest) -> Iterator[tuple[Module, int]]:
     module.close()
 
 
+@pytest.mark.long
 def test_on_a_real_bus_a_live_unit_is_asked_between_any_two_silent_ones(
     line: tuple[Module, int], tmp_path: Path
 ) -> None:

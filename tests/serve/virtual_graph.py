@@ -16,10 +16,10 @@ from bridges.rmf.definitions import Message
 from bridges.rmf.releases import NEWEST
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Subscription
+from bridges.rmf_rules import Party as RmfParty
+from bridges.rmf_rules import Said
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
-from hal_fakes.rmf import Party as RmfParty
-from hal_fakes.rmf import Said
 
 EPOCH = 2.0**30
 """Wall time when the world's clock shows 0; a power of two, so that sums of times stay exact."""
@@ -49,10 +49,16 @@ def at_once(sender: str, receiver: str) -> Sequence[float]:
     return (0.01,)
 
 
+def in_order(sender: str, receiver: str) -> Sequence[float]:
+    """A network that takes no time."""
+    return (0.0,)
+
+
 class World:
     """`sent`: (s, who, topic, message) of everything said; `watch` is told of each before it goes out.
 
-    `publishers`: topic -> who has declared that they publish it.
+    `publishers`: topic -> who has declared that they publish it. `hears_others`: topic, and who does
+    not hear itself on it.
     """
 
     def __init__(self, route: Route = at_once) -> None:
@@ -61,6 +67,7 @@ class World:
         self.parties: dict[str, Party] = {}
         self.hearers: dict[str, set[str]] = defaultdict(set)
         self.publishers: dict[str, set[str]] = defaultdict(set)
+        self.hears_others: set[tuple[str, str]] = set()
         self.retained: dict[str, deque[Said]] = {}
         self.sent: list[tuple[float, str, Topic[Any], Any]] = []
         self.watch: Callable[[str, Topic[Any], Any], None] = lambda sender, topic, message: None
@@ -87,6 +94,8 @@ class World:
             retained = self.retained.setdefault(sender, deque(maxlen=topic.publish.depth))
             retained.append((topic, message))
         for receiver in sorted(self.hearers[topic.name]):
+            if receiver == sender and (topic.name, sender) in self.hears_others:
+                continue
             for delay in self.route(sender, receiver):
                 self._arrives_after(delay, receiver, topic, message)
 
@@ -137,6 +146,7 @@ class WorldTransport:
     """A node's place in the world (`bridges.rmf.transport.Transport`)."""
 
     speaks = "memory"
+    domain_id = 0
     release = NEWEST
 
     def __init__(self, world: World, name: str) -> None:
@@ -152,9 +162,16 @@ class WorldTransport:
     def subscribe(
         self, topic: Topic[Any], received: Callable[[Any], None], *, others_only: bool = False
     ) -> Subscription:
-        if not others_only:
-            self.received[topic.name].append(received)
+        if others_only:
+            self.world.hears_others.add((topic.name, self.name))
+        self.received[topic.name].append(received)
+        self.world.hearers[topic.name].add(self.name)
         return _End(self, topic)
+
+    def hear(self, topic: Topic[Any], message: Any) -> None:
+        """A message has arrived."""
+        for received in self.received[topic.name]:
+            received(message)
 
     lives = True
 
@@ -226,7 +243,7 @@ class Served:
     def restart(self) -> None:
         """A new daemon: only what was kept is remembered, and everything retained heard again."""
         self.transport.close()
-        self.world.add(self, *self._kind.requests)
+        self.world.add(self)
         self.transport = WorldTransport(self.world, self.name)
         self.node = GraphNode(
             self._kind, self._settings, self.transport, self._clock, kept=self.disk
@@ -239,9 +256,13 @@ class Served:
         """It is stopped and leaves the graph."""
         self.world.remove(self.name)
 
+    def reset(self) -> None:
+        """An operator says that latched faults may clear."""
+        self.node.reset()
+        self.node.round()
+
     def hear(self, topic: Topic[Any], message: Any) -> None:
-        for received in self.transport.received[topic.name]:
-            received(message)
+        self.transport.hear(topic, message)
         self.node.round()
 
     def wake_at(self) -> float:
@@ -263,6 +284,27 @@ class Served:
             for name, faults in shown.items()
             if faults
         }
+
+
+class Ticking:
+    """A node with subscriptions, whose timer calls `tick` every so often."""
+
+    def __init__(self, world: World, name: str, every_s: float, tick: Callable[[], None]) -> None:
+        self.name = name
+        self.transport = WorldTransport(world, name)
+        self._every_s, self._tick = every_s, tick
+        self._next_at = world.now + every_s
+        world.add(self)
+
+    def hear(self, topic: Topic[Any], message: Any) -> None:
+        self.transport.hear(topic, message)
+
+    def wake_at(self) -> float:
+        return self._next_at
+
+    def wake(self) -> None:
+        self._next_at += self._every_s
+        self._tick()
 
 
 class StandIn:

@@ -1,5 +1,6 @@
 """Files that are checked together: what none of them shows alone."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -141,7 +142,7 @@ def test_a_coordinators_station_that_no_charger_has_is_an_error(
 ) -> None:
     coordinator = (CONFIG / "charger_coordinator.yaml").read_text()
     code, lines = said(capsys, (CONFIG / "charger_http.yaml").read_text(), coordinator, "-q")
-    assert code == 78
+    assert code == os.EX_CONFIG
     assert [line.partition(": ")[2] for line in lines] == [
         "unknown charger 'charger_b': did you mean 'charger_a'? known here: charger_a",
         "",
@@ -191,7 +192,7 @@ def test_the_coil_of_a_modules_pulse_is_claimed_as_well(capsys: pytest.CaptureFi
     second = first.replace("ward_door", "lab").replace('coil 0"', 'coil 1"')
     second = second.replace("input 0", "input 4").replace("input 1", "input 5")
     code, lines = said(capsys, first, second, "-q")
-    assert code == 78
+    assert code == os.EX_CONFIG
     assert [line.partition(": ")[2] for line in lines if "coil" in line] == [
         "unit 1 coil 512 of 192.168.1.50:502 is used in a.yaml too, on line 26"
     ]

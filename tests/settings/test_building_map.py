@@ -1,5 +1,6 @@
 """`rmf-bridge check FILE --building-map MAP`: our names against RMF's, on maps of both forms."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -110,7 +111,7 @@ def complaints(
     Path("device.yaml").write_text(text)
     code = main(["check", "-q", "device.yaml", "--building-map", building])
     said = capsys.readouterr().err.splitlines()
-    assert code == (78 if said else 0)
+    assert code == (os.EX_CONFIG if said else 0)
     return said[:-1]
 
 
@@ -238,7 +239,7 @@ def test_a_file_that_is_not_a_map_is_refused_at_the_place_that_is_wrong(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     Path("device.yaml").write_text(LIFT)
-    assert main(["check", "device.yaml", "--building-map", "device.yaml"]) == 78
+    assert main(["check", "device.yaml", "--building-map", "device.yaml"]) == os.EX_CONFIG
     assert capsys.readouterr() == (
         "",
         "device.yaml:1:1: this is not a building map or navigation graph: it has no 'levels:'\n"

@@ -1,5 +1,6 @@
 """`rmf-bridge check`: problems or the wiring table, as a person sees them."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -101,7 +102,7 @@ def test_a_driver_without_wires_says_what_it_talks_to(capsys: pytest.CaptureFixt
 
 def test_problems_go_to_stderr_with_their_number(capsys: pytest.CaptureFixture[str]) -> None:
     Path("gate.yaml").write_text(changed("tries: 2", "tries: 0, gian: 1"))
-    assert check("gate.yaml") == 78
+    assert check("gate.yaml") == os.EX_CONFIG
     assert capsys.readouterr() == (
         "",
         "gate.yaml:15:32: 'tries' is 0: write a whole number of at least 1\n"
@@ -113,7 +114,7 @@ def test_problems_go_to_stderr_with_their_number(capsys: pytest.CaptureFixture[s
 
 def test_one_wrong_file_among_several_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
     Path("gate.yaml").write_text(RIGHT)
-    assert check("no.yaml", "gate.yaml") == 78
+    assert check("no.yaml", "gate.yaml") == os.EX_CONFIG
     out, err = capsys.readouterr()
     assert out.startswith("gate.yaml: gate, driver contact\n")
     assert err == ("no.yaml:1:1: cannot be read: No such file or directory\n1 error\n")
@@ -151,5 +152,5 @@ def test_quiet_prints_problems_only(capsys: pytest.CaptureFixture[str]) -> None:
     assert check("-q", "gate.yaml") == 0
     assert capsys.readouterr() == ("", "")
     Path("gate.yaml").write_text(changed("tries: 2", "loud: yes"))
-    assert check("--quiet", "gate.yaml") == 78
+    assert check("--quiet", "gate.yaml") == os.EX_CONFIG
     assert len(capsys.readouterr().err.splitlines()) == 2

@@ -2,6 +2,7 @@
 
 import cmath
 import math
+import os
 from pathlib import Path
 
 import pytest
@@ -154,7 +155,7 @@ def test_what_cannot_be_right_is_named_where_it_stands(
 ) -> None:
     assert THEIRS.count(old) == 1
     code, found = site.check(theirs=THEIRS.replace(old, new))
-    assert (code, problem in found) == (78, True), found
+    assert (code, problem in found) == (os.EX_CONFIG, True), found
 
 
 def test_a_station_that_lets_go_before_rmf_is_content_is_a_mismatch(site: Site) -> None:
@@ -224,7 +225,7 @@ reference_coordinates:
   {robot}
 """
     code, found = site.check(theirs=older)
-    assert code == 78
+    assert code == os.EX_CONFIG
     assert [line.split(": ")[0] for line in found] == ["config.yaml:8:34"]
     code, found = site.check(theirs=older.replace("dok_b", "dock_b"))
     assert (code, found) == (0, [])
@@ -243,14 +244,14 @@ def test_waypoints_are_compared_with_the_navigation_graph(site: Site) -> None:
 def test_a_waypoint_in_the_robots_coordinates_is_named_with_rmfs(site: Site) -> None:
     code, found = site.check(OURS.replace("x: 10, y: 5", "x: 4, y: -5"), THEIRS, GRAPH)
     text = "this is on the robot's map; on RMF's it is x: 10, y: 5 (graph.yaml:6)"
-    assert (code, found) == (78, [f"ours.yaml:8:9: {text}"])
+    assert (code, found) == (os.EX_CONFIG, [f"ours.yaml:8:9: {text}"])
 
 
 def test_a_waypoint_on_another_level_is_named(site: Site) -> None:
     code, found = site.check(
         OURS.replace("dock_b: {level: L1", "dock_b: {level: L2"), THEIRS, GRAPH
     )
-    assert code == 78
+    assert code == os.EX_CONFIG
     assert "ours.yaml:8:18: graph.yaml:6 has 'dock_b' on level 'L1'" in found
 
 
@@ -264,7 +265,7 @@ def test_a_file_that_is_no_fleet_configuration_is_refused_with_its_line(site: Si
     )
     code, found = site.check(theirs="levels: {}\n")
     text = "object missing required field `rmf_fleet`: is this a fleet adapter's configuration?"
-    assert (code, found) == (78, [f"config.yaml:1:1: {text}"])
+    assert (code, found) == (os.EX_CONFIG, [f"config.yaml:1:1: {text}"])
 
 
 def test_a_fleet_configuration_without_a_coordinator_is_compared_with_nothing(
@@ -272,7 +273,10 @@ def test_a_fleet_configuration_without_a_coordinator_is_compared_with_nothing(
 ) -> None:
     theirs = tmp_path / "config.yaml"
     theirs.write_text(THEIRS)
-    assert main(["check", "-q", "config/lift_one_hot.yaml", "--fleet-config", str(theirs)]) == 78
+    assert (
+        main(["check", "-q", "config/lift_one_hot.yaml", "--fleet-config", str(theirs)])
+        == os.EX_CONFIG
+    )
     assert "no FILE is one" in capsys.readouterr().err
 
 

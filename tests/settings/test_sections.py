@@ -57,7 +57,7 @@ def test_a_file_needs_all_its_sections(file: Path) -> None:
 def test_a_section_of_another_kind_is_unknown(file: Path) -> None:
     assert problems_of(file, changed("gates:", "doors:")) == [
         "1:1: the file needs 'gates': a mapping (key: value)",
-        "6:1: unknown key 'doors': known here: kind, driver, rmf, buses, gates",
+        "6:1: unknown key 'doors': known here: kind, driver, rmf, recording, buses, gates",
     ]
 
 
@@ -217,7 +217,7 @@ def test_a_point_serves_one_signal_of_one_device(file: Path) -> None:
     ]
 
 
-def test_a_point_that_an_alias_repeats_is_taken_too(file: Path) -> None:
+def test_a_point_that_a_yaml_alias_repeats_is_used_twice_and_refused(file: Path) -> None:
     text = changed("inputs:", "inputs: &i") + "  south: {lanes: [in], inputs: *i}\n"
     assert problems_of(file, text) == [
         "10:23: A0 is used by north inputs.opened on line 10: "

@@ -1,6 +1,7 @@
 """`check --json` and `check --sheet`: the same as the text, for a program and for a signature."""
 
 import json
+import os
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -97,14 +98,14 @@ def test_what_a_file_says_is_text_and_no_markup() -> None:
 
 def test_there_is_no_sheet_of_a_file_that_is_wrong() -> None:
     Path("gate.yaml").write_text(changed("tries: 2", "tries: 0"))
-    assert main(["check", "-q", "--sheet", "sheet.html", "gate.yaml"]) == 78
+    assert main(["check", "-q", "--sheet", "sheet.html", "gate.yaml"]) == os.EX_CONFIG
     assert not Path("sheet.html").exists()
 
 
 def test_a_sheet_that_cannot_be_written_is_an_exit_code_of_its_own(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert main(["check", "-q", "--sheet", "no/sheet.html", LIFT]) == 73
+    assert main(["check", "-q", "--sheet", "no/sheet.html", LIFT]) == os.EX_CANTCREAT
     assert capsys.readouterr().err == (
         "no/sheet.html cannot be written: No such file or directory\n"
     )
@@ -136,7 +137,7 @@ def test_json_says_what_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
     Path("gate.yaml").write_text(changed("tries: 2", "tries: 0"))
     Path("right.yaml").write_text(RIGHT)
     code, found = json_of(capsys, "gate.yaml", "right.yaml")
-    assert code == 78
+    assert code == os.EX_CONFIG
     assert (found["ok"], found["errors"]) == (False, 1)
     assert [file["errors"] for file in found["files"]] == [
         [

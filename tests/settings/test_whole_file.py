@@ -86,7 +86,7 @@ bus, driver, accept_unsafe, lanes, inputs, outputs, bits, codes, limits
 28:3: this name is written no, which YAML may read as false: \
 if the text is meant, write "no" in quotes
 28:7: 'no' is the number 3: write a mapping (key: value)
-29:1: unknown key 'extra': known here: kind, driver, rmf, buses, gates
+29:1: unknown key 'extra': known here: kind, driver, rmf, recording, buses, gates
 """
 
 

@@ -6,7 +6,6 @@ behind the drivers stand the plants of `hal_fakes`, and RMF is its stand-in. One
 
     timeline.py  virtual time
     network.py   the graph: delay, loss, repeats and cuts, within what DDS may do
-    wires.py     the far side of every bus
     building.py  the devices: settings, plants, drivers
     daemons.py   what serves them, and the supervisors: each can be killed and started
     robots.py    fleet adapters and their robots, each with an endless day

@@ -28,9 +28,9 @@ from hal_fakes.modbus.register_door import RegisterDoor, contacts
 from hal_fakes.plants import door as door_plant
 from hal_fakes.plants import lift as lift_plant
 from hal_fakes.plants.machine import Machine
+from tests.drivers.far import Far, HttpFar, PointsFar, RegisterFar
 from tests.drivers.lift.wirings import alarm, coil, line
 from tests.site.timeline import Timeline
-from tests.site.wires import Far, HttpFar, PointsFar, RegisterFar
 
 CONFIG = Path(__file__).parents[2] / "config"
 FLOORS = ["L1", "L2", "L3", "L4"]
@@ -43,13 +43,15 @@ POLL_S = {"gpio": 0.0, "modbus": 0.05, "http": 0.5}
 
 @dataclass(frozen=True)
 class Device:
-    """One device from its settings to its plant. `driver()`: a new one, as a new daemon has it."""
+    """One device from its settings to its plant. `driver()`: a new one, as a new daemon has it;
+    `driver_name`: as a YAML has it."""
 
     name: str
     kind: AnyDeviceKind
     settings: Any
     plant: Machine
     far: Far
+    driver_name: str
     driver: Callable[[], Driver[Any, Any]]
     debounce: Mapping[str, float]
     poll_s: float
@@ -68,34 +70,38 @@ def devices(timeline: Timeline) -> dict[str, Device]:
     return {device.name: device for device in found}
 
 
-def _lift(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
-    plant = lift_plant.build(name, settings)
-    far = PointsFar(timeline, plant, lift_dry_contact.wires(settings))
+def _wired(
+    timeline: Timeline,
+    name: str,
+    kind: AnyDeviceKind,
+    driver: Any,
+    plant: Any,
+    settings: Any,
+    bus: str,
+) -> Device:
+    """A device on contacts."""
+    far = PointsFar(timeline, plant, driver.wires(settings))
     return Device(
         name,
-        LIFT,
+        kind,
         settings,
         plant,
         far,
-        lambda: lift_dry_contact.create(name, settings, far),
-        lift_dry_contact.debounce(settings),
+        driver.__name__.rpartition(".")[2],
+        lambda: driver.create(name, settings, far),
+        driver.debounce(settings),
         POLL_S[bus],
     )
+
+
+def _lift(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
+    plant = lift_plant.build(name, settings)
+    return _wired(timeline, name, LIFT, lift_dry_contact, plant, settings, bus)
 
 
 def _dry_door(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
     plant = door_plant.build(name, settings, door_dry_contact.wires(settings))
-    far = PointsFar(timeline, plant, door_dry_contact.wires(settings))
-    return Device(
-        name,
-        DOOR,
-        settings,
-        plant,
-        far,
-        lambda: door_dry_contact.create(name, settings, far),
-        door_dry_contact.debounce(settings),
-        POLL_S[bus],
-    )
+    return _wired(timeline, name, DOOR, door_dry_contact, plant, settings, bus)
 
 
 def _register_door(timeline: Timeline, name: str, settings: Any) -> Device:
@@ -107,6 +113,7 @@ def _register_door(timeline: Timeline, name: str, settings: Any) -> Device:
         settings,
         plant,
         far,
+        "register",
         lambda: door_register.create(name, settings, far),  # type: ignore[arg-type]
         {},
         POLL_S["modbus"],
@@ -127,6 +134,7 @@ def _charger(timeline: Timeline, name: str, clear_errors_per_h: int) -> Device:
         settings,
         plant,
         far,
+        "http",
         lambda: charger_http.create(name, settings, far),
         {},
         POLL_S["http"],

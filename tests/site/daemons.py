@@ -16,12 +16,14 @@ from bridges.core.graph_kind import AnyGraphKind
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
 from bridges.rmf.transport import Publisher
+from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
 from bridges.serve.clock import Clock
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
 from bridges.serve.subject import Status
+from bridges.serve.witness import NOBODY, Nobody
 from hal_fakes.plants.plant import Edge
-from hal_fakes.rmf.supervisors import DoorSupervisor, LiftSupervisor
+from tests.serve.virtual_graph import Disk
 from tests.site.building import Device
 from tests.site.network import Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
@@ -35,7 +37,8 @@ class DeviceDaemon:
     """Serves one device. `wall_step_s`: of its wall clock.
 
     `looks` is called with each time until which the plant was as it is, `scanned` after each scan,
-    `relayed` with each edge of a relay.
+    `relayed` with each edge of a relay, `started` as it starts, `hears` with each message that gets
+    to it.
     """
 
     def __init__(self, timeline: Timeline, air: Air, device: Device) -> None:
@@ -48,6 +51,11 @@ class DeviceDaemon:
         self.looks: Callable[[DeviceDaemon, float], None] = lambda daemon, at: None
         self.scanned: Callable[[DeviceDaemon], None] = lambda daemon: None
         self.relayed: Callable[[Edge], None] = lambda edge: None
+        self.witness: Nobody = NOBODY
+        self.started: Callable[[DeviceDaemon], None] = lambda daemon: None
+        self.hears: Callable[[DeviceDaemon, Topic[Any], Any], None] = lambda daemon, topic, told: (
+            None
+        )
         self._changed = False
         device.plant.on_edge = self._edge
         self._timeline = timeline
@@ -59,6 +67,7 @@ class DeviceDaemon:
 
     def start(self) -> None:
         """A new one: nothing remembered."""
+        self.started(self)
         device, kind = self.device, self.device.kind
         self._place = Place(self._air, self.name, lambda: None)
         topics = [kind.states, *kind.publishes(device.settings)]
@@ -68,7 +77,14 @@ class DeviceDaemon:
             lambda: self._timeline.now, lambda: EPOCH + self._timeline.now + self.wall_step_s
         )
         self._node = Node(
-            self.name, kind, device.settings, limits, device.driver(), self._publish, clock
+            self.name,
+            kind,
+            device.settings,
+            limits,
+            device.driver(),
+            self._publish,
+            clock,
+            self.witness,
         )
         self.alive = True
         for topic in kind.requests:
@@ -97,6 +113,7 @@ class DeviceDaemon:
         self.advance()
         self._changed = False
         self._node.scan(events)
+        self.witness.flush()
         self.scans += 1
         self.scanned(self)
         changes_at = (now if self._changed else self.device.plant.next_at()) + self.device.poll_s
@@ -117,9 +134,13 @@ class DeviceDaemon:
         """Something has happened to the plant: see it, at once or at the next poll."""
         self._timeline.after(self.device.poll_s, self.scan)
 
+    def status(self) -> Status:
+        """As the status file has it."""
+        return self._node.status()
+
     def faults(self) -> list[str]:
         """What it says is wrong."""
-        return [fault["code"] for fault in self._node.status()["faults"]] if self.alive else []
+        return [fault["code"] for fault in self.status()["faults"]] if self.alive else []
 
     def _edge(self, edge: Edge) -> None:
         """Of the plant, whose own record is not needed."""
@@ -130,27 +151,17 @@ class DeviceDaemon:
             self._changed = True
 
     def _hear(self, topic: Topic[Any], message: Any) -> None:
+        self.hears(self, topic, message)
         if self.device.kind.device_name(message) != self.name:
             return
+        self.witness.spoken(topic.name, message, sent=False)
         event = self._node.event(topic, message)
         if event is not None:
             self.scan(event)
 
     def _publish(self, topic: Topic[Any], message: Message) -> None:
         self._publishers[topic.name].publish(message)
-
-
-class Disk:
-    """The state directory of a supervisor. It outlives it."""
-
-    def __init__(self) -> None:
-        self._kept: bytes | None = None
-
-    def read(self) -> bytes | None:
-        return self._kept
-
-    def write(self, kept: bytes) -> None:
-        self._kept = kept
+        self.witness.spoken(topic.name, message, sent=True)
 
 
 RIVAL = "rmf_lift_supervisor"
@@ -226,6 +237,7 @@ class GraphDaemon:
         self.kind = kind
         self._settings = settings or kind.settings()
         self.alive = False
+        self.witness: Nobody = NOBODY
         self._timeline = timeline
         self._air = air
         self._disk = Disk()
@@ -238,7 +250,9 @@ class GraphDaemon:
         """A new one, which knows what it has kept."""
         self._place = Place(self._air, self.name, self._round)
         kept = self._disk if self.kind.persist else None
-        self.node = GraphNode(self.kind, self._settings, self._place, self._clock, kept=kept)
+        self.node = GraphNode(
+            self.kind, self._settings, self._place, self._clock, kept=kept, witness=self.witness
+        )
         self.alive = True
         self.node.subscribe()
         self._round()

@@ -187,8 +187,8 @@ class Site:
                 self.laws.require(empty, f"{supervisor.name}: {name} {waiting} at the end")
 
     def _speakers(self, topic: str) -> int:
-        """How many there are, but for what a rival has just made of it."""
-        speaking = [end.node.name for end in self.air.memory.publishers if end.topic.name == topic]
+        """How many supervisors speak. Ours and a rival that has just come count as one."""
+        speaking = [end.node.name for end in self.air.memory.publishers[topic]]
         if RIVAL in speaking and self.rmf == "ours":
             return 1
         return len(speaking)
@@ -384,11 +384,11 @@ class Site:
         )
 
     def _bus_down(self, device: Device) -> None:
-        device.far.down = True
+        device.far.down = "the module does not answer"
         self.timeline.after(2.0, device.far.watchdog)
 
     def _bus_up(self, device: Device) -> None:
-        device.far.down = False
+        device.far.down = ""
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:

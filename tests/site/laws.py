@@ -1,7 +1,8 @@
 """What must hold at every moment of the day. Nothing here asks a core's memory or a report.
 
-Judged are the messages as they are published, the relays as they are driven at the terminal block, and
-where car, doors, robots and current really are. What a sensor lies about (a stuck, inverted or noisy
+What can be judged from the graph is judged by the laws of `rmf-bridge judge` (`bridges/judge/`), with
+the node's own ears. Here are those that need more: the relays as they are driven at the terminal block,
+and where car, doors, robots and current really are. What a sensor lies about (a stuck or noisy
 wire) nobody can know: while it does, and a moment longer, the states that rest on it are not held
 against the node. A cut wire is no excuse.
 """
@@ -9,10 +10,13 @@ against the node. A cut wire is no excuse.
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from bridges.charger.signals import CURRENT_FLOWS
+from bridges.judge.judge import LAWS, Judge, Kind
+from bridges.judge.law import Verdict
 from bridges.lift.signals import Side
+from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from drivers.lift.table import group
@@ -21,7 +25,7 @@ from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.lift import LiftPlant
 from hal_fakes.plants.plant import Edge
 from tests.site.daemons import DeviceDaemon
-from tests.site.timeline import NEVER, Timeline
+from tests.site.timeline import EPOCH, NEVER, Timeline
 from tests.site.trouble import Ills
 
 AT_ONCE_S = 0.3
@@ -43,6 +47,9 @@ ARRIVED_S = 3.5
 for as long as a late message takes and our supervisor needs to repeat it, while an earlier CLOSE ends.
 """
 
+STATED = (d.LiftState, d.DoorState, d.ChargerState)
+NO_DWELL = "D2.people"
+"""The plants' doors fall shut as soon as nobody pushes, as no operator does and as this law forbids."""
 SHOWN = ("floor", "door", "motion")
 """The groups of a lift's lines that an open door rests on."""
 
@@ -70,6 +77,36 @@ class LiftTruth:
     ended: dict[str, float] = field(default_factory=dict)
 
 
+class Judges:
+    """Of one daemon, since it started: the laws of the graph, and those that rest on its sensors, which
+    are judged while nothing ails it."""
+
+    def __init__(self, daemon: DeviceDaemon) -> None:
+        kind = cast(Kind, daemon.device.kind.name)
+        self._name = daemon.name
+        self._kind = kind
+        self._always = Judge(kind, daemon.name, (law.id for law in LAWS[kind] if not law.sensed))
+        self._sensed: Judge | None = None
+
+    def hear(self, heard: Heard, well: bool) -> str:
+        """The laws that are broken now, with what shows it."""
+        self._always.hear(heard)
+        if not well:
+            self._sensed = None
+        elif self._sensed is None:
+            sensed = (law.id for law in LAWS[self._kind] if law.sensed and law.id != NO_DWELL)
+            self._sensed = Judge(self._kind, self._name, sensed)
+        if self._sensed is not None:
+            self._sensed.hear(heard)
+        judges = [judge for judge in (self._always, self._sensed) if judge and judge.broken]
+        return "; ".join(
+            f"{self._name} breaks {judged.law.id}: {judged.evidence[0].text}"
+            for judge in judges
+            for judged in judge.verdicts()
+            if judged.verdict is Verdict.BROKEN
+        )
+
+
 class Laws:
     """`log`: the latest of what was said and done, for the report of a failure."""
 
@@ -82,7 +119,7 @@ class Laws:
         self._doors: dict[str, float] = {}
         self._currents: dict[str, float] = {}
         self._pads: dict[str, str] = {}
-        self._charged: dict[str, str] = {}
+        self._judges: dict[str, Judges] = {}
         self._doorways: dict[str, dict[str, float]] = {}
         self._daemons: dict[str, DeviceDaemon] = {}
         self._relays: dict[str, set[str]] = {}
@@ -105,6 +142,8 @@ class Laws:
             self._currents[name] = -NEVER
         daemon.looks, daemon.scanned = self._see, self.scanned
         daemon.relayed = self._relay
+        self._judges[name] = Judges(daemon)
+        daemon.started, daemon.hears = self._started, self._hears
 
     def note(self, what: str) -> None:
         """One line for the report of a failure."""
@@ -118,8 +157,20 @@ class Laws:
 
     # ---- what is said
 
+    def _started(self, daemon: DeviceDaemon) -> None:
+        self._judges[daemon.name] = Judges(daemon)
+
+    def _hears(self, daemon: DeviceDaemon, topic: topics.Topic[Any], message: Any) -> None:
+        """What gets to a node, as it is judged by it."""
+        now = self._timeline.now
+        well = self._ills.well_since(daemon.name) + LATE_S < now
+        broken = self._judges[daemon.name].hear(Heard(now, EPOCH + now, topic.name, message), well)
+        self.require(not broken, broken)
+
     def heard(self, speaker: str, topic: topics.Topic[Any], message: Any) -> None:
         """Check a message that somebody publishes."""
+        if speaker in self._daemons and isinstance(message, STATED):
+            self._hears(self._daemons[speaker], topic, message)
         match message:
             case d.LiftState():
                 self._lift_state(speaker, message)
@@ -158,9 +209,6 @@ class Laws:
         self.require(name == state.lift_name, f"{name} speaks for {state.lift_name}")
         truth, now = self._lifts[name], self._timeline.now
         before = truth.session
-        handed = before and state.session_id and before != state.session_id
-        ended = truth.ended.get(before, -NEVER) > truth.since - LATE_S
-        self.require(ended or not handed, f"{name} went from {before} to {state.session_id}")
         if state.session_id != before:
             resumed = state.session_id == truth.last and now - truth.since <= GRACE_S
             truth.offered = truth.offered and (resumed or not state.session_id)
@@ -209,12 +257,8 @@ class Laws:
         word = d.ChargerStateValue(state.state).name[8:]
         self._note_state(name, f"{word} {state.request_id} {state.error_message}")
         self.require(name == state.charger_name, f"{name} speaks for {state.charger_name}")
-        before, self._charged[name] = self._charged.get(name, ""), ""
         if state.state != d.ChargerStateValue.CHARGER_CHARGING:
             return
-        self._charged[name] = state.request_id
-        same = before in ("", state.request_id) or state.request_id == f"unrequested/{name}"
-        self.require(same, f"{name} charges {before}, and calls it {state.request_id}")
         unsure_s = 4.0 if self._ills.any(name) else 1.5
         lied = {"server", "body"} & set(self._ills.lying(name, SETTLES_S))
         true = bool(lied) or self._timeline.now - self._currents[name] <= unsure_s
@@ -293,7 +337,7 @@ class Laws:
             return
         seen = plant.contact("obstruction") and plant.sense("obstruction")
         since = max(self._ills.well_since(name), self._ills.obstructed_since(name))
-        if seen and plant.position > 0.0:
+        if seen and not plant.contact("closed"):
             early = since + AT_ONCE_S > self._timeline.now
             self.require(early, f"{name} lets go onto an obstruction")
 

@@ -103,7 +103,7 @@ class Air:
     def _found_again(self, name: str, lost: bool) -> None:
         if not lost or self._cut.get(name, NEVER) > self.timeline.now:
             return
-        for end in list(self.memory.subscriptions):
+        for end in [end for ends in self.memory.subscriptions.values() for end in ends]:
             if end.node.name == name:
                 end.catch_up()
             else:
@@ -111,7 +111,7 @@ class Air:
 
     def _give_again(self, name: str, end: Any) -> None:
         """What the one who is back has retained for this subscription."""
-        for publisher in self.memory.publishers:
+        for publisher in self.memory.publishers[end.topic.name]:
             if publisher.node.name == name and _wants_retained(end, publisher):
                 for message in list(publisher.retained):
                     end.received(message)
@@ -162,5 +162,5 @@ class _Mouth:
 
 
 def _wants_retained(end: Any, publisher: Any) -> bool:
-    both = end._topic.subscribe.durability, publisher.topic.publish.durability
+    both = end.topic.subscribe.durability, publisher.topic.publish.durability
     return both == ("transient_local", "transient_local") and bool(end.hears(publisher))

@@ -33,8 +33,8 @@ FILES = {
 LIFT, DOOR = "Lift1", "ward_door"
 PLACES = Places(["L1", "L2"], [LIFT], [DOOR])
 PACE = 0.05
-PATIENCE_S = 60.0
-"""Nobody waits for longer, whoever was killed meanwhile."""
+PATIENCE_S = 240.0
+"""Nobody waits for longer, whoever was killed meanwhile and however busy the machine is."""
 
 
 class RealTime(Timeline):
@@ -69,6 +69,7 @@ class DdsPlace:
 
     def __init__(self, timeline: RealTime, domain: int, name: str) -> None:
         self.name = name
+        self.domain_id = domain
         self.dropped: dict[str, int] = {}
         self._timeline = timeline
         self._closed = False

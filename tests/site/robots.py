@@ -1,4 +1,4 @@
-"""The robots: each with its fleet adapter (RMF's rules, `hal_fakes.rmf`) and a day without end.
+"""The robots: each with its fleet adapter (RMF's rules, `bridges.rmf_rules`) and a day without end.
 
 Again and again: through a door, to another floor by lift, through another door, sometimes to a charger,
 sometimes a rest. Now and then a task is cancelled while it waits. An adapter that dies forgets all but
@@ -14,8 +14,8 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import duration
 from bridges.rmf.transport import Transport
-from hal_fakes.rmf.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from hal_fakes.rmf.robot import Phase, Robot
+from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Phase, Robot
 from tests.site.charging import Charge
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from hal_fakes.wire import runs_here
 from tests.site.on_dds import RealSite
 
 
@@ -15,6 +16,7 @@ def site(
 ) -> Iterator[RealSite]:
     directory: Path = tmp_path_factory.mktemp("s")  # a socket's name has 107 characters at the most
     monkeypatch.setenv("XDG_STATE_HOME", str(directory))
+    monkeypatch.setenv("TRANSPORT", runs_here())
     site = RealSite(directory, domain, ("red", "green", "blue"))
     yield site
     site.close()

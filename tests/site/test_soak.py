@@ -9,6 +9,7 @@ from tests.site.growth import Look, growth
 from tests.site.laws import Broken
 
 MINUTES = depth(8, 20)
+"""Robots go home in the last minutes of a day (`WIND_DOWN_S`): a shorter one has nothing else."""
 
 
 @pytest.mark.long
@@ -42,7 +43,7 @@ def test_rmfs_supervisor_that_forgets_a_robot_stops_a_lift_for_good_without_what
 def test_the_same_seed_is_the_same_day() -> None:
     days = [Site(5), Site(5)]
     for day in days:
-        day.run(depth(0.05, 0.15))
+        day.run(depth(0.03, 0.15))
     assert days[0].counts() == days[1].counts()
     assert list(days[0].laws.log) == list(days[1].laws.log)
 

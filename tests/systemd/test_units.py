@@ -16,7 +16,9 @@ from bridges.settings.load import load
 ROOT = Path(__file__).parents[2]
 FILES = ROOT / "systemd"
 UNIT = FILES / "rmf-bridge@.service"
+RECORDER = FILES / "rmf-bridge-recorder.service"
 CONFIG = device_yamls()
+VERIFY = ("systemd-analyze", "verify", "--man=no")
 MOST = 2.0
 """On systemd 252 a file on the network has 1.5, one with GPIO or a serial port 1.7, one with CAN's own
 sockets 1.7: AF_CAN counts as an exotic family, 0.2.
@@ -62,15 +64,25 @@ def test_no_shipped_file_needs_a_service_that_is_more_exposed_than_this(
 
 
 @needs_systemd
+def test_the_recorder_is_less_exposed_than_any_daemon(tmp_path: Path) -> None:
+    units = tmp_path / "etc/systemd/system"
+    units.mkdir(parents=True)
+    shutil.copy(RECORDER, units)
+    assert exposure(tmp_path, RECORDER.name) <= 1.0
+
+
+@needs_systemd
 def test_systemd_finds_nothing_wrong_with_the_units(tmp_path: Path) -> None:
     name = system(tmp_path, ROOT / "config/door_rs485.yaml")
     units = tmp_path / "etc/systemd/system"
     program = "/opt/rmf-bridges/.venv/bin/rmf-bridge"
-    for unit in (units / "rmf-bridge@.service", units / "rmf-bridges.target"):
+    shutil.copy(RECORDER, units)
+    recorder = units / RECORDER.name
+    for unit in (units / "rmf-bridge@.service", units / "rmf-bridges.target", recorder):
         unit.write_text(unit.read_text().replace(program, "/bin/true").replace("man:", "file:/"))
     (units / "rmf-bridge@.service").rename(units / name)
     done = subprocess.run(
-        ["systemd-analyze", "verify", "--man=no", units / name, units / "rmf-bridges.target"],
+        [*VERIFY, units / name, units / "rmf-bridges.target", recorder],
         capture_output=True,
         text=True,
     )

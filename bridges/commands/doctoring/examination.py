@@ -27,7 +27,7 @@ XNERGY_BITRATE: Final = 250_000
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class Options:
     """What the command line asks for. `kill_test`: device and output; None without the test.
 
     `whole_scan`: every unit or node of a bus. `listen_s`: how long to hear RMF's graph; 0 for not.
@@ -42,7 +42,7 @@ class Asked:
 
 
 def examined(
-    config: Config, building: "BuildingMap | None", machine: Machine, asked: Asked
+    config: Config, building: "BuildingMap | None", machine: Machine, asked: Options
 ) -> Iterator[Finding]:
     """Every finding, as it is made."""
     file, who = config.path.absolute(), user(machine)
@@ -112,7 +112,9 @@ def _gpio(config: Config, name: str, machine: Machine, who: User, now: Served) -
     yield from gpio.death(machine)
 
 
-def _asked_of_buses(config: Config, places: Places, now: Served, asked: Asked) -> Iterator[Finding]:
+def _asked_of_buses(
+    config: Config, places: Places, now: Served, asked: Options
+) -> Iterator[Finding]:
     """Who answers, while nobody else can open the buses."""
     names = [name for name, kind in config.bus_types.items() if kind != "gpio"]
     if now.busy or not names:
@@ -131,7 +133,7 @@ def _asked_of_buses(config: Config, places: Places, now: Served, asked: Asked) -
 
 
 def _killed(
-    config: Config, machine: Machine, places: Places, now: Served, asked: Asked
+    config: Config, machine: Machine, places: Places, now: Served, asked: Options
 ) -> Iterator[Finding]:
     from bridges.commands.doctoring.kill_test import KILL_TEST, kill_test
     from bridges.commands.doctoring.victim import step_called

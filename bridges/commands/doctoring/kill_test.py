@@ -30,12 +30,12 @@ OFF_WITHIN_S: Final = 15.0
 LOOK_S: Final = 0.02
 CUT: Final = "cut the relays' supply; then rmf-bridge outputs-off FILE"
 
-Kept = Callable[[], bool | None]
+StillDriven = Callable[[], bool | None]
 """Whether the kernel still drives the line; None where that cannot be seen."""
 
 
 def kill_test(
-    file: Path, device: str, step: Step, places: Places, runtime_dir: str | None, kept: Kept
+    file: Path, device: str, step: Step, places: Places, runtime_dir: str | None, kept: StillDriven
 ) -> Iterator[Finding]:
     """The subject `kill test`. Nobody else may serve the file."""
     name = f"{device} {step.name}"

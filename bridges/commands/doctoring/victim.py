@@ -10,9 +10,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
+from bridges.commands.by_hand import guarded, not_off
 from bridges.commands.walking.core import Step
 from bridges.commands.walking.steps import steps
-from bridges.serve import directory, guard, places, record, signals
+from bridges.serve import directory, guard, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers import Driver, DriverError
 from drivers.hal import Bus
@@ -25,9 +26,7 @@ def main(file: Path, device: str, step: str, runtime_dir: str | None) -> int:
     signals.End()
     try:
         config = load(file)
-        found = directory.find(file, runtime_dir)
-        places.own(found)
-        held = directory.RuntimeDirectory(found, file, serves=False)
+        held = directory.held(file, runtime_dir, serves=False)
     except (SettingsError, directory.AlreadyRunning, directory.Unknown, PermissionError) as error:
         return _say(f"{error}")
     try:
@@ -43,9 +42,7 @@ def _held(
     held: directory.RuntimeDirectory,
     switches_off: list[str],
 ) -> int:
-    held.claim(record.of(config))
-    watching = guard.Guard(switches_off)
-    places.work_somewhere(held.places)
+    all_off = guarded(config, held, switches_off)
     try:
         bus = config.open_bus(config.bus_of(device))
         driver = config.driver_type(device).create(device, config.devices[device], bus)
@@ -53,8 +50,7 @@ def _held(
     except DriverError as error:
         return _say(f"{error}")
     if off:
-        held.released()
-        watching.dismiss()
+        all_off()
     return 0 if off else 1
 
 
@@ -78,14 +74,10 @@ def _on_for_a_while(driver: Driver[Any, Any], bus: Bus, step: Step | None) -> bo
     except DriverError as error:
         _say(f"{error}")
     try:
-        bus.insist()
-        driver.make_safe()
-    except DriverError:
-        return False
+        return not not_off(driver, bus.insist)
     finally:
         driver.close()
         bus.close()
-    return True
 
 
 def _say(text: str) -> int:

@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
-from typing import ClassVar, NamedTuple, TypeVar
+from typing import ClassVar, Final, NamedTuple, TypeVar
 
 from bridges.charger.refusals import Refusal, read
 from bridges.commands.graph import CommandLine, Heard
@@ -25,8 +25,9 @@ class Seen:
     """What has happened since the command began; times are monotonic s.
 
     `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
-    request, in order. `names`: every device of the kind that was heard. `heartbeat`: the latest of the
-    door supervisor. `boarded`: what the lift's diagnostics say of a robot inside, "yes" or "no"; "" if
+    request, in order. `there`: kind and name of every device that was heard. `graph`: where we listen,
+    for people. `hinted`: the hints that were said. `heartbeat`: the latest of the door supervisor.
+    `boarded`: what the lift's diagnostics say of a robot inside, "yes" or "no"; "" if
     they were not heard. `refusals`: those of chargers, after our first request.
     """
 
@@ -36,7 +37,9 @@ class Seen:
     first_sent_at: float | None = None
     last_sent_at: float | None = None
     states: tuple[Heard[words.Stated], ...] = ()
-    names: frozenset[str] = frozenset()
+    there: frozenset[tuple[str, str]] = frozenset()
+    graph: str = ""
+    hinted: frozenset[str] = frozenset()
     heartbeat: Heard[SupervisorHeartbeat] | None = None
     boarded: str = ""
     refusals: tuple[Refusal, ...] = ()
@@ -52,7 +55,12 @@ class Seen:
         if not isinstance(message, words.Stated):
             return self
         states = (*self.states, Heard(message, heard.at)) if about(message) else self.states
-        return replace(self, names=self.names | {words.device(message)}, states=states)
+        this = words.kind(message), words.device(message)
+        return replace(self, there=self.there | {this}, states=states)
+
+    def names(self, kind: str) -> list[str]:
+        """Every device of this kind that was heard, sorted."""
+        return sorted(name for one, name in self.there if one == kind)
 
     def sends(self, now: float) -> "Seen":
         """The request is sent now."""
@@ -81,6 +89,12 @@ class Seen:
             if sessions.door_name == door
             for session in sessions.sessions
         ]
+
+
+WHERE: Final = (
+    "is it in another domain (--domain-id), on another transport (--transport), on another machine"
+    " (without --localhost)? rmf-bridge status shows a daemon's, on its own machine"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,36 +165,58 @@ class Request(ABC):
 
     def about(self, state: words.Stated) -> bool:
         """Whether the state is of this device."""
-        return words.device(state) == self.name
+        return (words.kind(state), words.device(state)) == (self.kind, self.name)
 
     def ready(self, seen: Seen) -> bool:
         """Whether the device has been heard."""
         return bool(seen.states)
 
-    def nobody(self) -> Obstacle:
+    def misnamed(self, seen: Seen) -> str:
+        """Which other kind of device has this name; "" if none was heard."""
+        if self.ready(seen):
+            return ""
+        kinds = sorted(kind for kind, name in seen.there if name == self.name and kind != self.kind)
+        if not kinds:
+            return ""
+        there = f"rmf-bridge send {kinds[0]} --help"
+        return f"{self.name} is a {' and a '.join(kinds)}, not a {self.kind}; {there}"
+
+    def nobody(self, seen: Seen) -> Obstacle:
         """No supervisor or daemon subscribes to the request."""
         silence = f"no node subscribes to {self.topic.name}"
         if self.supervisor is not None:
             silence = f"no node publishes {self.supervisor.name}"
+        who = f"{self.kind} supervisor"
         if self.topic == self.own:
-            listener = self.listener or f"{self.kind} daemon"
-            return Obstacle(True, f"no {listener} runs in this domain: {silence}", self._loopback())
+            who = self.listener or f"{self.kind} daemon"
+        text = f"no {who} runs in this domain: {silence}; {self._hears(seen)}"
+        if self.topic == self.own or self.name not in seen.names(self.kind):
+            return Obstacle(True, text, self._elsewhere(seen))
         there = self.line.again_with("--direct")
-        return Obstacle(
-            True,
-            f"no {self.kind} supervisor runs in this domain: {silence}",
-            f"to ask the {self.kind}'s own daemon: {there}",
-        )
+        return Obstacle(True, text, f"to ask the {self.kind}'s own daemon: {there}")
 
-    def unheard(self, names: frozenset[str]) -> Obstacle:
+    def unheard(self, seen: Seen) -> Obstacle:
         """The device has not been heard; perhaps another has a similar name."""
-        topic = self.states.name
+        topic, names = self.states.name, seen.names(self.kind)
         if not names:
-            here = f"no {self.kind} daemon runs in this domain and network"
-            return Obstacle(True, f"nothing is heard on {topic}: {here}", self._loopback())
-        there = ", ".join(sorted(names))
-        near = nearest(self.name, names)
-        return Obstacle(True, f"no '{self.name}' on {topic}; there: {there}{near}")
+            text = f"no {self.kind} is heard on {topic}; {self._hears(seen)}"
+            return Obstacle(True, text, self._elsewhere(seen))
+        return Obstacle(True, f"no '{self.name}' on {topic}; {self._hears(seen)}")
+
+    def _hears(self, seen: Seen) -> str:
+        """Whom we hear: devices of the kind, else any; else where we listen."""
+        if names := seen.names(self.kind):
+            near = "" if self.name in names else nearest(self.name, names)
+            return f"{self.kind}s heard: {', '.join(names)}{near}"
+        if seen.there:
+            return f"heard: {', '.join(map(' '.join, sorted(seen.there)))}"
+        return f"nothing is heard{seen.graph and f' by {seen.graph}'}"
+
+    def _elsewhere(self, seen: Seen) -> str:
+        """Where else the device may be: on loopback, in another domain, on another transport."""
+        if self._loopback():
+            return self._loopback()
+        return "" if seen.there else WHERE
 
     def _loopback(self) -> str:
         if "--localhost" in self.line.options:

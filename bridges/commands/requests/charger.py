@@ -137,7 +137,7 @@ class QueuedCharge(Charge):
 
     def ready(self, seen: Seen) -> bool:
         """Whether any charger has been heard."""
-        return bool(seen.names)
+        return bool(seen.names(self.kind))
 
     def outcome(self, seen: Seen) -> Done | Failed | None:
         """Done when a charger serves the robot; Failed when the coordinator refuses the request."""
@@ -147,11 +147,10 @@ class QueuedCharge(Charge):
         state = words.plain(d.ChargerStateValue, answer.state)
         return Done(f"{answer.charger_name} is {state} for {self.who}")
 
-    def unheard(self, names: frozenset[str]) -> Obstacle:
+    def unheard(self, seen: Seen) -> Obstacle:
         """No charger shows the robot yet: it probably waits in the queue."""
-        if not names:
-            silence = "no charger is heard: no charger daemon runs in this domain and network"
-            return Obstacle(True, silence, self._loopback())
+        if not seen.names(self.kind):
+            return super(QueuedCharge, self).unheard(seen)
         cancel = ("send", "charger", ANY, "--queue", "--cancel", self.request_id)
         return Obstacle(
             True,
@@ -183,7 +182,7 @@ class QueuedCancel(ChargeCancel):
 
     def ready(self, seen: Seen) -> bool:
         """Whether any charger has been heard."""
-        return bool(seen.names)
+        return bool(seen.names(self.kind))
 
     def outcome(self, seen: Seen) -> Done | None:
         """Done once the cancel has been sent."""
@@ -191,6 +190,6 @@ class QueuedCancel(ChargeCancel):
             return None
         return Done(f"the {COORDINATOR} was told that request {self.request_id} is withdrawn")
 
-    def unheard(self, names: frozenset[str]) -> Obstacle:
+    def unheard(self, seen: Seen) -> Obstacle:
         """The cancel was never sent."""
         return Obstacle(True, f"the cancel was not sent: no {COORDINATOR} listens")

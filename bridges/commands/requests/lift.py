@@ -141,11 +141,13 @@ class LiftEnd(_Lift):
         late = now >= asked_at + OBEYS_WITHIN_S
         return self.falls_back and not self.direct and late and self._outside(seen)
 
-    def nobody(self) -> Obstacle:
+    def nobody(self, seen: Seen) -> Obstacle:
         """Without a supervisor too, a robot may be in the car."""
-        found = super(LiftEnd, self).nobody()
-        if self.direct or self.car_empty or not self.falls_back:
+        found = super(LiftEnd, self).nobody(seen)
+        if self.direct or not self.falls_back or not seen.states:
             return found
+        if self._outside(seen):
+            return found._replace(remedy="the lift's own daemon is asked instead")
         return found._replace(remedy=f"if the car is empty: {self.line.again_with('--car-empty')}")
 
     def _outside(self, seen: Seen) -> bool:

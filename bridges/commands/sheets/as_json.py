@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import msgspec
 
-from bridges.commands.sheets.told import Told
+from bridges.commands.sheets.findings import Findings
 from bridges.core.table import Table
 
 
-def document(files: Sequence[Told], errors: int, warnings: int) -> str:
+def document(files: Sequence[Findings], errors: int, warnings: int) -> str:
     """`{"ok": true, "errors": 0, "warnings": 0, "files": [...]}`, with a newline at its end."""
     found = {
         "ok": not errors,
@@ -19,12 +19,12 @@ def document(files: Sequence[Told], errors: int, warnings: int) -> str:
     return msgspec.json.format(msgspec.json.encode(found), indent=2).decode() + "\n"
 
 
-def _file(told: Told) -> dict[str, object]:
+def _file(findings: Findings) -> dict[str, object]:
     parts = [
         {"device": part.device, "bus": part.bus, "tables": [*map(_table, part.tables)]}
-        for part in told.parts
+        for part in findings.parts
     ]
-    return {**msgspec.structs.asdict(told), "parts": parts}
+    return {**msgspec.structs.asdict(findings), "parts": parts}
 
 
 def _table(table: Table) -> dict[str, object]:

@@ -6,7 +6,7 @@ It needs no other file. Texts from a YAML are escaped, never markup.
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from bridges.commands.sheets.told import MEANINGS, WIRES, BusTold, Part, Told
+from bridges.commands.sheets.findings import MEANINGS, WIRES, BusShown, Findings, Part
 from bridges.core.table import Table
 
 STYLE = """
@@ -38,9 +38,9 @@ TO_TRY = (
 )
 
 
-def page(files: Sequence[Told]) -> str:
+def page(files: Sequence[Findings]) -> str:
     """The whole file."""
-    sections = (_section(told, part) for told in files for part in told.parts)
+    sections = (_section(findings, part) for findings in files for part in findings.parts)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f"<title>Commissioning sheet</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
@@ -48,12 +48,12 @@ def page(files: Sequence[Told]) -> str:
     )
 
 
-def _section(told: Told, part: Part) -> str:
-    bus = next((bus for bus in told.buses if bus.name == part.bus), None)
+def _section(findings: Findings, part: Part) -> str:
+    bus = next((bus for bus in findings.buses if bus.name == part.bus), None)
     tables = [*part.tables[:-1], *([_bus(bus)] if bus else ()), *part.tables[-1:]]
     lines = [
-        *_head(told, part),
-        *_remarks(told),
+        *_head(findings, part),
+        *_remarks(findings),
         *(line for table in tables if _is_wide(table) for line in _table(table, seen=True)),
         '<div class="narrow">',
         *(line for table in tables if not _is_wide(table) for line in _block(table)),
@@ -65,13 +65,13 @@ def _section(told: Told, part: Part) -> str:
     return "<section>\n" + "\n".join(lines) + "\n</section>\n"
 
 
-def _head(told: Told, part: Part) -> Iterator[str]:
-    driver = f", driver {told.driver}" if told.driver else ""
-    yield f"<h1>{escape(part.device)}: {escape(told.kind + driver)}</h1>"
-    yield f'<p class="file">{escape(told.file)}<br>SHA-256 {escape(told.sha256)}</p>'
+def _head(findings: Findings, part: Part) -> Iterator[str]:
+    driver = f", driver {findings.driver}" if findings.driver else ""
+    yield f"<h1>{escape(part.device)}: {escape(findings.kind + driver)}</h1>"
+    yield f'<p class="file">{escape(findings.file)}<br>SHA-256 {escape(findings.sha256)}</p>'
 
 
-def _bus(bus: BusTold) -> Table:
+def _bus(bus: BusShown) -> Table:
     title, rows = f"bus {bus.name} ({bus.type})", tuple(bus.settings.items())
     return Table(title, ("setting", "value"), rows)
 
@@ -85,10 +85,10 @@ def _letters(row: Sequence[str]) -> int:
     return sum(map(len, row))
 
 
-def _remarks(told: Told) -> Iterator[str]:
+def _remarks(findings: Findings) -> Iterator[str]:
     """The file's warnings and notes, all of them: each controller's page is signed by itself."""
-    warnings = (f"line {w.line}: {w.text.removeprefix('warning: ')}" for w in told.warnings)
-    for text in (*warnings, *(note.removeprefix(f"{told.file}:") for note in told.notes)):
+    warnings = (f"line {w.line}: {w.text.removeprefix('warning: ')}" for w in findings.warnings)
+    for text in (*warnings, *(note.removeprefix(f"{findings.file}:") for note in findings.notes)):
         yield f'<p class="warning">&#9744; {escape(text)}</p>'
 
 

@@ -3,25 +3,25 @@
 from collections.abc import Iterator, Sequence
 
 from bridges.commands.columns import aligned
-from bridges.commands.sheets.told import MEANINGS, WIRES, BusTold, Part, Told
+from bridges.commands.sheets.findings import MEANINGS, WIRES, BusShown, Findings, Part
 from bridges.core.table import Table
 
 
-def lines(told: Told) -> list[str]:
+def lines(findings: Findings) -> list[str]:
     """A valid file: its kind and driver, its wiring or messages, and a blank line at the end."""
-    driver = f", driver {told.driver}" if told.driver else ""
-    return [f"{told.file}: {told.kind}{driver}", "", *_body(told), *_notes(told)]
+    driver = f", driver {findings.driver}" if findings.driver else ""
+    return [f"{findings.file}: {findings.kind}{driver}", "", *_body(findings), *_notes(findings)]
 
 
-def _body(told: Told) -> Iterator[str]:
-    for bus in told.buses:
+def _body(findings: Findings) -> Iterator[str]:
+    for bus in findings.buses:
         yield _bus(bus)
-        yield from _wiring([part for part in told.parts if part.bus == bus.name])
+        yield from _wiring([part for part in findings.parts if part.bus == bus.name])
         yield ""
-    yield from _tables(told.parts)
+    yield from _tables(findings.parts)
 
 
-def _bus(bus: BusTold) -> str:
+def _bus(bus: BusShown) -> str:
     settings = ", ".join(f"{key} {text}" for key, text in bus.settings.items())
     return f"bus {bus.name} ({bus.type}){f': {settings}' if settings else ''}"
 
@@ -58,5 +58,5 @@ def _indented(rows: Sequence[Sequence[str]]) -> list[str]:
     return [f"  {line}" for line in aligned(rows)]
 
 
-def _notes(told: Told) -> list[str]:
-    return [*told.notes, ""] if told.notes else []
+def _notes(findings: Findings) -> list[str]:
+    return [*findings.notes, ""] if findings.notes else []

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from bridges.commands.by_hand import not_off
 from bridges.commands.walking import core
 from bridges.commands.walking.core import Event, Lost, Memory, Read, Step, Tick
 from bridges.commands.walking.tap import Tap
@@ -120,10 +121,6 @@ class Bench:
         """Without outputs to try, nothing was commanded, and a charge under way goes on."""
         if not self.steps:
             return True
-        self._bus.insist()
-        try:
-            self._driver.make_safe()
-        except DriverError as error:
-            self._decide(Lost(f"not verified off: {error}"))
-            return False
-        return True
+        if why := not_off(self._driver, self._bus.insist):
+            self._decide(Lost(why))
+        return not why

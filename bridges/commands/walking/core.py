@@ -1,7 +1,8 @@
 """When an output of a walk is on, and what counts as seen. Pure: time is an argument.
 
 One output at a time, for ON_S at most; off at once where a reading fails, grows old, or shows that the
-output must not be on. Feedback may come later than the output: a car needs its time.
+output must not be on. Feedback may come later than the output: a car needs its time. What the inputs
+showed before the output was switched on is no feedback.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -110,15 +111,21 @@ def _switch(memory: Memory, step: int, now: float, steps: Sequence[Step]) -> Mem
         return _off(memory, "switched off")
     if why := _hindrance(memory, now, steps[step]):
         return replace(memory, says=f"{steps[step].name} stays off: {why}")
-    results = {**memory.results, step: "switched on, and nothing was seen"}
+    tried = steps[step]
+    proves = tried.seen is None or not tried.seen(memory.sample)
+    told = "switched on, and nothing was seen"
+    if not proves:
+        told = "switched on; the inputs showed that before, so it proves nothing"
     return replace(
         memory,
         on=step,
         off_at=now + ON_S,
-        waits=step,
+        waits=step if proves else None,
         waits_until=now + FEEDBACK_S,
-        results=results,
-        says="",
+        results={**memory.results, step: told},
+        says=""
+        if proves
+        else f"the inputs show already what {tried.name} should do: that proves nothing",
     )
 
 

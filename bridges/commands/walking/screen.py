@@ -1,4 +1,4 @@
-"""A walk on a terminal, also a narrow one: tables that are redrawn in place, and keys."""
+"""A walk on a terminal, also that of a phone: tables that are redrawn in place, and keys."""
 
 import os
 import re
@@ -8,7 +8,7 @@ import termios
 import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, NamedTuple
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -17,8 +17,12 @@ from rich.text import Text
 
 from bridges.commands.walking.bench import Bench, Input
 from bridges.commands.walking.core import ByEye, Switch
+from bridges.commands.walking.signed import NOT_TRIED
 
 HELP: Final = "ENTER on/off   n next   p back   y seen   x not seen   q end"
+WIDE: Final = 60
+"""Columns from which the wires are shown too: a phone has about 40."""
+HEADINGS: Final = 2
 UP, DOWN = "\x1b[A", "\x1b[B"
 KEY: Final = re.compile(r"\x1b\[[A-Z]|.", re.S)
 
@@ -26,11 +30,11 @@ KEY: Final = re.compile(r"\x1b\[[A-Z]|.", re.S)
 class Screen:
     """What the person sees and types. `cursor`: the output that ENTER switches."""
 
-    def __init__(self, device: str, bench: Bench) -> None:
+    def __init__(self, device: str, bench: Bench, console: Console | None = None) -> None:
         self._device = device
         self._bench = bench
         self._cursor = 0
-        self._live = Live(console=Console(), auto_refresh=False, transient=False)
+        self._live = Live(console=console or Console(), auto_refresh=False, transient=False)
 
     def __enter__(self) -> "Screen":
         self._live.start()
@@ -41,7 +45,7 @@ class Screen:
 
     def draw(self, now: float) -> None:
         """Show everything as it is now (monotonic s)."""
-        self._live.update(self._page(now), refresh=True)
+        self._live.update(self.page(now), refresh=True)
 
     def obey(self, key: str) -> bool:
         """Act on a key. False for the one that ends the walk."""
@@ -60,43 +64,95 @@ class Screen:
             self._cursor = (self._cursor - 1) % steps
         return True
 
-    def _page(self, now: float) -> Group:
-        memory = self._bench.memory
+    def page(self, now: float) -> Group:
+        """Everything as it is now, as far as there is room."""
+        memory, console = self._bench.memory, self._live.console
         age = "not read yet" if memory.read_at is None else f"read {now - memory.read_at:.1f} s ago"
-        says = Text(memory.why_lost or memory.says, style="bold red")
-        return Group(
+        texts = [
             Text(f"{self._device}: {age}", style="bold"),
-            self._inputs(now),
             Text(self._bench.decoded),
-            self._outputs(now),
-            says,
+            Text(self._selected()),
+            Text(memory.why_lost or memory.says, style="bold red"),
             Text(HELP, style="dim"),
+        ]
+        title, decoded, selected, says, keys_ = texts
+        free = console.height - len(console.render_lines(Group(*texts))) - HEADINGS
+        shown = room(free, len(self._bench.inputs), len(self._bench.steps))
+        return Group(
+            title,
+            self._inputs(now, shown.inputs, wires=console.width >= WIDE),
+            decoded,
+            self._outputs(now, shown.outputs),
+            selected,
+            says,
+            keys_,
         )
 
-    def _inputs(self, now: float) -> Table:
-        table = Table("input", "wire", "level", "means", "for", "seen")
-        for one in self._bench.inputs:
-            table.add_row(*_row(one, now), style="bold" if one.asserted else "")
+    def _selected(self) -> str:
+        """What the output at the cursor does, and what was seen of it."""
+        if not self._bench.steps:
+            return "no output can be tried here"
+        step = self._bench.steps[self._cursor]
+        seen = self._bench.memory.results.get(self._cursor, NOT_TRIED)
+        return f"{step.name} {step.does}; should be seen: {step.expects}. So far: {seen}"
+
+    def _inputs(self, now: float, most: int, *, wires: bool) -> Table | Text:
+        """Every input; where there is no room, those that have changed last."""
+        if not self._bench.inputs:
+            return Text("no contacts: registers or messages, decoded", style="dim")
+        table = _table("input", *(["wire"] if wires else []), "level", "is", "for", "seen")
+        known = self._bench.inputs
+        latest = sorted(known, key=lambda one: -(one.changed_at or 0.0))[:most]
+        for one in (one for one in known if one in latest):
+            name, wire, *told = _row(one, now)
+            cells = (name, wire, *told) if wires else (name, *told)
+            table.add_row(*cells, style="bold" if one.asserted else "")
+        if len(known) > most:
+            table.add_row(f"… {len(known) - most} more")
         return table
 
-    def _outputs(self, now: float) -> Table:
-        memory = self._bench.memory
-        table = Table("", "output", "what it does", "is", "should be seen", "seen")
-        for i, step in enumerate(self._bench.steps):
+    def _outputs(self, now: float, most: int) -> Table:
+        """Every output; where there is no room, those around the cursor."""
+        memory, steps = self._bench.memory, self._bench.steps
+        table = _table("", "output", "is", "seen")
+        first = max(0, min(self._cursor - most // 2, len(steps) - most))
+        for i, step in list(enumerate(steps))[first : first + most]:
             on = i == memory.on
             is_now = f"ON, {max(0.0, memory.off_at - now):.0f} s" if on else "off"
             mark = ">" if i == self._cursor else ""
-            seen = memory.results.get(i, "")
-            table.add_row(
-                mark,
-                step.name,
-                step.does,
-                is_now,
-                step.expects,
-                seen,
-                style="bold yellow" if on else "",
-            )
+            told = _short(memory.results.get(i, ""))
+            table.add_row(mark, step.name, is_now, told, style="bold yellow" if on else "")
         return table
+
+
+class Room(NamedTuple):
+    """How many rows of inputs and of outputs fit."""
+
+    inputs: int
+    outputs: int
+
+
+def room(rows: int, inputs: int, outputs: int) -> Room:
+    """Share so many rows: three outputs at least, then inputs, then more outputs."""
+    least = min(outputs, 3)
+    if inputs + least <= rows:
+        return Room(inputs, min(outputs, rows - inputs))
+    for_inputs = max(1, rows - least - 1)  # a row says how many more there are
+    return Room(for_inputs, least)
+
+
+def _short(result: str) -> str:
+    """A result as a word or two, for the table."""
+    known = (word for word in ("seen", "not seen") if result.startswith(word))
+    return next(known, "nothing yet" if result else "")
+
+
+def _table(*headings: str) -> Table:
+    """Narrow: no frame, and one row for each line."""
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for heading in headings:
+        table.add_column(heading, no_wrap=True)
+    return table
 
 
 def _row(one: Input, now: float) -> tuple[str, ...]:

@@ -171,8 +171,10 @@ class GpioLines:
     def _levels(self, points: Iterable[str]) -> dict[str, bool]:
         levels = {}
         for point in points:
-            with _hal_errors(point):
+            try:
                 levels[point] = bool(self._of(point).state)
+            except _failures() as error:
+                raise _hal_error(point, error) from error
         return levels
 
     def _of(self, point: str) -> Pin:
@@ -222,5 +224,9 @@ def _hal_errors(point: str) -> Iterator[None]:
     try:
         yield
     except _failures() as error:
-        text = getattr(error, "value", error)  # lgpio's errors print in quotes
-        raise HalError(f"{describe(point)}: {text}") from error
+        raise _hal_error(point, error) from error
+
+
+def _hal_error(point: str, error: Exception) -> HalError:
+    text = getattr(error, "value", error)  # lgpio's errors print in quotes
+    return HalError(f"{describe(point)}: {text}")

@@ -1,12 +1,21 @@
 """A made-up machine: a directory tree, scripts for its commands, and what its GPIO chips answer."""
 
+import errno
 import os
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from bridges.commands.doctoring.chips import CHIP, CHIP_INFO, LINE, LINE_INFO, OUTPUT, USED
 from bridges.commands.doctoring.machine import Machine
 from bridges.commands.doctoring.users import User
+from tests.commands.doctoring.kernel_gpio import (
+    GET_CHIPINFO,
+    GET_LINEINFO,
+    INPUT,
+    OUTPUT,
+    USED,
+    GpiochipInfo,
+    LineInfo,
+)
 
 OURS = os.getegid()
 """The group of every file here: a user in it may use them."""
@@ -21,6 +30,8 @@ class MadeUp:
     ) -> None:
         self.root = root
         self._chips: dict[str, tuple[str, Mapping[int, str], Collection[int]]] = {}
+        self.hidden: set[str] = set()
+        """Chips that the doctor's own process may not open."""
         self.synchronised: bool | None = True
         self.machine = Machine(
             root,
@@ -68,9 +79,12 @@ class MadeUp:
 
     def _ioctl(self, device: Path, request: int, argument: bytes) -> bytes:
         label, held, outputs = self._chips[device.name]
-        if request == CHIP_INFO:
-            return CHIP.pack(device.name.encode(), label.encode(), 58)
-        assert request == LINE_INFO
-        _, _, offset, _, _ = LINE.unpack(argument)
-        flags = USED * (offset in held) + OUTPUT * (offset in outputs)
-        return LINE.pack(b"", held.get(offset, "").encode(), offset, 0, flags)
+        if device.name in self.hidden:
+            raise PermissionError(errno.EACCES, "Permission denied")
+        if request == GET_CHIPINFO:
+            return bytes(GpiochipInfo(device.name.encode(), label.encode(), 58))
+        assert request == GET_LINEINFO
+        offset = LineInfo.from_buffer_copy(argument).offset
+        flags = USED * (offset in held) | (OUTPUT if offset in outputs else INPUT)
+        consumer = held.get(offset, "").encode()
+        return bytes(LineInfo(f"GPIO{offset}".encode(), consumer, offset, 0, flags))

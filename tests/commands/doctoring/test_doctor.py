@@ -1,6 +1,7 @@
 """`rmf-bridge doctor` on real wires: Modbus, HTTP and CAN, and on RMF's graph."""
 
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -22,21 +23,17 @@ from bridges.serve import record
 from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.settings.load import load
-from hal_fakes.wire import join
+from hal_fakes.caller import Caller
+from hal_fakes.wire import join, wire
 from tests.commands import runtime
 from tests.commands.terminal import Terminal
 from tests.serve.site import Module, command, daemon, environment
 from tests.waiting import PATIENCE_S, wait_until
 
 READS = {1, 2, 3, 4}
+LISTEN_S = "15"
+"""The doctor listens for so long, and on a busy machine nodes find each other late."""
 """Modbus functions that change nothing."""
-
-
-@pytest.fixture
-def module(domain: int, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, domain)
-    yield standing
-    standing.close()
 
 
 def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, list[Any]]]:
@@ -219,10 +216,8 @@ doors:
 
 def test_the_kill_test_switches_nothing_on_against_a_fire_alarm(tmp_path: Path) -> None:
     with far_side(FIRE.format(port=502), "module", tmp_path) as there:
-        with socket.socket(socket.AF_UNIX) as control:
-            control.connect(str(tmp_path / "plant.sock"))
-            control.sendall(b"press ward_door fire on\n")
-            assert control.recv(100) == b"ok\n"
+        with Caller(tmp_path / "plant.sock") as control:
+            control.order("press ward_door fire on")
         file = tmp_path / "door.yaml"
         file.write_text(FIRE.format(port=there["tcp"]["port"]))
         _, found = doctor(file, tmp_path, "--listen", "0", "--kill-test", "--yes")
@@ -236,7 +231,7 @@ def test_the_kill_test_asks_once_more(module: Module, tmp_path: Path) -> None:
     terminal.wait_for("hold_open of ward_door will be ON for some seconds")
     terminal.type("no\n")
     terminal.wait_for("nothing was switched")
-    assert terminal.end() == 64
+    assert terminal.end() == os.EX_USAGE
     assert module.relay() == []
 
 
@@ -251,7 +246,7 @@ def test_the_kill_test_asks_once_more(module: Module, tmp_path: Path) -> None:
 def test_without_a_terminal_or_an_output_there_is_no_kill_test(
     module: Module, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: Any, why: str
 ) -> None:
-    assert cli.main(["doctor", str(module.file), "--kill-test", *options]) == 64
+    assert cli.main(["doctor", str(module.file), "--kill-test", *options]) == os.EX_USAGE
     assert why in capsys.readouterr().err
     assert module.relay() == []
 
@@ -260,7 +255,7 @@ def test_a_bad_yaml_is_told_as_check_tells_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "bad.yaml").write_text("kind: lift\n")
-    assert cli.main(["doctor", str(tmp_path / "bad.yaml")]) == 78
+    assert cli.main(["doctor", str(tmp_path / "bad.yaml")]) == os.EX_CONFIG
     assert "bad.yaml:1:1:" in capsys.readouterr().err
 
 
@@ -359,7 +354,7 @@ def test_who_sends_on_the_graph_is_seen_and_a_second_door_of_the_name_is_wrong(
     telling = threading.Thread(target=tell)
     telling.start()
     try:
-        _, found = doctor(module.file, tmp_path, "--listen", "6")
+        _, found = doctor(module.file, tmp_path, "--listen", LISTEN_S)
     finally:
         ended.set()
         telling.join()
@@ -376,7 +371,7 @@ def test_our_daemon_is_heard_and_a_graph_without_rmf_is_warned_of(
     with daemon(module.file, tmp_path / "run") as running:
         running.wait_for("ready file")
         wait_until((tmp_path / "run" / "status.json").exists, "the status is written")
-        _, found = doctor(module.file, tmp_path, "--listen", "6")
+        _, found = doctor(module.file, tmp_path, "--listen", LISTEN_S)
     assert ("ok", "ward_door is heard") in found["RMF"]
     assert ("warning", "door_requests: nobody sends") in found["RMF"]
 
@@ -384,12 +379,13 @@ def test_our_daemon_is_heard_and_a_graph_without_rmf_is_warned_of(
 def test_a_supervisor_beside_another_one_would_be_passive(domain: int, tmp_path: Path) -> None:
     file = tmp_path / "supervisor.yaml"
     file.write_text(
-        f"kind: door_supervisor\nrmf: {{network: localhost, domain_id: {domain}}}\nsupervisor: {{}}\n"
+        "kind: door_supervisor\nsupervisor: {}\n"
+        f"rmf: {{transport: {wire()}, network: localhost, domain_id: {domain}}}\n"
     )
     rmf = join("rmf", domain)
     rmf.publisher(DOOR_REQUESTS)
     try:
-        code, found = doctor(file, tmp_path, "--listen", "6")
+        code, found = doctor(file, tmp_path, "--listen", LISTEN_S)
     finally:
         rmf.close()
     assert code == 1

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from bridges.commands.doctoring.chips import devices
-from bridges.commands.doctoring.examination import Asked, examined
+from bridges.commands.doctoring.examination import Options, examined
 from bridges.commands.doctoring.finding import exit_code
 from bridges.commands.doctoring.users import UNIT
 from bridges.settings.load import load
@@ -27,7 +27,7 @@ def pi(root: Path) -> MadeUp:
 
 
 def levels(made: MadeUp, tmp_path: Path) -> tuple[int, list[tuple[str, str]]]:
-    asked = Asked(runtime_dir=str(tmp_path / "run"))
+    asked = Options(runtime_dir=str(tmp_path / "run"))
     found = list(examined(load(LIFT), None, made.machine, asked))
     return exit_code(found), [(one.subject, one.level) for one in found if one.subject != "disk"]
 

@@ -1,6 +1,6 @@
 """What the doctor finds of the header on made-up Raspberry Pis."""
 
-import struct
+import ctypes
 from pathlib import Path
 
 import pytest
@@ -9,6 +9,12 @@ from bridges.commands.doctoring.chips import CHIP, CHIP_INFO, LINE, LINE_INFO, l
 from bridges.commands.doctoring.finding import Finding, ok
 from bridges.commands.doctoring.gpio import boot, death, gpio, header, lines
 from drivers.hal.points import Wire
+from tests.commands.doctoring.kernel_gpio import (
+    GET_CHIPINFO,
+    GET_LINEINFO,
+    GpiochipInfo,
+    LineInfo,
+)
 from tests.commands.doctoring.made_up import OTHERS, OURS, MadeUp
 
 CALL = Wire("call_L1", "out", "BCM18", "high")
@@ -27,10 +33,11 @@ def told(findings: list[Finding]) -> list[tuple[str, str]]:
     return [(one.level, one.found) for one in findings]
 
 
-def test_the_requests_to_the_kernel_have_the_sizes_of_its_header() -> None:
-    sizes = [(request >> 16 & 0x3FFF) for request in (CHIP_INFO, LINE_INFO)]
+def test_the_requests_to_the_kernel_are_those_of_its_header() -> None:
+    assert (GET_CHIPINFO, GET_LINEINFO) == (CHIP_INFO, LINE_INFO) == (0x8044B401, 0xC100B405)
+    sizes = [ctypes.sizeof(GpiochipInfo), ctypes.sizeof(LineInfo)]
     assert sizes == [CHIP.size, LINE.size] == [68, 256]
-    assert struct.calcsize("=32s32sII") == 72  # the flags follow, aligned to eight
+    assert (LineInfo.flags.offset, LineInfo.attrs.offset) == (72, 80)
 
 
 @pytest.mark.parametrize(
@@ -102,6 +109,32 @@ def test_a_pin_that_another_program_holds_is_named(made: MadeUp) -> None:
     ]
     assert told(list(lines(made.machine, chip, [ALARM]))) == [
         ("ok", "no other program holds a pin of this file")
+    ]
+
+
+def test_a_doctor_that_may_not_open_the_chip_says_so_and_knows_nothing_of_it(made: MadeUp) -> None:
+    made.chip(0, "pinctrl-rp1")
+    made.chip(10, "gpio-brcmstb@107d508500")
+    made.hidden = {"gpiochip0"}
+    assert list(gpio(made.machine, None, made.user)) == [
+        Finding(
+            "gpio",
+            "wrong",
+            "of gpiochip0, gpiochip10 only this may be looked at:"
+            " gpiochip10 (gpio-brcmstb@107d508500)",
+            "whether the header is there is not known",
+            "sudo before the command, or be in the group gpio",
+        )
+    ]
+
+
+def test_a_pin_in_use_without_a_name_is_held_by_somebody(made: MadeUp) -> None:
+    made.chip(4, "pinctrl-rp1", held={18: ""})
+    chip = header(made.machine, None)
+    assert chip is not None
+    made.write("/proc/1/cmdline")
+    assert told(list(lines(made.machine, chip, [CALL]))) == [
+        ("wrong", "BCM18 = J8:12 (call_L1) is held by 'somebody'")
     ]
 
 

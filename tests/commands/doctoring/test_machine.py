@@ -204,7 +204,7 @@ def test_an_interface_that_is_up_and_recovers_by_itself(made: MadeUp) -> None:
     assert can_found(made, 250_000) == [("ok", text)]
 
 
-def test_each_trouble_of_an_interface_is_told(made: MadeUp) -> None:
+def test_each_fault_of_a_can_interface_is_named(made: MadeUp) -> None:
     can0(made, state="BUS-OFF", bittiming={"bitrate": 500000})
     assert can_found(made, 250_000) == [
         ("warning", "can0 has 500000 bit/s, and these stations come with 250000"),

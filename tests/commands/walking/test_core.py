@@ -125,3 +125,20 @@ def test_what_no_input_shows_is_seen_by_eye() -> None:
     walk.does(ByEye(1, True))
     walk.does(ByEye(0, False))
     assert walk.memory.results == {1: "seen, by eye", 0: "not seen, by eye"}
+
+
+def test_what_was_seen_before_it_was_switched_on_proves_nothing() -> None:
+    walk = Walk()
+    walk.sample = Sample(open=True)
+    walk.until(0.5)
+    walk.does(Switch(0))
+    walk.until(6.0)
+    assert walk.history == [(0.1, "off"), (0.5, "hold on"), (5.5, "off")]
+    told = "switched on; the inputs showed that before, so it proves nothing"
+    assert walk.memory.results == {0: told}
+    walk.sample = Sample()
+    walk.until(7.0)
+    walk.does(Switch(0))
+    walk.sample = Sample(open=True)
+    walk.until(7.5)
+    assert walk.memory.results == {0: "seen: the door is open"}

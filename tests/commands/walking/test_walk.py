@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,13 +11,6 @@ from bridges import cli
 from tests.commands.terminal import Terminal
 from tests.serve.site import Module, daemon, environment
 from tests.waiting import wait_until
-
-
-@pytest.fixture
-def module(domain: int, tmp_path: Path) -> Iterator[Module]:
-    standing = Module(tmp_path, domain)
-    yield standing
-    standing.close()
 
 
 def walk(module: Module, tmp_path: Path) -> Terminal:
@@ -78,8 +70,8 @@ def test_it_refuses_a_device_that_is_served(module: Module, tmp_path: Path) -> N
     with daemon(module.file, tmp_path / "run") as running:
         running.wait_for("ready file")
         terminal = walk(module, tmp_path)
-        terminal.wait_for("stop it first")
-        assert terminal.end() == 69
+        terminal.wait_for("To stop it: ")
+        assert terminal.end() == os.EX_UNAVAILABLE
 
 
 def test_a_record_that_cannot_be_written_ends_the_walk_before_anything_is_switched(
@@ -96,5 +88,5 @@ def test_a_record_that_cannot_be_written_ends_the_walk_before_anything_is_switch
 def test_without_a_terminal_it_switches_nothing(
     module: Module, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["walk", str(module.file)]) == 64
+    assert cli.main(["walk", str(module.file)]) == os.EX_USAGE
     assert "walk needs a terminal" in capsys.readouterr().err

@@ -12,21 +12,13 @@ from drivers.charger import http as charger_http
 from drivers.charger import modbus as charger_modbus
 from drivers.charger import register as charger_register
 from drivers.hal import modbus
-from hal_fakes.http_charger import HttpCharger
-from hal_fakes.modbus.register_charger import PARTS, RegisterCharger
-from hal_fakes.plants.charger import ChargerPlant
-from hal_fakes.plants.contact_charger import ContactCharger
-from hal_fakes.plants.pad import PadPlant
-from hal_fakes.plants.xnergy_rcu import ModbusRcu
-from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
 from tests.drivers.benches import on_http, on_modbus
 from tests.drivers.charger.contract import (
     AS_IT_IS,
     ON,
-    PACE,
     Bench,
     ChargerContract,
+    behind,
     news,
 )
 
@@ -48,10 +40,7 @@ class TestAnotherMakeOnHttp(ChargerContract):
     @contextmanager
     def benches(self) -> Iterator[Bench]:
         settings = self.settings()
-        asked = settings.range_check is not None
-        plant = ChargerPlant("a", settings.receivers, commanded=True, asked=asked, pace=PACE)
-        world = RealTime({"a": plant})
-        station = HttpCharger(world.plants["a"], settings)
+        world, station = behind(charger_http, settings)
         with on_http(world, station, timeout_s=0.5) as (bus, clock):
             yield Bench(news(charger_http, settings, bus), station.plant, clock)
 
@@ -67,12 +56,6 @@ class TestASupplyOnARelay(TestAnotherMakeOnHttp):
         assert self.checks(bench) == []
 
 
-class RcuBench(Bench):
-    """A receiver is enabled."""
-
-    switch: ClassVar = "enable"
-
-
 class TestAReceiverOnModbus(ChargerContract):
     link: ClassVar = "unit"
 
@@ -82,13 +65,9 @@ class TestAReceiverOnModbus(ChargerContract):
     @contextmanager
     def benches(self) -> Iterator[Bench]:
         settings = self.settings()
-        world = RealTime({"a": PadPlant("a", pace=PACE)})
-        rcu = ModbusRcu(world.plants["a"], settings)
+        world, rcu = behind(charger_modbus, settings)
         with on_modbus(world, [rcu]) as (bus, clock):
-            yield RcuBench(news(charger_modbus, settings, bus), rcu.plant, clock)
-
-    def checks(self, bench: Bench) -> list[object]:
-        return bench.switched("check_range")
+            yield Bench(news(charger_modbus, settings, bus), rcu.plant, clock)
 
 
 class TestAnyMakeOnRegisters(ChargerContract):
@@ -100,9 +79,7 @@ class TestAnyMakeOnRegisters(ChargerContract):
     @contextmanager
     def benches(self) -> Iterator[Bench]:
         settings = self.settings()
-        plant = ChargerPlant("a", commanded=True, asked=True, pace=PACE, parts=PARTS)
-        world = RealTime({"a": plant})
-        station = RegisterCharger(world.plants["a"], settings)
+        world, station = behind(charger_register, settings)
         with on_modbus(world, [station]) as (bus, clock):
             yield Bench(news(charger_register, settings, bus), station.plant, clock)
 
@@ -126,9 +103,7 @@ class TestContactsAtAModule(ChargerContract):
     @contextmanager
     def benches(self) -> Iterator[Bench]:
         settings = self.settings()
-        table = charger_contacts.wires(settings)
-        world = RealTime({"a": ContactCharger("a", table, pace=PACE)})
-        wiring = Wiring(world.plants["a"], table, modbus.canonical)
+        world, wiring = behind(charger_contacts, settings, modbus.canonical)
         with on_modbus(world, [wiring]) as (bus, clock):
             yield ContactBench(news(charger_contacts, settings, bus), wiring.plant, clock)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from typing import Any, ClassVar
 
 import can
@@ -16,15 +15,12 @@ from drivers.charger import canopen as charger_canopen
 from drivers.hal.can import CanBus, Settings, Slcan
 from hal_fakes.can.side import CanSide, Medium, VirtualBus
 from hal_fakes.can.slcan_port import SlcanPort
-from hal_fakes.fake import Fake
-from hal_fakes.plants.pad import PadPlant
-from hal_fakes.realtime import RealTime
 from tests.drivers.charger.contract import (
     OFF,
     ON,
-    PACE,
     Bench,
     ChargerContract,
+    behind,
     news,
 )
 from tests.drivers.hal.can.far_end import Clock, channel
@@ -38,9 +34,7 @@ WIFERION: dict[str, Any] = {
 
 
 class PadBench(Bench):
-    """A receiver is enabled; a range check's result is the last one's after a second."""
-
-    switch: ClassVar = "enable"
+    """A range check's result is the last one's after a second."""
 
     def sample(self, outputs: ChargerOutputs) -> ChargerSample | None:
         """One scan; None where it cannot be read."""
@@ -65,7 +59,7 @@ class PadBench(Bench):
 
     def in_range(self) -> bool | None:
         """What a new range check says."""
-        asked = ChargerOutputs(False, range_checks=len(self.switched("check_range")) + 1)
+        asked = ChargerOutputs(False, range_checks=len(self.switched("range_check")) + 1)
         wait_until(lambda: self.sample(asked) is not None, "it is asked")
         self.clock.now += 2.0
         samples: list[ChargerSample] = []
@@ -82,10 +76,7 @@ class PadBench(Bench):
 def on_a_bus(driver: Any, plain: dict[str, Any], medium: Medium, bus: CanBus) -> Iterator[PadBench]:
     """A bench whose station is on this medium."""
     settings = msgspec.convert(plain, driver.Settings)
-    world = RealTime({"a": PadPlant("a", PACE)})
-    fake: Fake[Any] = import_module(driver.DRIVER.fake).FAKE
-    assert fake.station
-    station: Any = fake.station(world.plants["a"], settings)
+    world, station = behind(driver, settings)
     side = CanSide(medium, [station], slow_s=2 * TIMEOUT_S)
 
     assert isinstance(bus.now, Clock)
@@ -127,9 +118,6 @@ class CanContract(ChargerContract):
         with on_a_bus(self.driver, self.settings, VirtualBus(name), bus) as bench:
             yield bench
 
-    def checks(self, bench: Bench) -> list[object]:
-        return bench.switched("check_range")
-
     def test_a_robot_that_stands_well_is_in_range_and_one_that_does_not_is_not(
         self, pad: PadBench
     ) -> None:
@@ -143,14 +131,14 @@ class CanContract(ChargerContract):
         pad.press("robot")
         assert [pad.in_range() for _ in range(3)] == [False] * 3
 
-    def test_a_fault_of_the_station_is_an_error_of_its_side(self, pad: PadBench) -> None:
+    def test_a_fault_of_the_station_is_blamed_on_the_station(self, pad: PadBench) -> None:
         pad.press("robot")
         pad.until(Activity.CHARGING, ON)
         pad.press("transmitter_fault")
         sample = pad.fault()
         assert (sample.side, sample.error_text != "") == ("station", True)
 
-    def test_a_fault_of_the_robot_is_an_error_of_its_side_and_over_when_it_is_gone(
+    def test_a_fault_of_the_robot_is_blamed_on_the_robot_and_over_when_it_has_gone(
         self, pad: PadBench
     ) -> None:
         pad.press("robot")

@@ -12,8 +12,7 @@ from drivers.hal import HalError
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus import Settings as BusSettings
 from hal_fakes.modbus import ModbusServer
-from hal_fakes.plants.pad import PadPlant
-from hal_fakes.plants.xnergy_rcu import ModbusRcu
+from hal_fakes.plants.xnergy_rcu import ModbusRcu, rcu_plant
 from tests.drivers.hal.modbus.module import Time
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_modbus.yaml"
@@ -47,7 +46,7 @@ def test_check_warns_that_it_is_untried_and_that_it_tells_no_receiver() -> None:
 
 
 def test_a_receiver_that_is_lost_while_it_is_enabled_is_let_go_without_a_word() -> None:
-    plant, clock = PadPlant("c"), Time()
+    plant, clock = rcu_plant("c"), Time()
     server = ModbusServer([ModbusRcu(plant, SETTINGS)], slow_s=0.3)
     plain = {"type": "modbus", "timeout_s": 5.0, "retries": 0, **server.replace}
     bus = ModbusBus(msgspec.convert(plain, BusSettings), clock)
@@ -59,4 +58,4 @@ def test_a_receiver_that_is_lost_while_it_is_enabled_is_let_go_without_a_word() 
         driver.read()
     driver.close()
     bus.close()
-    assert [edge.value for edge in plant.edges if edge.signal == "enable"] == [True]
+    assert [edge.value for edge in plant.edges if edge.signal == "power"] == [True]

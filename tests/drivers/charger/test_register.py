@@ -92,6 +92,7 @@ WRONG: dict[str, tuple[str, str]] = {
         "{at: coil 0, start: 1, stop: 1}",
         "'stop' is the value of start",
     ),
+    "start: 1, stop: 0": ("start: 1, stop: 2", "'stop': a coil is 0 or 1"),
     "{at: input register 4, scale: 0.01, signed: true}": (
         "{at: input register 4, bit: 16}",
         "a register has bits 0 to 15",

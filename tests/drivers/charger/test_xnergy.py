@@ -10,7 +10,7 @@ from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Mea
 from bridges.core.decision import Sampled
 from bridges.rmf.definitions import ChargerStateValue as State
 from drivers.charger import xnergy
-from drivers.charger.xnergy import Orders, Told, settled, steer
+from drivers.charger.xnergy import Orders, Written, settled, steer
 from tests.depth import examples
 
 WELL = {"state": 0, "error_low": 0, "error_high": 0, "range": 0}
@@ -129,9 +129,9 @@ def test_whatever_the_words_are_only_state_5_without_an_error_is_charging(
 
 def run(*scans: tuple[float, ChargerOutputs, int]) -> list[tuple[float, Orders]]:
     """The orders that are not empty, with their time; each scan is a time, outputs and the state."""
-    given_, told = [], Told()
+    given_, written = [], Written()
     for now, outputs, code in scans:
-        told, orders = steer(told, outputs, code, now)
+        written, orders = steer(written, outputs, code, now)
         if orders != Orders():
             given_.append((now, orders))
     return given_
@@ -175,9 +175,9 @@ def test_a_start_waits_for_a_range_check_that_could_not_be_asked_for_yet() -> No
 
 
 def test_a_result_is_the_last_checks_only_a_second_after_it_was_asked_for() -> None:
-    told = Told()
-    assert settled(told, 0.0)
-    told, _ = steer(told, ChargerOutputs(range_checks=1), 2, 5.0)
-    assert not settled(told, 99.0)
-    told, _ = steer(told, ChargerOutputs(range_checks=1), 0, 100.0)
-    assert [settled(told, now) for now in (100.5, 101.0)] == [False, True]
+    written = Written()
+    assert settled(written, 0.0)
+    written, _ = steer(written, ChargerOutputs(range_checks=1), 2, 5.0)
+    assert not settled(written, 99.0)
+    written, _ = steer(written, ChargerOutputs(range_checks=1), 0, 100.0)
+    assert [settled(written, now) for now in (100.5, 101.0)] == [False, True]

@@ -1,5 +1,6 @@
 """The dry-contact door: what its YAML may say, its wiring table, and its points."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,25 @@ from bridges.settings.load import load
 from drivers.door.dry_contact import create, debounce, warnings, wires
 from drivers.hal.points import Flash, HalError, Wire
 from hal_fakes.plants.door import build
-from hal_fakes.wiring import Wiring
-from tests.door.virtual import FIRE, OBSTRUCTION, Door, MemoryBus, settings
+from tests.door.virtual import FIRE, OBSTRUCTION, Door, settings
+from tests.drivers.far import PointsFar
+from tests.drivers.hal.modbus.module import Time
 
 CONFIG = Path(__file__).parents[3] / "config"
 NONE: dict[str, Any] = {}
 FLASHED = {"point": "unit 1 coil 0", "active": "high", "flash": "unit 1 coil 0x200"}
+
+
+class Noted(PointsFar):
+    """A bus that notes each write that reaches its module."""
+
+    def __init__(self, *place: Any) -> None:
+        super().__init__(*place)
+        self.written: list[dict[str, bool]] = []
+
+    def drive(self, levels: Mapping[str, bool]) -> None:
+        self.written.append(dict(levels))
+        super().drive(levels)
 
 
 def gpio(point: str, active: str, pull: str) -> dict[str, Any]:
@@ -233,7 +247,7 @@ def test_polarity_is_applied_at_the_wire_and_the_sample_has_none() -> None:
 
 def test_an_output_is_written_when_it_differs_and_again_after_a_failed_reading() -> None:
     built = settings()
-    bus = MemoryBus(Wiring(build("door", built, wires(built)), wires(built), str))
+    bus = Noted(Time(), build("door", built, wires(built)), wires(built))
     driver = create("door", built, bus)
     driver.open()
     bus.written.clear()

@@ -60,7 +60,7 @@ class LiftContract(Contract[Bench]):
     def test_a_call_brings_the_car_and_the_door_is_held_open_there(self, bench: Bench) -> None:
         bench.open()
         seen = bench.rides()
-        assert [sample.level for sample in seen if sample.door is Door.OPEN] == ["1"]
+        assert {sample.level for sample in seen if sample.door is Door.OPEN} == {"1"}
         assert bench.relays() == [
             ("agv_mode_request", True),
             ("call_1", True),

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from bridges.commands.sheets.findings import findings
 from bridges.commands.sheets.text import lines
-from bridges.commands.sheets.told import told
 from bridges.settings.load import load
 
 SHIPPED = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
@@ -29,7 +29,7 @@ def table(tmp_path: Path, title: str, *changes: tuple[str, str]) -> list[str]:
         text = text.replace(old, new)
     file = tmp_path / "lift.yaml"
     file.write_text(text)
-    shown = lines(told(load(file)))
+    shown = lines(findings(load(file)))
     first = shown.index(f"Lift1: {title}")
     return [" ".join(line.split()) for line in shown[first + 2 : shown.index("", first)]]
 
@@ -83,7 +83,7 @@ def test_codes_that_are_swapped_are_seen(tmp_path: Path) -> None:
     ]
 
 
-def test_how_long_a_call_lasts_is_told(tmp_path: Path) -> None:
+def test_the_table_says_how_long_a_call_lasts(tmp_path: Path) -> None:
     pulse = ("    inputs:\n", "    limits: {call_pulse_s: 0.5}\n    inputs:\n")
     assert table(tmp_path, "outputs", pulse) == [
         "agv_mode_request agv_mode_request on while a robot holds the lift, and 3 s longer",

@@ -10,15 +10,16 @@ import pytest
 from bridges.rmf import definitions as d
 from hal_fakes.demo.charging import CHARGED, problems
 from hal_fakes.demo.journal import Journal
-from tests.hal_fakes.demo.test_demo import directory, running
+from hal_fakes.wire import wire
+from tests.hal_fakes.demo.test_demo import PATIENTLY, directory, running
 
 __all__ = ["directory"]
 
 
 def demo(directory: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "hal_fakes.demo", "charging"],
-        env={"TMPDIR": str(directory), "PATH": "/usr/bin:/bin"},
+        [sys.executable, "-m", "hal_fakes.demo", "charging", *PATIENTLY],
+        env={"TMPDIR": str(directory), "PATH": "/usr/bin:/bin", "TRANSPORT": wire()},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

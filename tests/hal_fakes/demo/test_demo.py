@@ -10,16 +10,19 @@ from pathlib import Path
 import pytest
 
 from hal_fakes.demo.daemons import Daemon, Wrong, stop_all
+from hal_fakes.wire import Wire, runs_here, wire
 from tests.waiting import PATIENCE_S, wait_until
 
 CONFIG = Path(__file__).parents[3] / "config"
+PATIENTLY = ("--patience", "10")
+"""A busy machine does not make a day wrong."""
 
 
 @contextmanager
-def demo(directory: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
+def demo(directory: Path, *options: str, on: Wire | None = None) -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen(
         [sys.executable, "-m", "hal_fakes.demo", *options],
-        env={"TMPDIR": str(directory), "PATH": "/usr/bin:/bin"},
+        env={"TMPDIR": str(directory), "PATH": "/usr/bin:/bin", "TRANSPORT": on or wire()},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -51,28 +54,34 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.long
 def test_a_robot_goes_through_the_door_rides_the_lift_and_charges(directory: Path) -> None:
-    with demo(directory) as process:
+    with demo(directory, *PATIENTLY, on=runs_here()) as process:
         out, _ = process.communicate()
     assert process.returncode == 0, out
     assert "\nRIGHT: the robot went through the door, rode from L1 to L3 and charged" in out
     assert (running(directory), list(directory.iterdir())) == ([], [])
 
 
-def test_a_failure_makes_it_wrong_with_the_reason_and_the_logs(directory: Path) -> None:
-    with demo(directory, "--fail", "ward_door", "flux_capacitor", "off") as process:
-        out, _ = process.communicate()
-    assert process.returncode == 1, out
-    assert "WRONG: fail ward_door flux_capacitor off: error ward_door has no part" in out
-    assert out.count("--- the end of ") == 3
-    assert running(directory) == []
-
-
-def test_the_last_state_of_each_device_is_told_in_words(directory: Path) -> None:
+def test_a_failure_makes_it_wrong_with_the_reason_the_last_states_and_the_logs(
+    directory: Path,
+) -> None:
     with demo(directory, "--fail", "ward_door", "operator", "stuck") as process:
         out, _ = process.communicate()
     assert process.returncode == 1, out
     assert "\nlast state of Lift1: car at L1, door closed, mode HUMAN\n" in out
     assert "WRONG: waited 20 s for ward_door to be open, and the heartbeat to list the robot" in out
+    assert out.count("--- the end of ") == 3
+    assert running(directory) == []
+
+
+def test_a_part_that_a_plant_does_not_have_is_wrong(domain: int, directory: Path) -> None:
+    daemon = Daemon(CONFIG / "door_modbus.yaml", directory, domain)
+    try:
+        with pytest.raises(
+            Wrong, match=r"^fail ward_door flux_capacitor off: error ward_door has no"
+        ):
+            daemon.order("fail ward_door flux_capacitor off")
+    finally:
+        stop_all([daemon])
 
 
 def test_a_device_that_the_demo_does_not_have_is_a_usage_error(directory: Path) -> None:

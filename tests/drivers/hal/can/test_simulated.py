@@ -11,8 +11,8 @@ from bridges.settings.load import load
 from drivers import DriverError
 from drivers.charger import can_frames as charger_can_frames
 from drivers.charger import canopen as charger_canopen
+from hal_fakes.caller import Caller
 from hal_fakes.simulate import Simulation
-from tests.hal_fakes.test_control import Caller
 from tests.waiting import wait_until
 
 CONFIG = Path(__file__).parents[4] / "config"

@@ -1,4 +1,4 @@
-"""An slcan adapter on a pseudo-terminal: the way onto the bus with all that serial ports do."""
+"""An slcan adapter on a pseudo-terminal: frames on a serial port, and how a port fails."""
 
 import os
 import threading
@@ -10,7 +10,7 @@ import pytest
 from drivers.hal.can import EXTENDED, CanBus, Frame, Settings, Slcan, Wanted
 from hal_fakes.can.side import CanSide, Send
 from hal_fakes.can.slcan_port import SlcanPort, decoded, encoded
-from hal_fakes.plants.pad import PadPlant
+from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.plant import Plant
 from tests.drivers.hal.can.far_end import Clock, failure
 from tests.waiting import PATIENCE_S, wait_until
@@ -20,7 +20,7 @@ class Echo:
     """A station that sends back each frame, its id one higher."""
 
     def __init__(self) -> None:
-        self.plant: Plant = PadPlant("echo")
+        self.plant: Plant = ChargerPlant("echo", links=["bus"])
         self.heard = 0
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:

@@ -1,4 +1,4 @@
-"""The dead-man beside the loop, in virtual time but for its thread."""
+"""The dead-man beside the loop. Time is virtual; only its thread is real."""
 
 import pytest
 

@@ -208,7 +208,7 @@ def test_a_post_with_another_status_fails(status: str) -> None:
         bus.close()
 
 
-# ---- answers that are none
+# ---- what is not an HTTP answer
 
 
 @pytest.mark.parametrize(

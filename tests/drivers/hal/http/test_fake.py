@@ -103,7 +103,7 @@ def test_a_maker_with_few_numbers_shows_the_nearest() -> None:
 )
 def test_the_numbers_of_a_handshake_follow_one_another(progress: float, code: int) -> None:
     station = Station(ChargerPlant("a"), load(EXAMPLE).devices["charger_a"])
-    reading = Reading(Activity.HANDSHAKE, progress, "", {})
+    reading = Reading(Activity.HANDSHAKE, progress)
     assert json.loads(station.body(reading)) == {"state": code, "error_msg": ""}
 
 

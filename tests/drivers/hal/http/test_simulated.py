@@ -1,24 +1,16 @@
 """The HTTP charger of `--simulate`: a child process that a story reaches by its control socket."""
 
-import socket
 from pathlib import Path
 
 from bridges.charger.signals import Activity
 from bridges.settings.load import load
 from drivers.charger.http import create
 from drivers.hal.http import HttpBus
+from hal_fakes.caller import Caller
 from hal_fakes.simulate import Simulation
 from tests.waiting import wait_until
 
 EXAMPLE = Path(__file__).parents[4] / "config" / "charger_http.yaml"
-
-
-def say(path: Path, line: str) -> str:
-    """One line to the control socket, and its answer."""
-    with socket.socket(socket.AF_UNIX) as caller, caller.makefile("r") as answers:
-        caller.connect(str(path))
-        caller.sendall(f"{line}\n".encode())
-        return answers.readline().strip()
 
 
 def test_a_robot_that_is_pressed_onto_the_pad_is_charged_and_the_child_ends_with_us(
@@ -30,7 +22,8 @@ def test_a_robot_that_is_pressed_onto_the_pad_is_charged_and_the_child_ends_with
     assert isinstance(bus, HttpBus)
     driver = create("charger_a", config.devices["charger_a"], bus)
     assert driver.read().activity is Activity.IDLE
-    assert say(tmp_path / "plant.sock", "press charger_a robot on") == "ok"
+    with Caller(tmp_path / "plant.sock") as caller:
+        caller.order("press charger_a robot on")
     wait_until(lambda: driver.read().activity is Activity.CHARGING, "it charges")
     bus.close()
     simulation.close()

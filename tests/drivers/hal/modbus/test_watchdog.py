@@ -2,7 +2,6 @@
 
 import json
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -18,6 +17,7 @@ from drivers.door.dry_contact import create, wires
 from drivers.hal import modbus
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.watchdog import PROFILE
+from hal_fakes.caller import Caller
 from hal_fakes.modbus import ModbusServer
 from hal_fakes.modbus.dead_man import (
     RESTART,
@@ -34,7 +34,7 @@ from hal_fakes.wiring import Wiring
 from tests.drivers.door.contract import CLOSED, HOLD, OPEN, Bench, quick
 from tests.drivers.door.test_contract import dry
 from tests.drivers.hal.modbus.module import Time
-from tests.waiting import PATIENCE_S, wait_until
+from tests.waiting import wait_until
 
 SLOW = 600
 """A time (x 100 ms) in which no test is late."""
@@ -246,12 +246,9 @@ def test_a_killed_daemons_door_is_let_go_by_the_module(tmp_path: Path) -> None:
         assert far_side.stdout
         assert far_side.stdin
         path.write_text(YAML % json.loads(far_side.stdout.readline())["tcp"]["port"])
-        with socket.socket(socket.AF_UNIX) as follow:
-            follow.settimeout(PATIENCE_S)
-            follow.connect(str(sock))
-            follow.sendall(b"follow\n")
-            edges = (json.loads(line) for line in follow.makefile() if line.startswith("{"))
-            relay = (edge["value"] for edge in edges if edge["what"] == "relay")
+        with Caller(sock) as follow:
+            follow.order("follow")
+            relay = (edge.value for edge in follow.edges() if edge.what == "relay")
             with subprocess.Popen([sys.executable, "-c", DAEMON, str(path)]) as daemon:
                 assert next(relay) is True
                 daemon.send_signal(signal.SIGKILL)

@@ -1,0 +1,181 @@
+"""What a ring costs beside a daemon without one, and how fast a recording of a day is replayed."""
+
+import os
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from bench.daemons import Content, cost, daemon, memory_mb, shipped
+from bench.figures import Row, Rows, Tables, compared
+from bench.latency import daemon_paths
+from bridges import __version__
+from bridges.core.decision import Sampled
+from bridges.lift import KIND
+from bridges.lift.messages import state_message
+from bridges.lift.signals import Door, Ended, LiftSample, Requested
+from bridges.recording.bags import heard_in
+from bridges.recording.entries import Head
+from bridges.recording.files import opened
+from bridges.recording.recorder import Recorder
+from bridges.recording.replayed import Cores, Replay, of_head
+from bridges.recording.ring import Ring
+from bridges.recording.settings import Recording
+from bridges.recording.shelf import Shelf
+from bridges.recording.sources import Notes
+from bridges.rmf.definitions import LiftRequest, Time
+from bridges.rmf.releases import JAZZY
+from bridges.serve.clock import Clock
+from bridges.serve.refusals import Refusals
+from bridges.serve.subject import Core, Subject
+from bridges.serve.witness import Witness
+from bridges.settings.load import load
+
+ROUNDS, WATCHED_S = 2, 30.0
+SCAN_S, DAY_S, RIDES = 0.05, 86400.0, 4000
+RIDE_S = DAY_S / RIDES
+WALL = 1_800_000_000.0
+CONFIG = Path(__file__).parent.parent / "config/lift_dry_contact.yaml"
+
+
+def measure(scratch: Path) -> Tables:
+    """A lift with and without a ring, in turn; its paths; and a day of one lift at 20 Hz."""
+    return {
+        "a lift, left alone": _idle(scratch),
+        "its paths, with a ring": _paths(scratch),
+        f"a day of one lift, {RIDES} rides": {"recorded, read, replayed": _day(scratch)},
+    }
+
+
+def _keeping(keep: str) -> Content:
+    return {**shipped("lift_dry_contact"), "recording": {"keep": keep}}
+
+
+def _idle(scratch: Path) -> Rows:
+    rows: dict[str, list[Row]] = {"nothing": [], "ring": []}
+    for number in range(ROUNDS):
+        for keep, found in rows.items():
+            command = daemon(_keeping(keep), scratch / f"{keep}_{number}")
+            found.append(cost(command, scratch / f"{keep}_{number}.log", WATCHED_S))
+    means = {f"keep: {keep}": _mean(found) for keep, found in rows.items()}
+    without, with_ring = means.values()
+    more = {key: with_ring[key] - without[key] for key in ("RSS MB", "CPU %")}
+    return {**means, "the ring": more}
+
+
+def _mean(rows: list[Row]) -> Row:
+    return {key: sum(row[key] for row in rows) / len(rows) for key in rows[0]}
+
+
+def _paths(scratch: Path) -> Rows:
+    """Request to relay, input to RMF and hazard to off: with a ring, against the same without."""
+    with_ring = daemon_paths(scratch, "dds", keep="ring")
+    without = daemon_paths(scratch, "dds", keep="nothing")
+    names = ("LiftRequest to relay edge", "input edge to LiftState", "hazard to all outputs off")
+    return {name: compared(with_ring[n], without[n]) for n, name in enumerate(names)}  # type: ignore[arg-type]
+
+
+def _day(scratch: Path) -> Row:
+    """A continuous recording of a day; then what was heard is read, and all is decided again."""
+    began = time.perf_counter()
+    Day(scratch).play()
+    made_s = time.perf_counter() - began
+    files = scratch / "recordings"
+    before_mb = memory_mb(os.getpid())
+    began = time.perf_counter()
+    heard = sum(1 for _ in heard_in(files))
+    read_s = time.perf_counter() - began
+    head, entries = opened(files, Notes())
+    replay = Replay(entries, Cores(of_head(head)))
+    began = time.perf_counter()
+    differences = len(list(replay.differences()))
+    return {
+        "made s": made_s,
+        "MB": sum(file.stat().st_size for file in files.iterdir()) / 1e6,
+        "messages": heard,
+        "read s": read_s,
+        "decisions": replay.course.decisions,
+        "differences": differences,
+        "replay s": time.perf_counter() - began,
+        "more MB": memory_mb(os.getpid()) - before_mb,
+    }
+
+
+class Day:
+    """One lift at 20 scans a second for a day, with its ring and a recorder, in virtual time."""
+
+    def __init__(self, scratch: Path) -> None:
+        self.now = 0.0
+        config = load(CONFIG)
+        self._settings = config.devices["Lift1"]
+        limits = KIND.limits(self._settings, config.driver_type("Lift1").debounce(self._settings))
+        keep = Recording(keep="continuous", files=10_000, files_mb=10_000)
+        text = config.text
+        head = Head("day", os.getpid(), __version__, "lift", str(CONFIG), text, {}, True, {}, keep)
+        runtime = scratch / "runtime"
+        runtime.mkdir()
+        clock = Clock(lambda: self.now, lambda: WALL + self.now)
+        make = partial(Ring, runtime, head, 1_000_000)
+        self._witness = Witness(make, clock, lambda: JAZZY)
+        shelf = Shelf(scratch / "recordings")
+        self._recorder = Recorder(lambda: [runtime], shelf, lambda: self.now)
+        core: Core[Any, Any, Any, Any] = Core(
+            "device",
+            lambda memory, event, now: KIND.decide(memory, event, now, limits),
+            lambda report, now: {},
+            lambda fault: fault,
+        )
+        memory = KIND.initial(limits, 0.0)
+        self._lift = Subject(
+            "Lift1", memory, core, lambda *_: None, Refusals(), clock, self._witness
+        )
+
+    def play(self) -> None:
+        """The whole day."""
+        for scan in range(int(DAY_S / SCAN_S)):
+            self.now = scan * SCAN_S
+            for event in events(self.now):
+                self._lift.decide(event)
+            if scan % 20 == 0:
+                self._tell()
+                self._recorder.look()
+            self._witness.flush()
+        self._recorder.close()
+
+    def _tell(self) -> None:
+        """Each second: the state, and the request that RMF repeats."""
+        assert self._lift.decision
+        report = self._lift.decision.report
+        state = state_message("Lift1", self._settings, report, Time(int(WALL + self.now)))
+        self._witness.spoken("lift_states", state, sent=True)
+        self._lift.told(KIND.published(self._lift.memory, report))
+        if self.now % RIDE_S < 15.0:
+            request = LiftRequest(
+                "Lift1", Time(int(self.now)), "fleet/robot", 1, _floor(self.now), 2
+            )
+            self._witness.spoken("lift_requests", request, sent=False)
+
+
+def _floor(now: float) -> str:
+    return ("L1", "L3")[int(now / RIDE_S) % 2]
+
+
+def events(now: float) -> Iterator[object]:
+    """What the lift shows, and is requested: a ride in each RIDE_S."""
+    into, before = now % RIDE_S, _floor(now - RIDE_S)
+    agv = 0.5 < into < 16.0
+    if into < 2.0:
+        yield Sampled(LiftSample(before, Door.CLOSED, agv=agv))
+    elif into < 8.0:
+        yield Sampled(LiftSample(None, Door.CLOSED, agv=agv))
+    elif into < 9.5 or 15.5 <= into < 17.0:
+        yield Sampled(LiftSample(_floor(now), Door.BETWEEN, agv=agv))
+    elif into < 15.5:
+        yield Sampled(LiftSample(_floor(now), Door.OPEN, agv=agv))
+    else:
+        yield Sampled(LiftSample(_floor(now), Door.CLOSED, agv=agv))
+    if into < 15.0 and into % 1.0 < SCAN_S:
+        yield Requested("fleet/robot", True, _floor(now))
+    elif 15.0 <= into < 15.0 + SCAN_S:
+        yield Ended("fleet/robot")

@@ -1,0 +1,52 @@
+"""What commands share that hold one device by hand: which, its record and guard, its outputs off."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from bridges.serve import directory, guard, places, record
+from bridges.settings.load import Config
+from drivers import Driver, DriverError
+
+
+class NoDevice(Exception):
+    """No device of the file is meant; the text says what to write."""
+
+
+def device_of(config: Config, name: str | None) -> str:
+    """The device that is meant: the only one if none is named. Raises NoDevice."""
+    names = list(config.devices)
+    if not names:
+        raise NoDevice(f"a {config.kind} has no wires")
+    if name is None and len(names) > 1:
+        raise NoDevice(f"--device is needed: the file has {', '.join(names)}")
+    if name not in (None, *names):
+        raise NoDevice(f"the file has no device '{name}'; it has {', '.join(names)}")
+    return name or names[0]
+
+
+def guarded(
+    config: Config, held: directory.RuntimeDirectory, outputs_off: Sequence[str]
+) -> Callable[[], None]:
+    """Before the first output is claimed: the record, and a guard that runs `outputs_off` if we die.
+
+    Returns what to call when every output is verified off.
+    """
+    held.claim(record.of(config))
+    watching = guard.Guard(outputs_off)
+    places.work_somewhere(held.places)
+
+    def all_off() -> None:
+        held.released()
+        watching.dismiss()
+
+    return all_off
+
+
+def not_off(driver: Driver[Any, Any], insist: Callable[[], None]) -> str:
+    """Switch every output off; why that is not verified, or "". `insist`: ends the bus's pauses."""
+    insist()
+    try:
+        driver.make_safe()
+    except DriverError as error:
+        return f"not verified off: {error}"
+    return ""

@@ -1,0 +1,94 @@
+"""`rmf-bridge incident FILE`: a recording of a daemon's last minutes, because a person wants one."""
+
+import argparse
+import sys
+import time
+from datetime import datetime
+from pathlib import Path
+
+from bridges.recording.bags import INSTALL
+from bridges.recording.incident import AFTER_S, BEFORE_S, Incident, Note, part
+from bridges.recording.ring import DIED, NAME, Read, RingError
+from bridges.serve import directory as runtime
+from bridges.serve.clock import machine_s
+
+EX_UNAVAILABLE, EX_CANTCREAT = 69, 73
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `incident`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML of the daemon")
+    parser.add_argument("--note", default="", metavar="TEXT", help="what you saw")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="MCAP", help="default: NAME_TIME.mcap, here"
+    )
+    parser.add_argument(
+        "--after",
+        type=float,
+        default=AFTER_S,
+        metavar="S",
+        help=f"how long to wait for what follows (default: {AFTER_S:g} s)",
+    )
+    parser.add_argument(
+        "--died", action="store_true", help="the run before this one, which did not end in order"
+    )
+    parser.add_argument("--anonymous", action="store_true", help="without the site's names")
+    parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 when the file is written; 69 where there is no ring; 73 if the file cannot be written."""
+    try:
+        from bridges.recording import mcap_write
+    except ImportError as error:
+        print(f"to write a recording, {error.name} is needed: {INSTALL}", file=sys.stderr)
+        return EX_UNAVAILABLE
+    try:
+        places = runtime.find(args.file.absolute(), args.runtime_dir)
+        incident = _incident(places.runtime / (DIED if args.died else NAME), args)
+    except (runtime.Unknown, RingError) as error:
+        print(f"{error}. Does its daemon run, and does its YAML keep a ring?", file=sys.stderr)
+        return EX_UNAVAILABLE
+    if args.anonymous:
+        from bridges.recording.anonymous import anonymous
+
+        incident = anonymous(incident)
+    path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
+    try:
+        mcap_write.write(path, incident)
+    except OSError as error:
+        print(f"{path} cannot be written: {error.strerror}", file=sys.stderr)
+        return EX_CANTCREAT
+    print(f"{path}: {len(incident.entries)} entries")
+    return 0
+
+
+def _incident(ring: Path, args: argparse.Namespace) -> Incident:
+    """From 120 s before now on, and what follows. Raises RingError."""
+    before = Read(ring)
+    if args.died:
+        entries = list(before.entries())
+        at = entries[-1].at if entries else 0.0
+        return Incident(before.head, part(entries, at - BEFORE_S, at), _notes(at, args.note))
+    at = machine_s()
+    _wait(args.after)
+    try:
+        after = Read(ring)
+    except RingError:
+        after = before
+    entries = list(after.entries())
+    return Incident(after.head, part(entries, at - BEFORE_S, at + AFTER_S), _notes(at, args.note))
+
+
+def _notes(at: float, text: str) -> tuple[Note, ...]:
+    return (Note(at, "OPERATOR", text),)
+
+
+def _wait(seconds: float) -> None:
+    """Ctrl-C ends the wait, not the command."""
+    try:
+        if seconds > 0:
+            print(f"waiting {seconds:g} s for what follows; Ctrl-C to wait no longer")
+            time.sleep(seconds)
+    except KeyboardInterrupt:
+        print()

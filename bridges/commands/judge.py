@@ -1,0 +1,301 @@
+"""`rmf-bridge judge`: hold any lift, door or charger node against RMF's contract.
+
+`bridges/judge/` has the laws and the plays; here are the options, the graph, the clock and the verdict.
+Exit code 0: every law that was seen is kept. 1: one is broken. 2: a wrong command line. 69: nothing was
+heard, the graph cannot be joined, or what was to be played was not.
+"""
+
+import argparse
+import os
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from uuid import uuid4
+
+from bridges.commands.graph import add_graph_arguments, complain, interruptible, open_graph
+from bridges.commands.live import OF_DEVICES, Ear
+from bridges.commands.recordings import Span, add_span_arguments, heard_between
+from bridges.judge.judge import KINDS, Judge, Kind
+from bridges.judge.law import Verdict, shown
+from bridges.judge.plays import FLEET, Charge, Passages, Performance, Ride
+from bridges.judge.report import Report, as_json, junit, markdown, report, text, verdict
+from bridges.judge.stage import Stage
+from bridges.recording.heard import Heard
+from bridges.recording.sources import BagError
+from bridges.rmf import topics
+from bridges.rmf.definitions import Message
+from bridges.rmf.transport import Publisher, Transport, TransportError
+from bridges.rmf_rules import NEVER, Said
+
+NODE_NAME = "rmf_bridge_judge"
+LOOK_EVERY_S = 0.1
+NEVER_YET = float("-inf")
+FIRE = topics.FIRE_ALARM_TRIGGER
+WIDTH = 120
+BESIDE: dict[str, tuple[str, ...]] = {
+    "supervisor": (
+        topics.LIFT_REQUESTS.name,
+        topics.DOOR_REQUESTS.name,
+        topics.DOOR_SUPERVISOR_HEARTBEAT.name,
+    ),
+    "fleet": (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name),
+    "coordinator": (topics.CHARGER_REQUESTS.name, topics.CHARGER_CANCELS.name),
+}
+"""Whose topics a play may share, if it is told to play beside them."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which device, for how long, and what to play."""
+    parser.add_argument("kind", choices=KINDS)
+    parser.add_argument("name", metavar="NAME", nargs="?", help="the device, as RMF names it")
+    add_graph_arguments(parser)
+    parser.add_argument(
+        "--for",
+        type=_seconds,
+        dest="for_s",
+        default=NEVER,
+        metavar="S",
+        help="listen for S seconds (default: until Ctrl-C, which judges)",
+    )
+    parser.add_argument("--json", action="store_true", help="the verdict as one JSON object")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="the verdict for a CI server")
+    parser.add_argument(
+        "--laws", action="store_true", help="print the laws of this kind, and why they are; no NAME"
+    )
+    parser.add_argument(
+        "--recording",
+        type=Path,
+        metavar="FILE",
+        help="judge a recording instead of the graph: MCAP (ours, or of `ros2 bag`) or .db3",
+    )
+    add_span_arguments(parser)
+    _add_plays(parser)
+    parser.set_defaults(usage=parser.error)
+
+
+def _add_plays(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--active",
+        action="store_true",
+        help="move the device: needs --ride, --passages or --charge, and a device that is idle",
+    )
+    parser.add_argument(
+        "--ride", nargs=2, metavar="FLOOR", help="play a robot that rides from one floor to another"
+    )
+    parser.add_argument(
+        "--robots", type=int, choices=(1, 2), default=1, help="two: the second rides back"
+    )
+    parser.add_argument("--passages", type=int, metavar="N", help="play N passages of a door")
+    parser.add_argument("--charge", action="store_true", help="request a charger, and cancel")
+    parser.add_argument(
+        "--robot",
+        default=f"{FLEET}/robot1",
+        metavar="FLEET/ROBOT",
+        help="who asks for the charger; one that it knows",
+    )
+    parser.add_argument(
+        "--restarts",
+        action="store_true",
+        help="restart RMF's supervisor in between; in a simulation only (--localhost)",
+    )
+    parser.add_argument(
+        "--beside",
+        action="append",
+        choices=tuple(BESIDE),
+        default=[],
+        help="play although this one is on the graph, and through a supervisor",
+    )
+    parser.add_argument(
+        "--patience",
+        type=_seconds,
+        default=120.0,
+        metavar="S",
+        help="how long a robot waits for one thing (default: 120)",
+    )
+
+
+def _seconds(written: str) -> float:
+    with suppress(ValueError):
+        if 0 < float(written) <= 7 * 86400:
+            return float(written)
+    raise argparse.ArgumentTypeError(f"'{written}' is not a number of seconds up to a week")
+
+
+def performance_of(args: argparse.Namespace) -> Performance | None:
+    """What is to be played; None to listen alone. A contradiction ends with exit code 2."""
+    kinds: dict[Kind, bool] = {
+        "lift": args.ride is not None,
+        "door": args.passages is not None,
+        "charger": args.charge,
+    }
+    wanted = [kind for kind, asked in kinds.items() if asked]
+    if not wanted and not args.active:
+        return None
+    if wanted != [args.kind]:
+        args.usage("a lift is played by --ride A B, a door by --passages N, a charger by --charge")
+    if not args.active:
+        args.usage(f"this moves {words_of(args)}: say --active as well")
+    if args.restarts and not args.localhost:
+        args.usage(
+            "--restarts needs --localhost: on site a restart is not to be tried with a device"
+        )
+    through = "supervisor" in args.beside
+    match args.kind:
+        case "lift":
+            floors = (args.ride[0], args.ride[1])
+            how = {"through": through, "restarts": args.restarts}
+            return Ride(args.name, floors, args.robots, args.patience, **how)
+        case "door":
+            how = {"through": through, "restarts": args.restarts}
+            return Passages(args.name, max(1, args.passages), args.patience, **how)
+        case _:
+            request_id = f"{FLEET}-{uuid4().hex[:8]}"
+            return Charge(args.name, args.robot, request_id, min(args.patience, 30.0))
+
+
+def words_of(args: argparse.Namespace) -> str:
+    """The device, for a person."""
+    return f"the {args.kind} {shown(args.name)}"
+
+
+def run(args: argparse.Namespace) -> int:
+    """Listen, play or read, and judge."""
+    if args.laws:
+        print(markdown(args.kind))
+        return 0
+    if not args.name:
+        args.usage(f"which {args.kind}? Give its NAME")
+    performance = performance_of(args)
+    if args.recording is None:
+        return _live(args, performance)
+    if performance is not None:
+        args.usage("a recording cannot be played with: leave --active out")
+    try:
+        return _recorded(args)
+    except BagError as error:
+        complain("judge", error)
+        return os.EX_UNAVAILABLE
+
+
+def _recorded(args: argparse.Namespace) -> int:
+    judge, span = Judge(args.kind, args.name), Span(args.from_, args.to)
+    last: Heard | None = None
+    for heard in heard_between(args.recording, span, "judge"):
+        if isinstance(heard, Heard) and (
+            args.from_ is None or heard.at >= span.begins_at > NEVER_YET
+        ):
+            judge.hear(heard)
+            last = heard
+    if last is None or judge.first is None:
+        complain("judge", f"{args.recording} holds nothing of RMF's then")
+        return os.EX_UNAVAILABLE
+    return tell(report(judge, judge.end(last.at, last.wall), last.at - judge.first.at), args)
+
+
+def _live(args: argparse.Namespace, performance: Performance | None) -> int:
+    stage: Stage | None = None
+    try:
+        with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
+            live = Live(transport, args.kind, args.beside, performance)
+            stage = Stage(Judge(args.kind, args.name), performance, args.for_s, live.strangers)
+            live.judge(stage)
+    except TransportError as error:
+        complain("judge", error)
+    except KeyboardInterrupt:
+        pass
+    if stage is None:
+        return os.EX_UNAVAILABLE
+    now = time.monotonic()
+    judged = stage.judge.end(now, time.time())
+    notes = [f"not played to its end: {stage.note}"] if stage.note else []
+    return tell(report(stage.judge, judged, now - stage.began_at, *notes), args)
+
+
+def tell(found: Report, args: argparse.Namespace) -> int:
+    """Print the verdict, write the file, and give the exit code."""
+    if args.junit is not None:
+        try:
+            args.junit.write_text(junit(found), "utf-8")
+        except OSError as error:
+            complain("judge", f"{args.junit} is not written: {error.strerror or error}")
+            return os.EX_CANTCREAT
+    width = shutil.get_terminal_size((WIDTH, 50)).columns if sys.stdout.isatty() else 10**6
+    print(as_json(found) if args.json else text(found, width))
+    sys.stdout.flush()
+    if verdict(found) is Verdict.BROKEN:
+        return 1
+    return os.EX_UNAVAILABLE if found.notes or not found.states else 0
+
+
+class Live:
+    """The graph: what is heard on it, in order of arrival, and what is said."""
+
+    def __init__(
+        self, transport: Transport, kind: Kind, beside: list[str], performance: Performance | None
+    ) -> None:
+        self._transport = transport
+        self._publishers: dict[str, Publisher[Message]] = {}
+        self._ear = Ear(transport, (*OF_DEVICES, FIRE.live()), others_only=True)
+        self._retained = transport.subscribe(FIRE, lambda message: None)
+        allowed = {topic for name in beside for topic in BESIDE[name]}
+        speaks = {topic.name for topic in performance.speaks} if performance else set()
+        self._sole = sorted(speaks - allowed)
+        self._looks_at_fire = kind == "lift"
+        self._looked_at = 0.0
+
+    def strangers(self) -> str:
+        """Who speaks where the play would alone."""
+        found = [name for name in self._sole if self._ear.ends[name].matched()]
+        if not found:
+            return ""
+        who = [name for name, topics in BESIDE.items() if set(topics) & set(found)]
+        beside = " ".join(f"--beside {name}" for name in who)
+        return f"others publish on {', '.join(found)}: to play all the same, say {beside}"
+
+    def judge(self, stage: Stage) -> None:
+        """Until there is a verdict. Whatever ends a play, the device is let go first."""
+        stage.begin(time.monotonic(), time.time())
+        try:
+            with _told_to_end() as told:
+                while not stage.done:
+                    if told():
+                        self._say(stage.stop())
+                    self._turn(stage)
+        except BaseException:
+            with suppress(TransportError):
+                self._say(stage.stop())
+            raise
+
+    def _turn(self, stage: Stage) -> None:
+        waits_s = min(stage.wake_at() - time.monotonic(), LOOK_EVERY_S)
+        for heard in self._ear.listen(waits_s):
+            self._say(stage.hear(heard))
+        now, wall = time.monotonic(), time.time()
+        if self._looks_at_fire and now > self._looked_at + 1.0:
+            self._looked_at = now
+            publishers = self._ear.ends[FIRE.name].matched()
+            stage.judge.fire_ends(publishers, self._retained.matched(), now, wall)
+        self._say(stage.turn(now, wall))
+
+    def _say(self, said: list[Said]) -> None:
+        for topic, message in said:
+            if topic.name not in self._publishers:
+                self._publishers[topic.name] = self._transport.publisher(topic)
+            self._publishers[topic.name].publish(message)
+
+
+@contextmanager
+def _told_to_end() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C, SIGTERM or SIGHUP has come; none of them interrupts what is under way."""
+    told: list[int] = []
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, lambda n, _: told.append(n)) for number in signals}
+    try:
+        yield lambda: bool(told)
+    finally:
+        for number, action in before.items():
+            signal.signal(number, action)

@@ -1,0 +1,64 @@
+"""A live graph as a stream of `Heard`, as recordings give it."""
+
+import time
+from collections.abc import Iterable
+from functools import partial
+from queue import Empty, SimpleQueue
+from typing import Final
+
+from bridges.recording.heard import Heard
+from bridges.rmf import topics
+from bridges.rmf.definitions import Message
+from bridges.rmf.topics import AnyTopic
+from bridges.rmf.transport import Subscription, Transport
+
+OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
+    topics.LIFT_STATES,
+    topics.LIFT_REQUESTS,
+    topics.ADAPTER_LIFT_REQUESTS.live(),
+    topics.DOOR_STATES,
+    topics.DOOR_REQUESTS,
+    topics.ADAPTER_DOOR_REQUESTS,
+    topics.DOOR_SUPERVISOR_HEARTBEAT,
+    topics.CHARGER_STATES,
+    topics.CHARGER_REQUESTS,
+    topics.CHARGER_CANCELS,
+    topics.CHARGER_REFUSALS,
+    topics.ADAPTER_CHARGER_REQUESTS,
+    topics.ADAPTER_CHARGER_CANCELS,
+    topics.DIAGNOSTICS,
+)
+"""Where devices are spoken of. Volatile: no retained request is taken for a new one."""
+
+
+class Ear:
+    """Hears these topics from now on. `others_only`: not what the same transport publishes. `ends`: the
+    subscriptions by topic."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        heard: Iterable[AnyTopic] = OF_DEVICES,
+        *,
+        others_only: bool = False,
+    ) -> None:
+        self._waiting: SimpleQueue[Heard] = SimpleQueue()
+        self.ends: dict[str, Subscription] = {
+            topic.name: transport.subscribe(
+                topic, partial(self._received, topic.name), others_only=others_only
+            )
+            for topic in heard
+        }
+
+    def _received(self, topic: str, message: Message) -> None:
+        self._waiting.put(Heard(time.monotonic(), time.time(), topic, message))
+
+    def listen(self, timeout_s: float) -> list[Heard]:
+        """Everything that has arrived, in order; waits up to `timeout_s` for the first."""
+        heard = []
+        try:
+            heard.append(self._waiting.get(timeout=max(0.0, timeout_s)))
+            while True:
+                heard.append(self._waiting.get_nowait())
+        except Empty:
+            return heard

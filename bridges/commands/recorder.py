@@ -1,0 +1,58 @@
+"""`rmf-bridge recorder`: the process that turns the rings of this machine's daemons into files."""
+
+import argparse
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+from bridges import log
+from bridges.recording.bags import INSTALL
+from bridges.recording.recorder import Recorder
+from bridges.recording.shelf import Shelf
+from bridges.serve import places, signals
+from bridges.serve.clock import machine_s
+from bridges.serve.notify import notify
+
+EX_UNAVAILABLE = 69
+EVERY_S = 1.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `recorder`."""
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="default: the unit's, else the user's"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 after SIGTERM or SIGINT; 69 where the library is missing."""
+    log.start()
+    try:
+        from bridges.recording import mcap_write  # noqa: F401 - later would be too late
+    except ImportError as error:
+        print(f"the recorder needs {error.name}: {INSTALL}", file=sys.stderr)
+        return EX_UNAVAILABLE
+    end = signals.End()
+    shelf = Shelf(args.output or _folder())
+    shelf.tidy()
+    recorder = Recorder(places.runtimes, shelf, machine_s)
+    recorder.look()
+    _notify("READY=1")
+    while not end.wait(EVERY_S):
+        recorder.look()
+        _notify("WATCHDOG=1")
+    _notify("STOPPING=1")
+    recorder.close()
+    return 0
+
+
+def _folder() -> Path:
+    """Where recordings lie: in the unit's state directory, else in the user's."""
+    given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
+    return Path(given) if given else places.state_base() / "recordings"
+
+
+def _notify(state: str) -> None:
+    with suppress(OSError):
+        notify(state)

@@ -1,0 +1,148 @@
+"""`rmf-bridge replay FILE`: today's core decides again on what was recorded."""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict
+from datetime import datetime
+from itertools import islice
+from pathlib import Path
+from typing import Final
+
+from bridges.log import plain
+from bridges.recording.entries import Head
+from bridges.recording.files import opened
+from bridges.recording.replayed import Cores, Course, Difference, Replay, of_head
+from bridges.recording.sources import BagError, Notes
+from bridges.recording.trees import Tree, UnknownValue, value
+from bridges.settings.load import SettingsError, load
+
+EX_DATAERR, EX_CONFIG = 65, 78
+MOST: Final = 200
+"""So many differences are told at most."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `replay`."""
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="a recording of a daemon, or its ring"
+    )
+    parser.add_argument(
+        "--config", type=Path, metavar="YAML", help="show what this YAML would have changed"
+    )
+    parser.add_argument("--json", action="store_true", help="the same as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0: every decision is the same. 1: one is not. 65: it cannot be replayed. 78: a YAML is wrong."""
+    notes = Notes()
+    try:
+        head, entries = opened(args.file, notes)
+        config = load(args.config) if args.config else of_head(head)
+        if config.kind != head.kind:
+            raise BagError(f"{args.config} is of a {config.kind}, {args.file} of a {head.kind}")
+        replay = Replay(entries, Cores(config))
+        found = replay.changes() if args.config else replay.differences()
+        differences = list(islice(found, MOST))
+    except SettingsError as error:
+        for problem in error.problems:
+            print(problem, file=sys.stderr)
+        return EX_CONFIG
+    except (BagError, UnknownValue) as error:
+        print(error, file=sys.stderr)
+        return EX_DATAERR
+    return _told(args, head, replay.course, differences, notes)
+
+
+def _told(
+    args: argparse.Namespace,
+    head: Head,
+    course: Course,
+    differences: list[Difference],
+    notes: Notes,
+) -> int:
+    if args.json:
+        print(json.dumps(_as_json(head, course, differences, notes)))
+    else:
+        for line in _lines(args, head, course, differences):
+            print(line)
+        if notes.damage:
+            print(notes.damage, file=sys.stderr)
+    if not course.decisions:
+        print(f"{args.file} has nothing that can be replayed", file=sys.stderr)
+        return EX_DATAERR
+    return 1 if differences else 0
+
+
+def _as_json(
+    head: Head, course: Course, differences: list[Difference], notes: Notes
+) -> dict[str, object]:
+    return {
+        "file": head.file,
+        "version": head.version,
+        "subjects": sorted(course.subjects),
+        "from": course.began,
+        "to": course.ended,
+        "decisions": course.decisions,
+        "not_replayed": course.unusable,
+        "damage": notes.damage,
+        "differences": [asdict(one) for one in differences],
+    }
+
+
+def _lines(
+    args: argparse.Namespace, head: Head, course: Course, differences: list[Difference]
+) -> Iterator[str]:
+    names = ", ".join(sorted(course.subjects)) or "nobody"
+    yield (
+        f"{course.decisions} decisions of {names}, {_day(course.began)} to {_time(course.ended)},"
+        f" recorded by version {head.version}"
+    )
+    if course.unusable:
+        yield f"{course.unusable} entries are left out: their memory is not in the recording"
+    for one in differences:
+        yield from _what_if(one) if args.config else _difference(one)
+    if len(differences) == MOST:
+        yield f"… and no more than {MOST} are shown"
+    if not differences:
+        same = f"{args.config} would have changed none" if args.config else "all as recorded"
+        yield same
+
+
+def _what_if(one: Difference) -> Iterator[str]:
+    """One line: what would have been, or that it is as it was again."""
+    where = f"{_time(one.wall)} {one.subject}: {_part(one)}"
+    if one.today is None:
+        yield f"{where}: as recorded again"
+    else:
+        yield f"{where}: {_plain(one.today)}, where {_plain(one.recorded)} was recorded"
+
+
+def _difference(one: Difference) -> Iterator[str]:
+    yield f"{one.subject} at {_time(one.wall)}: {_part(one)} differs"
+    yield f"  recorded: {_plain(one.recorded)}"
+    yield f"  today:    {_plain(one.today)}"
+    yield "  after these events:"
+    for at, words in one.before:
+        yield f"    {_time(at)} {words}"
+
+
+def _part(one: Difference) -> str:
+    return "state" if one.what == "news" else one.what
+
+
+def _plain(told: Tree) -> str:
+    """A part of a decision for people."""
+    try:
+        return plain(value(told))
+    except UnknownValue:
+        return str(told)
+
+
+def _day(wall: float) -> str:
+    return datetime.fromtimestamp(wall).astimezone().isoformat(" ", "milliseconds")
+
+
+def _time(wall: float) -> str:
+    return datetime.fromtimestamp(wall).strftime("%H:%M:%S.%f")[:-3]

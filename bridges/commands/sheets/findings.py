@@ -1,0 +1,151 @@
+"""The findings of `check` about one file, as tables; text, JSON and sheet are made from them."""
+
+import hashlib
+from collections.abc import Sequence
+
+import msgspec
+
+from bridges.core.graph_kind import GraphKind
+from bridges.core.table import Table
+from bridges.rmf import instead
+from bridges.settings import names as named
+from bridges.settings.load import Config
+from bridges.settings.nodes import Problem
+from bridges.settings.shown import choices_of, plain
+from drivers.hal.points import Wire
+
+HEADINGS = ("signal", "point", "direction", "active", "pull", "debounce", "at rest", "wire broken")
+BROKEN = {True: "asserted", False: "not asserted", None: "floats"}
+WIRES, MEANINGS = "wires", "meanings"
+"""The titles of the tables that say what is on the bus."""
+SETTINGS = ("setting", "value", "not the default")
+
+
+class Part(msgspec.Struct, frozen=True, kw_only=True):
+    """One controller: its name, its bus and its tables.
+
+    `device`: its name, or the kind's if the kind has no devices. `bus`: its bus's name, or "".
+    `tables`: its wires, or what is sent to it and read from it, come first.
+    """
+
+    device: str
+    bus: str
+    tables: list[Table]
+
+
+class BusShown(msgspec.Struct, frozen=True, kw_only=True):
+    """One bus and how it is set."""
+
+    name: str
+    type: str
+    settings: dict[str, str]
+
+
+class Findings(msgspec.Struct, frozen=True, kw_only=True):
+    """One file: its contents if it is valid, and its errors and warnings.
+
+    `sha256`: of its bytes, so that a signed sheet identifies the file. `notes`: what else a user should
+    know.
+    """
+
+    file: str
+    kind: str = ""
+    driver: str = ""
+    sha256: str = ""
+    buses: list[BusShown] = []
+    parts: list[Part] = []
+    notes: list[str] = []
+    errors: list[Problem] = []
+    warnings: list[Problem] = []
+
+
+def wrong(file: str, errors: Sequence[Problem]) -> Findings:
+    """The findings about an invalid file."""
+    return Findings(file=file, errors=list(errors))
+
+
+def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = ()) -> Findings:
+    """The findings about a valid file. `errors`: from comparing it with RMF's map."""
+    return Findings(
+        file=str(config.path),
+        kind=config.kind,
+        driver=config.driver,
+        sha256=hashlib.sha256(config.text).hexdigest(),
+        buses=[_bus(config, bus) for bus in config.buses],
+        parts=[_graph(config)] if config.section is not None else _devices(config),
+        notes=[*notes, *map(str, config.notes), *_lacking(config)],
+        errors=list(errors),
+        warnings=list(config.warnings),
+    )
+
+
+def _lacking(config: Config) -> list[str]:
+    """What takes another way where RMF's release lacks its message."""
+    kind = named.kind_called(config.kind)
+    if isinstance(kind, GraphKind):
+        topics = [*kind.publishes]
+    else:
+        topics = [t for device in config.devices.values() for t in kind.publishes(device)]
+    lines = [line for topic in topics for line in instead.told(topic, config.rmf.release)]
+    return list(dict.fromkeys(lines))
+
+
+def _bus(config: Config, name: str) -> BusShown:
+    settings = {key: text for key, text, _ in plain(config.buses[name]) if text != "-"}
+    return BusShown(name=name, type=config.bus_types[name], settings=settings)
+
+
+def _graph(config: Config) -> Part:
+    """A kind without devices: its own tables, and its settings."""
+    kind = named.kind_called(config.kind)
+    assert isinstance(kind, GraphKind)
+    tables = [*kind.tables(config.section), _settings(config.section)]
+    return Part(device=config.kind, bus="", tables=tables)
+
+
+def _devices(config: Config) -> list[Part]:
+    return [_device(config, name) for bus in config.buses for name in config.devices_on(bus)]
+
+
+def _device(config: Config, name: str) -> Part:
+    settings, bus, driver = config.devices[name], config.bus_of(name), config.driver_type(name)
+    point = config.bus_type(bus).describe
+    wires = tuple(_row(wire, point(wire.point)) for wire in config.wires(name))
+    meanings = tuple(driver.describe(settings, config.buses[bus]))
+    tables = [
+        Table(WIRES, HEADINGS, wires),
+        Table(MEANINGS, ("what", "meaning"), meanings),
+        *driver.tables(settings),
+        _settings(settings),
+    ]
+    return Part(device=name, bus=bus, tables=[table for table in tables if table.rows])
+
+
+def _settings(settings: object) -> Table:
+    """Durations and choices, without what is shown elsewhere: the bus, and accepted wires."""
+    rows = (row for row in choices_of(settings) if row[0] not in ("bus", "driver", "accept_unsafe"))
+    return Table("settings", SETTINGS, tuple(rows))
+
+
+def _row(wire: Wire, point: str) -> tuple[str, ...]:
+    """One wire. `point`: its description by the bus; the YAML's spelling is added to it."""
+    spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"
+    if wire.flash is not None:
+        spelled += f", {wire.flash.on_s:g} s by the module at {wire.flash.point}"
+    is_input = wire.direction == "in"
+    return (
+        wire.signal,
+        spelled,
+        wire.direction,
+        wire.active,
+        wire.pull or "-",
+        _debounce(wire) if is_input else "-",
+        "-" if is_input else ("high" if wire.level(False) else "low"),
+        BROKEN[wire.broken_reads()],
+    )
+
+
+def _debounce(wire: Wire) -> str:
+    if wire.debounce_s is None:
+        return "default"
+    return f"{wire.debounce_s:g} s" if wire.debounce_s else "none"

@@ -1,0 +1,82 @@
+"""Who asks for a device, for what, since when, and whether they still do."""
+
+from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from bridges.explain.phrases import Moment
+
+MOST_CLAIMS: Final = 64
+ASKS_WITHIN_S: Final = 3.5
+"""Who waits asks at each state or each second; after three that were missed it has stopped."""
+
+
+@dataclass(slots=True)
+class Claim:
+    """One requester's wish. `wants`: a floor, or what else is asked. `first`: of the whole visit;
+    `since`: of this wish. `times`: how often it asked. `passed_on`: when the supervisor last asked for
+    it. `own`: it was heard itself, not only through the supervisor. `met`: RMF saw what this wish waits
+    for. `granted`: the device was its. `end_passed_on`: by the supervisor. `stamp_age_s`: of its last
+    request, if that was `stamped`, by our clock.
+    """
+
+    who: str
+    wants: str
+    first: Moment
+    since: Moment
+    last: Moment
+    times: int = 0
+    own: bool = False
+    passed_on: Moment | None = None
+    granted: Moment | None = None
+    met: Moment | None = None
+    was_met: int = 0
+    ended: Moment | None = None
+    end_passed_on: bool = False
+    gone: bool = False
+    stamped: bool = False
+    stamp_age_s: float = 0.0
+
+    def asks(self, now: Moment) -> bool:
+        """Does it still ask?"""
+        return self.ended is None and now.at - self.last.at <= ASKS_WITHIN_S
+
+
+class Claims:
+    """All requesters of one device; a flood of names pushes out who has been silent longest."""
+
+    def __init__(self) -> None:
+        self._all: OrderedDict[str, Claim] = OrderedDict()
+
+    def __iter__(self) -> Iterator[Claim]:
+        return iter(self._all.values())
+
+    def get(self, who: str) -> Claim | None:
+        """The claim of this requester."""
+        return self._all.get(who)
+
+    def ask(self, who: str, wants: str, moment: Moment, keep: str = "") -> tuple[Claim, bool]:
+        """It asks for this. Returns its claim, and if that is a new wish. `keep`: who must stay."""
+        claim = self._all.get(who)
+        if claim is None or claim.ended is not None:
+            if claim is None and len(self._all) >= MOST_CLAIMS:
+                self._make_room(keep)
+            claim = self._all[who] = Claim(who, wants, moment, moment, moment)
+            new = True
+        else:
+            new = claim.wants != wants
+        if new:
+            claim.wants, claim.since, claim.met = wants, moment, None
+        claim.last, claim.gone = moment, False
+        claim.times += 1
+        self._all.move_to_end(who)
+        return claim, new
+
+    def drop(self, who: str) -> None:
+        """It is forgotten."""
+        self._all.pop(who, None)
+
+    def _make_room(self, keep: str) -> None:
+        oldest = next(who for who in self._all if who != keep)
+        del self._all[oldest]

@@ -1,0 +1,69 @@
+"""Times, durations and lists as a person says them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, tzinfo
+
+DAY_S = 86400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """When something began. `at`: s on `Heard.at`'s clock. `wall`: s since the epoch. `seen`: False if
+    it was so already when the first message came.
+    """
+
+    at: float
+    wall: float
+    seen: bool = True
+
+
+def lasted(seconds: float) -> str:
+    """`0.4 s`, `12 s`, `2 min 39 s`, `3 h 5 min`, `2 d 4 h`."""
+    if seconds < 9.95:
+        return f"{max(0.0, seconds):.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    for large, small, in_s in (("min", "s", 60), ("h", "min", 3600), ("d", "h", 86400)):
+        if whole < {60: 3600, 3600: 86400}.get(in_s, whole + 1):
+            rest = whole % in_s // (in_s // {60: 60, 3600: 60, 86400: 24}[in_s])
+            return f"{whole // in_s} {large}" + (f" {rest} {small}" if rest else "")
+    raise AssertionError(seconds)
+
+
+def listed(names: Sequence[str], word: str = "and") -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    *first, last = names
+    return f"{', '.join(first)} {word} {last}" if first else last
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Says times by one time zone (None: this machine's), as seen from `now`."""
+
+    now: Moment
+    zone: tzinfo | None
+
+    def time(self, wall: float, *, tenths: bool = False) -> str:
+        """`14:03:07`; with the date where it is not today's."""
+        at = self._local(wall)
+        text = f"{at:%H:%M:%S}" + (f".{at.microsecond // 100000}" if tenths else "")
+        return text if at.date() == self._local(self.now.wall).date() else f"{at:%Y-%m-%d} {text}"
+
+    def date(self, wall: float) -> str:
+        """`2026-11-22 14:03:07`."""
+        return f"{self._local(wall):%Y-%m-%d %H:%M:%S}"
+
+    def since(self, moment: Moment) -> str:
+        """`since 14:03:07 (12 s)`."""
+        for_s = lasted(self.now.at - moment.at)
+        if moment.seen:
+            return f"since {self.time(moment.wall)} ({for_s})"
+        return f"since before {self.time(moment.wall)} (at least {for_s})"
+
+    def _local(self, wall: float) -> datetime:
+        try:
+            return datetime.fromtimestamp(wall, self.zone)
+        except (OverflowError, ValueError, OSError):  # a recording may hold any number
+            return datetime.fromtimestamp(0, self.zone)

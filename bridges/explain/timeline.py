@@ -1,0 +1,94 @@
+"""A timeline as values: what `plot` and the web page draw, and JSON by `dataclasses.asdict`.
+
+Times are s on `Heard.at`'s clock. Every text is printable and not too long, and may come from the
+network: it is text, never markup.
+"""
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+Kind = Literal["lift", "door", "charger"]
+KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger")
+LaneName = Literal[
+    "sessions", "floors", "door", "motion", "mode", "relays", "inputs", "requests", "faults"
+]
+LANES: Final[tuple[LaneName, ...]] = (
+    "sessions",
+    "floors",
+    "door",
+    "motion",
+    "mode",
+    "relays",
+    "inputs",
+    "requests",
+    "faults",
+)
+"""In the order in which they are drawn."""
+Tone = Literal["calm", "works", "open", "held", "asks", "wrong", "unknown"]
+"""How a span looks, beside its label. calm: at rest. works: moves, charges, is on. open: a robot may
+pass. held: somebody's session. asks: somebody wants something. wrong: a fault or hazard. unknown:
+nobody said."""
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Something that was so from `from_s` to `to_s`."""
+
+    from_s: float
+    to_s: float
+    label: str
+    tone: Tone
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something that happened at `at_s`."""
+
+    at_s: float
+    label: str
+    tone: Tone
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """One row of a lane; its spans never overlap. `row`: which relay, input, requester or fault; "" in
+    a lane of one row. `left_out`: the oldest spans and marks, dropped because there were too many.
+    """
+
+    name: LaneName
+    row: str
+    spans: tuple[Span, ...]
+    marks: tuple[Mark, ...]
+    left_out: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Timeline:
+    """One device between two times.
+
+    `wall`: s since the epoch at `from_s`, by the clock of who listened. `steps`: where that clock was
+    stepped. `lanes`: in the order of LANES, only those of which something was heard. `left_out`: rows
+    that were dropped.
+    """
+
+    kind: Kind
+    device: str
+    from_s: float
+    to_s: float
+    wall: float
+    lanes: tuple[Lane, ...]
+    steps: tuple[Mark, ...] = ()
+    left_out: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """What one of our daemons noted of its device: from `at` on, `name` is `value` ("": off, or over).
+
+    `lane`: relays (an output and its value), inputs, or faults (a code and its detail).
+    """
+
+    at: float
+    lane: Literal["relays", "inputs", "faults"]
+    name: str
+    value: str

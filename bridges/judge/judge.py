@@ -1,0 +1,123 @@
+"""Holds one device's messages against the laws of its kind."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final, Literal
+
+from bridges.judge import charger_laws, door_laws, lift_laws
+from bridges.judge.charger_scene import ChargerScene
+from bridges.judge.door_scene import DoorScene
+from bridges.judge.law import Doubt, Evidence, Judged, Law, Verdict
+from bridges.judge.lift_scene import LiftScene
+from bridges.judge.scene import Scene
+from bridges.recording.heard import Heard
+
+Kind = Literal["lift", "door", "charger"]
+KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger")
+LAWS: Final[Mapping[Kind, tuple[Law[Any], ...]]] = MappingProxyType(
+    {"lift": lift_laws.LAWS, "door": door_laws.LAWS, "charger": charger_laws.LAWS}
+)
+SCENES: Final[Mapping[Kind, type[Scene[Any]]]] = MappingProxyType(
+    {"lift": LiftScene, "door": DoorScene, "charger": ChargerScene}
+)
+LEEWAY_S: Final = 1.0
+"""Two topics may be so far apart."""
+SHOWN: Final = 3
+"""How much evidence is kept of one law."""
+
+
+@dataclass
+class _Tally:
+    """Of one law. `doubt`: what may still be excused, and what it would be evidence of."""
+
+    law: Law[Any]
+    kept: int = 0
+    broken: int = 0
+    evidence: list[Evidence] = field(default_factory=list)
+    doubt: tuple[Doubt, Evidence] | None = None
+
+    def found(self, heard: Evidence) -> None:
+        """It is broken."""
+        self.broken += 1
+        if len(self.evidence) < SHOWN:
+            self.evidence.append(heard)
+
+    def judged(self) -> Judged:
+        """What it comes to."""
+        if self.broken:
+            return Judged(self.law, Verdict.BROKEN, self.broken, tuple(self.evidence))
+        return Judged(self.law, Verdict.KEPT if self.kept else Verdict.NOT_SEEN, self.kept)
+
+
+class Judge:
+    """One device by RMF's name. Bounded memory, whatever is heard.
+
+    `only`: the ids of the laws to judge by; all of the kind without it. `broken`: any of them is.
+    """
+
+    def __init__(self, kind: Kind, name: str, only: Iterable[str] | None = None) -> None:
+        ids = {law.id for law in LAWS[kind]} if only is None else set(only)
+        self.kind: Kind = kind
+        self.name = name
+        self.scene = SCENES[kind](name)
+        self.first: Heard | None = None
+        self.broken = False
+        self._tallies = [_Tally(law) for law in LAWS[kind] if law.id in ids]
+
+    def hear(self, heard: Heard) -> None:
+        """The next message, of any device; in order of arrival."""
+        self.first = self.first or heard
+        if self.scene.take(heard):
+            for tally in self._tallies:
+                self._check(tally, heard.at, heard.wall)
+        self._resolve(heard.at)
+
+    def fire_ends(self, publishers: int, retaining: int, at: float, wall: float) -> None:
+        """How many publishers the fire topic has, and how many of them retain; of a lift alone on the
+        graph, because the topic does not say whose alarm it is."""
+        if isinstance(self.scene, LiftScene) and publishers and not self.scene.others:
+            self.scene.volatile = retaining < publishers
+            for tally in self._tallies:
+                if tally.law.id == "L12.retained":
+                    self._check(tally, at, wall)
+
+    def end(self, at: float, wall: float) -> tuple[Judged, ...]:
+        """Nothing more is heard; each law with its verdict, in the laws' order."""
+        self.scene.pass_time(at)
+        if self.scene.states:
+            for tally in self._tallies:
+                self._check(tally, at, wall)
+        self._resolve(at)
+        return self.verdicts()
+
+    def verdicts(self) -> tuple[Judged, ...]:
+        """As far as it has been heard."""
+        return tuple(tally.judged() for tally in self._tallies)
+
+    def _breaks(self, tally: _Tally, evidence: Evidence) -> None:
+        self.broken = True
+        tally.found(evidence)
+
+    def _check(self, tally: _Tally, at: float, wall: float) -> None:
+        finding = tally.law.check(self.scene)
+        if finding is None:
+            return
+        if isinstance(finding, Doubt):
+            tally.doubt = tally.doubt or (finding, Evidence(at, wall, finding.text))
+        elif finding:
+            self._breaks(tally, Evidence(at, wall, finding))
+        else:
+            tally.kept += 1
+
+    def _resolve(self, now: float) -> None:
+        for tally in self._tallies:
+            if tally.doubt is None:
+                continue
+            doubt, evidence = tally.doubt
+            if doubt.excused():
+                tally.doubt = None
+                tally.kept += 1
+            elif now - evidence.at > LEEWAY_S:
+                tally.doubt = None
+                self._breaks(tally, evidence)

@@ -1,0 +1,39 @@
+"""What can be replayed: a file that our recorder wrote, a directory of such files, or a ring itself."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from bridges import user_files
+from bridges.recording.bags import INSTALL
+from bridges.recording.entries import AnyEntry, Head
+from bridges.recording.ring import MAGIC, Read, RingError
+from bridges.recording.sources import BagError, Notes
+
+
+def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
+    """The run of a daemon that a file is of, and its entries. Of a directory: the first run, and the
+    entries of all files, in the order of their names. Raises BagError."""
+    if path.is_dir():
+        return _of_all(sorted(path.glob("*.mcap")), path, notes)
+    try:
+        begins = user_files.read(path, len(MAGIC)).content
+    except OSError as error:
+        raise BagError(f"{path} cannot be read: {error.strerror}") from None
+    if begins.startswith(MAGIC):
+        try:
+            ring = Read(path)
+        except RingError as error:
+            raise BagError(str(error)) from None
+        return ring.head, ring.entries()
+    try:
+        from bridges.recording import incidents
+    except ImportError as error:
+        raise BagError(f"to read {path}, {error.name} is needed: {INSTALL}") from None
+    return incidents.head_of(path), incidents.entries_in(path, notes)
+
+
+def _of_all(files: list[Path], folder: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
+    if not files:
+        raise BagError(f"{folder} holds no recording: no .mcap file is in it")
+    head, _ = opened(files[0], notes)
+    return head, (entry for file in files for entry in opened(file, notes)[1])

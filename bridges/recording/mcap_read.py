@@ -1,0 +1,141 @@
+"""Reads the records of an MCAP file, whoever wrote it: in bounded memory, and in time that the file's
+size bounds.
+
+Nothing in the file is believed before it is checked: a length may lie, a chunk may unpack to
+gigabytes, the end may be missing. The index is not used, so a file without one is read as well. Format:
+https://mcap.dev/spec (version 0).
+"""
+
+import io
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO, Final
+
+import lz4.frame
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata, Schema
+
+MAGIC: Final = b"\x89MCAP0\r\n"
+LONGEST_RECORD: Final = 64 << 20
+"""Of a record, and of what a chunk unpacks to. rosbag2 and Foxglove write chunks of 1 to 8 MB."""
+MOST_UNPACKED: Final = 200
+"""A file may unpack to this many times its size, beyond one chunk: more is no recording."""
+MOST_DECLARED: Final = 10_000
+"""Schemas, and channels."""
+FRAME: Final = 9
+"""Each record begins with its opcode (1 byte) and its length (8 bytes)."""
+
+MESSAGE: Final = struct.Struct("<HIQQ")
+"""A message begins with its channel, its sequence, and when it was logged and published (ns). It is
+taken apart here, because there are more messages than anything else."""
+READ: Final[dict[int, Callable[[ReadDataStream], McapRecord]]] = {
+    Opcode.HEADER: Header.read,
+    Opcode.SCHEMA: Schema.read,
+    Opcode.CHANNEL: Channel.read,
+    Opcode.METADATA: Metadata.read,
+}
+INVALID: Final = (
+    McapError,
+    ValueError,
+    OverflowError,
+    struct.error,
+    zstandard.ZstdError,
+    RuntimeError,
+)
+"""What reading a record of any bytes may raise."""
+LAST: Final = (Opcode.DATA_END, Opcode.FOOTER)
+
+
+class Damaged(ValueError):
+    """The file cannot be read further, and why."""
+
+
+def records(path: Path) -> Iterator[McapRecord]:
+    """Every header, schema, channel, message and metadata record, in the file's order.
+
+    Raises Damaged at the place from which nothing more can be read, and OSError.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as source:
+        if source.read(len(MAGIC)) != MAGIC:
+            raise Damaged("it does not begin as an MCAP file")
+        yield from _Limits(size).records(source, size)
+
+
+class _Limits:
+    """What is left of a file's allowances."""
+
+    def __init__(self, size: int) -> None:
+        self._unpacked = LONGEST_RECORD + MOST_UNPACKED * size
+        self._declared = MOST_DECLARED
+
+    def records(self, source: IO[bytes], size: int) -> Iterator[McapRecord]:
+        """Those from here to the end of the data."""
+        while True:
+            at = source.tell()
+            opcode, body = _body(source, at, size)
+            if opcode in LAST:
+                return
+            try:
+                yield from self._opened(opcode, body)
+            except INVALID as error:
+                why = str(error) or type(error).__name__
+                raise Damaged(f"the record at byte {at} is invalid: {why}") from error
+
+    def _opened(self, opcode: int, body: bytes) -> Iterator[McapRecord]:
+        if opcode != Opcode.CHUNK:
+            yield from self._one(opcode, body)
+            return
+        unpacked = self._unpack(Chunk.read(_stream(body)))
+        source, size = io.BytesIO(unpacked), len(unpacked)
+        while source.tell() < size:
+            yield from self._one(*_body(source, source.tell(), size))
+
+    def _one(self, opcode: int, body: bytes) -> Iterator[McapRecord]:
+        if opcode == Opcode.MESSAGE:
+            channel, sequence, at, published = MESSAGE.unpack_from(body)
+            yield Message(channel, at, body[MESSAGE.size :], published, sequence)
+        elif read := READ.get(opcode):
+            self._declared -= opcode in (Opcode.SCHEMA, Opcode.CHANNEL)
+            if self._declared < 0:
+                raise Damaged(f"more than {MOST_DECLARED} channels and schemas")
+            yield read(_stream(body))
+
+    def _unpack(self, chunk: Chunk) -> bytes:
+        most = min(LONGEST_RECORD, self._unpacked)
+        if chunk.compression == "zstd":
+            reader = zstandard.ZstdDecompressor(max_window_size=LONGEST_RECORD).stream_reader(
+                chunk.data
+            )
+            unpacked = reader.read(most + 1)
+        elif chunk.compression == "lz4":
+            unpacked = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, most + 1)
+        elif chunk.compression == "":
+            unpacked = chunk.data
+        else:
+            raise Damaged(f"a chunk is compressed by {chunk.compression[:20]!r}, not zstd or lz4")
+        if len(unpacked) > most:
+            raise Damaged(f"a chunk of {len(chunk.data)} bytes unpacks to more than {most}")
+        self._unpacked -= len(unpacked)
+        return unpacked
+
+
+def _stream(body: bytes) -> ReadDataStream:
+    return ReadDataStream(io.BytesIO(body))
+
+
+def _body(source: IO[bytes], at: int, size: int) -> tuple[int, bytes]:
+    """The next record's opcode and content. Raises Damaged."""
+    frame = source.read(FRAME)
+    if len(frame) < FRAME:
+        raise Damaged(f"it ends in the middle, at byte {at}")
+    length = int.from_bytes(frame[1:], "little")
+    if length > size - at - FRAME:
+        raise Damaged(f"it ends in the middle of the record at byte {at}")
+    if length > LONGEST_RECORD:
+        raise Damaged(f"the record at byte {at} is longer than {LONGEST_RECORD >> 20} MB")
+    return frame[0], source.read(length)

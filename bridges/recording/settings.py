@@ -1,0 +1,29 @@
+"""The `recording:` section of a YAML: what is kept of what happened, and where."""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+Megabytes = Annotated[float, Meta(ge=0.25, le=64, extra={"unit": "MB"})]
+Files = Annotated[int, Meta(ge=1, le=10_000)]
+Space = Annotated[float, Meta(ge=1, le=100_000, extra={"unit": "MB"})]
+Patience = Annotated[float, Meta(ge=10, le=86400, extra={"unit": "s"})]
+
+
+class Recording(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is kept of what happened. Nothing is written to a disk while all is well.
+
+    `keep`: `ring` keeps the last minutes in memory, and the recorder makes a file of them when
+    something goes wrong; `continuous` makes files of everything, the oldest of which go; `nothing`
+    keeps nothing.
+    `ring_mb`: the size of the ring. 1 MB is 10 minutes or more of a lift.
+    `files`, `files_mb`: how many files of this daemon, and how much of the disk, the recorder keeps.
+    `waiting_s`: after so long without what was requested a file is made.
+    """
+
+    keep: Literal["nothing", "ring", "continuous"] = "ring"
+    ring_mb: Megabytes = 1.0
+    files: Files = 40
+    files_mb: Space = 100.0
+    waiting_s: Patience = 180.0

@@ -1,0 +1,91 @@
+"""The topics of a recording: which of them are RMF's, and how their samples are decoded."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from bridges.core.names import LONGEST_NAME
+from bridges.recording.texts import MESSAGES, releases_of
+from bridges.rmf import cdr, topics
+from bridges.rmf.definitions import Message
+from bridges.rmf.releases import NEWEST, RELEASES, Release
+from bridges.rmf.rihs01 import releases_of as releases_of_hash
+
+TOPICS: Final = frozenset(t.name for t in vars(topics).values() if isinstance(t, topics.Topic))
+
+
+class BagError(Exception):
+    """The path holds no recording that can be read. The text says what to do."""
+
+
+@dataclass(slots=True)
+class Notes:
+    """What was not given. `skipped`: messages by reason. `damage`: why the end is missing, if it is."""
+
+    skipped: Counter[str] = field(default_factory=Counter)
+    damage: str = ""
+
+    def damaged(self, path: object, why: object) -> None:
+        """Note why the rest of a file is missing."""
+        told = f"{path}: {why}; what comes before is used"
+        self.damage = f"{self.damage}; {told}" if self.damage else told
+
+
+class Raw(NamedTuple):
+    """A message as it was recorded. `at`, `wall`: ns by the recorder's and by the wall clock.
+
+    `decode`: None for a text of our own recorder's.
+    """
+
+    at: int
+    wall: int
+    topic: str
+    sample: bytes
+    decode: Callable[[bytes], Message] | None
+
+
+class Source(NamedTuple):
+    """A recorded topic. `decode`: None where it is not RMF's; then `why` says so."""
+
+    topic: str
+    decode: Callable[[bytes], Message] | None
+    why: str = ""
+
+
+def source(topic: str, type_name: str, releases: list[Release]) -> Source:
+    """A topic of this type, of one of these releases."""
+    topic = topic.removeprefix("/")
+    short = topic[:LONGEST_NAME]
+    message_type = MESSAGES.get(type_name)
+    if message_type is None or not (type_name.startswith("rmf_") or topic in TOPICS):
+        return Source(topic, None, f"{short}: not RMF's")
+    if not releases:
+        return Source(topic, None, f"{short}: {type_name} of an unknown release")
+    return Source(topic, lambda sample: _decoded(message_type, sample, releases))
+
+
+def releases(type_name: str, definition: str, digest: str = "") -> list[Release]:
+    """Those that a message may be of; where the recording does not say, all that have it.
+
+    `definition`: its text, or "". `digest`: its RIHS01 hash, or "".
+    """
+    message_type = MESSAGES.get(type_name)
+    if message_type is None:
+        return []
+    if definition:
+        return releases_of(message_type, definition)
+    if digest:
+        return releases_of_hash(digest)
+    return [r for r in dict.fromkeys((NEWEST, *RELEASES.values())) if r.has(message_type)]
+
+
+def _decoded(message_type: type[Message], sample: bytes, releases: Iterable[Release]) -> Message:
+    """Raises CdrError, the last release's."""
+    error = cdr.CdrError("no release")
+    for release in releases:
+        try:
+            return cdr.decode(message_type, sample, release)
+        except cdr.CdrError as refused:
+            error = refused
+    raise error

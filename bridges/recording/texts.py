@@ -1,0 +1,134 @@
+"""Message definitions as ROS writes them in recordings: made from our table, and found in it.
+
+A text has the message's fields, a line each, then for each type below it a line of `=`, a line
+`MSG: package/Name`, and its fields (the `ros2msg` schema of MCAP, as rosbag2 concatenates it).
+"""
+
+import re
+import typing
+from functools import cache
+from typing import Final
+
+from bridges.rmf.definitions import PACKAGES, Message
+from bridges.rmf.releases import NEWEST, RELEASES, Release
+from bridges.rmf.rihs01 import type_name
+
+RULE: Final = "=" * 80
+LONGEST: Final = 1 << 20
+DEEPEST: Final = 8
+"""Types below types; a definition that names itself would go on forever."""
+MESSAGES: Final[dict[str, type[Message]]] = {
+    type_name(message_type): message_type for message_type in typing.get_args(Message)
+}
+"""By the ROS type's name, as `rmf_lift_msgs/msg/LiftState`."""
+
+Shape = tuple[tuple[str, object], ...]
+"""(field, its type's name or Shape); a sequence's type ends with `[]`, or is a tuple of one Shape."""
+
+
+class UnknownDefinition(ValueError):
+    """The text is no definition, or one that no release of ours has."""
+
+
+def text(message_type: type, release: Release) -> str:
+    """The definition of a message, with those of all types below it."""
+    parts = [_fields(message_type, release)]
+    for nested in _below(message_type, release):
+        parts += [RULE, f"MSG: {_short(nested)}", _fields(nested, release)]
+    return "\n".join(parts) + "\n"
+
+
+def releases_of(message_type: type, definition: str) -> list[Release]:
+    """The releases whose definition of a message this is, the newest first; empty for none."""
+    try:
+        found = _read(_short(message_type), definition)
+    except UnknownDefinition:
+        return []
+    newest_first = sorted(RELEASES.values(), key=lambda release: release is not NEWEST)
+    return [r for r in newest_first if r.has(message_type) and found == _shape(message_type, r)]
+
+
+def _short(message_type: type) -> str:
+    return type_name(message_type).replace("/msg/", "/")
+
+
+def _fields(message_type: type, release: Release) -> str:
+    return "\n".join(
+        f"{_ros_type(kind)} {name}" for name, kind in release.fields(message_type).items()
+    )
+
+
+def _ros_type(kind: type) -> str:
+    """The type of a field, as a definition names it."""
+    if typing.get_origin(kind) is tuple:
+        return _ros_type(typing.get_args(kind)[0]) + "[]"
+    if kind in PACKAGES:
+        return _short(kind)
+    if typing.get_origin(kind) is typing.Annotated:
+        return str(typing.get_args(kind)[1])
+    return {str: "string", bool: "bool"}[kind]
+
+
+def _element(kind: type) -> type:
+    return typing.get_args(kind)[0] if typing.get_origin(kind) is tuple else kind
+
+
+def _below(message_type: type, release: Release) -> list[type]:
+    """The types below a message, each once, in the order in which they are first named."""
+    found: dict[type, None] = {}
+    for kind in map(_element, release.fields(message_type).values()):
+        if kind in PACKAGES:
+            found |= dict.fromkeys([kind, *_below(kind, release)])
+    return list(found)
+
+
+@cache
+def _shape(message_type: type, release: Release) -> Shape:
+    return tuple(
+        (name, _shape_of(kind, release)) for name, kind in release.fields(message_type).items()
+    )
+
+
+def _shape_of(kind: type, release: Release) -> object:
+    element = _element(kind)
+    if element not in PACKAGES:
+        return _ros_type(kind)
+    below = _shape(element, release)
+    return below if element is kind else (below,)
+
+
+FIELD: Final = re.compile(r"([A-Za-z][\w/]*)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+([a-z]\w*)\b(?!\s*=)")
+"""A field: type, `[]`, name. A constant has a `=` after its name; a default has none."""
+
+
+def _read(name: str, definition: str) -> Shape:
+    """Raises UnknownDefinition."""
+    if len(definition) > LONGEST:
+        raise UnknownDefinition("longer than any message's")
+    sections = re.split(r"^=+$\n?", definition, flags=re.MULTILINE)
+    own, *others = sections
+    texts = {name: own}
+    for section in others:
+        title, _, body = section.strip().partition("\n")
+        texts[title.removeprefix("MSG:").strip().replace("/msg/", "/")] = body
+    return _shape_in(name, texts, DEEPEST)
+
+
+def _shape_in(name: str, texts: dict[str, str], deeper: int) -> Shape:
+    if name not in texts or deeper == 0:
+        raise UnknownDefinition(name)
+    package = name.partition("/")[0]
+    found = []
+    for line in texts[name].splitlines():
+        field = FIELD.match(line.partition("#")[0].strip())
+        if field:
+            found.append((field[3], _field_in(field, package, texts, deeper)))
+    return tuple(found)
+
+
+def _field_in(field: re.Match[str], package: str, texts: dict[str, str], deeper: int) -> object:
+    kind = field[1].replace("/msg/", "/")
+    if not kind[0].isupper() and "/" not in kind:
+        return kind + ("[]" if field[2] else "")
+    below = _shape_in(kind if "/" in kind else f"{package}/{kind}", texts, deeper - 1)
+    return (below,) if field[2] else below

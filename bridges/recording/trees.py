@@ -1,0 +1,160 @@
+"""What cores work with (events, memories, outputs, reports) as trees of plain values, and back.
+
+A tree holds None, bool, int, float, str, lists and mappings with text as keys. A tuple is a
+list; anything else is a mapping whose key `""` names its type below `bridges` (`lift.memory.Session`),
+with its fields beside it, or what it holds under `=`. Only types that merely hold values are made
+again: no recording can have anything else called.
+"""
+
+import dataclasses
+import importlib
+import math
+from collections.abc import Mapping
+from enum import Enum
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import msgspec
+
+if TYPE_CHECKING:
+    Tree = None | bool | int | float | str | list["Tree"] | dict[str, "Tree"]
+else:  # msgspec has no recursive types; it decodes nothing but these
+    Tree = Any
+
+TYPE: Final = ""
+HOLDS: Final = "="
+MAP, SET, NUMBER = "map", "set", "number"
+ENDLESS: Final = (math.inf, -math.inf)
+"""What JSON has no word for."""
+ROOT: Final = "bridges."
+HOMES: Final = ("core.", "rmf.definitions.", "rmf.constants.")
+"""Modules with values that every kind uses; besides these, those of the kinds themselves."""
+PLAIN: Final = frozenset({type(None), bool, int, float, str})
+
+
+class UnknownValue(ValueError):
+    """A tree names a type, a field or a member that this version does not have."""
+
+
+class Struct(NamedTuple):
+    """A type with fields: its name in a tree, and its fields' names."""
+
+    name: str
+    fields: tuple[str, ...]
+
+
+def tree(value: object) -> Tree:
+    """The tree of a value. Raises TypeError for what no core has."""
+    kind: type[Any] = type(value)
+    if kind is float and value in ENDLESS:
+        return {TYPE: NUMBER, HOLDS: str(value)}
+    if kind in PLAIN:
+        return value  # type: ignore[return-value]
+    if kind is tuple or kind is list:
+        return [tree(part) for part in value]  # type: ignore[attr-defined]
+    if struct := _struct(kind):
+        found: dict[str, Tree] = {TYPE: struct.name}
+        for name in struct.fields:
+            found[name] = tree(getattr(value, name))
+        return found
+    return _other(value)
+
+
+def _other(value: object) -> Tree:
+    if isinstance(value, Enum):
+        return {TYPE: _name(type(value)), HOLDS: value.name}
+    if isinstance(value, frozenset | set):
+        return {TYPE: SET, HOLDS: sorted(map(tree, value), key=repr)}
+    if isinstance(value, Mapping):
+        return {TYPE: MAP, HOLDS: [[tree(key), tree(part)] for key, part in value.items()]}
+    if isinstance(value, tuple):  # with names
+        return {TYPE: _name(type(value)), HOLDS: [tree(part) for part in value]}
+    raise TypeError(f"{type(value).__name__} is no value of a core")
+
+
+def value(found: Tree) -> Any:
+    """The value of a tree. Raises UnknownValue."""
+    try:
+        return _value(found)
+    except (TypeError, KeyError, AttributeError, ValueError, RecursionError) as error:
+        raise UnknownValue(f"no value of a core: {error}") from error
+
+
+def _value(found: Tree) -> Any:
+    if isinstance(found, list):
+        return tuple(map(_value, found))
+    if not isinstance(found, dict):
+        return found
+    name, held = found.get(TYPE), found.get(HOLDS)
+    if name == MAP and isinstance(held, list):
+        return {_value(key): _value(part) for key, part in _twos(held)}
+    if name == SET and isinstance(held, list):
+        return frozenset(map(_value, held))
+    if name == NUMBER:
+        return float(str(held))
+    return _made(_type(str(name)), found, held)
+
+
+def _twos(held: list[Tree]) -> list[tuple[Tree, Tree]]:
+    found = [(part[0], part[1]) for part in held if isinstance(part, list) and len(part) == 2]
+    if len(found) != len(held):
+        raise UnknownValue("a mapping of other than pairs")
+    return found
+
+
+def _made(kind: type[Any], found: dict[str, Tree], held: Tree) -> object:
+    if issubclass(kind, Enum):
+        return kind[str(held)]
+    if issubclass(kind, tuple):
+        assert isinstance(held, list)
+        return kind(*map(_value, held))
+    struct = _struct(kind)
+    assert struct
+    return kind(**{name: _value(found[name]) for name in struct.fields if name in found})
+
+
+_structs: dict[type[Any], Struct | None] = {}
+
+
+def _struct(kind: type[Any]) -> Struct | None:
+    """The fields of a type; None if it has none."""
+    if kind not in _structs:
+        _structs[kind] = _found(kind)
+    return _structs[kind]
+
+
+def _found(kind: type[Any]) -> Struct | None:
+    if issubclass(kind, msgspec.Struct):
+        return Struct(_name(kind), kind.__struct_fields__)
+    if dataclasses.is_dataclass(kind):
+        names = tuple(field.name for field in dataclasses.fields(kind) if field.init)
+        return Struct(_name(kind), names)
+    return None
+
+
+def _name(kind: type) -> str:
+    return f"{kind.__module__}.{kind.__qualname__}".removeprefix(ROOT)
+
+
+@cache
+def _type(name: str) -> type[Any]:
+    """The type of this name, if it only holds values. Raises UnknownValue."""
+    module, _, own = name.rpartition(".")
+    if not _is_home(module) or not own.isidentifier():
+        raise UnknownValue(f"{name!r} is no value of a core")
+    try:
+        kind: type[Any] = getattr(importlib.import_module(ROOT + module), own)
+    except (ImportError, AttributeError):
+        raise UnknownValue(f"{name!r} is not known to this version") from None
+    holds = isinstance(kind, type) and (_struct(kind) or issubclass(kind, Enum | tuple))
+    if not holds or _name(kind) != name:
+        raise UnknownValue(f"{name!r} holds no values")
+    return kind
+
+
+def _is_home(module: str) -> bool:
+    from bridges.settings.names import kind_names
+
+    if not all(part.isidentifier() for part in module.split(".")):
+        return False
+    return f"{module}.".startswith((*HOMES, *(f"{kind}." for kind in kind_names())))

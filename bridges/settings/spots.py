@@ -1,0 +1,71 @@
+"""Places in a YAML file: where a value stands, and what an error about it points to."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from yaml import MappingNode, Node, ScalarNode, SequenceNode
+
+from bridges.core.spelling import short
+from bridges.settings.nodes import is_plain
+from bridges.settings.scalars import is_null_word
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A node that is to become a value.
+
+    `at`: the node that an error about the whole value points to (its key). `label`: the value's name
+    in errors. `path`: its path below the top struct.
+    """
+
+    node: Node
+    at: Node
+    label: str
+    path: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One `key: value` of a mapping."""
+
+    name: str
+    key: Node
+    value: Node
+
+    def spot(self, path: tuple[str, ...] = ()) -> Spot:
+        """The value, below `path`."""
+        return Spot(self.value, self.key, f"'{short(self.name)}'", (*path, self.name))
+
+    def where(self) -> Node:
+        """The node that an error about the value points to: a scalar itself, else the key."""
+        node = self.value
+        if isinstance(node, ScalarNode) and (node.value or not is_plain(node)):
+            return node
+        return self.key
+
+
+def below(node: Node, part: str) -> Entry | None:
+    """The entry of a mapping, or the item of a list, that `part` names."""
+    if isinstance(node, MappingNode):
+        for key, value in node.value:
+            if isinstance(key, ScalarNode) and key.value == part:
+                return Entry(part, key, value)
+    if isinstance(node, SequenceNode) and part.isdecimal() and int(part) < len(node.value):
+        return Entry(part, node.value[int(part)], node.value[int(part)])
+    return None
+
+
+def locate(spot: Spot, path: Iterable[object]) -> Entry:
+    """The entry at `path` below a value, or its nearest existing parent."""
+    found = Entry("", spot.at, spot.node)
+    for part in path:
+        entry = below(found.value, str(part))
+        if entry is None:
+            break
+        found = entry
+    return found
+
+
+def is_none(node: Node) -> bool:
+    """Whether `null` or `~` is written. An empty value does not count: it was probably forgotten."""
+    return isinstance(node, ScalarNode) and is_plain(node) and is_null_word(node.value)

@@ -1,0 +1,64 @@
+"""One connection to the control socket of a running simulation; `control.py` says what it takes."""
+
+import json
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from hal_fakes.plants.plant import Edge
+
+PATIENCE_S: Final = 120.0
+
+
+class Refused(Exception):
+    """The simulation does not do it; the text is its answer."""
+
+
+class Caller:
+    """A connection. Raises OSError where nobody listens or answers within `patience_s`; None: waits."""
+
+    def __init__(self, path: Path, patience_s: float | None = PATIENCE_S) -> None:
+        self._end = socket.socket(socket.AF_UNIX)
+        try:
+            self._end.settimeout(patience_s)
+            self._end.connect(str(path))
+        except OSError:
+            self._end.close()
+            raise
+        self._lines = self._end.makefile("r", encoding="utf-8")
+
+    def __enter__(self) -> "Caller":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def say(self, line: str) -> str:
+        """Send a line, and return the next one that comes."""
+        self._end.sendall(line.encode() + b"\n")
+        return self.hear()
+
+    def order(self, line: str) -> None:
+        """Send a line. Raises Refused unless it is done."""
+        answer = self.say(line)
+        if answer != "ok":
+            raise Refused(f"{line}: {answer or 'no answer'}")
+
+    def hear(self) -> str:
+        """The next line; "" when the simulation has hung up."""
+        return self._lines.readline().rstrip("\n")
+
+    def edges(self) -> Iterator[Edge]:
+        """Every edge from now on, after `follow`, until the simulation hangs up."""
+        while line := self.hear():
+            yield Edge(**json.loads(line))
+
+    def edge(self, signal: str, value: bool) -> float:
+        """Wait for this edge, after `follow`; its monotonic time (s)."""
+        return next(e.at for e in self.edges() if (e.signal, e.value) == (signal, value))
+
+    def close(self) -> None:
+        """Hang up. May be called twice."""
+        self._lines.close()
+        self._end.close()

@@ -1,0 +1,1 @@
+"""`judge`: nodes with the defects of the field, right ones, and ours, before the same laws."""

@@ -1,0 +1,11 @@
+"""start_timeout is not looked at."""
+
+from dataclasses import replace
+
+from bridges.rmf import definitions as d
+from tests.judge.nodes.right_charger import RightCharger
+
+
+class ChargerWaitsForEver(RightCharger):
+    def requested(self, request: d.ChargerRequest, now: float) -> None:
+        super().requested(replace(request, start_timeout=d.Duration()), now)

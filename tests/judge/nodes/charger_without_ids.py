@@ -1,0 +1,11 @@
+"""request_id stays empty."""
+
+from dataclasses import replace
+
+from bridges.rmf import definitions as d
+from tests.judge.nodes.right_charger import RightCharger
+
+
+class ChargerWithoutIds(RightCharger):
+    def state(self, now: float) -> d.ChargerState:
+        return replace(super().state(now), request_id="")

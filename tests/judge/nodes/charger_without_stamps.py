@@ -1,0 +1,11 @@
+"""charger_time is never filled."""
+
+from dataclasses import replace
+
+from bridges.rmf import definitions as d
+from tests.judge.nodes.right_charger import RightCharger
+
+
+class ChargerWithoutStamps(RightCharger):
+    def state(self, now: float) -> d.ChargerState:
+        return replace(super().state(now), charger_time=d.Time())

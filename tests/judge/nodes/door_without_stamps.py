@@ -1,0 +1,11 @@
+"""door_time is never filled."""
+
+from dataclasses import replace
+
+from bridges.rmf import definitions as d
+from tests.judge.nodes.right_door import RightDoor
+
+
+class DoorWithoutStamps(RightDoor):
+    def state(self, now: float) -> d.DoorState:
+        return replace(super().state(now), door_time=d.Time())

@@ -1,0 +1,21 @@
+"""The fire alarm is told once, and volatile: no fleet adapter hears it (low_level_lift)."""
+
+from dataclasses import replace
+
+from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from bridges.rmf_rules import Said
+from tests.judge.nodes.right_lift import RightLift
+
+ALARM = replace(topics.FIRE_ALARM_TRIGGER, publish=topics.VOLATILE)
+
+
+class FireIsVolatile(RightLift):
+    told = False
+
+    def tick(self, now: float) -> list[Said]:
+        said = super().tick(now)
+        if self.told:
+            return said
+        self.told = True
+        return [*said, (ALARM, d.Bool(True))]

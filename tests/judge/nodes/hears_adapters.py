@@ -1,0 +1,8 @@
+"""It hears adapter_lift_requests, around the supervisor."""
+
+from bridges.rmf import topics
+from tests.judge.nodes.right_lift import RightLift
+
+
+class HearsAdapters(RightLift):
+    subscribes = (topics.ADAPTER_LIFT_REQUESTS,)

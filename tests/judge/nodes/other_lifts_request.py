@@ -1,0 +1,14 @@
+"""The name is looked at when it is too late (sharp-rmf/low_level_lift)."""
+
+from dataclasses import replace
+
+from bridges.rmf import definitions as d
+from bridges.rmf_rules import Said
+from tests.judge.nodes.right_lift import RightLift
+
+
+class OtherLiftsRequest(RightLift):
+    def hear(self, message: d.Message, now: float) -> list[Said]:
+        if isinstance(message, d.LiftRequest):
+            super().hear(replace(message, lift_name=self.name), now)
+        return []

@@ -1,0 +1,118 @@
+"""Each defect of the field is caught by its own law, and by no other."""
+
+import pytest
+
+from bridges.rmf import topics
+from bridges.rmf_rules import Party
+from bridges.rmf_rules.supervisors import LiftSupervisor
+from tests.judge.nodes.any_end_ends import AnyEndEnds
+from tests.judge.nodes.end_needs_a_floor import EndNeedsAFloor
+from tests.judge.nodes.fire_boards import FireBoards
+from tests.judge.nodes.fire_frees import FireFrees
+from tests.judge.nodes.fire_grants import FireGrants
+from tests.judge.nodes.fire_is_volatile import FireIsVolatile
+from tests.judge.nodes.fire_says_false import FireSaysFalse
+from tests.judge.nodes.floor_by_last_character import FloorByLastCharacter
+from tests.judge.nodes.floor_flickers import FloorFlickers
+from tests.judge.nodes.goes_to_the_default_floor import GoesToTheDefaultFloor
+from tests.judge.nodes.hears_adapters import HearsAdapters
+from tests.judge.nodes.last_one_wins import LastOneWins
+from tests.judge.nodes.lift_answers import LiftAnswers
+from tests.judge.nodes.lift_blocks import LiftBlocks
+from tests.judge.nodes.lift_flaps import LiftFlaps
+from tests.judge.nodes.lift_mode_mixed import LiftModeMixed
+from tests.judge.nodes.lift_numbers_mixed import LiftNumbersMixed
+from tests.judge.nodes.lift_stale_open import LiftStaleOpen
+from tests.judge.nodes.lift_vendor_codes import LiftVendorCodes
+from tests.judge.nodes.lift_without_stamps import LiftWithoutStamps
+from tests.judge.nodes.open_nowhere import OpenNowhere
+from tests.judge.nodes.open_while_moving import OpenWhileMoving
+from tests.judge.nodes.other_lifts_request import OtherLiftsRequest
+from tests.judge.nodes.own_session_name import OwnSessionName
+from tests.judge.nodes.right_lift import RightLift
+from tests.judge.nodes.session_times_out import SessionTimesOut
+from tests.judge.nodes.shows_what_it_was_asked import ShowsWhatItWasAsked
+from tests.judge.script import Script, asks, lift
+from tests.judge.world import rides, watched
+
+RED, BLUE = "fleet/red", "fleet/blue"
+
+
+@pytest.mark.parametrize(
+    ("node", "law"),
+    [
+        (EndNeedsAFloor, "L5.ends"),
+        (LiftFlaps, "L7.holds"),
+        (LiftAnswers, "L2.answer"),
+        (LiftNumbersMixed, "L4.grants"),
+        (LiftModeMixed, "L7.agv"),
+        (LiftStaleOpen, "L7.fresh"),
+        (LiftBlocks, "L2.rate"),
+        (AnyEndEnds, "L5.foreign"),
+        (SessionTimesOut, "L4.ends"),
+        (OwnSessionName, "L4.own"),
+        (FireFrees, "L4.ends"),
+        (FireBoards, "L10.board"),
+        (FireIsVolatile, "L12.retained"),
+        (FireSaysFalse, "L12.false"),
+        (OpenWhileMoving, "L7.stopped"),
+        (OpenNowhere, "L7.floor"),
+        (FloorFlickers, "L7.jump"),
+        (LiftVendorCodes, "T1.numbers"),
+        (LiftWithoutStamps, "L3.stamp"),
+    ],
+)
+def test_a_ride_finds_the_defect(node: type[RightLift], law: str) -> None:
+    found, _ = rides(node())
+    assert found["broken"] == {law}
+
+
+@pytest.mark.parametrize(
+    ("node", "parties", "law"),
+    [
+        (
+            OtherLiftsRequest,
+            [Script((5.0, topics.LIFT_REQUESTS, lift(RED, "L3", "Lift2")))],
+            "L1.other",
+        ),
+        (LastOneWins, [asks(6.0, RED, "L3", 3), asks(12.5, BLUE, "L1")], "L4.ends"),
+        (FireGrants, [asks(5.0, RED, "L3")], "L10.grant"),
+        (FloorByLastCharacter, [asks(5.0, RED, "L10", 5)], "L8.floor"),
+        (GoesToTheDefaultFloor, [asks(6.0, RED, "L9", 5)], "L8.destination"),
+        (ShowsWhatItWasAsked, [asks(6.0, RED, "L9", 5)], "L9.unserved"),
+        (
+            HearsAdapters,
+            [
+                Script((8.0, topics.ADAPTER_LIFT_REQUESTS, lift(BLUE, "L1"))),
+                asks(7.0, RED, "L3", 5),
+            ],
+            "L1.bypass",
+        ),
+    ],
+)
+def test_watching_finds_the_defect(node: type[RightLift], parties: list[Party], law: str) -> None:
+    found = watched("lift", "Lift1", node(), *parties)
+    assert found["broken"] == {law}
+
+
+def test_an_end_without_a_floor_that_is_refused_is_found_by_watching_three_rides() -> None:
+    """RMF's supervisor follows with an END that has a floor, so one ride alone proves nothing."""
+    rides = [
+        line
+        for n in range(3)
+        for line in (
+            (10.0 + 20 * n, topics.ADAPTER_LIFT_REQUESTS, lift(RED, "L2")),
+            (20.4 + 20 * n, topics.ADAPTER_LIFT_REQUESTS, lift(RED, "", kind=0)),
+        )
+    ]
+    parties = [LiftSupervisor(), Script(*rides)]
+    assert watched("lift", "Lift1", EndNeedsAFloor(), *parties, for_s=80.0)["broken"] == {"L5.ends"}
+    parties = [LiftSupervisor(), Script(*rides)]
+    assert watched("lift", "Lift1", RightLift(), *parties, for_s=80.0)["broken"] == set()
+
+
+def test_two_robots_stand_before_a_lift_that_refuses_an_end_without_a_floor() -> None:
+    """Finding 4: the supervisor has taken up the second robot, and nobody can release the first."""
+    found, why = rides(EndNeedsAFloor(), robots=2)
+    assert found["broken"] == {"L5.ends"}
+    assert why == "RequestLift of rmf_bridge_judge/robot2 has not ended in 120 s"

@@ -1,0 +1,1 @@
+"""The black box: what is kept, and how it is read."""

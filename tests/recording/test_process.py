@@ -1,0 +1,108 @@
+"""The recorder and the commands beside a real daemon, as a person runs them."""
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bridges.recording.bags import heard_in
+from bridges.recording.entries import Spoken
+from bridges.recording.incidents import head_of, notes_in
+from bridges.recording.ring import Read
+from hal_fakes.wire import wire
+from tests.serve.site import command, daemon, environment, shipped
+from tests.waiting import PATIENCE_S, wait_until
+
+
+@pytest.fixture
+def lift(tmp_path: Path) -> Path:
+    return shipped("lift_dry_contact.yaml", tmp_path, wire())
+
+
+def bridge(*words: str | Path, **env: str) -> subprocess.CompletedProcess[str]:
+    """A command, to its end."""
+    return subprocess.run(
+        command(*words),
+        capture_output=True,
+        text=True,
+        env=environment(**env),
+        timeout=PATIENCE_S,
+        cwd=words[1].parent if isinstance(words[1], Path) else None,
+    )
+
+
+def states(place: Path) -> int:
+    """How many states the ring shows to have been sent."""
+    try:
+        return sum(isinstance(one, Spoken) for one in Read(place / "ring").entries())
+    except Exception:  # noqa: BLE001 - it is not there yet
+        return 0
+
+
+def test_a_person_records_an_incident_and_replays_it(
+    lift: Path, tmp_path: Path, domain: int
+) -> None:
+    place = tmp_path / "run"
+    with daemon(lift, place, "--simulate", "--domain-id", str(domain)) as running:
+        wait_until(lambda: states(place) > 2, "states are in the ring")
+        where = ("--runtime-dir", str(place))
+        made = bridge(
+            "incident", lift, "--note", "it stood", "--after", "0", "-o", "a.mcap", *where
+        )
+        ring = bridge("replay", place / "ring")
+        running.end(signal.SIGTERM)
+    file = tmp_path / "a.mcap"
+    told = bridge("replay", file, "--json")
+    other = tmp_path / "other.yaml"
+    other.write_text(lift.read_text())
+
+    assert made.returncode == 0, made.stderr
+    assert [(note.code, note.text) for note in notes_in(file)] == [("OPERATOR", "it stood")]
+    assert {one.topic for one in heard_in(file)} == {"lift_states", "diagnostics"}
+    assert (told.returncode, json.loads(told.stdout)["differences"]) == (0, [])
+    assert json.loads(told.stdout)["decisions"] > 5
+    assert (ring.returncode, ring.stdout.splitlines()[-1]) == (0, "all as recorded")
+    assert bridge("replay", file, "--config", other).stdout.endswith("changed none\n")
+
+
+def test_the_recorder_makes_a_file_of_a_daemon_that_is_killed(
+    lift: Path, tmp_path: Path, domain: int
+) -> None:
+    base = tmp_path / "user"
+    place = base / "rmf-bridge" / lift.stem
+    place.parent.mkdir(parents=True)
+    out = tmp_path / "out"
+    recorder = subprocess.Popen(
+        [sys.executable, "-m", "bridges.cli", "recorder", "-o", str(out)],
+        env=environment(XDG_RUNTIME_DIR=str(base)),
+    )
+    try:
+        with daemon(lift, place, "--simulate", "--domain-id", str(domain)) as running:
+            wait_until(lambda: states(place) > 2, "states are in the ring")
+            running.end(signal.SIGKILL)
+        wait_until(lambda: len(list(out.glob(f"{lift.stem}*.mcap"))) == 1, "a recording is written")
+        [file] = out.glob(f"{lift.stem}*.mcap")
+    finally:
+        recorder.send_signal(signal.SIGTERM)
+        code = recorder.wait(PATIENCE_S)
+
+    assert code == 0
+    assert [note.code for note in notes_in(file)] == ["DIED"]
+    assert head_of(file).yaml == lift.read_bytes()
+    assert bridge("replay", file).returncode == 0
+
+
+def test_a_command_without_a_ring_or_a_recording_says_what_to_do(
+    lift: Path, tmp_path: Path
+) -> None:
+    nothing = bridge("incident", lift, "--runtime-dir", str(tmp_path / "none"))
+    (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n")
+    no_entries = bridge("replay", tmp_path / "a.mcap")
+
+    assert (nothing.returncode, nothing.stdout) == (69, "")
+    assert "Does its daemon run" in nothing.stderr
+    assert no_entries.returncode == 65
+    assert "Traceback" not in nothing.stderr + no_entries.stderr

@@ -1,0 +1,45 @@
+"""Recordings as rosbag2 writes them, made by the `rosbags` library, with its own definition texts."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from bridges.recording.heard import Heard
+from bridges.recording.texts import text
+from bridges.rmf import cdr
+from bridges.rmf.releases import Release
+from bridges.rmf.rihs01 import type_name
+
+MCAP, SQLITE = StoragePlugin.MCAP, StoragePlugin.SQLITE3
+
+
+def store(release: Release) -> Typestore:
+    """The types of a release, as rosbags knows them from our definition texts."""
+    types = get_typestore(Stores.EMPTY)
+    for message_type in release.messages():
+        own = text(message_type, release).partition("=" * 80)[0]
+        types.register(get_types_from_msg(own, type_name(message_type)))
+    return types
+
+
+def write(
+    bag: Path, heard: Iterable[Heard], release: Release, storage: StoragePlugin = MCAP
+) -> Path:
+    """A bag with these messages, and with a topic that is not RMF's."""
+    types = store(release)
+    with Writer(bag, version=9, storage_plugin=storage) as writer:
+        other = writer.add_connection("/scan", "std_msgs/msg/Bool", typestore=types)
+        known = {}
+        for one in heard:
+            kind = type(one.message)
+            if one.topic not in known:
+                known[one.topic] = writer.add_connection(
+                    f"/{one.topic}", type_name(kind), typestore=types
+                )
+            at = round(one.wall * 1e9)
+            writer.write(known[one.topic], at, cdr.encode(kind, one.message, release))
+            writer.write(other, at, b"\0\1\0\0\1")
+    return bag

@@ -1,0 +1,38 @@
+"""What docs/architecture.md, CONTRIBUTING.md and the README say of files: they are there."""
+
+import re
+from pathlib import Path, PurePath
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("bridges", "drivers", "hal_fakes", "tests", "bench", "config", "docs", "systemd", "ros")
+THERE = [
+    PurePath(path.relative_to(ROOT))
+    for room in ROOMS
+    for path in (ROOT / room, *(ROOT / room).rglob("*"))
+    if "__pycache__" not in path.parts
+]
+PATH = re.compile(r"`([\w.-]+(?:/[\w.-]+)*(?:/|\.(?:py|md|yaml|dbc)))`")
+"""A file or a folder in a text; `<kind>` and `*` stand for many, and are not looked for."""
+WAYS = ("a request", "an edge", "a register", "a frame", "a YAML")
+
+
+def named(text: str) -> list[str]:
+    return [found for found in PATH.findall(text) if found != "plant.sock"]
+
+
+@pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md"])
+def test_every_file_that_is_named_exists(page: str) -> None:
+    found = named((ROOT / page).read_text())
+    assert len(found) > 10
+    assert [n for n in found if not any(path.match(n.rstrip("/")) for path in THERE)] == []
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_each_of_the_five_ways_is_told_file_by_file(way: str) -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    section = page.partition(f"\n## The path of {way}\n")[2].partition("\n## ")[0]
+    steps = re.split(r"\n\d\. ", section)[1:]
+    assert len(steps) >= 6
+    assert [step for step in steps[:-1] if not named(step)] == []
