@@ -57,7 +57,7 @@ class Ros2Transport(Threaded):
         self._loopback = loopback
         self._ros_args = ros_args
         self._pause = threading.Event()
-        self._ends = Ends()
+        self._ends = Ends(self.release)
         self._stay: Stay | None = None
         with self._reporting(f"cannot join ROS domain {domain_id}"):
             self._join()
@@ -80,7 +80,7 @@ class Ros2Transport(Threaded):
         publisher = Ros2Publisher(topic, self._ends, lambda: self.lives, self._withdraw)
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             if self._stay is not None:
-                publisher.create(self._stay.node, self.release)
+                publisher.create(self._stay.node)
             self._ends.publishers += (publisher,)
         return publisher
 
@@ -93,7 +93,7 @@ class Ros2Transport(Threaded):
         )
         with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
             if self._stay is not None:
-                subscription.create(self._stay.node, self.release)
+                subscription.create(self._stay.node)
             self._ends.subscriptions += (subscription,)
         return subscription
 
@@ -148,7 +148,7 @@ class Ros2Transport(Threaded):
             try:
                 self._join()
                 for end in self._ends:
-                    end.create(self.node, self.release)
+                    end.create(self.node)
             except REFUSALS as error:
                 self._leave()
                 if was_joined:

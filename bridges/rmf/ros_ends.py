@@ -39,7 +39,8 @@ that the message has woken run first."""
 class Ends:
     """The ends of one node, and which of them must not hear which."""
 
-    def __init__(self) -> None:
+    def __init__(self, release: Release) -> None:
+        self.release = release
         self.publishers: tuple[Ros2Publisher, ...] = ()
         self.subscriptions: tuple[Ros2Subscription, ...] = ()
 
@@ -78,11 +79,10 @@ class Ros2Publisher:
         depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
         self._retained: deque[Message] = deque(maxlen=depth)
 
-    def create(self, node: Node, release: Release) -> None:
+    def create(self, node: Node) -> None:
         """Make rclpy's publisher, and send again what an earlier one retained for late joiners."""
-        self._release = release
         made = node.create_publisher(
-            ros_type(self.topic.type, release),
+            ros_type(self.topic.type, self._ends.release),
             self.topic.name,
             _profile(self.topic.publish),
             event_callbacks=PublisherEventCallbacks(
@@ -127,12 +127,12 @@ class Ros2Publisher:
         self._withdraw(self)
 
     def _write(self, message: Message) -> None:
-        sample = cdr.encode(self.topic.type, message, self._release)
+        sample = cdr.encode(self.topic.type, message, self._ends.release)
         with self._using:
             if self._end is None:
                 raise TransportError(f"topic {self.topic.name}: not sent: there is no network")
             for subscription in self._ends.heard_back(self.topic):
-                subscription.said.append(cdr.decode(self.topic.type, sample, self._release))
+                subscription.said.append(cdr.decode(self.topic.type, sample, self._ends.release))
             try:
                 self._end.publish(sample)
             except RuntimeError as error:
@@ -164,12 +164,11 @@ class Ros2Subscription:
         self._using = threading.Lock()
         self._end: RosSubscription | None = None
 
-    def create(self, node: Node, release: Release) -> None:
+    def create(self, node: Node) -> None:
         """Make rclpy's subscription."""
-        self._release = release
         self.said.clear()
         made = node.create_subscription(
-            ros_type(self.topic.type, release),
+            ros_type(self.topic.type, self._ends.release),
             self.topic.name,
             self._take,
             _profile(self.topic.subscribe),
@@ -204,7 +203,7 @@ class Ros2Subscription:
 
     def _take(self, sample: bytes) -> None:
         try:
-            message = cdr.decode(self.topic.type, sample, self._release)
+            message = cdr.decode(self.topic.type, sample, self._ends.release)
         except cdr.CdrError as error:
             notices.drop(self._dropped, self.topic, error)
             return
