@@ -9,8 +9,10 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from bridges.commands.graph import complain
-from bridges.recording.bags import heard_in
-from bridges.recording.heard import Heard
+from bridges.explain import noted
+from bridges.recording.bags import all_in
+from bridges.recording.heard import Heard, Own
+from bridges.recording.mcap_bags import OWN_TOPICS
 from bridges.recording.sources import Notes
 from bridges.rmf import topics
 
@@ -99,6 +101,8 @@ class Sieve:
 
     def keep(self, topic: str, sample: bytes, at: float) -> bool:
         """Is it to be decoded?"""
+        if topic.startswith(OWN_TOPICS) and topic.removeprefix(OWN_TOPICS) not in noted.TOPICS:
+            return False
         if self._name not in sample and not self._is_common(topic, sample):
             self._others[topic] += 1
             return self._others[topic] <= FIRST_OF_OTHERS
@@ -119,12 +123,12 @@ class Sieve:
         return True
 
 
-def heard_between(path: Path, span: Span, command: str, device: str = "") -> Iterator[Heard]:
+def heard_between(path: Path, span: Span, command: str, device: str = "") -> Iterator[Heard | Own]:
     """What concerns the device ("": all) until the end of the span; what is before it too, as states
     last. Damage is told on standard error. Raises BagError.
     """
     notes, began, until = Notes(), None, float("inf")
-    for heard in heard_in(path, notes, Sieve(device).keep):
+    for heard in all_in(path, notes, Sieve(device).keep):
         if began is None:
             began = heard.wall
             until = span.to.wall(began) if span.to else until

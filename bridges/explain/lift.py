@@ -257,6 +257,13 @@ def _end_not_obeyed(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) 
             Step("the device's node", "the next state shows no session"),
         )
         return
+    if claim.own and not claim.end_passed_on and lift.supervisor_last is not None:
+        found.say(
+            f"{claim.who} sent END at {clock.time(claim.ended.wall)}, and the supervisor has not passed"
+            " it on.",
+            Step("the supervisor", f"pass on END; until then: `rmf-bridge release {lift.name}`"),
+        )
+        return
     found.say(
         f"{claim.who} sent END at {clock.time(claim.ended.wall)}, and the lift still shows its"
         " session.",

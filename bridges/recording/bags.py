@@ -14,11 +14,11 @@ from typing import Final
 
 from bridges import user_files
 from bridges.log import pairs
-from bridges.recording.heard import Heard
+from bridges.recording.heard import Heard, Own
 from bridges.recording.sources import BagError, Notes, Raw
 from bridges.rmf import cdr
 
-__all__ = ["BagError", "Keep", "Notes", "heard_in"]
+__all__ = ["BagError", "Keep", "Notes", "all_in", "heard_in"]
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +34,14 @@ Keep = Callable[[str, bytes, float], bool]
 
 
 def heard_in(path: Path, notes: Notes | None = None, keep: Keep | None = None) -> Iterator[Heard]:
-    """Every message of RMF in a recording, in the order in which it was recorded.
+    """All messages of RMF in a recording, as `all_in` gives them."""
+    return (one for one in all_in(path, notes, keep) if isinstance(one, Heard))
+
+
+def all_in(
+    path: Path, notes: Notes | None = None, keep: Keep | None = None
+) -> Iterator[Heard | Own]:
+    """Every message of RMF in a recording, and every text of ours, in the order of recording.
 
     `path`: an MCAP file, a `.db3` file, or a directory of rosbag2. What is skipped or damaged is noted
     in `notes`; damage is logged where there are none. What `keep` does not want is left out undecoded,
@@ -48,11 +55,13 @@ def heard_in(path: Path, notes: Notes | None = None, keep: Keep | None = None) -
         try:
             if len(raw.sample) > LONGEST_MESSAGE:
                 raise cdr.CdrError("too long")
-            message = raw.decode(raw.sample)
+            at, wall = clock.at(raw.at) * NS, raw.wall * NS
+            if raw.decode is None:
+                yield Own(at, wall, raw.topic, cdr.decode_text(raw.sample))
+            else:
+                yield Heard(at, wall, raw.topic, raw.decode(raw.sample))
         except cdr.CdrError:
             noted.skipped[f"{raw.topic}: cannot be decoded"] += 1
-            continue
-        yield Heard(clock.at(raw.at) * NS, raw.wall * NS, raw.topic, message)
     if noted.damage and notes is None:
         log.warning(pairs("damaged", reason=noted.damage))
 

@@ -69,6 +69,15 @@ def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T
     return typing.cast(T, message)
 
 
+def decode_text(sample: bytes) -> str:
+    """The text in a std_msgs/String. Raises CdrError."""
+    order = _ORDERS.get(sample[:2])
+    try:
+        return str(_get(str, order or "<", NEWEST)(sample, 4)[0])
+    except (struct.error, IndexError, UnicodeDecodeError) as error:
+        raise CdrError(f"no text: {error}") from error
+
+
 _ORDERS = {LITTLE_ENDIAN[:2]: "<", BIG_ENDIAN[:2]: ">"}
 
 
