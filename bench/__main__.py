@@ -12,11 +12,18 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench import buses, day, idle, latency, recording
+from bench import buses, day, explain, idle, latency, recording
 from bench.figures import lines
 
 RESULTS = Path(__file__).parent / "results"
-SECTIONS = {"latency": latency, "idle": idle, "buses": buses, "day": day, "recording": recording}
+SECTIONS = {
+    "latency": latency,
+    "idle": idle,
+    "buses": buses,
+    "day": day,
+    "explain": explain,
+    "recording": recording,
+}
 
 
 def main(chosen: list[str]) -> int:

@@ -8,23 +8,25 @@ heard, the graph cannot be joined, or what was to be played was not.
 import argparse
 import os
 import shutil
+import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
 from bridges.commands.graph import add_graph_arguments, complain, interruptible, open_graph
 from bridges.commands.live import OF_DEVICES, Ear
-from bridges.commands.recordings import Span, add_span_arguments, heard_between
+from bridges.commands.recordings import Time, add_span_arguments
 from bridges.judge.judge import KINDS, Judge, Kind
 from bridges.judge.law import Verdict, shown
 from bridges.judge.plays import FLEET, Charge, Passages, Performance, Ride
 from bridges.judge.report import Report, as_json, junit, markdown, report, text, verdict
 from bridges.judge.stage import Stage
+from bridges.recording.bags import heard_in
 from bridges.recording.heard import Heard
-from bridges.recording.sources import BagError
+from bridges.recording.sources import BagError, Notes
 from bridges.rmf import topics
 from bridges.rmf.definitions import Message
 from bridges.rmf.transport import Publisher, Transport, TransportError
@@ -32,7 +34,6 @@ from bridges.rmf_rules import NEVER, Said
 
 NODE_NAME = "rmf_bridge_judge"
 LOOK_EVERY_S = 0.1
-NEVER_YET = float("-inf")
 FIRE = topics.FIRE_ALARM_TRIGGER
 WIDTH = 120
 BESIDE: dict[str, tuple[str, ...]] = {
@@ -181,16 +182,27 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _recorded(args: argparse.Namespace) -> int:
-    judge, span = Judge(args.kind, args.name), Span(args.from_, args.to)
+    judge, notes = Judge(args.kind, args.name), Notes()
     last: Heard | None = None
-    for heard in heard_between(args.recording, span, "judge"):
-        if args.from_ is None or heard.at >= span.begins_at > NEVER_YET:
-            judge.hear(heard)
-            last = heard
+    for last in _span(heard_in(args.recording, notes), args.from_, args.to):
+        judge.hear(last)
+    if notes.damage:
+        complain("judge", notes.damage)
     if last is None or judge.first is None:
         complain("judge", f"{args.recording} holds nothing of RMF's then")
         return os.EX_UNAVAILABLE
     return tell(report(judge, judge.end(last.at, last.wall), last.at - judge.first.at), args)
+
+
+def _span(heard: Iterable[Heard], begin: Time | None, end: Time | None) -> Iterator[Heard]:
+    """Every message from one time to the other; none is left out, as each may break a law."""
+    began: float | None = None
+    for one in heard:
+        began = one.wall if began is None else began
+        if end is not None and one.wall > end.wall(began):
+            return
+        if begin is None or one.wall >= begin.wall(began):
+            yield one
 
 
 def _live(args: argparse.Namespace, performance: Performance | None) -> int:
@@ -254,11 +266,18 @@ class Live:
         return f"others publish on {', '.join(found)}: to play all the same, say {beside}"
 
     def judge(self, stage: Stage) -> None:
-        """Until there is a verdict. An interrupt ends a play by letting the device go."""
+        """Until there is a verdict. Whatever ends a play, the device is let go first."""
         stage.begin(time.monotonic(), time.time())
-        while not stage.done:
-            with _interrupts_end(stage, self._say):
-                self._turn(stage)
+        try:
+            with _told_to_end() as told:
+                while not stage.done:
+                    if told():
+                        self._say(stage.stop())
+                    self._turn(stage)
+        except BaseException:
+            with suppress(TransportError):
+                self._say(stage.stop())
+            raise
 
     def _turn(self, stage: Stage) -> None:
         waits_s = min(stage.wake_at() - time.monotonic(), LOOK_EVERY_S)
@@ -279,15 +298,13 @@ class Live:
 
 
 @contextmanager
-def _interrupts_end(stage: Stage, say: Callable[[list[Said]], None]) -> Iterator[None]:
-    """Ctrl-C or SIGTERM: let the device go, then judge. Another one meanwhile changes nothing."""
+def _told_to_end() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C, SIGTERM or SIGHUP has come; none of them interrupts what is under way."""
+    told: list[int] = []
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, lambda n, _: told.append(n)) for number in signals}
     try:
-        yield
-    except KeyboardInterrupt:
-        while True:
-            try:
-                said = stage.stop()
-                say(said)
-                return
-            except KeyboardInterrupt:
-                continue
+        yield lambda: bool(told)
+    finally:
+        for number, action in before.items():
+            signal.signal(number, action)

@@ -2,17 +2,28 @@
 
 import argparse
 import re
+from collections import Counter, OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 
 from bridges.commands.graph import complain
-from bridges.recording.bags import heard_in
-from bridges.recording.heard import Heard
+from bridges.explain import noted
+from bridges.recording.bags import Keep, all_in
+from bridges.recording.heard import Heard, Own
+from bridges.recording.mcap_bags import OWN_TOPICS
 from bridges.recording.sources import Notes
+from bridges.rmf import topics
 
 CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[ T])?(\d\d?):(\d\d)(?::(\d\d(?:\.\d+)?))?")
+SAME_S = 2.4
+"""Less than after what a daemon is taken to be silent (3 s)."""
+STAMPED = 12
+"""So many bytes of a DiagnosticArray are CDR's head and the stamp (OMG DDSI-RTPS 10.2; Header)."""
+MOST_TOLD = 512
+FIRST_OF_OTHERS = 300
+COORDINATOR = b"charger_coordinator"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +86,65 @@ def _plus(text: str) -> float:
     return float(text)
 
 
+class Sieve:
+    """Which samples are worth decoding, for one device or (name "") for all.
+
+    Diagnostics come each second and seldom change: those that differ from what their node has just
+    said by numbers alone (ages, counts) are taken every SAME_S only. Of other devices the first
+    samples are taken, for their names.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name.encode(errors="replace")
+        self._others: Counter[str] = Counter()
+        self._told: OrderedDict[bytes, float] = OrderedDict()
+
+    def keep(self, topic: str, sample: bytes, at: float) -> bool:
+        """Is it to be decoded?"""
+        if topic.startswith(OWN_TOPICS) and topic.removeprefix(OWN_TOPICS) not in noted.TOPICS:
+            return False
+        if self._name not in sample and not self._is_common(topic, sample):
+            self._others[topic] += 1
+            return self._others[topic] <= FIRST_OF_OTHERS
+        return topic != topics.DIAGNOSTICS.name or self._is_news(sample, at)
+
+    def _is_common(self, topic: str, sample: bytes) -> bool:
+        """Is it of all devices? A heartbeat without this door says that nobody holds it."""
+        return topic == topics.DOOR_SUPERVISOR_HEARTBEAT.name or COORDINATOR in sample
+
+    def _is_news(self, sample: bytes, at: float) -> bool:
+        essence = sample[STAMPED:].translate(None, b"0123456789")
+        if 0 <= at - self._told.get(essence, float("-inf")) < SAME_S:
+            return False
+        self._told[essence] = at
+        self._told.move_to_end(essence)
+        if len(self._told) > MOST_TOLD:
+            self._told.popitem(last=False)
+        return True
+
+
+def told_between(path: Path, span: Span, command: str, device: str) -> Iterator[Heard | Own]:
+    """What concerns the device ("": all), messages and our recorder's texts, as `between` gives it.
+
+    Of what is much the same each second a part is left out (`Sieve`).
+    """
+    return between(path, span, command, Sieve(device).keep)
+
+
 def heard_between(path: Path, span: Span, command: str) -> Iterator[Heard]:
-    """Everything until the end of the span; what is before it too, as states last.
+    """Every message of RMF, as `between` gives it."""
+    return (one for one in between(path, span, command) if isinstance(one, Heard))
+
+
+def between(
+    path: Path, span: Span, command: str, keep: Keep | None = None
+) -> Iterator[Heard | Own]:
+    """A recording until the end of the span; what is before it too, as states last.
 
     Damage is told on standard error. Raises BagError.
     """
     notes, began, until = Notes(), None, float("inf")
-    for heard in heard_in(path, notes):
+    for heard in all_in(path, notes, keep):
         if began is None:
             began = heard.wall
             until = span.to.wall(began) if span.to else until

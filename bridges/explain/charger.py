@@ -144,7 +144,7 @@ def _refusal(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
 
 def _coordinated(found: Answer, charger: ChargerFacts, coordinator: Coordinator) -> None:
     """What the coordinator says of this charger, of the queue and of the schedule."""
-    of_it = coordinator.get(charger.name, "")
+    of_it = coordinator.get(charger.id, "")
     if of_it:
         found.say(f"The coordinator has it as {label(of_it)}.")
     for key, text in (("queue", "Its queue: "), ("schedule", "Its schedule: ")):

@@ -17,8 +17,8 @@ class Claim:
     """One requester's wish. `wants`: a floor, or what else is asked. `first`: of the whole visit;
     `since`: of this wish. `times`: how often it asked. `passed_on`: when the supervisor last asked for
     it. `own`: it was heard itself, not only through the supervisor. `met`: RMF saw what this wish waits
-    for. `granted`: the device was its. `stamp_age_s`: of its last request, if that was
-    `stamped`, by our clock.
+    for. `granted`: the device was its. `end_passed_on`: by the supervisor. `stamp_age_s`: of its last
+    request, if that was `stamped`, by our clock.
     """
 
     who: str
@@ -33,6 +33,7 @@ class Claim:
     met: Moment | None = None
     was_met: int = 0
     ended: Moment | None = None
+    end_passed_on: bool = False
     gone: bool = False
     stamped: bool = False
     stamp_age_s: float = 0.0

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridges.explain.explanation import Line
+from bridges.explain.noted import Noted
 from bridges.explain.phrases import Moment, lasted
 from bridges.explain.rows import label
 from bridges.explain.timeline import Kind
@@ -24,6 +25,8 @@ BACK_TIMES: Final = 3
 BACK_WITHIN_S: Final = 15.0
 """Stamps that go back so far, so often in so short a time are of two nodes."""
 REFUSED: Final = "refused "
+QUIET_S: Final = 60.0
+"""A refusal that comes again within this time is no news."""
 
 
 @dataclass(slots=True)
@@ -61,16 +64,20 @@ class Diagnosis:
 
 
 class Device:
-    """One device as it was heard. `began`: when anything was heard first."""
+    """One device as it was heard. `id`: its name on the graph. `name`: the same as a text that can be
+    shown. `began`: when anything was heard first.
+    """
 
     kind: Kind
 
     def __init__(self, name: str, began: Moment) -> None:
-        self.name = name
+        self.id = name
+        self.name = label(name)
         self.began = began
         self.lines: deque[Line] = deque(maxlen=MOST_LINES)
         self.told = 0
         self.diagnoses: dict[str, Diagnosis] = {}
+        self.noted: Diagnosis | None = None
         self.first_state: Moment | None = None
         self.last_state: Moment | None = None
         self.stamp_age_s = 0.0
@@ -132,9 +139,35 @@ class Device:
         self._faults(found, moment, status)
         self._refusals(found, moment)
 
+    def note(self, moment: Moment, note: Noted) -> None:
+        """What its own daemon noted: it writes what changes, so each note holds until the next."""
+        if self.noted is None:
+            near = moment.at - self.began.at <= SILENT_S
+            self.noted = Diagnosis(self.kind, Moment(moment.at, moment.wall, seen=not near))
+        known = self.noted
+        if note.outputs is not None:
+            on = [f"{label(name)} {label(value)}" for name, value in note.outputs.items() if value]
+            known.values = {"outputs": ", ".join(on).replace(" on", " yes") or "-"}
+        if note.faults is not None:
+            self._set_faults(
+                known, moment, {label(code): label(text) for code, text in note.faults.items()}
+            )
+        if note.refused:
+            self._refuses(known, moment, label(note.refused.partition(": ")[0]))
+
+    def _refuses(self, known: Diagnosis, moment: Moment, reason: str) -> None:
+        before = known.refused.get(reason)
+        if before is None and len(known.refused) >= MOST_CODES:
+            return
+        if before is None or moment.at - before.last.at > QUIET_S:
+            self.tell(moment, f"its daemon refuses a request: {reason}")
+        known.refused[reason] = Refused(before.count + 1 if before else 1, moment)
+
     def heard_from(self, now: Moment) -> Iterator[Diagnosis]:
-        """What daemons of ours say now."""
-        return (one for one in self.diagnoses.values() if now.at - one.last.at <= SILENT_S)
+        """What daemons of ours say now, and what the device's own noted."""
+        if self.noted is not None:
+            yield self.noted
+        yield from (one for one in self.diagnoses.values() if now.at - one.last.at <= SILENT_S)
 
     def own(self, now: Moment) -> Diagnosis | None:
         """What the device's own daemon says now; None if that is not ours, or silent."""
@@ -178,6 +211,9 @@ class Device:
             label(code): label(found.values.get(code, ""))
             for code in diagnostics.faults(status)[:MOST_CODES]
         }
+        self._set_faults(found, moment, codes)
+
+    def _set_faults(self, found: Diagnosis, moment: Moment, codes: Mapping[str, str]) -> None:
         for code in [code for code in found.faults if code not in codes]:
             del found.faults[code]
             self.tell(moment, f"fault {code} is over")
@@ -198,6 +234,6 @@ class Device:
                     if moment.seen:
                         self.tell(moment, f"its daemon refuses a request: {reason}")
             elif count != before.count:
-                if moment.at - before.last.at > 60.0:
+                if moment.at - before.last.at > QUIET_S:
                     self.tell(moment, f"its daemon refuses a request: {reason}")
                 before.count, before.last = count, Moment(moment.at, moment.wall)

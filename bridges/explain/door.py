@@ -34,6 +34,8 @@ def answer(door: DoorFacts, clock: Clock, around: common.Heard, focus: str = "")
         found.say(f"{claim.who} waits for {door.name} to be {wants} {clock.since(claim.since)}.")
     holders = [f"{who} {clock.since(since)}" for who, since in [*door.holders.items()][:4]]
     held = f"It is held by {', '.join(holders)}." if holders else "Nobody holds it."
+    if door.last_heartbeat is None:
+        held = "Who holds it was not heard."
     found.say(f"{door.name} is {door.mode.value} {clock.since(door.mode.since)}. {held}")
     if old := common.old_reading(door, clock):
         found.say(old)
@@ -164,8 +166,11 @@ def _not_let_go(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> N
 
 
 def _nobody_asks(found: Answer, door: DoorFacts, clock: Clock) -> None:
+    asked = door.asked.value if door.asked else ""
     if door.holders:
         _held_open(found, door, clock)
+    elif door.last_heartbeat is None and asked == OPEN and door.mode.value not in AWAY:
+        _asked_open(found, door, clock)
     elif door.mode.value == CLOSED:
         found.say("Nobody waits for it.", Step("nobody", "nothing is waited for"))
     elif door.mode.value in AWAY:
@@ -176,6 +181,15 @@ def _nobody_asks(found: Answer, door: DoorFacts, clock: Clock) -> None:
             " for CLOSE at each of its states meanwhile; that releases a hold and shuts nothing.",
             Step("the controller", f"close {door.name} when nobody is in the doorway"),
         )
+
+
+def _asked_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
+    """Only the supervisor was heard, as the door's own daemon hears it."""
+    assert door.asked is not None
+    found.say(f"The supervisor asks for OPEN {clock.since(door.asked.since)}.")
+    opened = Step("the robot", "drive through; then its fleet adapter sends CLOSE")
+    opens = Step("the controller", f"open {door.name} fully, and show it by its contact")
+    found.next.append(opened if door.mode.value == OPEN else opens)
 
 
 def _held_open(found: Answer, door: DoorFacts, clock: Clock) -> None:

@@ -53,7 +53,7 @@ class DoorFacts(Device):
         found = [
             label(session.requester_id)
             for sessions in heartbeat.all_sessions
-            if sessions.door_name == self.name
+            if sessions.door_name == self.id
             for session in sessions.sessions[:MOST_HOLDERS]
         ]
         seen = not first or moment.at - self.began.at > ASKS_WITHIN_S

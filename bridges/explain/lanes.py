@@ -13,9 +13,10 @@ from typing import Final
 
 from bridges.charger import refusals
 from bridges.explain import tones
+from bridges.explain.noted import levels, noted
 from bridges.explain.rows import Row, label
 from bridges.explain.timeline import LANES, Kind, Lane, LaneName, Level, Timeline, Tone
-from bridges.recording.heard import Heard
+from bridges.recording.heard import Heard, Own
 from bridges.rmf import definitions as d
 from bridges.rmf import words
 from bridges.serve import diagnostics
@@ -33,7 +34,7 @@ STEP_S: Final = 2.0
 
 
 def lanes(
-    heard: Iterable[Heard | Level],
+    heard: Iterable[Heard | Level | Own],
     kind: Kind,
     device: str,
     from_s: float = float("-inf"),
@@ -62,10 +63,17 @@ class Drawing:
         self._left_out = 0
         self._noted: set[str] = set()
         self._destination = ""
+        self._on: dict[tuple[str, str], str] = {}
         self._faulty: dict[str, frozenset[str]] = {}
 
-    def take(self, heard: Heard | Level) -> None:
+    def take(self, heard: Heard | Level | Own) -> None:
         """The next one. One that is late, by a recording's disorder, counts as of now."""
+        if isinstance(heard, Own):
+            note = noted(heard.topic.rpartition("/")[2], heard.text)
+            if note is not None and note.subject == self._device:
+                for level in levels(heard.at, note, self._on):
+                    self.take(level)
+            return
         self._now = max(self._now, heard.at)
         if self._began_at is None:
             self._began_at = self._now

@@ -105,6 +105,8 @@ class LiftFacts(Device):
 
     def _end(self, moment: Moment, who: str, passed_on: bool) -> None:
         claim = self.claims.get(who)
+        if claim is not None and passed_on:
+            claim.end_passed_on = True
         if claim is None or claim.ended is not None:
             if passed_on and who and who == self.session.value and claim is None:
                 claim, _ = self.claims.ask(who, "", moment)

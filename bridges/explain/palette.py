@@ -42,7 +42,7 @@ LIGHT: Final[dict[Tone, Look]] = {
 }
 DARK: Final[dict[Tone, Look]] = {
     "calm": Look("#474c55", "#f2f4f7"),
-    "works": Look("#2f86b8", "#ffffff"),
+    "works": Look("#236f9d", "#ffffff"),
     "open": Look("#0a8463", "#ffffff"),
     "held": Look("#c68a12", "#140e00"),
     "asks": Look("#5c5614", "#fffbd1", "#c9bb2e"),

@@ -17,10 +17,11 @@ from bridges.explain.device import SILENT_S, Device
 from bridges.explain.door_facts import DoorFacts
 from bridges.explain.explanation import Explanation, Line
 from bridges.explain.lift_facts import LiftFacts
+from bridges.explain.noted import noted
 from bridges.explain.phrases import Clock, Moment, lasted
 from bridges.explain.rows import label
 from bridges.explain.timeline import Kind
-from bridges.recording.heard import Heard
+from bridges.recording.heard import Heard, Own
 from bridges.rmf import definitions as d
 from bridges.rmf import words
 
@@ -54,9 +55,12 @@ class Site:
         self._steps: list[tuple[Moment, float]] = []
         self._coordinator: tuple[Moment, Mapping[str, str]] | None = None
 
-    def take(self, heard: Heard) -> None:
-        """The next message."""
+    def take(self, heard: Heard | Own) -> None:
+        """The next message, or the next text of our own recorder's."""
         moment = self._moment(heard)
+        if isinstance(heard, Own):
+            self._note(moment, heard)
+            return
         self.messages += 1
         topic, message = heard.topic.rpartition("/")[2], heard.message
         match message:
@@ -96,7 +100,7 @@ class Site:
 
     def kinds(self, name: str) -> list[Kind]:
         """What a device of this name is: those that have shown a state first, else who is asked for."""
-        found = [one for one in self._devices.values() if one.name == name]
+        found = [one for one in self._devices.values() if one.id == name]
         shown = [one.kind for one in found if one.last_state is not None]
         return shown or [one.kind for one in found]
 
@@ -146,7 +150,7 @@ class Site:
 
     # ---- who hears what
 
-    def _moment(self, heard: Heard) -> Moment:
+    def _moment(self, heard: Heard | Own) -> Moment:
         at = max(heard.at, self._now.at) if self._began else heard.at
         offset = heard.wall - heard.at
         if self._began is None:
@@ -216,6 +220,13 @@ class Site:
             found = self._devices.get((known, status.hardware_id)) if known == device else None
             if found is not None:
                 found.diagnose(moment, status, kind)
+
+    def _note(self, moment: Moment, own: Own) -> None:
+        note = noted(own.topic.rpartition("/")[2], own.text)
+        for kind in MAKES:
+            found = self._devices.get((kind, note.subject)) if note else None
+            if found is not None and note is not None:
+                found.note(moment, note)
 
     def _coordinates(self) -> Mapping[str, str]:
         if self._coordinator is None or self._now.at - self._coordinator[0].at > SILENT_S:

@@ -54,6 +54,7 @@ class Stage:
         self._until = NEVER
         self._leave_until = NEVER
         self._epoch = 0.0
+        self._in_haste = False
         self._last: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -104,12 +105,13 @@ class Stage:
         return NEVER if self.act is Act.DONE else self._until
 
     def stop(self) -> list[Said]:
-        """Enough: let go of the device first, if we have it."""
+        """Enough: let go of the device first, if we have it. May be called again."""
         if self.act is Act.PLAY:
-            self.note = "interrupted"
+            self.note, self._in_haste = "interrupted", True
             return self._begin_leaving()
         if self.act is not Act.LEAVE:
             self.act = Act.DONE
+        self._in_haste = True
         return []
 
     @property
@@ -163,7 +165,8 @@ class Stage:
         return self._told(self._performance.leave(self._now))
 
     def _settle(self) -> None:
-        self.act, self._until = Act.SETTLE, self._last[0] + SETTLES_S
+        self.act = Act.DONE if self._in_haste else Act.SETTLE
+        self._until = self._last[0] + SETTLES_S
 
     def _told(self, said: list[Said]) -> list[Said]:
         """Ours is judged as everybody's is: what the device is asked."""

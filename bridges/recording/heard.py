@@ -21,3 +21,16 @@ class Heard:
     wall: float
     topic: str
     message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """A text that our recorder wrote beside the messages: JSON of what a daemon noted.
+
+    `topic`: such as `rmf_bridge/outputs`. Times as of `Heard`.
+    """
+
+    at: float
+    wall: float
+    topic: str
+    text: str

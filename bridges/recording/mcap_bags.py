@@ -23,9 +23,8 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
         for record in records(path):
             if isinstance(record, Message):
                 found = declared.sources.get(record.channel_id, NO_CHANNEL)
-                if found.decode is None:
-                    if not declared.is_ours(found):
-                        notes.skipped[found.why] += 1
+                if found.decode is None and not declared.is_ours(found):
+                    notes.skipped[found.why] += 1
                     continue
                 wall = record.publish_time if declared.ours else record.log_time
                 yield Raw(record.log_time, wall, found.topic, record.data, found.decode)

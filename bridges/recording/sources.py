@@ -33,13 +33,16 @@ class Notes:
 
 
 class Raw(NamedTuple):
-    """A message as it was recorded. `at`, `wall`: ns by the recorder's and by the wall clock."""
+    """A message as it was recorded. `at`, `wall`: ns by the recorder's and by the wall clock.
+
+    `decode`: None for a text of our own recorder's.
+    """
 
     at: int
     wall: int
     topic: str
     sample: bytes
-    decode: Callable[[bytes], Message]
+    decode: Callable[[bytes], Message] | None
 
 
 class Source(NamedTuple):

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, TypeVar
 
+from bridges.rmf.definitions import field_types
 from bridges.rmf.releases import NEWEST, Release
 
 T = TypeVar("T")
@@ -66,6 +67,15 @@ def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T
     if not 0 <= len(sample) - end <= 3:
         raise CdrError(f"{len(sample)} bytes, where {message_type.__name__} takes {end}")
     return typing.cast(T, message)
+
+
+def decode_text(sample: bytes) -> str:
+    """The text in a std_msgs/String. Raises CdrError."""
+    order = _ORDERS.get(sample[:2])
+    try:
+        return str(_get(str, order or "<", NEWEST)(sample, 4)[0])
+    except (struct.error, IndexError, UnicodeDecodeError) as error:
+        raise CdrError(f"no text: {error}") from error
 
 
 _ORDERS = {LITTLE_ENDIAN[:2]: "<", BIG_ENDIAN[:2]: ">"}
@@ -173,11 +183,11 @@ def _getting_number(code: str) -> Get:
 
 
 def _getting_text(order: str) -> Get:
-    get_length = _getting_number(order + "I")
+    unpack = struct.Struct(order + "I").unpack_from
 
     def get(sample: bytes, at: int) -> tuple[str, int]:
-        length, at = get_length(sample, at)
-        end = at + length
+        at += (HEADER - at & 3) + 4
+        end = at + unpack(sample, at - 4)[0]
         if sample.find(0, at, end) != end - 1:
             raise CdrError("a string does not end with its only NUL")
         return sample[at : end - 1].decode(), end
@@ -202,10 +212,14 @@ def _getting_sequence(get_element: Get, order: str) -> Get:
 
 
 def _getting_struct(kind: type, members: dict[str, Get]) -> Get:
+    gets, names = tuple(members.values()), tuple(members)
+    whole = names == tuple(field_types(kind))  # else the release lacks some of its fields
+
     def get(sample: bytes, at: int) -> tuple[object, int]:
-        values = {}
-        for name, get_member in members.items():
-            values[name], at = get_member(sample, at)
-        return kind(**values), at
+        values = []
+        for get_member in gets:
+            value, at = get_member(sample, at)
+            values.append(value)
+        return kind(*values) if whole else kind(**dict(zip(names, values, strict=True))), at
 
     return get

@@ -16,6 +16,8 @@ Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel
 
 def printable(text: str) -> str:
     """The text on one line, with control characters escaped, so that no name can move the cursor."""
+    if text.isprintable():
+        return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 

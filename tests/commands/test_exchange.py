@@ -503,4 +503,4 @@ def test_a_charger_of_ones_own_choice_is_named_in_the_request() -> None:
 def test_a_withdrawal_is_done_when_it_is_sent() -> None:
     ran = tell(QueuedCancel("any", "r1"), [])
     assert ran.sent == [(2.0, d.ChargerCancel("", "r1"))]
-    assert ran.outcome == Done("the charger coordinator was ran that request r1 is withdrawn")
+    assert ran.outcome == Done("the charger coordinator was told that request r1 is withdrawn")

@@ -119,7 +119,7 @@ def test_a_start_releases_a_door_whose_status_cannot_be_read(
 ) -> None:
     registers.words[1, *COMMAND] = 7
     registers.refused[1, *STATUS] = code
-    bus = bus_to(module.port, timeout_s=0.3)
+    bus = bus_to(module.port, timeout_s=1.0)
     door = register.create("front", REGISTER_DOOR, bus)
     tried(door.open)
     assert registers.words[1, *COMMAND] == 5
@@ -139,7 +139,7 @@ def test_a_start_releases_a_door_that_can_only_be_written(
             door_map, command=msgspec.structs.replace(door_map.command, read_back=False)
         ),
     )
-    tried(register.create("front", mute, bus_to(module.port, timeout_s=0.3)).open)
+    tried(register.create("front", mute, bus_to(module.port, timeout_s=1.0)).open)
     assert registers.written == [(20, 5)]
 
 
@@ -147,7 +147,7 @@ def test_a_start_releases_a_door_that_can_only_be_written(
 def test_a_held_door_whose_status_fails_is_released_at_once_and_not_after_the_units_pause(
     module: Module, registers: Registers, code: int
 ) -> None:
-    bus = bus_to(module.port, timeout_s=0.3)
+    bus = bus_to(module.port, timeout_s=1.0)
     door = register.create("front", REGISTER_DOOR, bus)
     door.open()
     door.read()
@@ -179,7 +179,7 @@ def test_an_off_that_is_lost_is_tried_again_while_readings_fail(
     module: Module, registers: Registers
 ) -> None:
     clock = Time()
-    door = dry_contact.create("front", CONTACT_DOOR, bus_to(module.port, clock, timeout_s=0.3))
+    door = dry_contact.create("front", CONTACT_DOOR, bus_to(module.port, clock, timeout_s=1.0))
     door.open()
     door.read()
     door.write(HELD)
@@ -201,7 +201,7 @@ def two_relays() -> list[Wire]:
 def test_a_dead_unit_keeps_no_other_units_relay_on(
     module: Module, registers: Registers, dead: int
 ) -> None:
-    points = Points(two_relays(), bus_to(module.port, timeout_s=0.3))
+    points = Points(two_relays(), bus_to(module.port, timeout_s=1.0))
     points.open()
     points.write({"relay_1": True, "relay_2": True})
     registers.refused |= {(dead, 1, 0): 0, (dead, 5, 0): 0}
@@ -215,7 +215,7 @@ def test_a_start_switches_off_what_it_can_while_one_unit_is_dead(
 ) -> None:
     registers.words |= {(1, 1, 0): 1, (2, 1, 0): 1}
     registers.refused |= {(dead, 1, 0): 0, (dead, 5, 0): 0}
-    points = Points(two_relays(), bus_to(module.port, timeout_s=0.3))
+    points = Points(two_relays(), bus_to(module.port, timeout_s=1.0))
     assert not tried(points.open)
     assert (registers.words[1, 1, 0], registers.words[2, 1, 0]).index(0) == 2 - dead
 
@@ -247,7 +247,7 @@ def test_a_charge_on_modbus_is_stopped_while_its_state_cannot_be_read(
     module: Module, registers: Registers, code: int
 ) -> None:
     settings = modbus.Settings(unit=1)
-    charger = modbus.create("c", settings, bus_to(module.port, timeout_s=0.3))
+    charger = modbus.create("c", settings, bus_to(module.port, timeout_s=1.0))
     charger.read()
     charger.write(ChargerOutputs(power=True))
     assert registers.words[1, 1, 0] == 1

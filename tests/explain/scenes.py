@@ -146,7 +146,7 @@ def no_supervisor() -> Told:
 def reading_is_old() -> Told:
     """The lift's bus does not answer any more."""
     scene, red, _ = _two("Lift2")
-    scene.devices["Lift2"].far.down = "no answer"
+    scene.devices["Lift2"].far.down = "the module does not answer"
     scene.run(30.0)
     assert not red.robot.done
     return scene.heard, "lift", "Lift2"

@@ -20,7 +20,7 @@ from bridges.rmf.settings import Rmf
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Publisher
 from bridges.rmf_rules import Party
-from hal_fakes.wire import Wire, wire
+from hal_fakes.wire import Wire, runs_here
 from tests.judge.nodes.fire_is_volatile import FireIsVolatile
 from tests.judge.nodes.lift_answers import LiftAnswers
 from tests.judge.nodes.right_lift import RightLift
@@ -29,7 +29,7 @@ from tests.waiting import PATIENCE_S, wait_until
 CONFIG = Path(__file__).parents[2] / "config"
 
 
-@pytest.fixture(params=sorted({wire(), "zenoh"}))
+@pytest.fixture(params=sorted({runs_here(), "zenoh"}))
 def speaks(request: pytest.FixtureRequest) -> Wire:
     """The transport of the node and of the judge."""
     speaks: Wire = request.param
@@ -101,11 +101,14 @@ def verdict(process: subprocess.Popen[str]) -> tuple[int, set[str], list[str]]:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("file", "words"),
+    ("file", "words", "speaks"),
     [
-        ("lift_dry_contact", ["lift", "Lift1", "--ride", "L1", "L2", "--restarts"]),
-        ("door_modbus", ["door", "ward_door", "--passages", "1"]),
-        ("charger_http", ["charger", "charger_a", "--charge", "--robot", "fleet/AMR01"]),
+        *(
+            ("lift_dry_contact", ["lift", "Lift1", "--ride", "L1", "L2", "--restarts"], speaks)
+            for speaks in sorted({runs_here(), "zenoh"})
+        ),
+        ("door_modbus", ["door", "ward_door", "--passages", "1"], runs_here()),
+        ("charger_http", ["charger", "charger_a", "--charge", "--robot", "fleet/AMR01"], "zenoh"),
     ],
 )
 def test_our_own_daemons_keep_every_law(
@@ -137,10 +140,8 @@ def test_a_volatile_fire_alarm_is_told_by_who_matches(speaks: Wire, domain: int)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_judge_that_is_told_to_end_ends_its_session_first(
-    number: signal.Signals, speaks: Wire, domain: int
-) -> None:
+def test_a_judge_that_is_told_to_end_ends_its_session_first(speaks: Wire, domain: int) -> None:
+    number = signal.SIGTERM if speaks == "zenoh" else signal.SIGINT
     ride = ["judge", "lift", "Lift1", "--active", "--ride", "L1", "L3", "--json", "--localhost"]
     node = RightLift()
     with served(node, speaks, domain), bridge(*ride, speaks=speaks, domain=domain) as process:

@@ -35,10 +35,13 @@ def head(name: str, kind: str, content: dict[str, Any]) -> Head:
 
 def of_device(device: Device) -> Head:
     """The head of a daemon with this device alone."""
-    driver = type(device.settings).__module__.rpartition(".")[2]
     bus = {0.0: "gpio", 0.05: "modbus", 0.5: "http"}[device.poll_s]
     devices = {device.name: msgspec.to_builtins(device.settings)}
-    content = {"driver": driver, "buses": {"b": BUSES[bus]}, device.kind.devices_key: devices}
+    content = {
+        "driver": device.driver_name,
+        "buses": {"b": BUSES[bus]},
+        device.kind.devices_key: devices,
+    }
     return head(device.name, device.kind.name, content)
 
 

@@ -43,13 +43,15 @@ POLL_S = {"gpio": 0.0, "modbus": 0.05, "http": 0.5}
 
 @dataclass(frozen=True)
 class Device:
-    """One device from its settings to its plant. `driver()`: a new one, as a new daemon has it."""
+    """One device from its settings to its plant. `driver()`: a new one, as a new daemon has it;
+    `driver_name`: as a YAML has it."""
 
     name: str
     kind: AnyDeviceKind
     settings: Any
     plant: Machine
     far: Far
+    driver_name: str
     driver: Callable[[], Driver[Any, Any]]
     debounce: Mapping[str, float]
     poll_s: float
@@ -85,6 +87,7 @@ def _wired(
         settings,
         plant,
         far,
+        driver.__name__.rpartition(".")[2],
         lambda: driver.create(name, settings, far),
         driver.debounce(settings),
         POLL_S[bus],
@@ -110,6 +113,7 @@ def _register_door(timeline: Timeline, name: str, settings: Any) -> Device:
         settings,
         plant,
         far,
+        "register",
         lambda: door_register.create(name, settings, far),  # type: ignore[arg-type]
         {},
         POLL_S["modbus"],
@@ -130,6 +134,7 @@ def _charger(timeline: Timeline, name: str, clear_errors_per_h: int) -> Device:
         settings,
         plant,
         far,
+        "http",
         lambda: charger_http.create(name, settings, far),
         {},
         POLL_S["http"],

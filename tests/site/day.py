@@ -384,7 +384,7 @@ class Site:
         )
 
     def _bus_down(self, device: Device) -> None:
-        device.far.down = "no answer"
+        device.far.down = "the module does not answer"
         self.timeline.after(2.0, device.far.watchdog)
 
     def _bus_up(self, device: Device) -> None:

@@ -3,6 +3,8 @@
 from dataclasses import replace
 
 from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from bridges.rmf_rules import Said
 from tests.judge.nodes.right_charger import ERROR, RELEASED, RightCharger
 from tests.judge.nodes.right_door import RightDoor
 from tests.judge.nodes.right_lift import LOOP_S, RightLift
@@ -42,7 +44,16 @@ class SlowLift(RightLift):
 class EagerLift(RightLift):
     """Ten times a second, whatever happens."""
 
-    period_s = 0.0
+    beats_at = 0.0
+
+    def tick(self, now: float) -> list[Said]:
+        if now >= self.due_at:
+            super().tick(now)
+        self.beats_at = now + 0.1
+        return [(topics.LIFT_STATES, self.state(now))]
+
+    def wake_at(self) -> float:
+        return self.beats_at
 
 
 class LiftWithoutModes(RightLift):

@@ -174,7 +174,7 @@ def test_the_jitter_only_shortens_a_pause(either: Module) -> None:
 def test_one_dead_unit_costs_the_other_its_tries_and_then_one_a_pause(either: Module) -> None:
     door(either, unit=1)
     clock = Time()
-    bus = bus_to(either.port, clock, timeout_s=0.3)
+    bus = bus_to(either.port, clock, timeout_s=1.0)
     alive = bus.lines({IN0: None}, {})
     for _ in range(30):
         clock.now += 0.1
@@ -192,6 +192,6 @@ def test_the_echo_of_another_write_is_no_answer(either: Module, pdu: bytes) -> N
     either.reply = lambda request: (
         frame(request, pdu) if request[7] == 5 else either.answer(request)
     )
-    lines = bus_to(either.port, timeout_s=0.3).lines({IN0: None}, {COIL: False})
+    lines = bus_to(either.port, timeout_s=1.0).lines({IN0: None}, {COIL: False})
     with pytest.raises(HalError, match="tried 2x"):
         lines.write({COIL: True})

@@ -60,7 +60,7 @@ def test_a_coil_is_written_and_read_as_one(either: Module) -> None:
 def test_a_reply_that_does_not_answer_is_no_reading(module: Module, pdu: str) -> None:
     module.reply = lambda request: frame(request, bytes.fromhex(pdu))
     with pytest.raises(HalError, match=r"no Modbus reply to it|no reply within"):
-        bus_to(module.port, Time(), timeout_s=0.05, retries=0).cells([H0])
+        bus_to(module.port, Time(), timeout_s=0.5, retries=0).cells([H0])
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_a_reply_that_does_not_answer_is_no_reading(module: Module, pdu: str) ->
 def test_the_echo_of_another_write_is_no_success(module: Module, pdu: str) -> None:
     module.reply = lambda request: frame(request, bytes.fromhex(pdu))
     with pytest.raises(HalError):
-        bus_to(module.port, Time(), timeout_s=0.05, retries=0).write(H9, 0xABCD)
+        bus_to(module.port, Time(), timeout_s=0.5, retries=0).write(H9, 0xABCD)
 
 
 def test_closing_what_was_never_claimed_sends_nothing(module: Module) -> None:

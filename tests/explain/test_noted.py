@@ -1,0 +1,78 @@
+"""What a daemon noted of its device, in our own incident files."""
+
+from pathlib import Path
+
+import pytest
+
+from bridges.commands.recordings import Span as Part
+from bridges.commands.recordings import told_between
+from bridges.explain.lanes import Drawing
+from bridges.explain.noted import MOST, Noted, levels, noted
+from bridges.explain.site import Site
+from bridges.explain.timeline import Level
+
+CORPUS = Path(__file__).parents[1] / "recording" / "corpus"
+
+
+def test_an_incident_of_our_own_has_relays_inputs_and_faults() -> None:
+    drawing = Drawing("lift", "Lift1")
+    for one in told_between(CORPUS / "Lift1_1.mcap", Part(None, None), "test", "Lift1"):
+        drawing.take(one)
+    rows = [(lane.name, lane.row) for lane in drawing.timeline().lanes]
+    assert [row for row in rows if row[0] in ("relays", "inputs", "faults")] == [
+        ("relays", "agv_request"),
+        ("relays", "hold_door"),
+        ("relays", "call"),
+        ("inputs", "door"),
+        ("inputs", "agv"),
+        ("inputs", "floor_valid"),
+        ("inputs", "level"),
+        ("faults", "RMF_SILENT"),
+    ]
+
+
+def test_an_incident_says_what_its_daemon_refused_and_which_fault_it_has() -> None:
+    site = Site("Lift1")
+    for one in told_between(CORPUS / "Lift1_1.mcap", Part(None, None), "test", "Lift1"):
+        site.take(one)
+    told = site.explain("lift", "Lift1", None)
+    assert [fault.code for fault in told.faults] == ["RMF_SILENT"]
+    assert not told.notes
+
+
+def test_notes_become_levels_when_they_change() -> None:
+    on: dict[tuple[str, str], str] = {}
+    first = [*levels(1, Noted("Lift1", outputs={"call": "L2", "agv_request": "on"}), on)]
+    same = [*levels(2, Noted("Lift1", outputs={"call": "L2", "agv_request": "on"}), on)]
+    after = [*levels(3, Noted("Lift1", outputs={"call": "", "agv_request": "on"}), on)]
+    faults = [*levels(4, Noted("Lift1", faults={"FIRE": "FIRE"}), on)]
+    over = [*levels(5, Noted("Lift1", faults={}), on)]
+    assert (first, same, after, faults, over) == (
+        [Level(1, "relays", "call", "L2"), Level(1, "relays", "agv_request", "on")],
+        [],
+        [Level(3, "relays", "call", "")],
+        [Level(4, "faults", "FIRE", "FIRE")],
+        [Level(5, "faults", "FIRE", "")],
+    )
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[", "[]", "7", '{"subject":7}', '{"outputs":{}}', "[" * 100_000, '{"subject":"a"}x'],
+)
+def test_a_text_of_another_shape_is_no_note(text: str) -> None:
+    assert noted("outputs", text) is None
+
+
+@pytest.mark.parametrize("held", ["7", "[1]", '"x"', "null", '{"a":[],"b":{"=":7},"c":1.5,"":"x"}'])
+def test_values_of_another_shape_are_left_out(held: str) -> None:
+    note = noted("outputs", f'{{"subject":"Lift1","outputs":{held}}}')
+    assert note == Noted("Lift1", outputs={})
+
+
+def test_a_note_of_very_many_values_is_bounded() -> None:
+    held = ",".join(f'"o{n}":true' for n in range(10_000))
+    note = noted("outputs", f'{{"subject":"Lift1","outputs":{{{held}}}}}')
+    assert note is not None
+    assert note.outputs is not None
+    assert len(note.outputs) == MOST
