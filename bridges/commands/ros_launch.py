@@ -1,23 +1,23 @@
 """Starts the daemon as a ROS node: `ros2 launch rmf_bridges <kind>.launch.py config:=FILE`.
 
 After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/serve/guard.py`). Only
-the launch files in `ros/launch/`, one for each kind, import this module; it needs ROS's `launch`.
+the launch files in `ros/launch/`, one for each kind, import this module. `ros2` runs it with ROS's own
+Python, which has `launch` and yaml and none of the project's other packages.
 """
 
 from pathlib import Path
 
+import yaml
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from bridges.settings.load import SettingsError, load
-
 __all__ = ["LaunchDescription", "daemon"]
 
 
 def daemon(kind: str) -> LaunchDescription:
-    """The launch description for one kind. A file of another kind, or with errors, starts nothing."""
+    """The launch description for one kind. A file of another kind starts nothing."""
     return LaunchDescription(
         [
             DeclareLaunchArgument("config", description=f"the YAML of the {kind}"),
@@ -40,14 +40,17 @@ def _actions(kind: str, context: LaunchContext) -> list[Node]:
 
 
 def _check(kind: str, file: str) -> None:
-    """Raises RuntimeError for a file that cannot be served."""
+    """Raises RuntimeError for a file of another kind; the daemon finds every other error."""
     try:
-        config = load(file)
-    except SettingsError as error:
-        raise RuntimeError(str(error)) from None
-    if config.kind != kind:
+        settings = yaml.safe_load(Path(file).read_bytes())
+    except (OSError, yaml.YAMLError) as error:
+        raise RuntimeError(f"{file}: {error}") from None
+    found = settings.get("kind") if isinstance(settings, dict) else None
+    if found != kind:
         raise RuntimeError(
-            f"{file} is for a {config.kind}: ros2 launch rmf_bridges {config.kind}.launch.py"
+            f"{file} is for a {found}: ros2 launch rmf_bridges {found}.launch.py"
+            if found
+            else f"{file} does not say for which kind it is"
         )
 
 

@@ -1,4 +1,5 @@
-"""What was heard on RMF's graph, from a recording: ours, or rosbag2's of any release (MCAP or sqlite3).
+"""What was heard on RMF's graph, from a recording: ours, rosbag2's of any release (MCAP or sqlite3), or
+a daemon's ring itself.
 
 A recording is read as a stream, in bounded memory. Topics and types that are not RMF's are skipped and
 counted. If it is damaged, what can be read is given, and then the damage is told.
@@ -14,8 +15,11 @@ from typing import Final
 
 from bridges import user_files
 from bridges.log import pairs
+from bridges.recording.entries import Spoken
 from bridges.recording.heard import Heard, Own
-from bridges.recording.sources import BagError, Notes, Raw
+from bridges.recording.incident import timed
+from bridges.recording.ring import MAGIC, Read, RingError
+from bridges.recording.sources import BagError, Notes, Raw, releases, source
 from bridges.rmf import cdr
 
 __all__ = ["BagError", "Keep", "Notes", "all_in", "heard_in"]
@@ -43,9 +47,9 @@ def all_in(
 ) -> Iterator[Heard | Own]:
     """Every message of RMF in a recording, and every text of ours, in the order of recording.
 
-    `path`: an MCAP file, a `.db3` file, or a directory of rosbag2. What is skipped or damaged is noted
-    in `notes`; damage is logged where there are none. What `keep` does not want is left out undecoded,
-    which takes a tenth of the time. Raises BagError if it is no recording at all.
+    `path`: an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. What is skipped or damaged
+    is noted in `notes`; damage is logged where there are none. What `keep` does not want is left out
+    undecoded, which takes a tenth of the time. Raises BagError if it is no recording at all.
     """
     noted = Notes() if notes is None else notes
     clock = _Clock()
@@ -111,6 +115,8 @@ def _number(path: Path) -> tuple[int, str]:
 
 
 def _raw_of(part: Path, noted: Notes) -> Iterator[Raw]:
+    if not part.is_dir() and _beginning(part).startswith(MAGIC):
+        return _of_ring(part)
     begins = b"SQLite format 3\0" if part.is_dir() else _beginning(part)
     try:
         if begins.startswith(b"\x89MCAP0"):
@@ -124,6 +130,19 @@ def _raw_of(part: Path, noted: Notes) -> Iterator[Raw]:
     except ImportError as error:
         raise BagError(f"to read {part}, {error.name} is needed: {INSTALL}") from None
     raise BagError(f"{part} is no recording: neither MCAP nor a .db3 file of rosbag2")
+
+
+def _of_ring(path: Path) -> Iterator[Raw]:
+    try:
+        entries = list(Read(path).entries())
+    except RingError as error:
+        raise BagError(str(error)) from None
+    for entry, steady, wall in timed(entries):
+        if isinstance(entry, Spoken):
+            found = source(entry.topic, entry.type, releases(entry.type, ""))
+            if found.decode is not None:
+                at, told = round(steady / NS), round(wall / NS)
+                yield Raw(at, told, found.topic, entry.cdr, found.decode)
 
 
 def _beginning(path: Path) -> bytes:

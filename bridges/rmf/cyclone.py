@@ -16,6 +16,14 @@ LOOPBACK: Final = (
 """Keeps a node on this machine: unicast on `lo`, for up to 31 processes."""
 
 MOST_PROCESSES: Final = 32
+LEAVING: Final = (
+    "<Internal><MultipleReceiveThreads>false</MultipleReceiveThreads>"
+    "<WriterLingerDuration>100 ms</WriterLingerDuration></Internal>"
+)
+"""A node leaves at once, also when its address has gone. Else Cyclone 0.10 ends its receive threads by
+a datagram to that address and waits for it, for minutes (q_receive.c, trigger_recv_threads), and every
+writer waits 1 s for acknowledgements that do not come. rclpy holds Python's lock meanwhile: the whole
+daemon stands still."""
 
 
 def configuration(environ: Mapping[str, str]) -> str:
@@ -35,10 +43,19 @@ def configuration(environ: Mapping[str, str]) -> str:
     )
     silent = "<General><AllowMulticast>false</AllowMulticast></General>" if here else ""
     ours = (
-        f"<CycloneDDS><Domain>{silent}<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+        f"<CycloneDDS><Domain>{silent}{LEAVING}<Discovery><ParticipantIndex>auto</ParticipantIndex>"
         f"<MaxAutoParticipantIndex>{MOST_PROCESSES}</MaxAutoParticipantIndex>"
         + (f"<Peers>{named}</Peers>" if named else "")
         + "</Discovery></Domain></CycloneDDS>"
+    )
+    return f"{ours},{own}" if own else ours
+
+
+def for_ros(environ: Mapping[str, str]) -> str:
+    """CYCLONEDDS_URI for a ROS node on the network: how it leaves, then what is there already."""
+    ours, own = (
+        f"<CycloneDDS><Domain>{LEAVING}</Domain></CycloneDDS>",
+        environ.get("CYCLONEDDS_URI", ""),
     )
     return f"{ours},{own}" if own else ours
 

@@ -12,10 +12,8 @@ Only this file, dds_ends.py, idl.py and graph.py import cyclonedds, and only cho
 
 import ctypes
 import logging
-import math
 import os
 import threading
-import time
 from collections.abc import Callable
 from typing import Final, TypeVar
 from weakref import WeakValueDictionary
@@ -35,7 +33,7 @@ from bridges.rmf.dds_peers import DdsPeers
 from bridges.rmf.graph import NodeOnGraph
 from bridges.rmf.idl import sample_type
 from bridges.rmf.releases import Release
-from bridges.rmf.threaded import Threaded
+from bridges.rmf.threaded import LOOK_EVERY_S, Threaded
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
 
@@ -47,10 +45,7 @@ CANNOT_JOIN: Final = (
     "is a network interface up, and does CYCLONEDDS_URI, if set, name one that exists? "
     "`network: localhost` needs none. Cannot join DDS domain"
 )
-LOOK_EVERY_S: Final = 1.0
-LOOK_EVERY_NS: Final = 1_000_000_000
-"""How often to look whether the network has changed. Cyclone looks for an interface only once, when a
-node joins: with only `lo` up it stays there forever, and it never notices a changed address."""
+LOOK_EVERY_NS: Final = int(LOOK_EVERY_S * 1e9)
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
 ERRORS: Final = 1 | 2
 """What Cyclone may log: errors, also fatal ones. It would warn of each malformed datagram, and anybody
@@ -85,8 +80,6 @@ class DdsTransport(Threaded):
         self._loopback = loopback
         self._stop = threading.Event()
         self._joined = False
-        self._look_at = -math.inf
-        self._addresses: addresses.Addresses = frozenset()
         self._dds_peers = DdsPeers(self._peers)
         try:
             with self._reporting(f"{CANNOT_JOIN} {domain_id}"):
@@ -148,15 +141,9 @@ class DdsTransport(Threaded):
 
     def _follow_network(self) -> None:
         """Join again if the machine's addresses have changed since the last time."""
-        now = time.monotonic()
-        if now < self._look_at or (self._loopback and self._joined):
+        if (self._loopback and self._joined) or not self._look_is_due():
             return
-        self._look_at = now + LOOK_EVERY_S
-        found = addresses.addresses()
-        if found != self._addresses:
-            log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
-            self._join_anew()
-        elif not self._joined:
+        if self._network_changed() or not self._joined:
             self._join_anew()
 
     def _join_anew(self) -> None:

@@ -71,12 +71,12 @@ class DdsPublisher:
 
     def publish(self, message: Message) -> None:
         """Send; blocks for 20 ms at most. Raises TransportError if it was not sent."""
+        if not self._reader_thread.is_alive():
+            raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
+        self._retained.append(message)  # goes out when the node joins again
         if self._writer is None:
             why = "there is no network, or RMF's release lacks the message"
             raise TransportError(f"topic {self.topic.name}: not sent: {why}")
-        if not self._reader_thread.is_alive():
-            raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        self._retained.append(message)
         try:
             self._write(message)
         except DDSException as error:

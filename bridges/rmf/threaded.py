@@ -1,14 +1,24 @@
 """What the transports with a thread of their own share: `dds`, `zenoh` and `ros2`."""
 
+import logging
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import ClassVar
+from typing import ClassVar, Final
 
+from bridges.log import pairs
+from bridges.rmf import addresses
 from bridges.rmf.peers import Peers
 from bridges.rmf.releases import Release
 from bridges.rmf.transport import TransportError
+
+log = logging.getLogger(__name__)
+
+LOOK_EVERY_S: Final = 1.0
+"""How often (s) to look whether the machine's addresses have changed. No library does that: one that
+starts with only `lo` up stays there forever, and none notices a changed address."""
 
 
 class Threaded:
@@ -26,6 +36,8 @@ class Threaded:
         self.dropped: dict[str, int] = {}
         self._lock = threading.Lock()
         self._closed = False
+        self._look_at = -math.inf
+        self._addresses: addresses.Addresses = frozenset()
 
     @property
     def release(self) -> Release:
@@ -48,6 +60,23 @@ class Threaded:
     def _start(self, run: Callable[[], None], wire: str) -> None:
         self._thread = threading.Thread(target=run, name=f"{self.name}-{wire}", daemon=True)
         self._thread.start()
+
+    def _look_is_due(self) -> bool:
+        """Whether it is time to look at the network again."""
+        now = time.monotonic()
+        if now < self._look_at:
+            return False
+        self._look_at = now + LOOK_EVERY_S
+        return True
+
+    def _network_changed(self) -> bool:
+        """Whether the machine's addresses have changed since the node joined; logs them."""
+        found = addresses.addresses()
+        if found == self._addresses:
+            return False
+        self._addresses = found
+        log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
+        return True
 
     def _join_thread(self) -> None:
         """Wait until the thread has ended, unless it is the one that asks."""

@@ -26,7 +26,7 @@ from bridges.log import pairs
 from bridges.rmf import addresses, notices, zenoh_config
 from bridges.rmf.releases import Release
 from bridges.rmf.settings import Zenoh
-from bridges.rmf.threaded import Threaded
+from bridges.rmf.threaded import LOOK_EVERY_S, Threaded
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
 from bridges.rmf.zenoh_ends import Order, ZenohEnd, ZenohPublisher, ZenohSubscription
@@ -36,7 +36,6 @@ from bridges.rmf.zenoh_session import closed, opened, trim_memory
 
 log = logging.getLogger(__name__)
 
-LOOK_EVERY_S: Final = 1.0
 NO_ROUTER: Final = (
     "no router answers, or it refuses this node: RMF hears nothing until one accepts it"
 )
@@ -261,16 +260,10 @@ class ZenohTransport(Threaded):
 
     def _follow_network(self) -> None:
         """Join again if the machine's addresses have changed since the last time."""
-        now = time.monotonic()
-        if self._loopback or now < self._look_at:
+        if self._loopback or not self._look_is_due():
             return
-        self._look_at = now + LOOK_EVERY_S
         self._look()
-        found = addresses.addresses()
-        if found != self._addresses and self._leaves_machine():
-            log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
-            self._join_anew()
-        elif self._session is None:
+        if (self._leaves_machine() and self._network_changed()) or self._session is None:
             self._join_anew()
 
     def _leaves_machine(self) -> bool:

@@ -12,20 +12,18 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Final
 
-from bridges.core.decision import Decision, IoFailed, Sampled
+from bridges.core.decision import IoFailed, Sampled
 from bridges.core.durations import AGES_AGO, NEVER
 from bridges.recording import entries
-from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Known, Same, Spoken, Step, Told
+from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Same, Spoken, Told
 from bridges.recording.ring import FRAME, Ring
-from bridges.recording.trees import Tree, tree
+from bridges.recording.seen import AnyDecision, Seen, known, step
 from bridges.rmf import cdr
 from bridges.rmf.definitions import Message
 from bridges.rmf.releases import Release
 from bridges.rmf.rihs01 import type_name
 from bridges.serve.clock import Clock
 from bridges.serve.directory import Once
-
-AnyDecision = Decision[Any, Any, Any]
 
 KNOWN_EVERY_S: Final = 60.0
 """So often all that is known is written again: a recording may begin there."""
@@ -70,29 +68,6 @@ class Nobody:
 
 
 NOBODY: Final = Nobody()
-
-
-class _Subject:
-    """What is known of a subject, as the ring shows it. `times`: when the last reading came again."""
-
-    def __init__(self, memory: object) -> None:
-        self.memory = memory
-        self.reading: object = None
-        self.outputs: object = None
-        self.report: Any = None
-        self.news: object = None
-        self.times: list[float] = []
-
-    def is_as_before(self, event: object, decision: AnyDecision, news: object) -> bool:
-        """Is this the last reading again, and did it change nothing?"""
-        return (
-            event == self.reading
-            and decision.outputs == self.outputs
-            and news == self.news
-            and decision.report.faults == self.report.faults
-            and not decision.refused
-            and not decision.publish
-        )
 
 
 class Witness(Nobody):
@@ -180,9 +155,9 @@ class Witness(Nobody):
 
     def _fresh(self) -> None:
         """Nothing of this is in the ring yet."""
-        self._subjects: dict[str, _Subject] = {}
+        self._subjects: dict[str, Seen] = {}
         self._out = bytearray()
-        self._same: dict[str, _Subject] = {}
+        self._same: dict[str, Seen] = {}
         self._known_at = AGES_AGO
         self._offset_s = 0.0
 
@@ -222,19 +197,19 @@ class Witness(Nobody):
             self._again(name, subject, now)
             return
         self._say_same(name)
-        self._put(_step_of(name, subject, event, now, decision, news))
+        self._put(step(name, subject, event, now, decision, news))
         subject.memory, subject.outputs = decision.memory, decision.outputs
         subject.report, subject.news = decision.report, news
         if is_reading:
             subject.reading = event
 
-    def _anew(self, name: str, memory: object, now: float) -> _Subject:
+    def _anew(self, name: str, memory: object, now: float) -> Seen:
         self._say_same(name)
-        self._put(_known(name, _Subject(memory), now, anew=True))
-        self._subjects[name] = subject = _Subject(memory)
+        self._put(known(name, Seen(memory), now, anew=True))
+        self._subjects[name] = subject = Seen(memory)
         return subject
 
-    def _again(self, name: str, subject: _Subject, now: float) -> None:
+    def _again(self, name: str, subject: Seen, now: float) -> None:
         subject.times.append(now)
         self._same[name] = subject
         if len(subject.times) == SAME_AT_ONCE:
@@ -319,50 +294,11 @@ class Witness(Nobody):
                 self._frame(content)
 
     def _all_known(self, now: float) -> list[bytes]:
-        known = [_known(name, subject, now) for name, subject in self._subjects.items()]
-        clocks = entries.encode(Clocks(now, now + self._offset_s))
-        return [clocks, *map(entries.encode, known)]
+        clocks = Clocks(now, now + self._offset_s)
+        all_known = [known(name, seen, now) for name, seen in self._subjects.items()]
+        return [entries.encode(clocks), *map(entries.encode, all_known)]
 
     def _write(self) -> None:
         if self._out and self._ring is not None:
             self._ring.write(bytes(self._out))
             self._out.clear()
-
-
-def _known(name: str, subject: _Subject, now: float, *, anew: bool = False) -> Known:
-    return Known(
-        now,
-        name,
-        tree(subject.memory),
-        tree(subject.reading),
-        tree(subject.outputs),
-        tree(subject.report),
-        anew,
-    )
-
-
-def _step_of(
-    name: str,
-    subject: _Subject,
-    event: object,
-    now: float,
-    decision: AnyDecision,
-    news: object,
-) -> Step:
-    """The entry of a decision: what is as before is left out."""
-    faults, before = decision.report.faults, subject.report
-    return Step(
-        now,
-        name,
-        tree(event),
-        tree(decision.wake_at),
-        decision.refused,
-        [] if decision.outputs == subject.outputs else [tree(decision.outputs)],
-        [] if news == subject.news else [tree(news)],
-        [] if before and faults == before.faults else [tree(faults)],
-        _said(decision),
-    )
-
-
-def _said(decision: AnyDecision) -> list[Tree]:
-    return [[topic.name, tree(message)] for topic, message in decision.publish]

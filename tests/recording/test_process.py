@@ -61,7 +61,7 @@ def test_a_person_records_an_incident_and_replays_it(
 
     assert made.returncode == 0, made.stderr
     assert [(note.code, note.text) for note in notes_in(file)] == [("OPERATOR", "it stood")]
-    assert {one.topic for one in heard_in(file)} == {"lift_states"}
+    assert {one.topic for one in heard_in(file)} == {"lift_states", "diagnostics"}
     assert (told.returncode, json.loads(told.stdout)["differences"]) == (0, [])
     assert json.loads(told.stdout)["decisions"] > 5
     assert (ring.returncode, ring.stdout.splitlines()[-1]) == (0, "all as recorded")

@@ -99,6 +99,7 @@ def test_a_step_of_the_wall_clock_is_in_the_recording_and_turns_no_time_back(
     write(tmp_path / "a.mcap", Incident(HEAD, entries))
 
     heard = list(heard_in(tmp_path / "a.mcap"))
+    assert list(heard_in(tmp_path / "ring")) == heard
     assert [round(one.wall - WALL, 3) for one in heard] == [101, 102, -3497, -3496, 105.01]
     assert [round(one.at - WALL, 3) for one in heard] == [101, 102, 103, 104, 105]
     assert len([one for one in entries if isinstance(one, Clocks)]) == 3

@@ -20,18 +20,20 @@ ZENOH = {"zenoh": Zenoh(), "zenoh_ros2dds": Zenoh(keys="ros2dds")}
 """The two ways to name things on zenoh."""
 
 
-def joining(transport: str, domain: int, release: Release | None = RELEASE) -> Join:
-    """What opens nodes of this transport in this domain, on loopback."""
+def joining(
+    transport: str, domain: int, release: Release | None = RELEASE, *, loopback: bool = True
+) -> Join:
+    """What opens nodes of this transport in this domain, on loopback unless the test says how else."""
 
     def join(name: str) -> Transport:
         if transport.startswith("zenoh"):
             ways = ZENOH[transport]
-            return ZenohTransport(name, domain, loopback=True, settings=ways, release=release)
+            return ZenohTransport(name, domain, loopback=loopback, settings=ways, release=release)
         # Imported here: there may be no ROS.
         module = importlib.import_module(f"bridges.rmf.{transport}")
         kind = {"dds": "DdsTransport", "ros2": "Ros2Transport"}[transport]
         wanted = {} if transport == "ros2" else {"release": release}  # that takes what is installed
-        node: Transport = getattr(module, kind)(name, domain, loopback=True, **wanted)
+        node: Transport = getattr(module, kind)(name, domain, loopback=loopback, **wanted)
         return node
 
     return join

@@ -8,16 +8,18 @@ import pytest
 from bridges.rmf import addresses, cyclone
 from bridges.rmf import definitions as d
 from bridges.rmf.cyclone import LOOPBACK
-from bridges.rmf.dds import DdsTransport
 from bridges.rmf.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
 from bridges.rmf.transport import TransportError
 from tests.rmf import peer
+from tests.rmf.conftest import ROS2
+from tests.rmf.joining import joining
 from tests.waiting import wait_until
 
 AUTO = (
-    "<CycloneDDS><Domain><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+    f"<CycloneDDS><Domain>{cyclone.LEAVING}<Discovery><ParticipantIndex>auto</ParticipantIndex>"
     "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>{}</Discovery></Domain></CycloneDDS>"
 )
+ALARM = FIRE_ALARM_TRIGGER.named("ping_fire_alarm_trigger")
 PEERS = '<Peers><Peer address="10.0.0.5"/><Peer address="rmf.local"/></Peers>'
 
 
@@ -33,8 +35,7 @@ PEERS = '<Peers><Peer address="10.0.0.5"/><Peer address="rmf.local"/></Peers>'
             AUTO.format(
                 '<Peers><Peer address="localhost"/><Peer address="10.0.0.5"/></Peers>'
             ).replace(
-                "<Discovery>",
-                "<General><AllowMulticast>false</AllowMulticast></General><Discovery>",
+                "<Domain>", "<Domain><General><AllowMulticast>false</AllowMulticast></General>"
             ),
         ),
         ({"CYCLONEDDS_URI": "file:///c.xml"}, AUTO.format("") + ",file:///c.xml"),
@@ -51,30 +52,41 @@ def test_ross_variables_become_cyclones_configuration(environ: dict[str, str], w
 class Machine:
     """The machine's addresses, as the test sets them."""
 
-    def __init__(self) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self._monkeypatch = monkeypatch
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
+
+    def goes_down(self) -> None:
+        """It has no network: Cyclone finds no interface, and rclpy finds no middleware."""
+        self._monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace('"lo"', '"no-such-interface"'))
+        self.addresses = frozenset()
+
+    def comes_back(self) -> None:
+        """It has a network: loopback."""
+        self._monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
 
 
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
     """A machine whose nodes go by its addresses, and in truth stay on loopback."""
-    made = Machine()
+    made = Machine(monkeypatch)
     monkeypatch.setattr(addresses, "addresses", lambda: made.addresses)
-    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # for Fast DDS
+    made.comes_back()
     return made
 
 
 class Echoed:
     """A node under test, and a process that sends back what it hears."""
 
-    def __init__(self, domain: int) -> None:
+    def __init__(self, transport: str, domain: int) -> None:
         self.domain = domain
-        self.node = DdsTransport("node", domain, loopback=False)
+        self.node = joining(transport, domain, loopback=False)("node")
         self.heard: list[d.Message] = []
         self.node.subscribe(DOOR_STATES.named("pong_door_states"), self.heard.append)
         self.node.subscribe(FIRE_ALARM_TRIGGER.named("pong_fire_alarm_trigger"), self.heard.append)
         self.states = self.node.publisher(DOOR_STATES.named("ping_door_states"))
-        self.alarm = self.node.publisher(FIRE_ALARM_TRIGGER.named("ping_fire_alarm_trigger"))
+        self.alarm = self.node.publisher(ALARM)
 
     def comes_back(self, number: int) -> bool:
         """Whether a state that is sent again and again has been there and back."""
@@ -84,9 +96,9 @@ class Echoed:
         return state in self.heard
 
 
-@pytest.fixture
-def echoed(domain: int, machine: Machine) -> Iterator[Echoed]:
-    made = Echoed(domain)
+@pytest.fixture(params=["dds", ROS2])
+def echoed(request: pytest.FixtureRequest, domain: int, machine: Machine) -> Iterator[Echoed]:
+    made = Echoed(request.param, domain)
     with peer.running("echo", domain):
         wait_until(lambda: made.comes_back(1), "the process is found")
         yield made
@@ -115,11 +127,9 @@ def test_another_address_is_joined_with_all_ends_and_what_was_retained_goes_out_
 def test_without_a_network_it_waits_says_so_once_and_is_back_when_the_network_is(
     echoed: Echoed,
     machine: Machine,
-    monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace('"lo"', '"no-such-interface"'))
-    machine.addresses = frozenset()
+    machine.goes_down()
     wait_until(lambda: any("not_joined" in text for text in caplog.messages), "it cannot join")
     with pytest.raises(TransportError):
         echoed.states.publish(d.DoorState())
@@ -128,19 +138,29 @@ def test_without_a_network_it_waits_says_so_once_and_is_back_when_the_network_is
     assert meanwhile.matched() == 0
     with pytest.raises(TransportError):
         meanwhile.publish(d.DoorState())
-    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+    machine.comes_back()
     wait_until(lambda: echoed.comes_back(2), "states go there and back")
     assert sum("not_joined" in text for text in caplog.messages) == 1
+
+
+def test_an_alarm_that_is_raised_without_a_network_goes_out_when_there_is_one(
+    echoed: Echoed, machine: Machine, caplog: pytest.LogCaptureFixture
+) -> None:
+    machine.goes_down()
+    wait_until(lambda: any("not_joined" in text for text in caplog.messages), "it cannot join")
+    declared_meanwhile = echoed.node.publisher(ALARM)
+    with pytest.raises(TransportError):
+        declared_meanwhile.publish(d.Bool(True))
+    machine.comes_back()
+    wait_until(lambda: d.Bool(True) in echoed.heard, "the alarm is heard")
 
 
 def test_it_can_be_closed_while_there_is_no_network(
     echoed: Echoed,
     machine: Machine,
-    monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace('"lo"', '"no-such-interface"'))
-    machine.addresses = frozenset()
+    machine.goes_down()
     wait_until(lambda: any("not_joined" in text for text in caplog.messages), "it cannot join")
     echoed.states.close()
     echoed.node.close()

@@ -1,13 +1,13 @@
 """Hypothesis strategies for every message type, made from the annotations of `definitions.py`."""
 
 import typing
-from dataclasses import fields
 from typing import Any
 
 from hypothesis import settings
 from hypothesis import strategies as st
 
 from bridges.rmf import definitions as d
+from bridges.rmf.releases import NEWEST, Release
 from tests.depth import examples
 
 NUMBERS: dict[str, st.SearchStrategy[Any]] = {
@@ -26,14 +26,15 @@ repeatable = settings(derandomize=True, deadline=None, database=None, max_exampl
 MESSAGE_TYPES: tuple[Any, ...] = typing.get_args(d.Message)
 
 
-def values(kind: Any) -> st.SearchStrategy[Any]:
-    """Any value of a field's or a message's type."""
+def values(kind: Any, release: Release = NEWEST) -> st.SearchStrategy[Any]:
+    """Any value of a field's or a message's type that this release of the messages can carry."""
     if typing.get_origin(kind) is typing.Annotated:
         return NUMBERS[kind.__metadata__[0]]
     if typing.get_origin(kind) is tuple:
-        return st.lists(values(typing.get_args(kind)[0]), max_size=6).map(tuple)
+        return st.lists(values(typing.get_args(kind)[0], release), max_size=6).map(tuple)
     if kind is str:
         return TEXTS
     if kind is bool:
         return st.booleans()
-    return st.builds(kind, *(values(field.type) for field in fields(kind)))
+    carried = release.fields(kind).items()
+    return st.builds(kind, **{name: values(field, release) for name, field in carried})

@@ -29,8 +29,11 @@ class End:
     def get_subscription_count(self): return 0
     def get_publisher_count(self): return 0
     def publish(self, sample): pass
+class Clock:
+    def now(self): raise RuntimeError
 class Node:
     def __init__(self, name, **options): self.name = name
+    def get_clock(self): return Clock()
     def get_name(self): return self.name
     def create_guard_condition(self, callback):
         self.guard = Guard()
@@ -47,7 +50,7 @@ import threading, rclpy
 class SingleThreadedExecutor:
     def __init__(self, context): pass
     def add_node(self, node): self.node = node
-    def spin_once(self):
+    def spin_once(self, timeout_sec):
         rclpy.spinning.add(threading.current_thread())
         self.node.guard.rung.wait()
     def shutdown(self): pass
@@ -66,6 +69,8 @@ class PublisherEventCallbacks:
     def __init__(self, **options): pass
 class SubscriptionEventCallbacks(PublisherEventCallbacks): pass
 """
+PUBLISHER = "class Publisher: pass\n"
+SUBSCRIPTION = "class Subscription: pass\n"
 EXCEPTIONS = "class NameValidationException(Exception): pass\n"
 MODULES = {
     "__init__": RCLPY,
@@ -75,6 +80,8 @@ MODULES = {
     "qos": QOS,
     "event_handler": EVENTS,
     "exceptions": EXCEPTIONS,
+    "publisher": PUBLISHER,
+    "subscription": SUBSCRIPTION,
 }
 PACKAGES = (
     *("builtin_interfaces", "rmf_lift_msgs", "rmf_door_msgs", "rmf_charger_msgs"),
