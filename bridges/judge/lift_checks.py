@@ -81,7 +81,7 @@ def grants(scene: LiftScene) -> Finding:
         return KEPT if scene.session != scene.session_before else None
     free_s = scene.now - scene.free_since
     for session, ask in list(scene.asks.items()):
-        asked = ask.direct and ask.times >= GRANT_ASKED and scene.now - ask.at < 3.0
+        asked = ask.direct and ask.times >= GRANT_ASKED and scene.now - ask.direct_at < 3.0
         served = ask.floors[-1] in scene.new.available_floors or not scene.new.available_floors
         long_s = min(free_s, scene.now - ask.since)
         if asked and served and session and not ask.human and long_s > GRANTS_WITHIN_S:

@@ -4,7 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Final
 
-from bridges.judge.scene import NEVER, Scene, keep
+from bridges.judge.scene import NEVER, SILENT_S, Scene, keep
 from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -23,7 +23,8 @@ END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
 @dataclass
 class Ask:
-    """The requests of one session. `at`: the latest. `since`: the first after it had none.
+    """The requests of one session. `at`: the latest. `direct_at`: the latest on lift_requests, where it
+    has been asked for without a gap `since` then.
     `human`: it asked for HUMAN mode. `direct`: it was heard on lift_requests."""
 
     at: float
@@ -31,6 +32,7 @@ class Ask:
     floors: deque[str] = field(default_factory=lambda: deque(maxlen=FLOORS))
     times: int = 0
     human: bool = False
+    direct_at: float = NEVER
     direct: bool = False
 
 
@@ -194,8 +196,9 @@ class LiftScene(Scene[d.LiftState]):
     def _ask(self, message: d.LiftRequest, direct: bool) -> None:
         session = message.session_id
         ask = self.asks.get(session) or Ask(self.now, self.now)
-        if not ask.times:
+        if direct and (not ask.times or self.now - ask.direct_at > SILENT_S):
             ask.since = self.now
+        ask.direct_at = self.now if direct else ask.direct_at
         ask.at, ask.direct = self.now, ask.direct or direct
         ask.times += direct
         ask.human |= message.request_type == d.LiftRequestType.REQUEST_HUMAN_MODE

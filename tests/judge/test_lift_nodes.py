@@ -2,6 +2,7 @@
 
 import pytest
 
+from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf_rules import Party
 from bridges.rmf_rules.supervisors import LiftSupervisor
@@ -93,6 +94,18 @@ def test_a_ride_finds_the_defect(node: type[RightLift], law: str) -> None:
 def test_watching_finds_the_defect(node: type[RightLift], parties: list[Party], law: str) -> None:
     found = watched("lift", "Lift1", node(), *parties)
     assert found["broken"] == {law}
+
+
+def test_a_lift_whose_supervisor_has_died_owes_nobody_a_session() -> None:
+    """The robot goes on asking on adapter_lift_requests, where a lift grants nothing."""
+
+    class Taken(RightLift):
+        def serves(self, request: d.LiftRequest) -> bool:
+            return False
+
+    adapter = [(20.0 + n, topics.ADAPTER_LIFT_REQUESTS, lift(RED, "L3")) for n in range(60)]
+    parties = asks(5.0, RED, "L3", 15), Script(*adapter)
+    assert watched("lift", "Lift1", Taken(), *parties, for_s=90.0)["broken"] == set()
 
 
 def test_with_two_lifts_nobody_knows_whose_alarm_it_is() -> None:
