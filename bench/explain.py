@@ -86,11 +86,11 @@ def _heard(second: int, part: float, topic: str, message: d.Message) -> Heard:
 
 def main(bag: Path) -> None:
     """Explain, and print figures as JSON."""
-    from bridges.commands.recordings import Span, heard_between
+    from bridges.commands.recordings import Span, told_between
     from bridges.explain.site import Site
 
     began, site = time.process_time(), Site("Lift1")
-    for heard in heard_between(bag, Span(None, None), "bench", "Lift1"):
+    for heard in told_between(bag, Span(None, None), "bench", "Lift1"):
         site.take(heard)
     told = site.explain("lift", "Lift1", None)
     took_s = time.process_time() - began

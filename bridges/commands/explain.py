@@ -22,7 +22,7 @@ from bridges.commands.graph import (
     open_graph,
 )
 from bridges.commands.live import Ear
-from bridges.commands.recordings import Span, add_span_arguments, heard_between
+from bridges.commands.recordings import Span, add_span_arguments, told_between
 from bridges.explain.explanation import Explanation
 from bridges.explain.site import Site
 from bridges.explain.text import SCREEN_LINES, lines
@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
 def _recorded(args: argparse.Namespace) -> int:
     site = Site(args.device or "", args.session)
     span = Span(args.from_, args.to)
-    for heard in heard_between(args.file, span, "explain", args.device or ""):
+    for heard in told_between(args.file, span, "explain", args.device or ""):
         site.take(heard)
     site.story_from(span.begins_at)
     if not site.messages:

@@ -11,21 +11,22 @@ import shutil
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
 from bridges.commands.graph import add_graph_arguments, complain, interruptible, open_graph
 from bridges.commands.live import OF_DEVICES, Ear
-from bridges.commands.recordings import Span, add_span_arguments, heard_between
+from bridges.commands.recordings import Time, add_span_arguments
 from bridges.judge.judge import KINDS, Judge, Kind
 from bridges.judge.law import Verdict, shown
 from bridges.judge.plays import FLEET, Charge, Passages, Performance, Ride
 from bridges.judge.report import Report, as_json, junit, markdown, report, text, verdict
 from bridges.judge.stage import Stage
+from bridges.recording.bags import heard_in
 from bridges.recording.heard import Heard
-from bridges.recording.sources import BagError
+from bridges.recording.sources import BagError, Notes
 from bridges.rmf import topics
 from bridges.rmf.definitions import Message
 from bridges.rmf.transport import Publisher, Transport, TransportError
@@ -33,7 +34,6 @@ from bridges.rmf_rules import NEVER, Said
 
 NODE_NAME = "rmf_bridge_judge"
 LOOK_EVERY_S = 0.1
-NEVER_YET = float("-inf")
 FIRE = topics.FIRE_ALARM_TRIGGER
 WIDTH = 120
 BESIDE: dict[str, tuple[str, ...]] = {
@@ -182,18 +182,27 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _recorded(args: argparse.Namespace) -> int:
-    judge, span = Judge(args.kind, args.name), Span(args.from_, args.to)
+    judge, notes = Judge(args.kind, args.name), Notes()
     last: Heard | None = None
-    for heard in heard_between(args.recording, span, "judge"):
-        if isinstance(heard, Heard) and (
-            args.from_ is None or heard.at >= span.begins_at > NEVER_YET
-        ):
-            judge.hear(heard)
-            last = heard
+    for last in _span(heard_in(args.recording, notes), args.from_, args.to):
+        judge.hear(last)
+    if notes.damage:
+        complain("judge", notes.damage)
     if last is None or judge.first is None:
         complain("judge", f"{args.recording} holds nothing of RMF's then")
         return os.EX_UNAVAILABLE
     return tell(report(judge, judge.end(last.at, last.wall), last.at - judge.first.at), args)
+
+
+def _span(heard: Iterable[Heard], begin: Time | None, end: Time | None) -> Iterator[Heard]:
+    """Every message from one time to the other; none is left out, as each may break a law."""
+    began: float | None = None
+    for one in heard:
+        began = one.wall if began is None else began
+        if end is not None and one.wall > end.wall(began):
+            return
+        if begin is None or one.wall >= begin.wall(began):
+            yield one
 
 
 def _live(args: argparse.Namespace, performance: Performance | None) -> int:

@@ -13,7 +13,7 @@ from typing import Final
 
 from bridges.commands.faults import remedies
 from bridges.commands.graph import complain
-from bridges.commands.recordings import Span, add_span_arguments, heard_between
+from bridges.commands.recordings import Span, add_span_arguments, told_between
 from bridges.explain.lanes import Drawing
 from bridges.explain.palette import PAPER, Theme
 from bridges.explain.picture import svg
@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
 def _only(args: argparse.Namespace) -> str:
     """The only device of the recording. Raises PlotError where there are more."""
     site = Site()
-    for heard in heard_between(args.file, Span(args.from_, args.to), "plot"):
+    for heard in told_between(args.file, Span(args.from_, args.to), "plot", ""):
         site.take(heard)
     names = {name: f"{kind} {name}" for kind, name in site.devices() if args.kind in (None, kind)}
     if len(names) > 1:
@@ -107,7 +107,7 @@ def _read(args: argparse.Namespace, name: str) -> tuple[Timeline, list[str]]:
     """The device's lanes, and its explanation in lines. Raises PlotError if it shows no state."""
     span, site = Span(args.from_, args.to), Site(name)
     drawings = {kind: Drawing(kind, name) for kind in KINDS if args.kind in (None, kind)}
-    for heard in heard_between(args.file, span, "plot", name):
+    for heard in told_between(args.file, span, "plot", name):
         site.take(heard)
         for drawing in drawings.values():
             drawing.take(heard)

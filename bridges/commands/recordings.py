@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bridges.commands.graph import complain
 from bridges.explain import noted
-from bridges.recording.bags import all_in
+from bridges.recording.bags import Keep, all_in
 from bridges.recording.heard import Heard, Own
 from bridges.recording.mcap_bags import OWN_TOPICS
 from bridges.recording.sources import Notes
@@ -123,12 +123,28 @@ class Sieve:
         return True
 
 
-def heard_between(path: Path, span: Span, command: str, device: str = "") -> Iterator[Heard | Own]:
-    """What concerns the device ("": all) until the end of the span; what is before it too, as states
-    last. Damage is told on standard error. Raises BagError.
+def told_between(path: Path, span: Span, command: str, device: str) -> Iterator[Heard | Own]:
+    """What concerns the device ("": all), messages and our recorder's texts, as `between` gives it.
+
+    Of what is much the same each second a part is left out (`Sieve`).
+    """
+    return between(path, span, command, Sieve(device).keep)
+
+
+def heard_between(path: Path, span: Span, command: str) -> Iterator[Heard]:
+    """Every message of RMF, as `between` gives it."""
+    return (one for one in between(path, span, command) if isinstance(one, Heard))
+
+
+def between(
+    path: Path, span: Span, command: str, keep: Keep | None = None
+) -> Iterator[Heard | Own]:
+    """A recording until the end of the span; what is before it too, as states last.
+
+    Damage is told on standard error. Raises BagError.
     """
     notes, began, until = Notes(), None, float("inf")
-    for heard in all_in(path, notes, Sieve(device).keep):
+    for heard in all_in(path, notes, keep):
         if began is None:
             began = heard.wall
             until = span.to.wall(began) if span.to else until

@@ -264,8 +264,8 @@ def grants_nothing(scene: LiftScene) -> Finding:
 
 
 def no_false(scene: LiftScene) -> Finding:
-    """Nothing calls an alarm off but its end by an operator."""
-    if not isinstance(scene.news, d.Bool):
+    """Nothing calls an alarm off but its end by an operator. With several lifts, whose word is it?"""
+    if not isinstance(scene.news, d.Bool) or scene.others:
         return None
     often = len(scene.false_alarms) == FALSE
     if often and scene.now - scene.false_alarms[0] < FALSE_WITHIN_S:

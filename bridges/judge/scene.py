@@ -19,6 +19,8 @@ REMEMBERED: Final = 200
 BURST: Final = 20
 FROZEN_S: Final = 0.05
 ANSWERS_WITHIN_S: Final = 0.1
+EARLY_S: Final = 0.15
+"""Sooner than a timer jitters."""
 
 NEVER: Final = float("-inf")
 
@@ -41,8 +43,7 @@ class Scene(Generic[T]):
     states; `before` is None at the first one, and after a silence: whoever speaks then may have
     restarted. `since`: when that was. `gap_s`: from one to the other. `frozen_s`: for how long the
     states have shown the same stamp. `burst_s`: how long the latest BURST unchanged states took.
-    `answers`: how many requests in a row were each answered by a state that was not due. `back`: when
-    stamps went backwards.
+    `back`: when stamps went backwards.
     """
 
     kind: ClassVar[type[words.Stated]]
@@ -56,14 +57,14 @@ class Scene(Generic[T]):
         self.gap_s = 0.0
         self.frozen_s = 0.0
         self.burst_s = float("inf")
-        self.answers = 0
         self.states = 0
         self.back: deque[float] = deque(maxlen=4)
         self.others: set[str] = set()
         self._unchanged: deque[float] = deque(maxlen=BURST)
         self._stamp = self._moved_at = NEVER
         self._asked_at = NEVER
-        self._quiet_s = float("inf")
+        self._answers: deque[bool] = deque(maxlen=8)
+        self._quiet: deque[float] = deque(maxlen=15)
 
     def take(self, heard: Heard) -> bool:
         """Take a message. False if no law needs to look, because it is not about this device."""
@@ -95,6 +96,11 @@ class Scene(Generic[T]):
     def new(self) -> T | None:
         """The state, if it is what was heard last."""
         return self.state if self.news is self.state else None
+
+    @property
+    def answers(self) -> int:
+        """How many of the latest 8 requests were each answered by a state that was not due."""
+        return sum(self._answers)
 
     def _take_state(self, state: T) -> bool:
         if words.device(state) != self.name:
@@ -129,11 +135,12 @@ class Scene(Generic[T]):
         if len(self._unchanged) == BURST:
             self.burst_s = self.now - self._unchanged[0]
         if self._asked_at <= self.heard_at:
-            self._quiet_s = min(self._quiet_s, self.gap_s)
-        elif self._quiet_s < float("inf"):
+            self._quiet.append(self.gap_s)
+        elif self._quiet:
             at_once = self.now - self._asked_at < ANSWERS_WITHIN_S
-            early = at_once and self.gap_s < 0.5 * self._quiet_s
-            self.answers = self.answers + 1 if early else 0
+            usual_s = sorted(self._quiet)[len(self._quiet) * 3 // 4]
+            early = at_once and self.gap_s < usual_s - EARLY_S
+            self._answers.append(early)
 
 
 def _content(state: words.Stated) -> words.Stated:

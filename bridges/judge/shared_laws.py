@@ -35,7 +35,7 @@ def answers(scene: AnyScene) -> Finding:
     if scene.burst_s < BURST_WITHIN_S:
         return f"{BURST} states that tell nothing new in {scene.burst_s:.2f} s"
     if scene.answers >= ANSWERS:
-        return f"{ANSWERS} requests in a row were each answered by a state that tells nothing new"
+        return f"{ANSWERS} of 8 requests were each answered by a state that tells nothing new"
     return KEPT
 
 

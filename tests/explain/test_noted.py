@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bridges.commands.recordings import Span as Part
-from bridges.commands.recordings import heard_between
+from bridges.commands.recordings import told_between
 from bridges.explain.lanes import Drawing
 from bridges.explain.noted import MOST, Noted, levels, noted
 from bridges.explain.site import Site
@@ -16,7 +16,7 @@ CORPUS = Path(__file__).parents[1] / "recording" / "corpus"
 
 def test_an_incident_of_our_own_has_relays_inputs_and_faults() -> None:
     drawing = Drawing("lift", "Lift1")
-    for one in heard_between(CORPUS / "Lift1_1.mcap", Part(None, None), "test", "Lift1"):
+    for one in told_between(CORPUS / "Lift1_1.mcap", Part(None, None), "test", "Lift1"):
         drawing.take(one)
     rows = [(lane.name, lane.row) for lane in drawing.timeline().lanes]
     assert [row for row in rows if row[0] in ("relays", "inputs", "faults")] == [
@@ -33,7 +33,7 @@ def test_an_incident_of_our_own_has_relays_inputs_and_faults() -> None:
 
 def test_an_incident_says_what_its_daemon_refused_and_which_fault_it_has() -> None:
     site = Site("Lift1")
-    for one in heard_between(CORPUS / "Lift1_1.mcap", Part(None, None), "test", "Lift1"):
+    for one in told_between(CORPUS / "Lift1_1.mcap", Part(None, None), "test", "Lift1"):
         site.take(one)
     told = site.explain("lift", "Lift1", None)
     assert [fault.code for fault in told.faults] == ["RMF_SILENT"]

@@ -3,6 +3,7 @@
 import pytest
 
 from tests.judge.nodes.any_cancel_cancels import AnyCancelCancels
+from tests.judge.nodes.charger_answers import ChargerAnswers
 from tests.judge.nodes.charger_falls_silent import ChargerFallsSilent
 from tests.judge.nodes.charger_idle_from_memory import ChargerIdleFromMemory
 from tests.judge.nodes.charger_ignores_cancels import ChargerIgnoresCancels
@@ -46,6 +47,12 @@ def test_a_charge_that_the_next_request_takes_over_is_found_by_watching() -> Non
     assert found["broken"] == {"C1.keeps"}
     found = watched("charger", "bay1", RightCharger(2.0), *robots, for_s=12.0)
     assert found["broken"] == set()
+
+
+def test_a_request_that_is_repeated_is_not_answered_by_a_state() -> None:
+    asked = [charge(5.2 + n, "red", "r1") for n in range(16)]
+    assert watched("charger", "bay1", ChargerAnswers(), *asked)["broken"] == {"C4.answer"}
+    assert watched("charger", "bay1", RightCharger(), *asked)["broken"] == set()
 
 
 def test_a_robot_that_never_comes_keeps_the_station_for_ever() -> None:

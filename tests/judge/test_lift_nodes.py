@@ -95,6 +95,13 @@ def test_watching_finds_the_defect(node: type[RightLift], parties: list[Party], 
     assert found["broken"] == {law}
 
 
+def test_with_two_lifts_nobody_knows_whose_alarm_it_is() -> None:
+    class Other(RightLift):
+        name = "Lift2"
+
+    assert watched("lift", "Lift1", FireSaysFalse(), Other())["broken"] == set()
+
+
 def test_an_end_without_a_floor_that_is_refused_is_found_by_watching_three_rides() -> None:
     """RMF's supervisor follows with an END that has a floor, so one ride alone proves nothing."""
     rides = [
