@@ -33,6 +33,10 @@ COMMANDS = {
     "disable": ("end a service, outputs off; its YAML stays", "disable my_lift"),
     "schema": ("print the JSON Schema of a device YAML", "schema > rmf-bridge.json"),
     "watch": ("show lifts, doors and chargers live, as RMF sees them", "watch --localhost"),
+    "page": (
+        "serve a web page of what is on RMF's graph, or of a recording",
+        "page --localhost",
+    ),
     "status": (
         "show every daemon on this machine: state, faults and what to do",
         "status --json",

@@ -10,7 +10,7 @@ from bridges.rmf.choose import missing_of_dds, missing_of_ros
 from hal_fakes.domain import domain_for_a_while
 from tests.depth import DEEP
 
-ON_WIRES = ("commands", "drivers", "hal_fakes", "rmf", "serve", "site")
+ON_WIRES = ("commands", "drivers", "hal_fakes", "page", "rmf", "serve", "site")
 """The folders whose tests have threads, processes and sockets. In the others time is virtual."""
 WIRES_HANG_AFTER_S = 900
 """No test that passes takes so long, however busy the machine is."""
@@ -74,7 +74,7 @@ def pytest_terminal_summary(
     """Say so: a green run without ROS has not seen the ros2 transport."""
     if missing := missing_of_dds():
         terminalreporter.write_line(f"not run: the tests of the dds transport, as {missing}")
-    if _deselected and config.getoption("markexpr") == "not ros":
+    if _deselected and config.getoption("markexpr") == "not ros and not browser":
         files = sorted({nodeid.partition("::")[0] for nodeid in _deselected})
         terminalreporter.write_line(
             f"not run: {len(_deselected)} tests that need ROS 2 (make test-ros), in {', '.join(files)}"

@@ -128,6 +128,15 @@ class Board:
         young = {key for key, at in self._first_at.items() if now - at < SETTLES_S}
         return {(kind, words.printable(name)) for kind, name in young - known}
 
+    def forget(self, kind: str, name: str) -> None:
+        """A device that is silent gives way to another."""
+        self._latest.pop((kind, name), None)
+
+    def row(self, kind: str, name: str, now: float, wall: float) -> Row | None:
+        """One device's row; None if it has published no state."""
+        heard = self._latest.get((kind, name))
+        return self._device(kind, name, heard, now, wall) if heard else None
+
     def rows(self, now: float, wall: float) -> list[Row]:
         """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
         devices = sorted(self._latest.items(), key=_order)

@@ -32,7 +32,7 @@ def names(verb: str) -> Completer:
         found = set[str]()
         with suppress(OSError, ValueError):
             for path in _sockets(parsed_args):
-                for device, known in json.loads(_ask(path, ["names"])).items():
+                for device, known in json.loads(ask(path, ["names"])).items():
                     if parsed_args.device in (None, device):
                         found |= set(known[verb])
         return sorted(found)
@@ -51,7 +51,7 @@ def _folder(args: argparse.Namespace) -> Path:
 def tell(args: argparse.Namespace, verb: str) -> int:
     """Print what can `press` or `fail` in each device. 0; 69 if no simulation runs."""
     try:
-        answers = [json.loads(_ask(path, ["names"])) for path in _sockets(args)]
+        answers = [json.loads(ask(path, ["names"])) for path in _sockets(args)]
     except (OSError, ValueError) as error:
         return _silent(args, error)
     if not answers:
@@ -77,7 +77,7 @@ def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
         print(error, file=sys.stderr)
         return os.EX_USAGE if isinstance(error, NoDevice) else os.EX_CONFIG
     try:
-        answers = [_ask(path, [verb, device, *words]) for path in _sockets(args)]
+        answers = [ask(path, [verb, device, *words]) for path in _sockets(args)]
     except OSError as error:
         return _silent(args, error)
     if "ok" in answers:
@@ -104,7 +104,7 @@ def _nobody(args: argparse.Namespace) -> int:
     return os.EX_UNAVAILABLE
 
 
-def _ask(path: Path, words: list[str]) -> str:
+def ask(path: Path, words: list[str]) -> str:
     """The answer to one line: `ok` or `error TEXT`. Raises OSError."""
     with socket.socket(socket.AF_UNIX) as caller:
         caller.settimeout(ANSWER_S)

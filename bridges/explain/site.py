@@ -42,7 +42,9 @@ class Site:
     `session`: whose last ride's story is kept, though others come after it.
     """
 
-    def __init__(self, name: str = "", session: str = "") -> None:
+    def __init__(self, name: str = "", session: str = "", most: int = MOST_DEVICES) -> None:
+        """`most`: how many devices of each kind are remembered."""
+        self._most = most
         self.messages = 0
         self._story_from = float("-inf")
         self._name = name
@@ -168,7 +170,7 @@ class Site:
         found = self._devices.get((kind, name))
         if found is not None or not name:
             return found
-        if len(self._devices) >= 3 * MOST_DEVICES:
+        if len(self._devices) >= 3 * self._most:
             return None
         assert self._began is not None
         made = LiftFacts(name, self._began, self._session) if kind == "lift" else None
@@ -180,7 +182,7 @@ class Site:
         if not isinstance(state, d.ChargerState):
             kind = "lift" if isinstance(state, d.LiftState) else "door"
         name = words.device(state)
-        if name and len(self._names[kind]) < MOST_DEVICES:
+        if name and len(self._names[kind]) < self._most:
             self._names[kind][label(name)] = None
         match self._device(kind, name, moment), state:
             case LiftFacts() as found, d.LiftState():

@@ -1,0 +1,186 @@
+"""Who may act on the page: passwords, sessions, and how often a wrong one may be tried.
+
+A password file has a line `user:scrypt$N$r$p$salt$hash` for each user, as `rmf-bridge page --add-user`
+writes it: scrypt with a salt of its own (RFC 7914, from Python's hashlib).
+"""
+
+import base64
+import hashlib
+import hmac
+import os
+import re
+import secrets
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from bridges.serve.files import replace
+from bridges.user_files import OTHERS, read
+
+COST: Final = (2**14, 8, 1)
+"""N, r and p: 16 MB and about 50 ms for one try."""
+MOST_COST: Final = 2**17
+SESSION_S: Final = 12 * 3600.0
+"""A shift; after that somebody says again who they are."""
+IDLE_S: Final = 3600.0
+MOST_SESSIONS: Final = 100
+TRIES: Final = 5
+TRIES_IN_S: Final = 60.0
+MOST_ADDRESSES: Final = 1000
+SHORTEST: Final = 8
+LONGEST_FILE: Final = 64 * 1024
+USER: Final = re.compile(r"[A-Za-z0-9._@-]{1,64}")
+
+
+class PasswordError(Exception):
+    """A password file that cannot be used, or a user or password that cannot be added."""
+
+
+def hashed(password: str) -> str:
+    """The password's hash, with a salt of its own, as the file has it."""
+    salt = os.urandom(16)
+    n, r, p = COST
+    parts = (base64.b64encode(part).decode() for part in (salt, _scrypt(password, salt, n, r, p)))
+    return "$".join(("scrypt", str(n), str(r), str(p), *parts))
+
+
+def matches(password: str, stored: str) -> bool:
+    """Whether it is this password. Raises PasswordError if `stored` is not one of our hashes."""
+    try:
+        name, n, r, p, salt, expected = stored.split("$")
+        cost = (int(n), int(r), int(p))
+        raw, wanted = (base64.b64decode(part, validate=True) for part in (salt, expected))
+    except ValueError:
+        raise PasswordError("not a hash of `rmf-bridge page --add-user`") from None
+    if name != "scrypt" or cost[0] > MOST_COST or cost[1] > 16 or cost[2] > 4:
+        raise PasswordError("not a hash of `rmf-bridge page --add-user`")
+    return hmac.compare_digest(_scrypt(password, raw, *cost), wanted)
+
+
+def _scrypt(password: str, salt: bytes, n: int, r: int, p: int) -> bytes:
+    return hashlib.scrypt(password.encode(), salt=salt, n=n, r=r, p=p, maxmem=2**28, dklen=32)
+
+
+def users(file: Path) -> dict[str, str]:
+    """The hash of each user. Raises PasswordError, with the file and line."""
+    try:
+        content, mode = read(file, LONGEST_FILE)
+    except OSError as error:
+        raise PasswordError(f"{file}: {error.strerror}") from None
+    if mode & OTHERS:
+        raise PasswordError(f"{file} is open to other users: chmod 600 {file}")
+    if len(content) > LONGEST_FILE:
+        raise PasswordError(f"{file} is too long for a password file")
+    found: dict[str, str] = {}
+    for number, line in enumerate(content.decode(errors="replace").splitlines(), start=1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        user, _, stored = line.partition(":")
+        if not USER.fullmatch(user) or user in found:
+            raise PasswordError(f"{file}:{number}: not a user's name, or a second time")
+        try:
+            matches("", stored)
+        except PasswordError as error:
+            raise PasswordError(f"{file}:{number}: {error}") from None
+        found[user] = stored
+    if not found:
+        raise PasswordError(f"{file}: no user in it; add one with rmf-bridge page --add-user NAME")
+    return found
+
+
+def add_user(file: Path, user: str, password: str) -> None:
+    """Add a user, or give one another password. Raises PasswordError."""
+    if not USER.fullmatch(user):
+        raise PasswordError(f"'{user}' is no user's name: letters, digits and . _ @ - only")
+    if len(password) < SHORTEST:
+        raise PasswordError(f"the password is too short: {SHORTEST} characters at least")
+    known = users(file) if file.exists() else {}
+    known[user] = hashed(password)
+    text = "".join(f"{name}:{stored}\n" for name, stored in known.items())
+    before = os.umask(OTHERS)
+    try:
+        replace(file, text.encode())
+    except OSError as error:
+        raise PasswordError(f"{file}: {error.strerror}") from None
+    finally:
+        os.umask(before)
+
+
+class Tries:
+    """How often an address has tried in vain. Bounded: the ones that are longest ago are forgotten."""
+
+    def __init__(self) -> None:
+        self._failed_at: OrderedDict[str, list[float]] = OrderedDict()
+
+    def allowed(self, address: str, now: float) -> bool:
+        """Whether it may try again."""
+        recent = [at for at in self._failed_at.get(address, ()) if now - at < TRIES_IN_S]
+        return len(recent) < TRIES
+
+    def failed(self, address: str, now: float) -> None:
+        """One more try was in vain."""
+        recent = [at for at in self._failed_at.pop(address, ()) if now - at < TRIES_IN_S]
+        self._failed_at[address] = [*recent, now]
+        while len(self._failed_at) > MOST_ADDRESSES:
+            self._failed_at.popitem(last=False)
+
+
+@dataclass(slots=True)
+class Session:
+    """Somebody who has logged in. `proof`: what a form must send back (CSRF)."""
+
+    user: str
+    began_at: float
+    used_at: float
+    proof: str
+
+
+class Sessions:
+    """Who has logged in, by the secret of their cookie."""
+
+    def __init__(self) -> None:
+        self._by_secret: OrderedDict[str, Session] = OrderedDict()
+
+    def begin(self, user: str, now: float) -> str:
+        """A new session's secret. Whoever had one before has a new one now."""
+        secret = secrets.token_urlsafe(32)
+        self._by_secret[secret] = Session(user, now, now, secrets.token_urlsafe(16))
+        while len(self._by_secret) > MOST_SESSIONS:
+            self._by_secret.popitem(last=False)
+        return secret
+
+    def find(self, secret: str | None, now: float) -> Session | None:
+        """The session of this cookie; None if there is none, or it is over."""
+        session = self._by_secret.get(secret or "")
+        if session is None or secret is None:
+            return None
+        if now - session.began_at > SESSION_S or now - session.used_at > IDLE_S:
+            del self._by_secret[secret]
+            return None
+        session.used_at = now
+        return session
+
+    def end(self, secret: str | None) -> None:
+        """Log out."""
+        self._by_secret.pop(secret or "", None)
+
+
+class Door:
+    """Lets users in with a password, each address only so often."""
+
+    def __init__(self, known: Mapping[str, str]) -> None:
+        self._known = known
+        self._tries = Tries()
+        self._nobody = hashed(secrets.token_urlsafe(16))
+
+    def refuses(self, user: str, password: str, address: str, now: float) -> str:
+        """Why this user may not come in; "" if they may. A user who is not known takes as long."""
+        if not self._tries.allowed(address, now):
+            return "too many wrong passwords; wait a minute"
+        right = matches(password[:1024], self._known.get(user, self._nobody))
+        if right and user in self._known:
+            return ""
+        self._tries.failed(address, now)
+        return "this user and password do not go together"

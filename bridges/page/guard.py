@@ -1,0 +1,115 @@
+"""What every request to the page must pass before anything else sees it: its Host, its Origin, a login.
+
+A page on 127.0.0.1 can be reached by any web site that the same browser has open: by a name that is
+made to mean 127.0.0.1 (DNS rebinding), or by a socket or form of another origin. So only the names that
+the page was given are answered, and only its own origin may open its socket or post.
+"""
+
+import ipaddress
+from collections.abc import Awaitable, Callable, Collection, Iterable, MutableMapping
+from dataclasses import dataclass
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+Scope = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+App = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+HEADERS: Final = (
+    (
+        b"content-security-policy",
+        b"default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval';"
+        b" style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self' data:;"
+        b" connect-src 'self'; frame-ancestors 'none'; base-uri 'self'; form-action 'self'",
+    ),
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"same-origin"),
+)
+"""NiceGUI's own scripts are inline and evaluated; everything comes from this address."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why a request is not answered. `to`: where it is sent instead, if anywhere."""
+
+    status: int
+    why: str
+    to: str = ""
+
+
+def refused(scope: Scope, hosts: Collection[str]) -> str:
+    """Why this request is not answered; "" if it is. `hosts`: names, with or without a port.
+
+    An address is answered as well: only a name can be made to mean another machine.
+    """
+    headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+    host = headers.get("host", "").lower()
+    if not _is_address(host) and not any(
+        host in (known, host_of(known)) or host_of(host) == known for known in hosts
+    ):
+        return "this page does not answer to that host name"
+    origin = headers.get("origin")
+    changes = scope["type"] == "websocket" or scope.get("method") not in ("GET", "HEAD", "OPTIONS")
+    if origin is None:
+        return "no origin" if scope["type"] == "websocket" else ""
+    if changes and urlsplit(origin).netloc.lower() != host:
+        return "that is for this page's own origin only"
+    return ""
+
+
+def host_of(netloc: str) -> str:
+    """Without the port: `[::1]:8080` is `[::1]`."""
+    name, colon, port = netloc.rpartition(":")
+    return name if colon and port.isdecimal() else netloc
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host_of(host).strip("[]"))
+    except ValueError:
+        return False
+    return True
+
+
+class Guard:
+    """The outermost layer of the page.
+
+    `gate`: what else is asked of a request whose Host and Origin are right.
+    """
+
+    def __init__(
+        self, app: App, hosts: Iterable[str], gate: Callable[[Scope], Refusal | None]
+    ) -> None:
+        self._app = app
+        self._hosts = frozenset(host.lower() for host in hosts)
+        self._gate = gate
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """ASGI."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        why = refused(scope, self._hosts)
+        refusal = Refusal(403, why) if why else self._gate(scope)
+        if refusal is not None:
+            await _refuse(scope, send, refusal)
+            return
+
+        async def sending(message: MutableMapping[str, Any]) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message.get("headers", ()), *HEADERS]
+            await send(message)
+
+        await self._app(scope, receive, sending)
+
+
+async def _refuse(scope: Scope, send: Send, refusal: Refusal) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 1008, "reason": refusal.why})
+        return
+    headers = [(b"content-type", b"text/plain; charset=utf-8"), *HEADERS]
+    headers += [(b"location", refusal.to.encode())] if refusal.to else []
+    await send({"type": "http.response.start", "status": refusal.status, "headers": headers})
+    await send({"type": "http.response.body", "body": refusal.why.encode()})

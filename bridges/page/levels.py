@@ -1,0 +1,90 @@
+"""What a daemon on this machine senses and drives now, from the ring that it writes.
+
+The ring has what the driver made of the contacts, and what the core decided; no voltages.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Final
+
+from bridges.recording.entries import AnyEntry, Known, Step
+from bridges.recording.ring import NAME, RingError, Tail
+from bridges.recording.trees import HOLDS, TYPE, Tree
+
+SAMPLED: Final = "core.decision.Sampled"
+FAILED: Final = ("core.decision.IoFailed", "core.decision.WriteFailed", "core.decision.Suspended")
+
+Rows = Mapping[str, str]
+"""What something is called, and what it is now."""
+
+
+class Levels:
+    """Follows the ring of one daemon. `sensed`, `driven`: by the device's name."""
+
+    def __init__(self, folder: Path) -> None:
+        self.sensed: dict[str, Rows] = {}
+        self.driven: dict[str, Rows] = {}
+        self._path = folder / NAME
+        self._tail: Tail | None = None
+        self._inode = 0
+
+    def look(self) -> None:
+        """Read what is new; a ring that is missing or cannot be read leaves nothing known."""
+        try:
+            inode = self._path.stat().st_ino
+            if self._tail is None or inode != self._inode:
+                self._tail, self._inode = Tail(self._path), inode
+            self.take(self._tail.new())
+        except (OSError, RingError):
+            self._tail = None
+            self.sensed, self.driven = {}, {}
+
+    def take(self, entries: Iterable[AnyEntry]) -> None:
+        """Entries of the ring, in their order."""
+        for entry in entries:
+            if isinstance(entry, Known):
+                self._event(entry.subject, entry.reading)
+                self._outputs(entry.subject, entry.outputs)
+            elif isinstance(entry, Step):
+                self._event(entry.subject, entry.event)
+                for outputs in entry.outputs:
+                    self._outputs(entry.subject, outputs)
+
+    def _event(self, subject: str, event: Tree) -> None:
+        if not isinstance(event, dict):
+            return
+        if event.get(TYPE) == SAMPLED:
+            self.sensed[subject] = dict(_fields(event.get("sample")))
+        elif event.get(TYPE) in FAILED:
+            self.sensed[subject] = {"the last reading": f"failed: {event.get('reason')}"}
+
+    def _outputs(self, subject: str, outputs: Tree) -> None:
+        if isinstance(outputs, dict):
+            self.driven[subject] = dict(_fields(outputs))
+
+
+def _fields(tree: Tree) -> Iterator[tuple[str, str]]:
+    if isinstance(tree, dict):
+        for name, value in tree.items():
+            if name != TYPE:
+                yield name.replace("_", " "), shown(value)
+
+
+def shown(value: Tree) -> str:
+    """A value in a word or a few."""
+    match value:
+        case None:
+            return "-"
+        case bool():
+            return "on" if value else "off"
+        case float():
+            return f"{value:g}"
+        case list():
+            return ", ".join(map(shown, value)) or "none"
+        case dict() if HOLDS in value:
+            held = value[HOLDS]
+            return held.lower().replace("_", " ") if isinstance(held, str) else shown(held)
+        case dict():
+            return ", ".join(f"{name} {told}" for name, told in _fields(value)) or "-"
+        case _:
+            return str(value)[:200]

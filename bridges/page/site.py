@@ -1,0 +1,256 @@
+"""What the page knows of RMF's graph: the latest of each device, and ten minutes of each one's past.
+
+Pure: time comes with each message. Names come from the network, where anybody may make them up, so
+everything has a bound; who is known stays, whoever comes later.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+from bridges.commands.board import KINDS as KIND_OF
+from bridges.commands.board import Board, Row
+from bridges.commands.graph import Heard as Arrived
+from bridges.explain import site
+from bridges.explain.answer import Remedies
+from bridges.explain.explanation import Explanation
+from bridges.explain.lanes import Drawing
+from bridges.explain.timeline import KINDS, Kind, Timeline
+from bridges.recording.heard import Heard
+from bridges.rmf import definitions as d
+from bridges.rmf import topics, words
+from bridges.rmf.topics import AnyTopic
+from bridges.rmf.words import Requested, Stated
+from bridges.serve import diagnostics
+
+KEPT_S: Final = 600.0
+"""The past that a device's page shows."""
+MOST_DEVICES: Final = 500
+"""Of each kind; RMF's largest sites have a tenth of it."""
+MOST_ROBOTS: Final = 500
+GONE_AFTER_S: Final = 60.0
+"""A device silent for so long gives way to a new one when there is no room."""
+
+HEARD: Final[tuple[AnyTopic, ...]] = (
+    topics.LIFT_STATES,
+    topics.DOOR_STATES,
+    topics.CHARGER_STATES,
+    topics.LIFT_REQUESTS,
+    topics.ADAPTER_LIFT_REQUESTS.live(),
+    topics.DOOR_REQUESTS,
+    topics.ADAPTER_DOOR_REQUESTS,
+    topics.CHARGER_REQUESTS,
+    topics.CHARGER_CANCELS,
+    topics.ADAPTER_CHARGER_REQUESTS,
+    topics.ADAPTER_CHARGER_CANCELS,
+    topics.CHARGER_REFUSALS,
+    topics.DOOR_SUPERVISOR_HEARTBEAT,
+    topics.CHARGING_ASSIGNMENTS,
+    topics.FLEET_STATES,
+    topics.DIAGNOSTICS,
+)
+
+Device = tuple[str, str]
+"""Its kind and its name on RMF's graph."""
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot, as its fleet says. `place`: where the charging schedule sends it."""
+
+    fleet: str
+    state: d.RobotState
+    at: float
+    place: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A device as the page draws it: its row, as `watch` has it, and its last state if it has one."""
+
+    row: Row
+    state: Stated | None = None
+
+
+class Site:
+    """Everything heard so far, within bounds."""
+
+    def __init__(self) -> None:
+        self._board = Board()
+        self._last_at: dict[Device, float] = {}
+        self._states: dict[Device, Stated] = {}
+        self._drawings: dict[Device, Drawing] = {}
+        self._changed: set[Device] = set()
+        self._robots: dict[tuple[str, str], Robot] = {}
+        self._story = site.Site(most=MOST_DEVICES)
+        self.crowded: set[str] = set()
+        self._full_until: dict[str, float] = {}
+        self.heard_at: float | None = None
+
+    def take(self, heard: Heard) -> None:
+        """One message of the graph."""
+        self.heard_at = heard.at
+        message = heard.message
+        if isinstance(message, Stated):
+            self._state(heard, message)
+        elif isinstance(message, d.FleetState):
+            self._fleet(message, heard.at)
+        elif isinstance(message, d.DiagnosticArray):
+            self._diagnosed(heard, message)
+        elif isinstance(message, d.DiagnosticStatus):
+            self._about(("charger", message.hardware_id), heard)
+        elif isinstance(message, Requested):
+            self._about((_kind_of(message), words.device(message)), heard)
+        else:
+            self._story.take(heard)
+            self._heartbeat(heard)
+            self._board.take(Arrived(heard.message, heard.at))
+
+    def devices(self, now: float, wall: float) -> list[Shown]:
+        """All devices, coordinators and scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
+        states = {(kind, words.printable(name)): s for (kind, name), s in self._states.items()}
+        rows = self._board.rows(now, wall)
+        return [Shown(row, states.get((row.kind, row.name))) for row in rows]
+
+    def device(self, kind: str, name: str, now: float, wall: float) -> Shown | None:
+        """One of them; None if it was never heard."""
+        every = self.devices(now, wall)
+        return next((one for one in every if (one.row.kind, one.row.name) == (kind, name)), None)
+
+    def changed(self, now: float, wall: float) -> list[Shown]:
+        """The devices that were heard of since this was asked last."""
+        changed, self._changed = self._changed, set()
+        return [
+            Shown(row, self._states[device])
+            for device in changed
+            if device in self._states and (row := self._board.row(*device, now, wall))
+        ]
+
+    def knows(self, kind: str, name: str) -> bool:
+        """Whether the device of this printed name is still here; whatever has no state always is."""
+        return kind not in KINDS or self._found(kind, name) is not None
+
+    def explain(
+        self, kind: str, name: str, now: float, wall: float, remedies: Remedies
+    ) -> Explanation | None:
+        """Why somebody waits for this device, or what it does."""
+        device = self._found(kind, name)
+        if device is None:
+            return None
+        self._story.passed(now, wall)
+        return self._story.explain(_kind(device[0]), device[1], None, remedies)
+
+    def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
+        """The last ten minutes of a device; `name` as it is shown."""
+        device = self._found(kind, name)
+        drawing = self._drawings.get(device) if device else None
+        return drawing.timeline(now - KEPT_S) if drawing else None
+
+    def _found(self, kind: str, name: str) -> Device | None:
+        if (kind, name) in self._states:
+            return (kind, name)
+        every = (one for one in self._states if one[0] == kind)
+        return next((one for one in every if words.printable(one[1]) == name), None)
+
+    def robots(self) -> list[Robot]:
+        """The robots that fleets report, by fleet and name."""
+        return [robot for _, robot in sorted(self._robots.items())]
+
+    def _state(self, heard: Heard, state: Stated) -> None:
+        device = (KIND_OF[type(state)], words.device(state))
+        if device not in self._last_at and not self._room(device[0], heard.at):
+            self.crowded.add(device[0])
+            return
+        self._last_at[device], self._states[device] = heard.at, state
+        self._board.take(Arrived(heard.message, heard.at))
+        self._story.take(heard)
+        self._remember(device, heard)
+
+    def _room(self, kind: str, at: float) -> bool:
+        if at <= self._full_until.get(kind, float("-inf")):
+            return False
+        known = [one for one in self._last_at if one[0] == kind]
+        if len(known) < MOST_DEVICES:
+            return True
+        oldest = min(known, key=self._last_at.__getitem__)
+        self._full_until[kind] = self._last_at[oldest] + GONE_AFTER_S
+        if at <= self._full_until[kind]:
+            return False
+        for table in (self._last_at, self._states, self._drawings):
+            table.pop(oldest, None)
+        self._board.forget(*oldest)
+        return True
+
+    def _about(self, device: Device, heard: Heard) -> None:
+        """A request, a cancel or a refusal. None is kept for a device that does not exist: anybody can
+        ask for anything."""
+        if device in self._last_at:
+            self._story.take(heard)
+            self._remember(device, heard)
+
+    def _remember(self, device: Device, heard: Heard) -> None:
+        """What the device's timeline shows."""
+        if device in self._last_at:
+            drawing = self._drawings.get(device)
+            if drawing is None:
+                drawing = self._drawings[device] = Drawing(_kind(device[0]), device[1])
+            drawing.take(heard)
+            self._changed.add(device)
+
+    def _diagnosed(self, heard: Heard, message: d.DiagnosticArray) -> None:
+        known = {name for _, name in self._last_at}
+        ours = [
+            status
+            for status in message.status[: diagnostics.MOST + 1]
+            if status.hardware_id in known or status.name.endswith(": daemon") or _is_graph(status)
+        ]
+        kept = replace(heard, message=replace(message, status=tuple(ours)))
+        self._board.take(Arrived(kept.message, heard.at))
+        self._story.take(kept)
+        for status in ours:
+            device = _about(status)
+            if device:
+                alone = replace(message, status=(status,))
+                self._remember(device, replace(heard, message=alone))
+
+    def _heartbeat(self, heard: Heard) -> None:
+        if not isinstance(heard.message, d.SupervisorHeartbeat):
+            return
+        listed = {one.door_name: one for one in heard.message.all_sessions}
+        for device in self._last_at:
+            if device[0] == "door":
+                own = (listed[device[1]],) if device[1] in listed else ()
+                self._remember(device, replace(heard, message=d.SupervisorHeartbeat(own)))
+
+    def _fleet(self, message: d.FleetState, at: float) -> None:
+        for state in message.robots:
+            key = (message.name, state.name)
+            if key in self._robots or len(self._robots) < MOST_ROBOTS:
+                self._robots[key] = Robot(message.name, state, at)
+
+
+def _kind(name: str) -> Kind:
+    return next(one for one in KINDS if one == name)
+
+
+def _is_graph(status: d.DiagnosticStatus) -> bool:
+    return _kind_in(status).endswith(("supervisor", "coordinator"))
+
+
+def _about(status: d.DiagnosticStatus) -> Device | None:
+    kind = _kind_in(status).removesuffix("_supervisor")
+    found = next((known for known in KINDS if known == kind), None)
+    return (found, status.hardware_id) if found else None
+
+
+def _kind_in(status: d.DiagnosticStatus) -> str:
+    return next((pair.value for pair in status.values if pair.key == "kind"), "")
+
+
+def _kind_of(message: Requested) -> str:
+    match message:
+        case d.LiftRequest():
+            return "lift"
+        case d.DoorRequest():
+            return "door"
+        case _:
+            return "charger"

@@ -1,0 +1,178 @@
+"""The views of a live site: all of it, and one device with its timeline, its why and its wiring."""
+
+import time
+from collections.abc import Sequence
+from html import escape
+from typing import Final
+
+from fastapi import Request
+from nicegui import Client, ui
+
+from bridges.commands.faults import remedies
+from bridges.explain.explanation import Explanation
+from bridges.explain.picture import svg
+from bridges.explain.timeline import KINDS
+from bridges.page import tables
+from bridges.page.actions import Deeds
+from bridges.page.buttons import Buttons
+from bridges.page.drawing import path_of
+from bridges.page.gallery import AGES_S, Gallery, Key
+from bridges.page.head import head, main, part
+from bridges.page.here import Here
+from bridges.page.login import Login
+from bridges.page.site import Site
+from bridges.page.why import explanation, story
+
+SECTIONS: Final = (
+    ("lift", "Lifts"),
+    ("door", "Doors"),
+    ("charger", "Chargers"),
+    ("coordinator", "Charger coordinators"),
+    ("robot", "Charging schedule"),
+)
+WIDE: Final = "panel wide-part"
+NOT_HERE: Final = "Its daemon is not on this machine, or the page's user may not see it."
+
+
+class SiteWall:
+    """One browser's view of the site."""
+
+    def __init__(self, gallery: Gallery) -> None:
+        self._gallery = gallery
+        self._cards: dict[Key, ui.html] = {}
+        self._status = part(gallery.status())
+        self._find = ui.input("Find a device").props("dense clearable").classes("find")
+        self._box = ui.element("div")
+        self._robots = part(gallery.robots())
+        self._find.on_value_change(self.rebuild)
+        self.rebuild()
+
+    def change(self, key: Key, html: str) -> None:
+        """This card is another now."""
+        if card := self._cards.get(key):
+            card.set_content(html)
+
+    def tell(self, status: str, robots: str) -> None:
+        """The lines that change each second."""
+        self._status.set_content(status)
+        self._robots.set_content(robots)
+
+    def rebuild(self) -> None:
+        """All cards whose name is looked for, by kind and name."""
+        wanted = str(self._find.value or "").lower()
+        self._box.clear()
+        self._cards = {}
+        with self._box:
+            for kind, title in SECTIONS:
+                self._section(title, [k for k in self._gallery.cards if k[0] == kind], wanted)
+            if not self._cards:
+                part("<p>No device is shown.</p>")
+
+    def _section(self, title: str, keys: Sequence[Key], wanted: str) -> None:
+        found = sorted(key for key in keys if wanted in key[1].lower())
+        if not found:
+            return
+        part(f"<h2>{title}</h2>")
+        with ui.element("div").classes("cards"):
+            for key in found:
+                self._card(key)
+
+    def _card(self, key: Key) -> None:
+        """The link stands beside what is drawn again, so that it keeps the keyboard's focus."""
+        with ui.element("div").classes("slot"):
+            self._cards[key] = part(self._gallery.cards[key])
+            if key[0] in KINDS:
+                link = ui.link(target=path_of(*key)).classes("cover")
+                link.props["aria-label"] = key[1]
+
+
+class SiteViews:
+    """The site and its devices."""
+
+    def __init__(
+        self,
+        site: Site,
+        gallery: Gallery,
+        here: Here,
+        login: Login,
+        deeds: Deeds,
+        graph: Sequence[str],
+    ) -> None:
+        self._site = site
+        self._gallery = gallery
+        self._here = here
+        self._login = login
+        self._buttons = Buttons(gallery, here, login, deeds, graph)
+        self._remedies = {code: (one.cause, one.do) for code, one in remedies().items()}
+
+    def install(self) -> None:
+        """Put the views at their addresses."""
+        ui.page("/", title="Site")(self.site)
+        ui.page("/{kind}/{name}", title="Device")(self.device)
+
+    def site(self, request: Request, client: Client) -> None:
+        """Everything, as a wall of cards."""
+        head("Site", self._login, request)
+        with main():
+            wall = SiteWall(self._gallery)
+        self._gallery.walls.append(wall)
+        client.on_delete(lambda: self._gallery.walls.remove(wall))
+
+    def device(self, kind: str, name: str, request: Request) -> None:
+        """One device."""
+        head(name, self._login, request)
+        key = (kind, name)
+        with main("device"):
+            if key not in self._gallery.shown:
+                part(f"<p>{escape(f'No {kind} of the name {name} was heard.')}</p>", WIDE)
+                return
+            drawn = [(part(), self._card)]
+            with ui.element("section").classes("panel"):
+                drawn.append((part(), self._why))
+                with ui.element("details"):
+                    part("What happened").props("tag=summary")
+                    drawn.append((part(), self._story))
+            self._buttons.show(key, request)
+            with ui.element("section").classes(WIDE):
+                part("<h2>Last ten minutes</h2>")
+                with ui.element("div").classes("timeline") as scrolls:
+                    scrolls.props('tabindex=0 role=region aria-label="Timeline"')
+                    drawn.append((part(), self._timeline))
+            with ui.element("section").classes(WIDE):
+                part("<h2>Wiring and limits</h2>")
+                drawn += [(part(), self._levels), (part(), self._wiring)]
+
+        def refresh() -> None:
+            for place, draw in drawn:
+                place.set_content(draw(key))
+
+        refresh()
+        ui.timer(AGES_S, refresh)
+
+    def _card(self, key: Key) -> str:
+        return self._gallery.cards.get(key, "<p>It is heard no more.</p>")
+
+    def _why(self, key: Key) -> str:
+        found = self._explained(key)
+        return f"<h2>Why</h2>{explanation(found)}" if found else ""
+
+    def _story(self, key: Key) -> str:
+        found = self._explained(key)
+        return story(found) if found else ""
+
+    def _explained(self, key: Key) -> Explanation | None:
+        return self._site.explain(*key, time.monotonic(), time.time(), self._remedies)
+
+    def _timeline(self, key: Key) -> str:
+        found = self._site.timeline(*key, time.monotonic())
+        return svg(found) if found else ""
+
+    def _levels(self, key: Key) -> str:
+        served = self._here.served.get(key)
+        return tables.levels(served.sensed, served.driven) if served else ""
+
+    def _wiring(self, key: Key) -> str:
+        served = self._here.served.get(key)
+        if served is None or not served.local.file:
+            return f"<p>{NOT_HERE}</p>"
+        return tables.wiring(served.local.file, key[1])

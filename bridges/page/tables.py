@@ -1,0 +1,60 @@
+"""A device's wiring and limits as HTML tables, from its YAML."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
+from html import escape
+from pathlib import Path
+
+from bridges.commands.sheets.findings import findings
+from bridges.core.table import Table
+from bridges.settings.load import SettingsError, load
+
+NO_RING = "Its daemon keeps no ring, or the page's user may not read it: no live levels."
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
+    """A table; every cell is text."""
+    heads = "".join(f'<th scope="col">{escape(text)}</th>' for text in headings)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return (
+        f'<div class="wide" tabindex="0" role="region" aria-label="{escape(caption)}">'
+        f"<table><caption>{escape(caption)}</caption>"
+        f"<thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>"
+    )
+
+
+def wiring(file: str, device: str) -> str:
+    """The tables of the device's YAML, wires and limits, as `rmf-bridge check` prints them."""
+    found = _tables(file, _changed_at(file), device)
+    if isinstance(found, str):
+        return f"<p>{escape(found)}</p>"
+    return "".join(table(one.headings, one.rows, one.title) for one in found)
+
+
+def levels(sensed: Mapping[str, str], driven: Mapping[str, str]) -> str:
+    """What a daemon senses and drives now."""
+    if not sensed and not driven:
+        return f"<p>{NO_RING}</p>"
+    rows = [(name, "sensed", value) for name, value in sensed.items()]
+    rows += [(name, "driven", value) for name, value in driven.items()]
+    return table(("what", "way", "now"), rows, "Levels now, as the driver understands them")
+
+
+def _changed_at(file: str) -> float:
+    try:
+        return Path(file).stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+@lru_cache(maxsize=64)
+def _tables(file: str, changed_at: float, device: str) -> list[Table] | str:
+    """The tables, or why there are none. `changed_at`: a file that has changed is read again."""
+    try:
+        config = load(Path(file))
+    except SettingsError as error:
+        return f"{file} cannot be read: {error.problems[0]}"
+    parts = [part for part in findings(config).parts if part.device in (device, config.kind)]
+    return [one for part in parts for one in part.tables]

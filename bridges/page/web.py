@@ -1,0 +1,162 @@
+"""The page's application: which view is at which address, its head, and the process that serves it.
+
+NiceGUI is imported here and in the views alone. What a browser does reaches the graph only by a
+command (`actions.py`).
+"""
+
+import argparse
+import asyncio
+import ipaddress
+import logging
+import os
+import socket
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from nicegui import app, core, ui
+
+from bridges.commands.graph import interruptible
+from bridges.page.access import Door
+from bridges.page.actions import Deeds
+from bridges.page.gallery import Gallery
+from bridges.page.gate import Gate
+from bridges.page.guard import Guard
+from bridges.page.here import Here
+from bridges.page.incident_views import IncidentViews
+from bridges.page.listener import Listener
+from bridges.page.login import STYLE, Login
+from bridges.page.site import Site
+from bridges.page.site_views import SiteViews
+from bridges.rmf.transport import Transport
+
+log = logging.getLogger(__name__)
+
+PUMP_S: Final = 0.1
+HERE_S: Final = 1.0
+RECONNECT_S: Final = 30.0
+"""A browser that is away for longer loads its view again."""
+MOST_HISTORY: Final = 100
+"""Updates that a browser which was away is sent again; beyond them it loads its view again."""
+MOST_CONNECTIONS: Final = 200
+MOST_BYTES: Final = 64 * 1024
+"""Of one message from a browser; the library's own are a hundredth of it."""
+MOST_WAITING: Final = 200
+"""Packets for a browser that does not read them; a browser that reads has a few."""
+
+
+def serve(
+    args: argparse.Namespace,
+    known: Mapping[str, str],
+    join: Callable[[], Transport],
+    graph: Sequence[str],
+) -> int:
+    """Serve until a signal ends it; the exit code. `known`: users and their hashes. `graph`: the
+    options that name the page's graph, for its commands."""
+    address, port = args.listen
+    try:
+        opened = socket.create_server((address, port), family=_family(address))
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else str(error)
+        other = f"another port: --listen {address}:0 takes a free one"
+        sys.stderr.write(f"rmf-bridge page: {address} port {port}: {why}; {other}\n")
+        return os.EX_UNAVAILABLE
+    shown = f"[{address}]" if ":" in address else address
+    netloc = f"{shown}:{opened.getsockname()[1]}"
+    login = Login(Door(known) if known else None, proxy=args.proxy or "", header=args.proxy_header)
+    ui.add_css(STYLE, shared=True)
+    app.get("/login")(login.show)
+    app.post("/login")(login.log_in)
+    app.post("/logout")(login.log_out)
+    IncidentViews(args.incidents, args.recording, login).install()
+    listener = None
+    if args.recording is None:
+        listener = _live(args, join, login, graph)
+    gate = Gate(login, closed=not ipaddress.ip_address(address).is_loopback)
+    app.add_middleware(Guard, hosts=_hosts(address, netloc, args.host), gate=gate)
+    app.on_startup(lambda: _drop_deaf())
+    app.on_startup(lambda: _say(f"the page is at http://{netloc}/ (Ctrl-C ends it)"))
+    try:
+        with interruptible(), suppress(KeyboardInterrupt):
+            ui.run(
+                reload=False,
+                show=False,
+                fd=opened.fileno(),
+                show_welcome_message=False,
+                proxy_headers=False,
+                server_header=False,
+                title="RMF bridges",
+                tailwind=False,
+                reconnect_timeout=RECONNECT_S,
+                message_history_length=MOST_HISTORY,
+                limit_concurrency=MOST_CONNECTIONS,
+                ws_max_size=MOST_BYTES,
+                language="en-GB",
+            )
+    finally:
+        if listener is not None:
+            listener.end()
+        opened.close()
+    return 0
+
+
+def _live(
+    args: argparse.Namespace,
+    join: Callable[[], Transport],
+    login: Login,
+    graph: Sequence[str],
+) -> Listener:
+    site = Site()
+    listener = Listener(site, join)
+    gallery, here = Gallery(site, listener), Here(args.runtime_dirs)
+    state = os.environ.get("STATE_DIRECTORY")
+    deeds = Deeds(Path(state) if state else None)
+    SiteViews(site, gallery, here, login, deeds, graph).install()
+    app.on_startup(lambda: _pump(gallery))
+    app.on_startup(lambda: _look(here))
+    listener.start()
+    return listener
+
+
+async def _pump(gallery: Gallery) -> None:
+    while True:
+        await asyncio.sleep(PUMP_S)
+        try:
+            gallery.turn()
+        except Exception:  # the page goes on, whatever a message does to one card
+            log.exception("page")
+
+
+async def _drop_deaf() -> None:
+    """End the connection of a browser that does not read what it is sent."""
+    while True:
+        await asyncio.sleep(HERE_S)
+        for socket_ in list(core.sio.eio.sockets.values()):
+            if socket_.queue.qsize() > MOST_WAITING:
+                with suppress(Exception):  # it may be closing already
+                    await socket_.close(wait=False)
+
+
+async def _look(here: Here) -> None:
+    """See which daemons are on this machine, off the pump's path."""
+    while True:
+        with suppress(OSError):
+            await asyncio.to_thread(here.look)
+        await asyncio.sleep(HERE_S)
+
+
+def _hosts(address: str, netloc: str, names: Sequence[str]) -> set[str]:
+    port = netloc.rpartition(":")[2]
+    loopback = ipaddress.ip_address(address).is_loopback
+    return {netloc, *names, *((f"localhost:{port}",) if loopback else ())}
+
+
+def _family(address: str) -> socket.AddressFamily:
+    return socket.AF_INET6 if ":" in address else socket.AF_INET
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()

@@ -1,0 +1,77 @@
+"""Devices as HTML and SVG: what is told in words, what is marked, and that no name is markup."""
+
+from xml.etree import ElementTree
+
+import pytest
+
+from bridges.commands.board import Row
+from bridges.page import drawing
+from bridges.page.site import Robot, Shown
+from bridges.rmf import definitions as d
+from bridges.rmf.words import Stated
+
+HOSTILE = "<script>alert(1)</script>\"'&"
+LIFT = d.LiftState(
+    lift_name="Lift1",
+    available_floors=("L1", "L2", "L3"),
+    current_floor="L2",
+    destination_floor="L3",
+    door_state=d.LiftDoor.DOOR_CLOSED,
+    motion_state=d.LiftMotion.MOTION_UP,
+)
+
+
+def well_formed(html: str) -> ElementTree.Element:
+    return ElementTree.fromstring(f"<all>{html}</all>")
+
+
+def test_a_shaft_has_its_highest_floor_on_top_and_says_what_it_shows() -> None:
+    root = well_formed(drawing.shaft(LIFT))
+    texts = [(one.text or "").strip() for one in root.iter("text")]
+    assert texts == ["◎ L3", "L2", "L1", "▲"]
+    (svg,) = root.iter("svg")
+    assert svg.get("aria-label") == (
+        "car at L2, going up, door closed, mode UNKNOWN, destination L3"
+    )
+
+
+def test_a_car_at_no_known_floor_is_drawn_nowhere() -> None:
+    root = well_formed(drawing.shaft(d.LiftState(available_floors=("L1", "L2"))))
+    assert [one.get("class") for one in root.iter("rect")] == ["shaft", "shaft"]
+
+
+def test_a_lift_of_a_thousand_floors_is_told_in_words_alone() -> None:
+    floors = tuple(map(str, range(1000)))
+    assert drawing.shaft(d.LiftState(available_floors=floors)) == ""
+
+
+@pytest.mark.parametrize("kind", ["lift", "door", "charger", "coordinator", "robot"])
+def test_no_name_is_markup(kind: str) -> None:
+    row = Row(kind, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, True, HOSTILE)
+    states: dict[str, Stated] = {
+        "lift": d.LiftState(available_floors=(HOSTILE,), current_floor=HOSTILE),
+        "door": d.DoorState(door_name=HOSTILE),
+        "charger": d.ChargerState(charger_name=HOSTILE, error_message=HOSTILE),
+    }
+    root = well_formed(drawing.card(Shown(row, states.get(kind))))
+    assert not list(root.iter("script"))
+    assert HOSTILE in "".join(root.itertext())
+
+
+def test_a_device_has_a_page_of_its_own_whatever_its_name() -> None:
+    assert drawing.path_of("door", "a/../b?c#d") == "/door/a%2F..%2Fb%3Fc%23d"
+
+
+def test_what_is_old_says_so_and_how_old_it_is() -> None:
+    html = drawing.card(Shown(Row("door", "ward", "open", age="12.0 s", mark="SILENT 12 s")))
+    text = "".join(well_formed(html).itertext())
+    assert "OLD: silent 12 s, last reading 12.0 s old" in text
+    assert "was" in text
+    assert "now" not in text
+
+
+def test_a_robot_whose_fleet_is_silent_is_old() -> None:
+    state = d.RobotState("r1", battery_percent=250.0, location=d.Location(level_name="L1"))
+    root = well_formed(drawing.robots([Robot("fleet", state, 100.0)], now=120.0))
+    cells = [cell.text for cell in root.iter("td")]
+    assert cells == ["fleet/r1", "idle (OLD: silent 20 s)", "L1", "100 %"]

@@ -1,0 +1,36 @@
+"""What a daemon senses and drives now, from the entries of its ring."""
+
+from pathlib import Path
+
+from bridges.core.decision import IoFailed, Sampled
+from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.page.levels import Levels
+from bridges.recording.entries import Step
+from bridges.recording.trees import tree
+
+
+def step(event: object, *outputs: object) -> Step:
+    return Step(1.0, "ward_door", tree(event), None, outputs=[tree(one) for one in outputs])
+
+
+def test_the_last_sample_and_the_last_outputs_are_shown_in_words() -> None:
+    levels = Levels(Path("nowhere"))
+    outputs = DoorOutputs(hold_open=True)
+    levels.take([step(Sampled(DoorSample(opened=False, closed=True)), outputs)])
+    levels.take([step(Sampled(DoorSample(opened=True, closed=False)))])
+    sensed = levels.sensed["ward_door"]
+    assert (sensed["opened"], sensed["closed"], sensed["errors"]) == ("on", "off", "none")
+    assert levels.driven["ward_door"]["hold open"] == "on"
+
+
+def test_a_reading_that_failed_is_told_as_failed() -> None:
+    levels = Levels(Path("nowhere"))
+    levels.take([step(IoFailed("no answer"))])
+    assert levels.sensed == {"ward_door": {"the last reading": "failed: no answer"}}
+
+
+def test_without_a_ring_nothing_is_known(tmp_path: Path) -> None:
+    levels = Levels(tmp_path)
+    levels.take([step(IoFailed("no answer"))])
+    levels.look()
+    assert (levels.sensed, levels.driven) == ({}, {})

@@ -1,0 +1,112 @@
+"""What the page knows of the graph: the latest of each device, in bounds, whatever is made up."""
+
+from dataclasses import replace
+
+from bridges.page.site import GONE_AFTER_S, MOST_DEVICES, MOST_ROBOTS, Site
+from bridges.recording.heard import Heard
+from bridges.rmf import definitions as d
+from bridges.rmf import topics
+from bridges.rmf.stamps import stamp
+from bridges.rmf.topics import AnyTopic
+from bridges.serve.diagnostics import diagnosis
+
+WALL = 1_700_000_000.0
+LIFT = d.LiftState(
+    lift_name="Lift1", available_floors=("L1", "L2"), current_floor="L1", door_state=2
+)
+
+
+def heard(at: float, topic: AnyTopic, message: d.Message) -> Heard:
+    return Heard(at, WALL + at, topic.name, message)
+
+
+def lift(at: float, name: str = "Lift1") -> Heard:
+    state = replace(LIFT, lift_name=name, lift_time=stamp(WALL + at))
+    return heard(at, topics.LIFT_STATES, state)
+
+
+def names(site: Site, now: float) -> list[str]:
+    return [shown.row.name for shown in site.devices(now, WALL + now)]
+
+
+def test_a_device_is_shown_with_its_state_and_its_row() -> None:
+    site = Site()
+    site.take(lift(1.0))
+    (shown,) = site.devices(1.2, WALL + 1.2)
+    assert (shown.row.state, shown.row.age) == ("car at L1, door open, mode UNKNOWN", "0.2 s")
+    assert isinstance(shown.state, d.LiftState)
+
+
+def test_only_what_was_heard_of_since_is_drawn_again() -> None:
+    site = Site()
+    site.take(lift(1.0))
+    site.take(lift(1.0, "Lift2"))
+    assert len(site.changed(1.1, WALL)) == 2
+    assert site.changed(1.2, WALL) == []
+    site.take(lift(2.0))
+    assert [shown.row.name for shown in site.changed(2.1, WALL)] == ["Lift1"]
+
+
+def test_ten_thousand_made_up_lifts_push_no_known_one_out() -> None:
+    site = Site()
+    site.take(lift(0.0))
+    for number in range(10_000):
+        site.take(lift(0.001 * number, f"made up {number}"))
+    found = names(site, 10.0)
+    assert len(found) == MOST_DEVICES
+    assert "Lift1" in found
+    assert site.crowded == {"lift"}
+
+
+def test_a_device_that_went_silent_gives_way_to_a_new_one() -> None:
+    site = Site()
+    for number in range(MOST_DEVICES):
+        site.take(lift(0.0, f"old {number}"))
+    later = GONE_AFTER_S + 1.0
+    site.take(lift(later, "new"))
+    found = names(site, later)
+    assert len(found) == MOST_DEVICES
+    assert "new" in found
+    assert not site.knows("lift", "old 0")
+
+
+def test_requests_for_devices_that_nobody_has_seen_are_not_kept() -> None:
+    site = Site()
+    asked = heard(0.0, topics.LIFT_REQUESTS, d.LiftRequest("nowhere", session_id="a/b"))
+    for _ in range(1000):
+        site.take(asked)
+    assert site.timeline("lift", "nowhere", 0.0) is None
+    assert names(site, 0.0) == []
+
+
+def test_made_up_robots_are_bounded() -> None:
+    site = Site()
+    robots = tuple(d.RobotState(f"r{n}") for n in range(10_000))
+    site.take(heard(0.0, topics.FLEET_STATES, d.FleetState("fleet", robots)))
+    assert len(site.robots()) == MOST_ROBOTS
+
+
+def test_the_timeline_has_the_sessions_and_requests_of_its_device_alone() -> None:
+    site = Site()
+    held = replace(LIFT, session_id="fleet/a", lift_time=stamp(WALL))
+    site.take(heard(0.0, topics.LIFT_STATES, held))
+    asked = d.LiftRequest("Lift1", session_id="fleet/b", destination_floor="L2")
+    site.take(heard(0.5, topics.ADAPTER_LIFT_REQUESTS, asked))
+    site.take(lift(0.6, "Lift2"))
+    timeline = site.timeline("lift", "Lift1", 1.0)
+    assert timeline is not None
+    found = {
+        (lane.name, lane.row) for lane in timeline.lanes if lane.name in ("sessions", "requests")
+    }
+    assert found == {("sessions", ""), ("requests", "fleet/b")}
+
+
+def test_faults_and_simulations_come_from_the_daemons_diagnostics() -> None:
+    site = Site()
+    site.take(lift(0.0))
+    fault = {"code": "OVERLOAD", "detail": "3 s"}
+    status = {"Lift1": {"faults": [fault], "input_age_s": 0.1}}
+    told = diagnosis("node", "lift", {"simulated": True}, status, stamp(WALL))
+    site.take(heard(0.1, topics.DIAGNOSTICS, told))
+    (shown,) = site.devices(0.2, WALL + 0.2)
+    assert (shown.row.faults, shown.row.simulated) == ("OVERLOAD (3 s)", True)
