@@ -6,12 +6,14 @@ BIN := .venv/bin
 # compiles every file again.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo demo-charging test suite deep test-ros lint style types man deb format bench flood soak torture mutate clean
+.PHONY: help demo demo-charging demo-page test test-page suite deep test-ros lint style types man deb format bench flood soak torture mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
 	@echo "make demo-charging  two fleets, two chargers and their coordinator: the scenarios by number, 100 s"
+	@echo "make demo-page  a site with lifts, doors, chargers and robots that ride for ever, and the web page of it"
 	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
+	@echo "make test-page  the web page in a real browser (Chromium)"
 	@echo "make deep    all tests, every walk to its full depth: some minutes more"
 	@echo "make test-ros  the tests that need ROS 2, in a shell that has sourced its setup file"
 	@echo "make bench   latency and memory, beside a bare transport node"
@@ -38,6 +40,9 @@ demo: .venv/ready
 demo-charging: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo charging
 
+demo-page: .venv/ready
+	@$(BIN)/python -m hal_fakes.demo page
+
 # Many tests wait for a process or a wire: more of them than there are cores run side by side.
 # Each test goes to the next free worker, in the order of conftest.py: long ones first. Tests that share a
 # process stay together (mark xdist_group).
@@ -48,6 +53,13 @@ test: .venv/ready style
 
 suite: .venv/ready
 	$(BIN)/pytest $(SIDE_BY_SIDE)
+
+# In Chromium from the distribution; as root, on a machine without one, it is installed.
+test-page: .venv/ready
+	@command -v chromium >/dev/null || { test "$$(id -u)" = 0 && apt-get update -q && \
+	  apt-get install -y -q --no-install-recommends chromium; } || { \
+	  echo "Chromium is missing: sudo apt install chromium"; exit 1; }
+	$(BIN)/pytest -m browser -n 2 --dist loadfile tests/page/browser
 
 # Walks to their full depth and every example. Run it before a release and after a change to a core.
 deep: .venv/ready

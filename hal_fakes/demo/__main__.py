@@ -1,14 +1,14 @@
-"""`python -m hal_fakes.demo [ride|charging]`: exit code 0 when the day went right, 1 with the reason,
-130 after Ctrl-C. Nothing is left running, whichever way it ends."""
+"""`python -m hal_fakes.demo [ride|charging|page]`: exit code 0 when the day went right, 1 with the
+reason, 130 after Ctrl-C. Nothing is left running, whichever way it ends."""
 
 import argparse
 import sys
 from collections.abc import Sequence
 
-from hal_fakes.demo import charging, ride
+from hal_fakes.demo import charging, ride, site
 from hal_fakes.demo.stage import Stage
 
-DEMOS = {"ride": ride.DEMO, "charging": charging.DEMO}
+DEMOS = {"ride": ride.DEMO, "charging": charging.DEMO, "page": site.DEMO}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

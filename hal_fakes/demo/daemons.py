@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -10,6 +11,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from bridges.page import access
 from hal_fakes.caller import Caller, Refused
 from hal_fakes.plants.plant import Edge
 from hal_fakes.wire import wire
@@ -23,25 +25,23 @@ class Wrong(Exception):
     """The demo did not go as it should; the text says what was missing."""
 
 
-class Daemon:
-    """One `rmf-bridge run FILE --simulate`, in a session of its own.
+class Program:
+    """One `rmf-bridge …`, in a session of its own.
 
     So a Ctrl-C in the terminal reaches the demo alone, which then stops everybody in order.
     """
 
-    def __init__(self, file: Path, directory: Path, domain_id: int) -> None:
-        self.name = file.stem
-        self.log = directory / f"{self.name}.log"
-        self.runtime_dir = directory / self.name
-        command = [sys.executable, "-m", "bridges.cli", "run", str(file), "--simulate"]
-        command += ["--runtime-dir", str(self.runtime_dir)]
+    def __init__(self, name: str, log: Path, words: Iterable[str], domain_id: int) -> None:
+        self.name = name
+        self.log = log
+        command = [sys.executable, "-m", "bridges.cli", *words]
         command += ["--domain-id", str(domain_id), "--transport", wire()]
         environment = {k: v for k, v in os.environ.items() if k != "RMF_BRIDGE_SERVICE"}
-        with self.log.open("wb") as log:
+        with self.log.open("wb") as out:
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
-                stdout=log,
+                stdout=out,
                 stderr=subprocess.STDOUT,
                 env=environment,
                 start_new_session=True,
@@ -51,25 +51,6 @@ class Daemon:
         """Raises Wrong when the daemon has died."""
         if self._exited():
             raise Wrong(f"the daemon {self.name} has died; its log says why")
-
-    def follow(self, tell: Callable[[Edge], None]) -> None:
-        """Call `tell`, on a thread, with every edge of its plants from now on."""
-        caller = self._caller()
-        caller.order("follow")
-        threading.Thread(target=_read, args=(caller, tell), daemon=True).start()
-
-    def order(self, line: str) -> None:
-        """Give its plants one order. Raises Wrong when they refuse it."""
-        with self._caller() as caller:
-            try:
-                caller.order(line)
-            except Refused as error:
-                raise Wrong(str(error)) from None
-
-    def reset(self) -> None:
-        """As `rmf-bridge reset` does."""
-        if not self._exited():
-            os.kill(self._process.pid, signal.SIGUSR1)
 
     def tail(self) -> str:
         """The end of its log."""
@@ -95,6 +76,34 @@ class Daemon:
         look = os.WEXITED | os.WNOHANG | os.WNOWAIT
         return os.waitid(os.P_PID, self._process.pid, look) is not None
 
+
+class Daemon(Program):
+    """One `rmf-bridge run FILE --simulate`."""
+
+    def __init__(self, file: Path, directory: Path, domain_id: int) -> None:
+        self.runtime_dir = directory / file.stem
+        words = ("run", str(file), "--simulate", "--runtime-dir", str(self.runtime_dir))
+        super().__init__(file.stem, directory / f"{file.stem}.log", words, domain_id)
+
+    def follow(self, tell: Callable[[Edge], None]) -> None:
+        """Call `tell`, on a thread, with every edge of its plants from now on."""
+        caller = self._caller()
+        caller.order("follow")
+        threading.Thread(target=_read, args=(caller, tell), daemon=True).start()
+
+    def order(self, line: str) -> None:
+        """Give its plants one order. Raises Wrong when they refuse it."""
+        with self._caller() as caller:
+            try:
+                caller.order(line)
+            except Refused as error:
+                raise Wrong(str(error)) from None
+
+    def reset(self) -> None:
+        """As `rmf-bridge reset` does."""
+        if not self._exited():
+            os.kill(self._process.pid, signal.SIGUSR1)
+
     def _caller(self) -> Caller:
         path, deadline = self.runtime_dir / "plant.sock", time.monotonic() + CONNECT_WITHIN_S
         while True:
@@ -107,13 +116,47 @@ class Daemon:
                 time.sleep(0.05)
 
 
+class Page(Program):
+    """`rmf-bridge page`, on which `demo` may log in."""
+
+    def __init__(self, directory: Path, domain_id: int, password: str) -> None:
+        self._password = password
+        passwords = directory / "passwords"
+        access.add_user(passwords, "demo", password)
+        words = ["page", "--localhost", "--passwords", str(passwords)]
+        words += ["--listen", f"127.0.0.1:{_page_port()}"]
+        words += ["--runtime-dirs", str(directory)]
+        super().__init__("page", directory / "page.log", words, domain_id)
+
+    def address(self) -> str:
+        """Where it is, once it has said so."""
+        deadline = time.monotonic() + CONNECT_WITHIN_S
+        while "http://" not in (said := self.tail()):
+            self.check()
+            if time.monotonic() > deadline:
+                raise Wrong("the page did not say where it is")
+            time.sleep(0.05)
+        return f"{said.splitlines()[0]}; log in as demo, password {self._password}"
+
+
+def _page_port() -> str:
+    """PAGE_PORT, else 8080, or a free one where that is taken."""
+    if given := os.environ.get("PAGE_PORT"):
+        return given
+    try:
+        socket.create_server(("127.0.0.1", 8080)).close()
+    except OSError:
+        return "0"
+    return "8080"
+
+
 def _read(caller: Caller, tell: Callable[[Edge], None]) -> None:
     with suppress(OSError), caller:
         for edge in caller.edges():
             tell(edge)
 
 
-def stop_all(daemons: Iterable[Daemon], within_s: float = STOP_WITHIN_S) -> None:
+def stop_all(daemons: Iterable[Program], within_s: float = STOP_WITHIN_S) -> None:
     """End every daemon, within `within_s` or by force."""
     daemons = list(daemons)
     for daemon in daemons:

@@ -74,6 +74,13 @@ class Journal:
         """What a robot does, where it is sent, what a person is told, or the demo itself."""
         self._add(Line(at, what, device, text))
 
+    def forget(self) -> None:
+        """Of a demo that never ends, only the latest of each device is kept."""
+        latest = {words.device(state): state for state in self.states}
+        self.states[:] = latest.values()
+        self.edges.clear()
+        self.requests.clear()
+
     def flush(self, until: float) -> None:
         """Print what happened before `until` (monotonic s)."""
         due = sorted((line for line in self._waiting if line.at <= until), key=lambda x: x.at)

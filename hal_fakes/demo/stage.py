@@ -16,11 +16,12 @@ from types import FrameType
 from typing import Final
 
 from bridges.rmf import words
+from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Transport, TransportError
 from bridges.settings.load import load
-from hal_fakes.demo.daemons import Daemon, Wrong, stop_all
+from hal_fakes.demo.daemons import Daemon, Page, Wrong, stop_all
 from hal_fakes.demo.journal import Journal
-from hal_fakes.demo.world import World
+from hal_fakes.demo.world import PUBLISHED, World
 from hal_fakes.domain import free_domain
 from hal_fakes.wire import join, wire
 
@@ -38,7 +39,9 @@ class Demo:
     """`files`: a daemon's YAML, by the device that it serves. `dawn`: how everything stands in the
     morning, which `dawns` sees. `live`: the day itself, which raises Wrong when something does not come
     about in time. `problems`: whatever was not as it should be, from the journal alone. `right`: the
-    day in a sentence. `outcomes`: what each part of the day has shown, if the summary lists them."""
+    day in a sentence. `outcomes`: what each part of the day has shown, if the summary lists them.
+    `page_password`: the page is served beside it, and `demo` may log in with it.
+    `publishes`: the topics of RMF's side; without the supervisors' where real ones run."""
 
     files: dict[str, Path]
     dawn: str
@@ -47,6 +50,8 @@ class Demo:
     problems: Callable[[Journal], Sequence[str]]
     right: str
     outcomes: Mapping[str, str] = field(default_factory=dict)
+    page_password: str = ""
+    publishes: Sequence[AnyTopic] = PUBLISHED
 
 
 class Stage:
@@ -61,6 +66,7 @@ class Stage:
         self._patience = patience
         self.daemons: dict[str, Daemon] = {}
         self.journal = Journal(time.monotonic(), sys.stdout.write, colour=sys.stdout.isatty())
+        self.page: Page | None = None
         self._interrupted = False
 
     def play(self) -> int:
@@ -94,7 +100,14 @@ class Stage:
         return 0, False
 
     def _live(self, transport: Transport) -> None:
-        world = World(transport, self.daemons, self.journal, self._check, self._patience)
+        world = World(
+            transport,
+            self.daemons,
+            self.journal,
+            self._check,
+            self._patience,
+            publishes=self.demo.publishes,
+        )
         for device, file in self.demo.files.items():
             if load(file).buses:
                 self.daemons[device].follow(world.edge)
@@ -120,10 +133,13 @@ class Stage:
             for device, file in self.demo.files.items():
                 self._check()
                 self.daemons[device] = Daemon(file, directory, domain)
+            if self.demo.page_password:
+                self.page = Page(directory, domain, self.demo.page_password)
+                self.journal.note("demo", self.page.address(), time.monotonic())
             yield transport
             self.journal.flush(time.monotonic())
         finally:
-            stop_all(self.daemons.values())
+            stop_all([*self.daemons.values(), *([self.page] if self.page else [])])
             transport.close()
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:

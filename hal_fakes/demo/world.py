@@ -55,9 +55,12 @@ class World:
         journal: Journal,
         check: Callable[[], None],
         patience: float = 1.0,
+        *,
+        publishes: Iterable[AnyTopic] = PUBLISHED,
     ) -> None:
         """`check` is called all the time, and raises when there is no point in going on. `patience`
-        multiplies how long `until` waits."""
+        multiplies how long `until` waits. `publishes`: what is said here; a supervisor that hears
+        another publisher of its topics waits."""
         self.daemons = daemons
         self.journal = journal
         self.places: dict[str, str] = {}
@@ -68,7 +71,7 @@ class World:
         self._transport = transport
         self._inbox: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._publishers: dict[str, Publisher[d.Message]] = {
-            topic.name: transport.publisher(topic) for topic in PUBLISHED
+            topic.name: transport.publisher(topic) for topic in publishes
         }
         self._heard: set[str] = set()
         self._hear(*STATES, topics.CHARGING_ASSIGNMENTS, topics.ALERT)
