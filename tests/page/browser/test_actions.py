@@ -1,0 +1,113 @@
+"""Actions in a real browser, on a real daemon beside the page; and who may not act."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page
+
+from tests.page.browser.conftest import (
+    PASSWORD,
+    USER,
+    Graph,
+    Until,
+    log_in,
+    on_graph,
+    page,
+    program,
+)
+
+pytestmark = pytest.mark.browser
+DOOR = Path("config/door_modbus.yaml").absolute()
+LIFT = Path("config/lift_dry_contact.yaml").absolute()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def daemons(folder: Path, module_domain: int) -> Iterator[None]:
+    """A lift and a door, simulated, on this test's domain."""
+    graph = on_graph(module_domain)[1:]
+    lift = ("run", str(LIFT), "--simulate", "--runtime-dir", str(folder / "run/lift"), *graph)
+    door = ("run", str(DOOR), "--simulate", "--runtime-dir", str(folder / "run/door"), *graph)
+    with program(*lift), program(*door):
+        yield
+
+
+def confirm(tab: Page, button: str, until: Until) -> None:
+    """Press a button, and say yes when it asks once more."""
+    until(lambda: tab.get_by_role("button", name=button, exact=True).count() == 1, button)
+    tab.get_by_role("button", name=button, exact=True).click()
+    tab.get_by_role("button", name="Yes").click()
+
+
+def main(tab: Page) -> str:
+    return tab.locator("#main").inner_text()
+
+
+def deeds(folder: Path) -> list[tuple[str, int, str]]:
+    """Who did what, as it is kept."""
+    lines = (folder / "state/actions.jsonl").read_text().splitlines()
+    told = [json.loads(line) for line in lines]
+    return [(one["user"], one["exit"], one["command"][0]) for one in told]
+
+
+@pytest.fixture(scope="module")
+def address(module_domain: int, folder: Path) -> Iterator[str]:
+    (folder / "state").mkdir()
+    words = ["--passwords", str(folder / "passwords"), "--runtime-dirs", str(folder / "run")]
+    with page(*on_graph(module_domain), *words, state=folder / "state") as found:
+        yield found
+
+
+def test_a_simulation_is_pressed_and_failed_and_each_deed_is_kept(
+    tab: Page, address: str, graph: Graph, until: Until, folder: Path
+) -> None:
+    tab.goto(address)
+    until(lambda: tab.get_by_role("link", name="Lift1").count() == 1, "the lift")
+    log_in(tab, address, PASSWORD, "/lift/Lift1")
+    until(lambda: "floor_bit0" in main(tab), "the wiring of the daemon beside the page")
+    assert "SIMULATED" in main(tab)
+    confirm(tab, "Press", until)
+    until(lambda: "fire" in tab.locator("article.card").inner_text().lower(), "the fire")
+    until(lambda: f"{USER}\tPress fire_alarm" in main(tab), "who did what")
+    confirm(tab, "Let go", until)
+    until(lambda: len(deeds(folder)) == 2, "the release of the button")
+    confirm(tab, "Let it fail", until)
+    until(lambda: len(deeds(folder)) == 3, "three deeds")
+    assert deeds(folder) == [(USER, 0, "press"), (USER, 0, "press"), (USER, 0, "fail")]
+
+
+def test_what_the_driver_senses_is_seen_live(tab: Page, address: str, until: Until) -> None:
+    tab.goto(f"{address}door/ward_door")
+    until(lambda: "Levels now" in main(tab), "the levels")
+    assert re.search(r"closed\s+sensed\s+on", main(tab))
+
+
+def test_a_release_reaches_the_daemon(
+    tab: Page, address: str, graph: Graph, until: Until, folder: Path
+) -> None:
+    before = len(deeds(folder))
+    asked = ("send", "lift", "Lift1", "L3", "--session", "me", "--direct", *graph.options)
+    log_in(tab, address, PASSWORD, "/lift/Lift1")
+    with program(*asked, ends=130):  # somebody asks, and goes without an END
+        until(lambda: "me" in tab.locator("article.card").inner_text().split(), "the session")
+    confirm(tab, "Release the lift", until)
+    until(lambda: len(deeds(folder)) > before, "the command's end")
+    assert deeds(folder)[before:] == [(USER, 0, "release")]
+    until(lambda: "held by" not in tab.locator("article.card").inner_text(), "the release")
+
+
+def test_a_session_that_has_ended_can_do_nothing(
+    tab: Page, address: str, until: Until, folder: Path
+) -> None:
+    before = len(deeds(folder))
+    log_in(tab, address, PASSWORD, "/lift/Lift1")
+    until(lambda: tab.get_by_role("button", name="Let it fail").count() == 1, "the button")
+    other = tab.context.new_page()
+    other.goto(address)
+    other.get_by_role("button", name="Log out").click()
+    other.get_by_role("link", name="Log in").wait_for()
+    confirm(tab, "Let it fail", until)
+    tab.get_by_text("nothing was done").wait_for()
+    assert len(deeds(folder)) == before
