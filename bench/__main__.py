@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench import buses, day, explain, idle, latency, recording
+from bench import buses, day, explain, idle, latency, page, recording
 from bench.figures import lines
 
 RESULTS = Path(__file__).parent / "results"
@@ -23,6 +23,7 @@ SECTIONS = {
     "day": day,
     "explain": explain,
     "recording": recording,
+    "page": page,
 }
 
 

@@ -48,10 +48,10 @@ put systemd/rmf-bridges.sysusers usr/lib/sysusers.d/rmf-bridges.conf
 put systemd/rmf-bridges.tmpfiles usr/lib/tmpfiles.d/rmf-bridges.conf
 put systemd/60-rmf-bridges.rules usr/lib/udev/rules.d/60-rmf-bridges.rules
 put systemd/80-rmf-can0.network usr/share/doc/rmf-bridges/examples/80-rmf-can0.network
-sed 's#/opt/rmf-bridges/.venv/bin/#/usr/lib/rmf-bridges/bin/#' "$here/systemd/rmf-bridge@.service" \
-  > "$root/usr/lib/systemd/system/rmf-bridge@.service"
-sed 's#/opt/rmf-bridges/.venv/bin/#/usr/lib/rmf-bridges/bin/#' "$here/systemd/rmf-bridge-recorder.service" \
-  > "$root/usr/lib/systemd/system/rmf-bridge-recorder.service"
+for unit in rmf-bridge@ rmf-bridge-recorder rmf-bridge-page; do
+  sed 's#/opt/rmf-bridges/.venv/bin/#/usr/lib/rmf-bridges/bin/#' "$here/systemd/$unit.service" \
+    > "$root/usr/lib/systemd/system/$unit.service"
+done
 for file in "$here"/config/*.yaml; do put "config/${file##*/}" "usr/share/doc/rmf-bridges/examples/${file##*/}"; done
 mkdir -p "$root/usr/share/man/man1" "$root/usr/share/bash-completion/completions" \
   "$root/usr/share/zsh/vendor-completions" "$root/usr/share/fish/vendor_completions.d"

@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 FILES = ROOT / "systemd"
 UNIT = FILES / "rmf-bridge@.service"
 RECORDER = FILES / "rmf-bridge-recorder.service"
+PAGE = FILES / "rmf-bridge-page.service"
 CONFIG = device_yamls()
 VERIFY = ("systemd-analyze", "verify", "--man=no")
 MOST = 2.0
@@ -72,17 +73,26 @@ def test_the_recorder_is_less_exposed_than_any_daemon(tmp_path: Path) -> None:
 
 
 @needs_systemd
+def test_the_page_is_less_exposed_than_any_daemon(tmp_path: Path) -> None:
+    units = tmp_path / "etc/systemd/system"
+    units.mkdir(parents=True)
+    shutil.copy(PAGE, units)
+    assert exposure(tmp_path, PAGE.name) <= 1.5
+
+
+@needs_systemd
 def test_systemd_finds_nothing_wrong_with_the_units(tmp_path: Path) -> None:
     name = system(tmp_path, ROOT / "config/door_rs485.yaml")
     units = tmp_path / "etc/systemd/system"
     program = "/opt/rmf-bridges/.venv/bin/rmf-bridge"
+    others = [units / "rmf-bridges.target", units / RECORDER.name, units / PAGE.name]
     shutil.copy(RECORDER, units)
-    recorder = units / RECORDER.name
-    for unit in (units / "rmf-bridge@.service", units / "rmf-bridges.target", recorder):
+    shutil.copy(PAGE, units)
+    for unit in (units / "rmf-bridge@.service", *others):
         unit.write_text(unit.read_text().replace(program, "/bin/true").replace("man:", "file:/"))
     (units / "rmf-bridge@.service").rename(units / name)
     done = subprocess.run(
-        [*VERIFY, units / name, units / "rmf-bridges.target", recorder],
+        [*VERIFY, units / name, *others],
         capture_output=True,
         text=True,
     )
