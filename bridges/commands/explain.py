@@ -13,8 +13,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
+from bridges.commands import faults
 from bridges.commands.board import SECONDS
-from bridges.commands.faults import remedies
 from bridges.commands.graph import (
     add_graph_arguments,
     complain,
@@ -112,7 +112,7 @@ def _recorded(args: argparse.Namespace) -> int:
 
 def _all(site: Site, devices: list[tuple[Kind, str]], *, as_json: bool) -> int:
     """Each device in a line, or as JSON."""
-    told = [site.explain(kind, name, None, _remedies()) for kind, name in devices]
+    told = [site.explain(kind, name, None, faults.told()) for kind, name in devices]
     if as_json:
         print(json.dumps([asdict(one) for one in told]))
         return 0
@@ -130,7 +130,7 @@ def _one(site: Site, args: argparse.Namespace) -> int:
         several = " and a ".join(kinds)
         complain("explain", f"'{name}' is a {several}: say which with --kind")
         return 2
-    found = site.explain(kinds[0], name, None, _remedies())
+    found = site.explain(kinds[0], name, None, faults.told())
     _tell(found, as_json=args.json)
     return 0 if (kinds[0], name) in site.devices() else 1
 
@@ -143,10 +143,6 @@ def _tell(found: Explanation, *, as_json: bool) -> None:
     for line in lines(found, None, size.columns, max(24, min(SCREEN_LINES, size.lines - 1))):
         print(line)
     sys.stdout.flush()
-
-
-def _remedies() -> dict[str, tuple[str, str]]:
-    return {code: (one.cause, one.do) for code, one in remedies().items()}
 
 
 # ---- the graph
@@ -177,7 +173,7 @@ def _follow(ear: Ear, site: Site, args: argparse.Namespace) -> None:
     _listen(ear, site, args.for_s)
     while True:
         kinds: list[Kind] = [args.kind] if args.kind else site.kinds(args.live) or ["lift"]
-        found = site.explain(kinds[0], args.live, None, _remedies())
+        found = site.explain(kinds[0], args.live, None, faults.told())
         news = [SECONDS.sub("", text) for text in found.now], found.next
         if news != told:
             _tell(found, as_json=args.json)

@@ -6,6 +6,7 @@
 import re
 import shlex
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -67,6 +68,12 @@ def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Re
         return f"`{text}` ({known[text]})" if text in known else f"`{text}`"
 
     return Remedy(*(QUOTED.sub(named, text) for text in (remedy.cause, remedy.do)))
+
+
+@cache
+def told() -> dict[str, tuple[str, str]]:
+    """Each fault's likely cause and what to do, by its code, as `bridges/explain/` takes them."""
+    return {code: (one.cause, one.do) for code, one in remedies().items()}
 
 
 def page() -> str:

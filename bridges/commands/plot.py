@@ -11,7 +11,7 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
-from bridges.commands.faults import remedies
+from bridges.commands import faults
 from bridges.commands.graph import complain
 from bridges.commands.recordings import Span, add_span_arguments, told_between
 from bridges.explain.lanes import Drawing
@@ -116,8 +116,7 @@ def _read(args: argparse.Namespace, name: str) -> tuple[Timeline, list[str]]:
         raise PlotError(f"'{name}' is a {' and a '.join(kinds)}: say which with --kind")
     for kind in kinds:
         site.story_from(span.begins_at)
-        known = {code: (one.cause, one.do) for code, one in remedies().items()}
-        words = lines(site.explain(kind, name, None, known))
+        words = lines(site.explain(kind, name, None, faults.told()))
         return drawings[kind].timeline(span.begins_at), words
     raise PlotError(f"{args.file} holds no state of '{name}' in that time")
 

@@ -131,11 +131,6 @@ def told_between(path: Path, span: Span, command: str, device: str) -> Iterator[
     return between(path, span, command, Sieve(device).keep)
 
 
-def heard_between(path: Path, span: Span, command: str) -> Iterator[Heard]:
-    """Every message of RMF, as `between` gives it."""
-    return (one for one in between(path, span, command) if isinstance(one, Heard))
-
-
 def between(
     path: Path, span: Span, command: str, keep: Keep | None = None
 ) -> Iterator[Heard | Own]:

@@ -31,7 +31,6 @@ class Claim:
     passed_on: Moment | None = None
     granted: Moment | None = None
     met: Moment | None = None
-    was_met: int = 0
     ended: Moment | None = None
     end_passed_on: bool = False
     gone: bool = False

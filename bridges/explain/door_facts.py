@@ -26,14 +26,12 @@ class DoorFacts(Device):
         self.holders: dict[str, Moment] = {}
         self.last_heartbeat: Moment | None = None
         self.asked: Fact | None = None
-        self.asked_last: Moment | None = None
         self.passages = 0
 
     def requested(self, moment: Moment, request: d.DoorRequest, *, passed_on: bool) -> None:
         """A request of a fleet adapter or, passed on, of the supervisor."""
         wants = words.plain(d.DoorModeValue, request.requested_mode.value)
         if passed_on:
-            self.asked_last = moment
             if self.asked is None:
                 self.asked = Fact(wants, moment)
             elif self.asked.say(wants, moment):

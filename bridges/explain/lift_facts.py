@@ -48,7 +48,6 @@ class LiftFacts(Device):
         self.mode = Fact("", began)
         self.session = Fact(NOBODY, began)
         self.destination = Fact("", began)
-        self.opened_before = False
         self.adapters_heard = False
         self.supervisor: Fact | None = None
         self.supervisor_last: Moment | None = None
@@ -181,7 +180,6 @@ class LiftFacts(Device):
             if claim.ended is None and self.matches(claim):
                 if claim.met is None:
                     claim.met = moment
-                    claim.was_met += 1
                     self._met(moment, claim)
             elif claim.met is not None and claim.ended is None:
                 claim.met = None

@@ -4,7 +4,7 @@
 memory than a minute's.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from datetime import tzinfo
 from typing import Final
 
@@ -263,18 +263,3 @@ def _before(device: Device, clock: Clock) -> str:
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
-
-
-def explained(
-    heard: Iterable[Heard],
-    kind: Kind,
-    name: str,
-    zone: tzinfo | None = None,
-    remedies: Remedies | None = None,
-    session: str = "",
-) -> Explanation:
-    """The explanation of one device, from all that was heard."""
-    site = Site(name, session)
-    for one in heard:
-        site.take(one)
-    return site.explain(kind, name, zone, remedies)

@@ -48,6 +48,12 @@ def hashed(password: str) -> str:
 
 def matches(password: str, stored: str) -> bool:
     """Whether it is this password. Raises PasswordError if `stored` is not one of our hashes."""
+    cost, salt, wanted = _parts(stored)
+    return hmac.compare_digest(_scrypt(password, salt, *cost), wanted)
+
+
+def _parts(stored: str) -> tuple[tuple[int, int, int], bytes, bytes]:
+    """N, r and p, the salt and the hash. Raises PasswordError."""
     try:
         name, n, r, p, salt, expected = stored.split("$")
         cost = (int(n), int(r), int(p))
@@ -56,7 +62,7 @@ def matches(password: str, stored: str) -> bool:
         raise PasswordError("not a hash of `rmf-bridge page --add-user`") from None
     if name != "scrypt" or cost[0] > MOST_COST or cost[1] > 16 or cost[2] > 4:
         raise PasswordError("not a hash of `rmf-bridge page --add-user`")
-    return hmac.compare_digest(_scrypt(password, raw, *cost), wanted)
+    return cost, raw, wanted
 
 
 def _scrypt(password: str, salt: bytes, n: int, r: int, p: int) -> bytes:
@@ -81,7 +87,7 @@ def users(file: Path) -> dict[str, str]:
         if not USER.fullmatch(user) or user in found:
             raise PasswordError(f"{file}:{number}: not a user's name, or a second time")
         try:
-            matches("", stored)
+            _parts(stored)
         except PasswordError as error:
             raise PasswordError(f"{file}:{number}: {error}") from None
         found[user] = stored

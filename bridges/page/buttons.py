@@ -8,6 +8,7 @@ from typing import Final, Literal
 from fastapi import Request
 from nicegui import ui
 
+from bridges.commands.fail import MODES
 from bridges.page.actions import Action, Deeds, Local, actions, fail, press, queue
 from bridges.page.gallery import AGES_S, Gallery, Key
 from bridges.page.head import part
@@ -15,8 +16,6 @@ from bridges.page.here import Here
 from bridges.page.login import Login
 from bridges.page.tables import table
 
-HOW: Final = ("off", "stuck", "slow", "garbage", "wrong", "ok")
-"""As `rmf-bridge fail` has them."""
 SHOWN_MS: Final = 10_000
 LONGEST: Final = 400
 MOST_TOLD: Final = 10
@@ -116,7 +115,7 @@ class Buttons:
     def _failing(self, local: Local, device: str, request: Request) -> None:
         names = list(local.fails)
         broken = ui.select(names, value=names[0], label="Part").props("dense")
-        how = ui.select([*HOW], value=HOW[0], label="fails").props("dense")
+        how = ui.select([*MODES], value=MODES[0], label="fails").props("dense")
         ui.button(
             "Let it fail",
             on_click=lambda: self._ask(

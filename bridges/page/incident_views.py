@@ -11,7 +11,7 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from nicegui import app, ui
 
-from bridges.commands.faults import remedies
+from bridges.commands import faults
 from bridges.explain.picture import svg
 from bridges.page import incidents
 from bridges.page.head import head, main, part
@@ -27,7 +27,7 @@ class IncidentViews:
         self._recording = recording
         self._login = login
         self._one_at_a_time = asyncio.Lock()
-        self._remedies = {code: (one.cause, one.do) for code, one in remedies().items()}
+        self._remedies = faults.told()
 
     def install(self) -> None:
         """Put the views at their addresses."""

@@ -111,11 +111,6 @@ class Site:
         rows = self._board.rows(now, wall)
         return [Shown(row, states.get((row.kind, row.name))) for row in rows]
 
-    def device(self, kind: str, name: str, now: float, wall: float) -> Shown | None:
-        """One of them; None if it was never heard."""
-        every = self.devices(now, wall)
-        return next((one for one in every if (one.row.kind, one.row.name) == (kind, name)), None)
-
     def changed(self, now: float, wall: float) -> list[Shown]:
         """The devices that were heard of since this was asked last."""
         changed, self._changed = self._changed, set()

@@ -8,7 +8,7 @@ from typing import Final
 from fastapi import Request
 from nicegui import Client, ui
 
-from bridges.commands.faults import remedies
+from bridges.commands import faults
 from bridges.explain.explanation import Explanation
 from bridges.explain.picture import svg
 from bridges.explain.timeline import KINDS
@@ -103,7 +103,7 @@ class SiteViews:
         self._here = here
         self._login = login
         self._buttons = Buttons(gallery, here, login, deeds, graph)
-        self._remedies = {code: (one.cause, one.do) for code, one in remedies().items()}
+        self._remedies = faults.told()
 
     def install(self) -> None:
         """Put the views at their addresses."""

@@ -55,9 +55,7 @@ custom_data: ~
 ros_distro: {distro}
 """
 """Tells rosbag2 the version; the rest it takes from the file's own index."""
-KNOWN_QOS: Final = {
-    topic.name: topic.publish for topic in vars(topics).values() if isinstance(topic, topics.Topic)
-}
+KNOWN_QOS: Final = {topic.name: topic.publish for topic in topics.every()}
 
 
 @dataclass(frozen=True, slots=True)

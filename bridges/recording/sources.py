@@ -12,7 +12,7 @@ from bridges.rmf.definitions import Message
 from bridges.rmf.releases import NEWEST, RELEASES, Release
 from bridges.rmf.rihs01 import releases_of as releases_of_hash
 
-TOPICS: Final = frozenset(t.name for t in vars(topics).values() if isinstance(t, topics.Topic))
+TOPICS: Final = frozenset(topic.name for topic in topics.every())
 
 
 class BagError(Exception):

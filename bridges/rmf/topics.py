@@ -80,3 +80,8 @@ EMERGENCY_SIGNAL = Topic(
     "emergency_signal", d.EmergencySignal, publish=RETAINED, subscribe=RETAINED
 )
 DIAGNOSTICS = Topic("diagnostics", d.DiagnosticArray)
+
+
+def every() -> list[AnyTopic]:
+    """All of them, in the order above."""
+    return [topic for topic in globals().values() if isinstance(topic, Topic)]

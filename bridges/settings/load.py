@@ -38,7 +38,7 @@ from drivers.hal.points import Wire
 
 __all__ = ["Config", "Problem", "SettingsError", "load"]
 
-TOPICS = [topic.name for topic in vars(topics).values() if isinstance(topic, topics.Topic)]
+TOPICS = [topic.name for topic in topics.every()]
 
 
 def load(path: Path | str) -> Config:
