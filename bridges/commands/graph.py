@@ -7,10 +7,11 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from types import FrameType
 from typing import Generic, TypeVar
 
 import msgspec
@@ -95,14 +96,19 @@ def _configured(file: Path | None) -> Rmf:
         raise TransportError("\n".join(map(str, error.problems))) from None
 
 
-@contextmanager
-def interruptible() -> Iterator[None]:
+def interruptible() -> AbstractContextManager[None]:
     """SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt.
 
     Otherwise the node of a killed command would stay on the graph for over 10 s.
     """
+    return ended_by(signal.default_int_handler)
+
+
+@contextmanager
+def ended_by(action: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    """SIGINT, SIGTERM and SIGHUP do this, and what they did before afterwards."""
     signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, signal.default_int_handler) for number in signals}
+    before = {number: signal.signal(number, action) for number in signals}
     try:
         yield
     finally:

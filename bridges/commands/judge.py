@@ -8,7 +8,6 @@ heard, the graph cannot be joined, or what was to be played was not.
 import argparse
 import os
 import shutil
-import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -16,7 +15,13 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
-from bridges.commands.graph import add_graph_arguments, complain, interruptible, open_graph
+from bridges.commands.graph import (
+    add_graph_arguments,
+    complain,
+    ended_by,
+    interruptible,
+    open_graph,
+)
 from bridges.commands.live import OF_DEVICES, Ear
 from bridges.commands.recordings import Time, add_span_arguments
 from bridges.judge.judge import KINDS, Judge, Kind
@@ -301,10 +306,5 @@ class Live:
 def _told_to_end() -> Iterator[Callable[[], bool]]:
     """Whether Ctrl-C, SIGTERM or SIGHUP has come; none of them interrupts what is under way."""
     told: list[int] = []
-    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, lambda n, _: told.append(n)) for number in signals}
-    try:
+    with ended_by(lambda number, _: told.append(number)):
         yield lambda: bool(told)
-    finally:
-        for number, action in before.items():
-            signal.signal(number, action)

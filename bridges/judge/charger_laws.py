@@ -12,7 +12,7 @@ from bridges.judge.charger_scene import (
     ChargerScene,
 )
 from bridges.judge.law import KEPT, Doubt, Finding, Law, shown
-from bridges.judge.scene import NEVER
+from bridges.judge.scene import NOT_YET
 from bridges.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
 from bridges.rmf import definitions as d
 from bridges.rmf import words
@@ -100,8 +100,8 @@ def _cancels(scene: ChargerScene) -> Finding:
     state = scene.new
     if state is None:
         return None
-    at = scene.cancels.get(state.request_id, NEVER)
-    if at == NEVER:
+    at = scene.cancels.get(state.request_id, NOT_YET)
+    if at == NOT_YET:
         return None
     limit_s = {ASSIGNED: CANCELLED_WITHIN_S, CHARGING: RAMPS_DOWN_S}.get(
         d.ChargerStateValue(state.state) if state.state in list(d.ChargerStateValue) else IDLE

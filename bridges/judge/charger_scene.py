@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from bridges.judge.scene import NEVER, Scene, keep
+from bridges.judge.scene import NOT_YET, Scene, keep
 from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 
@@ -24,7 +24,7 @@ class ChargerScene(Scene[d.ChargerState]):
         super().__init__(name)
         self.requests: dict[str, d.ChargerRequest] = {}
         self.cancels: dict[str, float] = {}
-        self.same_since = self.foreign_at = NEVER
+        self.same_since = self.foreign_at = NOT_YET
 
     def take_other(self, heard: Heard) -> bool:
         """Requests to this charger and their cancels."""

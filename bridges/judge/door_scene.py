@@ -3,7 +3,7 @@
 from collections import deque
 from typing import Final
 
-from bridges.judge.scene import NEVER, Scene
+from bridges.judge.scene import NOT_YET, Scene
 from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -35,13 +35,13 @@ class DoorScene(Scene[d.DoorState]):
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.latched = self.was_open = self.opened = self.left = self._was_closed = False
-        self.asked_at = self.not_closed_at = self.closed_at = self.adapter_closed_at = NEVER
+        self.asked_at = self.not_closed_at = self.closed_at = self.adapter_closed_at = NOT_YET
         self.openings = 0
         self.reopened: deque[float] = deque(maxlen=3)
         self.instant = 0
         self.shut = 0
-        self._left_open_at = NEVER
-        self._people_at = self._people_open_at = self._people_close_at = NEVER
+        self._left_open_at = NOT_YET
+        self._people_at = self._people_open_at = self._people_close_at = NOT_YET
 
     @property
     def mode(self) -> int:
@@ -72,7 +72,7 @@ class DoorScene(Scene[d.DoorState]):
     def forget(self) -> None:
         """A silence is over: what was asked before may be forgotten."""
         self.latched = self.was_open = False
-        self._people_at = NEVER
+        self._people_at = NOT_YET
         self.not_closed_at = self.now
 
     def settle(self, state: d.DoorState) -> None:
@@ -82,7 +82,7 @@ class DoorScene(Scene[d.DoorState]):
             self.not_closed_at, self.openings = self.now, 0
         if self.mode in BLIND:
             self.was_open = False
-            self._people_at = NEVER
+            self._people_at = NOT_YET
         if self.mode != self.mode_before:
             self._changed()
 
@@ -94,12 +94,12 @@ class DoorScene(Scene[d.DoorState]):
             open_s = self.now - max(self._people_open_at, self._people_close_at)
             self._people_leave(open_s < DWELLS_S)
         if self.mode_before == CLOSED and not self.latched:
-            self._people_at, self._people_open_at = self.now, NEVER
+            self._people_at, self._people_open_at = self.now, NOT_YET
             crossed = self.now - self.closed_at < CROSSES_S
-            self._people_close_at = self.closed_at if crossed else NEVER
+            self._people_close_at = self.closed_at if crossed else NOT_YET
             if self.mode == OPEN:
                 self._people_open_at = self.now
-        elif self.mode == CLOSED and self._people_at > NEVER:
+        elif self.mode == CLOSED and self._people_at > NOT_YET:
             self._people_leave(self.now - self._people_close_at < OPENING_S)
 
     def _opens(self) -> None:
@@ -109,15 +109,15 @@ class DoorScene(Scene[d.DoorState]):
         if self.latched and self.was_open and self.now - self._left_open_at < REOPENS_WITHIN_S:
             self.reopened.append(self.now)
         self.was_open = self.latched or self.was_open
-        if self._people_at > NEVER:
+        if self._people_at > NOT_YET:
             self._people_open_at = self.now
 
     def _people_leave(self, at_once: bool) -> None:
         """The opening that people made is over, or ends."""
-        if self._people_at > NEVER and self._people_close_at > NEVER:
+        if self._people_at > NOT_YET and self._people_close_at > NOT_YET:
             self.left = True
             self.shut = self.shut + 1 if at_once else 0
-        self._people_at = NEVER
+        self._people_at = NOT_YET
 
     def _ask_open(self) -> None:
         if not self.latched:
@@ -126,9 +126,9 @@ class DoorScene(Scene[d.DoorState]):
             self.openings = 0
             self.reopened.clear()
         self.openings += 1
-        self._people_at = NEVER
+        self._people_at = NOT_YET
 
     def _ask_close(self) -> None:
         self.latched, self.closed_at = False, self.now
-        if self._people_at > NEVER and self._people_close_at == NEVER:
+        if self._people_at > NOT_YET and self._people_close_at == NOT_YET:
             self._people_close_at = self.now

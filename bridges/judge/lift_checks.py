@@ -4,7 +4,7 @@ from typing import Final
 
 from bridges.judge.law import KEPT, Doubt, Finding, shown
 from bridges.judge.lift_scene import GRACE_S, HAZARDS, LATE_S, LiftScene
-from bridges.judge.scene import NEVER
+from bridges.judge.scene import NOT_YET
 from bridges.rmf import definitions as d
 from bridges.rmf import words
 
@@ -154,9 +154,9 @@ def ends(scene: LiftScene) -> Finding:
     if scene.session_before and scene.session != scene.session_before:
         return KEPT
     at = scene.ending.at
-    if at == NEVER or scene.now - at < ENDS_WITHIN_S:
+    if at == NOT_YET or scene.now - at < ENDS_WITHIN_S:
         return None
-    bare = scene.ending.bare_at == at and scene.ending.floor_at == NEVER
+    bare = scene.ending.bare_at == at and scene.ending.floor_at == NOT_YET
     floor = " without a floor" if bare else ""
     return f"still held by {shown(scene.session)} {scene.now - at:.1f} s after its END{floor}"
 

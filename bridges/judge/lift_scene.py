@@ -4,7 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Final
 
-from bridges.judge.scene import NEVER, SILENT_S, Scene, keep
+from bridges.judge.scene import NOT_YET, SILENT_S, Scene, keep
 from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -32,7 +32,7 @@ class Ask:
     floors: deque[str] = field(default_factory=lambda: deque(maxlen=FLOORS))
     times: int = 0
     human: bool = False
-    direct_at: float = NEVER
+    direct_at: float = NOT_YET
     direct: bool = False
 
 
@@ -42,9 +42,9 @@ class Ending:
     without a floor, `floor_at` with one. RMF's supervisor says the second when a state after the first
     still shows the session."""
 
-    at: float = NEVER
-    bare_at: float = NEVER
-    floor_at: float = NEVER
+    at: float = NOT_YET
+    bare_at: float = NOT_YET
+    floor_at: float = NOT_YET
 
 
 class LiftScene(Scene[d.LiftState]):
@@ -67,21 +67,21 @@ class LiftScene(Scene[d.LiftState]):
         self.asks: dict[str, Ask] = {}
         self.elsewhere: dict[str, float] = {}
         self.ended: dict[str, float] = {}
-        self.granted_at = self.held_since = self.last_at = NEVER
+        self.granted_at = self.held_since = self.last_at = NOT_YET
         self.known = False
         self.last = ""
         self.offered = self.offers = False
         self.ending = Ending()
         self.bare_refused = 0
         self.reopened: deque[float] = deque(maxlen=3)
-        self.open_seen = ("", NEVER)
-        self.other_asked_at = NEVER
+        self.open_seen = ("", NOT_YET)
+        self.other_asked_at = NOT_YET
         self.false_alarms: deque[float] = deque(maxlen=3)
         self.alarmed = False
         self.volatile: bool | None = None
-        self.free_since = NEVER
-        self._open: tuple[str, float] = ("", NEVER)
-        self._shut_at = NEVER
+        self.free_since = NOT_YET
+        self._open: tuple[str, float] = ("", NOT_YET)
+        self._shut_at = NOT_YET
 
     @property
     def session(self) -> str:
@@ -95,7 +95,7 @@ class LiftScene(Scene[d.LiftState]):
 
     def has_ended(self, session: str, since: float) -> bool:
         """Was it told to end, since then?"""
-        return self.ended.get(session, NEVER) > since - LATE_S
+        return self.ended.get(session, NOT_YET) > since - LATE_S
 
     def was_asked_to(self, floor: str) -> bool:
         """Has the present session asked for this floor?"""
@@ -128,7 +128,7 @@ class LiftScene(Scene[d.LiftState]):
         self.granted_at = self.free_since = self.now
         self.offered = True
         self.ending = Ending()
-        self.open_seen = self._open = ("", NEVER)
+        self.open_seen = self._open = ("", NOT_YET)
 
     def settle(self, state: d.LiftState) -> None:
         """The session, its offer, and the door."""
@@ -161,9 +161,9 @@ class LiftScene(Scene[d.LiftState]):
     def _count_bare(self, before: str) -> None:
         """Did this session end at an END without a floor, or only at one with a floor?"""
         ending = self.ending
-        if not before or ending.bare_at == NEVER:
+        if not before or ending.bare_at == NOT_YET:
             return
-        if ending.floor_at == NEVER:
+        if ending.floor_at == NOT_YET:
             self.bare_refused = 0
         elif self.now - ending.floor_at < AT_ONCE_S < ending.floor_at - ending.bare_at:
             self.bare_refused += 1
@@ -187,9 +187,9 @@ class LiftScene(Scene[d.LiftState]):
         if not direct or message.session_id != self.session or not self.session:
             return
         ending = self.ending
-        ending.at = self.now if ending.at == NEVER else ending.at
+        ending.at = self.now if ending.at == NOT_YET else ending.at
         if message.destination_floor:
-            ending.floor_at = self.now if ending.floor_at == NEVER else ending.floor_at
+            ending.floor_at = self.now if ending.floor_at == NOT_YET else ending.floor_at
         elif ending.at == self.now:
             ending.bare_at = self.now
 

@@ -22,7 +22,7 @@ ANSWERS_WITHIN_S: Final = 0.1
 EARLY_S: Final = 0.15
 """Sooner than a timer jitters."""
 
-NEVER: Final = float("-inf")
+NOT_YET: Final = float("-inf")
 
 T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState)
 V = TypeVar("V")
@@ -50,7 +50,7 @@ class Scene(Generic[T]):
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.now = self.since = self.heard_at = NEVER
+        self.now = self.since = self.heard_at = NOT_YET
         self.news: d.Message | None = None
         self.state: T | None = None
         self.before: T | None = None
@@ -61,8 +61,8 @@ class Scene(Generic[T]):
         self.back: deque[float] = deque(maxlen=4)
         self.others: set[str] = set()
         self._unchanged: deque[float] = deque(maxlen=BURST)
-        self._stamp = self._moved_at = NEVER
-        self._asked_at = NEVER
+        self._stamp = self._moved_at = NOT_YET
+        self._asked_at = NOT_YET
         self._answers: deque[bool] = deque(maxlen=8)
         self._quiet: deque[float] = deque(maxlen=15)
 
