@@ -112,8 +112,8 @@ def ended_by(action: Callable[[int, FrameType | None], object]) -> Iterator[None
     try:
         yield
     finally:
-        for number, action in before.items():
-            signal.signal(number, action)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 def complain(command: str, text: object) -> None:

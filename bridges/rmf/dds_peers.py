@@ -1,6 +1,7 @@
 """What the ends on a DDS graph announce: topic, type, and in their user data the type hash."""
 
 import re
+import threading
 from collections.abc import Hashable
 from typing import Final, Protocol
 
@@ -15,6 +16,10 @@ AT_ONCE: Final = 100
 HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 TYPE: Final = re.compile(r"(\w+)::msg::dds_::(\w+)_")
 """A message's name, as ROS writes it in DDS."""
+
+_reading = threading.Lock()
+"""cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*). Only one
+thread at a time may do so, or an end gets another's user data: a process may have several nodes."""
 
 
 class _State(Protocol):
@@ -50,11 +55,16 @@ class DdsPeers:
         """Take what was announced since; False if nothing was."""
         news = False
         for publishes, reader in self._readers:
-            while samples := reader.take(AT_ONCE):
+            while samples := self._announced(reader):
                 news = True
                 for sample in samples:
                     self._take(sample, bool(publishes))
         return news
+
+    @staticmethod
+    def _announced(reader: builtin.BuiltinDataReader) -> list[_End]:
+        with _reading:
+            return reader.take(AT_ONCE)
 
     def _take(self, sample: _End, publishes: bool) -> None:
         if sample.sample_info.instance_state != InstanceState.Alive:

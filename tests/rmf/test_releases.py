@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 
 import pytest
@@ -109,10 +109,28 @@ def test_two_releases_on_one_graph_are_a_fault_and_the_first_one_is_spoken(
             wait_until(lambda: len(ours.faults()) == 1, "the other one is seen")
             assert ours.faults() == [("TWO_RELEASES", "jazzy and kilted are both on this graph")]
             assert ours.release is KILTED
-            told = "each of the three nodes names it"
-            wait_until(lambda: caplog.text.count("two_releases") == 3, told)
+            what = "each of the three nodes names it"
+            wait_until(lambda: caplog.text.count("two_releases") == 3, what)
         wait_until(lambda: ours.faults() == [], "the other one has left")
     assert caplog.text.count("two_releases") == 3
+
+
+def test_each_of_many_nodes_in_one_process_reads_what_the_others_speak(join_of: Joining) -> None:
+    watching = [join_of(f"watching_{n}", JAZZY) for n in range(6)]
+    for node in watching:
+        node.subscribe(topics.FLEET_STATES, lambda _: None)
+    both = ("TWO_RELEASES", "jazzy and kilted are both on this graph")
+    with ExitStack() as fleets:
+        for n in range(1, 7):
+            fleets.enter_context(fleet(join_of(f"new_{n}", KILTED)))
+            fleets.enter_context(fleet(join_of(f"old_{n}", JAZZY)))
+            misfits = f"fleet_states: {n} of another definition than ours (jazzy)"
+            wait_until(told(watching, [both, ("TYPE_MISFIT", misfits)]), misfits)
+
+
+def told(nodes: list[Transport], faults: list[tuple[str, str]]) -> Callable[[], bool]:
+    """Whether each of the nodes tells these faults."""
+    return lambda: all(node.faults() == faults for node in nodes)
 
 
 def test_a_hash_that_is_missing_or_unknown_tells_no_release() -> None:
