@@ -64,7 +64,8 @@ class DdsPeers:
     @staticmethod
     def _announced(reader: builtin.BuiltinDataReader) -> list[_End]:
         with _reading:
-            return reader.take(AT_ONCE)
+            taken: list[_End] = reader.take(AT_ONCE)
+        return taken
 
     def _take(self, sample: _End, publishes: bool) -> None:
         if sample.sample_info.instance_state != InstanceState.Alive:
