@@ -46,7 +46,7 @@ def sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memor
         return _begun(memory, standing, now, site)
     if wish.by == "operator":
         return fulfilled(memory.takes_back(who), who, site) if _full(memory, who, site) else memory
-    if not memory.faulty(who) and _lasts(memory, wish, sighting, site):
+    if _lasts(memory, wish, sighting, site):
         return memory
     full = _full(memory, who, site)
     memory = memory.takes_back(who)
