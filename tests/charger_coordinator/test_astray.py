@@ -177,6 +177,8 @@ def test_a_robot_blocks_a_pad_a_while_after_it_came_or_the_station_let_it_go() -
 def test_nobody_blocks_where_nobody_waits_or_the_waiting_robot_itself_stands() -> None:
     for wishes in ((), (Wish(TWO, "fleet"),)):
         assert found(blocked(wishes=wishes), NEVER) == [[]]
+    has_another = blocked(grants={B: Grant(ONE, "r1", 10.0, shown=True)})
+    assert found(has_another, NEVER) == [[]]
 
 
 def test_who_waits_is_looked_for_among_all_wishes_and_their_pads_in_order() -> None:

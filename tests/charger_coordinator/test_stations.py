@@ -199,11 +199,15 @@ def test_a_request_that_is_not_taken_makes_room_and_its_station_is_passed_over_f
     assert stations.in_time(quiet, 99.0, SITE) == quiet
 
 
-def test_a_station_without_hope_is_to_let_the_robot_go_which_keeps_its_place() -> None:
-    memory = site(stations={A: shows(ERROR, LOST, heard=40.0)})
+@pytest.mark.parametrize(("error", "at_"), [(LOST, 40.0), (MISPLACED, 70.0)])
+def test_a_station_without_hope_is_to_let_the_robot_go_which_keeps_its_place(
+    error: str, at_: float
+) -> None:
+    robots = {ONE: at(ONE, "wait_1", 15.0)}
+    memory = site(stations={A: shows(ERROR, error, heard=99.0)}, robots=robots)
     let_go = replace(memory, grants={A: replace(GRANT, over=True, sent_at=AGES_AGO)})
-    assert stations.in_time(memory, 39.9, SITE) == memory
-    assert stations.in_time(memory, 40.0, SITE) == let_go
+    assert stations.in_time(memory, at_ - 0.1, SITE) == memory
+    assert stations.in_time(memory, at_, SITE) == let_go
 
 
 def test_who_stays_away_is_given_up() -> None:
@@ -233,6 +237,7 @@ def test_a_charge_under_way_or_over_is_left_alone_and_the_next_request_is_not() 
         (ERROR, "station: fan", {ONE: (B,), TWO: (B,)}),
         (ERROR, "out of service after: station: fan", {ONE: (B,), TWO: (B,)}),
         (ERROR, "over temperature", {ONE: (A, B), TWO: (B,)}),
+        (ERROR, "out of service after: over temperature", {ONE: (A, B), TWO: (B,)}),
         (IDLE, "", {ONE: (A, B), TWO: (B,)}),
     ],
 )

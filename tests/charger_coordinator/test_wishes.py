@@ -7,7 +7,7 @@ from bridges.charger.settings import Robot
 from bridges.charger_coordinator import wishes
 from bridges.charger_coordinator.memory import By, Grant, Memory, Site, Standing, Wish
 from bridges.charger_coordinator.schedule import Charging, LocalTime
-from bridges.charger_coordinator.signals import Sighting
+from bridges.charger_coordinator.signals import Sighting, Wanted
 from bridges.core.durations import AGES_AGO
 from tests.charger_coordinator.yard import settings
 
@@ -16,6 +16,7 @@ SITE = Site.of(settings())
 SCHEDULED = Site.of(settings(schedule=[NIGHT]))
 ONE, TWO = Robot("tiny", "AMR01"), Robot("tiny", "AMR02")
 A, B = "charger_a", "charger_b"
+CALLED = Grant(ONE, "r1", 10.0, shown=True)
 AT_NIGHT, AT_NOON = LocalTime(0, 23 * 60), LocalTime(0, 12 * 60)
 
 
@@ -31,9 +32,48 @@ def after(memory: Memory, sighting: Sighting, now: float, site: Site = SITE) -> 
     return replace(wishes.sighted(memory, sighting, now, site), robots=memory.robots)
 
 
-# ---- it came when it was called, or not
+# ---- an operator's request
 
-CALLED = Grant(ONE, "r1", 10.0, shown=True)
+
+def test_an_operators_request_counts_once_and_not_again_when_it_is_over() -> None:
+    asked = Wanted(ONE, B, "op-1", 30.0)
+    wish = Wish(ONE, "operator", "", False, B, "op-1", 30.0)
+    taken = Memory(wishes=(Wish(TWO, "fleet"), wish), strikes={TWO: (A,)})
+    before = replace(taken, wishes=taken.wishes[:1], strikes={TWO: (A,), ONE: (B,)})
+    assert wishes.wanted(before, asked, SITE) == (taken, "")
+    again = replace(taken, strikes={ONE: (B,)})
+    assert wishes.wanted(again, asked, SITE) == (again, "")
+    over = replace(before, over=("op-1",))
+    assert wishes.wanted(over, asked, SITE) == (over, "request is over")
+    three = Robot("tiny", "AMR03")
+    unsuited = (before, "station does not suit the robot")
+    assert wishes.wanted(before, Wanted(three, A, "op-2", 0.0), SITE) == unsuited
+
+
+def test_an_operators_newer_request_takes_the_robot_from_a_station_that_it_does_not_name() -> None:
+    wish = Wish(ONE, "operator", request_id="op-1")
+    memory = Memory(wishes=(wish, Wish(TWO, "fleet")), grants={A: CALLED})
+    for station, grant in ((A, CALLED), ("", CALLED), (B, replace(CALLED, over=True))):
+        changed, refused = wishes.wanted(memory, Wanted(ONE, station, "op-2", 0.0), SITE)
+        newer = Wish(ONE, "operator", station=station, request_id="op-2")
+        assert (changed.wishes, refused) == ((newer, Wish(TWO, "fleet")), "")
+        assert changed.grants == {A: grant}
+
+
+def test_a_withdrawal_is_by_the_operators_id_or_by_the_one_that_the_station_shows() -> None:
+    wish = Wish(ONE, "operator", request_id="op-1")
+    memory = Memory(wishes=(wish, Wish(TWO, "fleet")), grants={A: CALLED}, over=("op-0",))
+    left = replace(memory, wishes=memory.wishes[1:], grants={A: replace(CALLED, over=True)})
+    withdrawn = replace(left, over=("op-0", "op-1"))
+    assert wishes.unwanted(memory, "op-1") == (withdrawn, "")
+    assert wishes.unwanted(memory, "r1") == (withdrawn, "")
+    assert wishes.unwanted(memory, "op-0") == (memory, "")
+    assert wishes.unwanted(memory, "op-9") == (memory, "no such wish")
+    assert wishes.unwanted(memory, "") == (memory, "no such wish")
+    assert wishes.unwanted(left, "r1") == (left, "no such wish")
+
+
+# ---- it came when it was called, or not
 
 
 @pytest.mark.parametrize(
@@ -102,6 +142,13 @@ def test_a_robot_that_is_full_was_served_in_its_task_and_its_failures_are_forgot
         served={ONE: "t1"},
     )
     assert after(memory, seen("charger_a", 99.9, "t1", True), 30.0) == memory
+
+
+def test_a_robot_that_the_schedule_has_charged_far_enough_was_served() -> None:
+    memory = charged("schedule", when=AT_NIGHT)
+    enough = after(memory, seen("charger_a", 95.0, "t1", True), 30.0, SCHEDULED)
+    assert (enough.served, enough.rested) == ({ONE: "t1"}, {ONE})
+    assert after(memory, seen("charger_a", 94.9, "t1", True), 30.0, SCHEDULED) == memory
 
 
 def test_a_robot_that_leaves_before_it_is_full_was_not_served() -> None:
