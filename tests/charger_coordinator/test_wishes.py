@@ -147,7 +147,7 @@ def test_a_robot_that_is_full_was_served_in_its_task_and_its_failures_are_forgot
 def test_a_robot_that_the_schedule_has_charged_far_enough_was_served() -> None:
     memory = charged("schedule", when=AT_NIGHT)
     enough = after(memory, seen("charger_a", 95.0, "t1", True), 30.0, SCHEDULED)
-    assert (enough.served, enough.rested) == ({ONE: "t1"}, {ONE})
+    assert (enough.served, enough.rested) == ({ONE: "t1"}, frozenset({ONE}))
     assert after(memory, seen("charger_a", 94.9, "t1", True), 30.0, SCHEDULED) == memory
 
 
