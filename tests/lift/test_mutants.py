@@ -303,3 +303,23 @@ def test_after_a_sleep_everything_is_forgotten_but_the_last_landing() -> None:
 def test_an_illegal_door_number_names_the_rear_door() -> None:
     alone = Alone()(0.0, replace(AT_L1, rear_door=Door.UNKNOWN))
     assert alone.faults == (Fault("DOOR_CODE_ILLEGAL", "the rear door's number means nothing"),)
+
+
+def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_anew() -> None:
+    def history(reset_at: float) -> list[tuple[float, bool, list[str]]]:
+        """(s, AGV request, faults) at each change, scanned twice a second."""
+        alone = Alone(agv_timeout_s=5.0)
+        alone(0.0, replace(CLOSED, agv=False), ASKED)
+        shown: list[tuple[float, bool, list[str]]] = []
+        for n in range(1, 60):
+            now = n / 2
+            alone(now, replace(CLOSED, agv=False), *[OperatorReset()] * (now == reset_at))
+            line = (alone.decision.outputs.agv_request, [fault.code for fault in alone.faults])
+            if not shown or shown[-1][1:] != line:
+                shown.append((now, *line))
+        return shown
+
+    failed = "AGV_MODE_NOT_GRANTED"
+    before = [(0.5, True, []), (5.0, False, [failed]), (15.0, True, [failed])]
+    assert history(reset_at=99.0) == [*before, (20.0, False, [failed])]
+    assert history(reset_at=17.0) == [*before, (17.0, True, []), (22.0, False, [failed])]
