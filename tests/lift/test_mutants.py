@@ -384,7 +384,7 @@ def test_a_car_that_stands_there_is_called_again_when_agv_mode_has_ended_without
         (1.0, None, None),
         (1.5, None, Side.FRONT),
         (2.0, None, None),
-        (3.0, None, None),
+        (3.0, "L1", None),
         (3.5, "L1", None),
         (4.0, None, None),
         (4.5, None, Side.FRONT),
