@@ -130,6 +130,12 @@ def test_a_robot_that_lets_one_door_go_still_holds_the_other() -> None:
         assert robot.holding_door == left
 
 
+def test_a_robot_that_never_had_a_task_closes_what_it_is_listed_for() -> None:
+    robot = Robot(A)
+    robot.on_task = False
+    assert robot.hear(listing(A), 3.0) == [adapter_door(A, CLOSED, 3.0)]
+
+
 def test_a_door_is_asked_to_close_every_second_until_we_are_not_listed_for_it() -> None:
     robot = Robot(A)
     assert robot.begin(DoorClose("ward"), 1.0) == [adapter_door(A, CLOSED, 1.0)]
