@@ -10,10 +10,12 @@ from bridges.charger_coordinator.memory import (
     Memory,
     Seen,
     Site,
+    Standing,
     Wish,
 )
 from bridges.charger_coordinator.reasons import queued, reasons
 from bridges.charger_coordinator.schedule import Charging
+from bridges.charger_coordinator.signals import Sighting
 from bridges.rmf.definitions import ChargerStateValue
 from tests.charger_coordinator.yard import settings
 
@@ -43,7 +45,7 @@ BUSY = Memory(
     stations={
         "s1": shows(CHARGING, 609.0),
         "s2": shows(CHARGING, 90.0),
-        "s4": shows(ASSIGNED),
+        "s4": shows(ASSIGNED, 9.0),
         "s5": shows(ERROR),
         "s6": shows(IDLE),
     },
@@ -62,14 +64,20 @@ def test_each_waiting_robot_is_told_what_is_in_its_way_and_which_station_it_will
     assert four[0] == f"tiny/AMR01 by the robot: {why}, s2 is free in 88 s"
 
 
-def test_a_station_that_takes_nothing_is_in_error_or_not_free_yet_says_so() -> None:
+def test_the_station_where_it_stands_comes_first_and_its_own_robot_is_not_in_its_way() -> None:
     last_two = {name: BUSY.stations[name] for name in ("s5", "s6")}
-    memory = Memory(wishes=BUSY.wishes[:1], stations=last_two, shunned=BUSY.shunned)
-    two = Site({ONE: ("s5", "s6")}, {}, {"s5": {}, "s6": {}}, {}, 60.0, 100.0, 90.0, 60.0)
-    said = "tiny/AMR01 by the robot: s5 is out of service"
+    stands_there = Standing(Sighting(ONE, False, "p6", 50.0, ""), 10.0)
+    memory = Memory(
+        wishes=BUSY.wishes[:1],
+        stations=last_two,
+        shunned=BUSY.shunned,
+        robots={ONE: stands_there},
+    )
+    places = {"s5": {"tiny": "p5"}, "s6": {"tiny": "p6"}}
+    two = Site({ONE: ("s5", "s6")}, {}, places, {}, 60.0, 100.0, 90.0, 60.0)
     assert [list(reasons(memory, now, two)) for now in (12.0, 13.0)] == [
-        [f"{said}, s6 takes no request"],
-        [f"{said}, s6 is not free yet"],
+        ["tiny/AMR01 by the robot: s6 takes no request, s5 is out of service"],
+        ["tiny/AMR01 by the robot: s6 is not free yet, s5 is out of service"],
     ]
 
 
