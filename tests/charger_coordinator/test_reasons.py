@@ -81,6 +81,29 @@ def test_the_station_where_it_stands_comes_first_and_its_own_robot_is_not_in_its
     ]
 
 
+def said(now: float, seen: Seen, *robots: Robot) -> str:
+    """What AMR01 hears of its only station, at which these robots stand."""
+    one = Site({ONE: ("s1",)}, {}, {"s1": {"tiny": "p1"}}, {}, 60.0, 100.0, 90.0, 60.0)
+    there = {who: Standing(Sighting(who, False, "p1", 50.0, ""), 10.0) for who in robots}
+    memory = Memory(wishes=BUSY.wishes[:1], stations={"s1": seen}, robots=there)
+    (text,) = reasons(memory, now, one)
+    return text.removeprefix("tiny/AMR01 by the robot: ")
+
+
+def test_a_silent_station_and_one_where_another_robot_stands_say_so() -> None:
+    assert [said(15.0, shows(IDLE)), said(12.0, shows(IDLE), TWO)] == [
+        "s1 is silent",
+        "tiny/AMR02 stands at s1",
+    ]
+
+
+def test_how_long_a_charge_still_takes_is_told_in_seconds_or_minutes() -> None:
+    found = [said(12.0, shows(CHARGING, full_s)) for full_s in (1.0, 101.0, 102.0, 3602.0)]
+    assert found == [
+        f"s1 is not free yet, s1 is free in {lasts}" for lasts in ("0 s", "99 s", "2 min", "60 min")
+    ]
+
+
 def test_a_robot_without_any_station_waits_for_the_schedule() -> None:
     memory = Memory(wishes=BUSY.wishes[:1], alone=False)
     assert list(reasons(memory, 12.0, site(2))) == [
