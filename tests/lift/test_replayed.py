@@ -4,7 +4,8 @@ from collections.abc import Mapping
 
 import pytest
 
-from bridges.lift.replayed import LASTS_S, MOST, noted
+from bridges.lift.memory import Doubted, Session
+from bridges.lift.replayed import LASTS_S, MOST, doubt, noted
 from bridges.lift.signals import Ended, Requested
 from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
@@ -78,11 +79,19 @@ def test_a_floor_that_only_the_supervisor_asks_for_counts_after_a_while() -> Non
     lift = Overheard()
     lift.adapter(AGV, "L2")
     began = lift.story.now
-    while lift.story.outputs.hold_door:
+    while lift.story.outputs.hold_door and lift.story.now < began + 2 * LASTS_S:
         lift.story.asks(A, "L4")
         lift.story.run(lift.story.now + 0.25)
     assert began + LASTS_S <= lift.story.now <= began + LASTS_S + 0.5
     assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
+
+
+def test_a_doubt_lasts_three_seconds_to_the_instant() -> None:
+    doubted = Doubted("L4", 10.0)
+    session = Session(A, True, "L2", 0.0, doubted=doubted)
+    request = Requested(A, True, "L4")
+    lasts = [doubt(session, request, "L2", True, now) for now in (12.9, 13.0)]
+    assert lasts == [doubted, None]
 
 
 def test_a_request_for_the_present_floor_ends_the_doubt_and_the_next_one_begins_anew() -> None:
