@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from bridges.commands.board import KINDS as KIND_OF
-from bridges.commands.board import Board, Row
+from bridges.commands.board import Board, Device, Row
 from bridges.commands.graph import Heard as Arrived
 from bridges.explain import site
 from bridges.explain.answer import Remedies
@@ -48,9 +48,6 @@ HEARD: Final[tuple[AnyTopic, ...]] = (
     topics.FLEET_STATES,
     topics.DIAGNOSTICS,
 )
-
-Device = tuple[str, str]
-"""Its kind and its name on RMF's graph."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,11 +111,9 @@ class Site:
     def changed(self, now: float, wall: float) -> list[Shown]:
         """The devices that were heard of since this was asked last."""
         changed, self._changed = self._changed, set()
-        return [
-            Shown(row, self._states[device])
-            for device in changed
-            if device in self._states and (row := self._board.row(*device, now, wall))
-        ]
+        known = [device for device in changed if device in self._states]
+        rows = self._board.rows_of(known, now, wall)
+        return [Shown(row, self._states[device]) for device, row in zip(known, rows, strict=True)]
 
     def knows(self, kind: str, name: str) -> bool:
         """Whether the device of this printed name is still here; whatever has no state always is."""

@@ -7,7 +7,16 @@ from dataclasses import replace
 import pytest
 
 from bridges.commands import watch
-from bridges.commands.board import Board, Row, change_line, changes, json_line, repaint, table
+from bridges.commands.board import (
+    MOST_PLACES,
+    Board,
+    Row,
+    change_line,
+    changes,
+    json_line,
+    repaint,
+    table,
+)
 from bridges.commands.graph import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import stamp
@@ -307,3 +316,19 @@ def test_the_coordinator_has_a_row_with_its_queue_its_faults_and_whether_it_assi
     )
     assert board(told(passive=False)).rows(100.0, WALL) == [replace(row, state=beside)]
     assert board(told(passive=False)).rows(104.0, WALL) == []
+
+
+def test_made_up_daemons_and_robots_are_bounded_and_give_way_when_they_fall_silent() -> None:
+    made = board(LIFT)
+    for number in range(5000):
+        flood = diagnosis(f"made_up{number}", "lift", {}, {}, stamp(WALL))
+        made.take(Heard(flood, 100.0))
+        place = d.ChargingAssignment(f"robot{number}", "pad", d.ChargingMode(1))
+        made.take(Heard(d.ChargingAssignments("fleet", (place,)), 100.0))
+    told = diagnosis("node", "lift", {"simulated": True}, {"Lift1": {}}, stamp(WALL))
+    made.take(Heard(told, 100.1))
+    assert [row.simulated for row in made.rows(100.2, WALL) if row.kind == "lift"] == [False]
+    made.take(Heard(told, 104.0))
+    rows = made.rows(104.1, WALL)
+    assert [row.simulated for row in rows if row.kind == "lift"] == [True]
+    assert len([row for row in rows if row.kind == "robot"]) == MOST_PLACES
