@@ -31,7 +31,10 @@ SECTIONS: Final = (
     ("robot", "Charging schedule"),
 )
 WIDE: Final = "panel wide-part"
-NOT_HERE: Final = "Its daemon is not on this machine, or the page's user may not see it."
+NOT_HERE: Final = (
+    "Its daemon is not on this machine, or the page's user may not see it: wiring, limits and live"
+    " levels are shown by a page on the daemon's own machine."
+)
 
 
 class SiteWall:
@@ -170,4 +173,4 @@ class SiteViews:
         served = self._here.served.get(key)
         if served is None or not served.local.file:
             return f"<p>{NOT_HERE}</p>"
-        return tables.wiring(served.local.file, key[1])
+        return tables.wiring(served.local.file, key[1], served.contacts)
