@@ -12,7 +12,8 @@ from dataclasses import asdict, dataclass
 from typing import Final
 
 from bridges.commands.columns import aligned
-from bridges.commands.graph import SILENT_AFTER_S, Heard
+from bridges.commands.graph import SILENT_AFTER_S
+from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import words
 from bridges.serve import diagnostics
@@ -106,14 +107,15 @@ class Board:
     """The latest state and diagnosis of each device."""
 
     def __init__(self) -> None:
-        self._latest: dict[Device, Heard[words.Stated]] = {}
+        self._latest: dict[Device, words.Stated] = {}
+        self._heard_at: dict[Device, float] = {}
         self._first_at: dict[Device, float] = {}
         self._requesters: dict[str, str] = {}
         self._places: dict[str, str] = {}
         self._diagnoses: dict[str, Diagnosis] = {}
         self._full_until = float("-inf")
 
-    def take(self, heard: Heard[d.Message]) -> None:
+    def take(self, heard: Heard) -> None:
         """Take one message that was heard."""
         match heard.message:
             case d.SupervisorHeartbeat():
@@ -132,7 +134,7 @@ class Board:
                     self._diagnose(status, heard.at)
             case d.LiftState() | d.DoorState() | d.ChargerState() as state:
                 key = (KINDS[type(state)], words.device(state))
-                self._latest[key] = Heard(state, heard.at)
+                self._latest[key], self._heard_at[key] = state, heard.at
                 self._first_at.setdefault(key, heard.at)
 
     def unsettled(self, now: float) -> set[Device]:
@@ -152,9 +154,9 @@ class Board:
             if not one.of_daemon:
                 about.setdefault(one.device, []).append(one)
         return [
-            self._device(*key, heard, about.get(key, ()), now, wall)
+            self._device(key, self._latest[key], about.get(key, ()), now, wall)
             for key in devices
-            if (heard := self._latest.get(key))
+            if key in self._latest
         ]
 
     def rows(self, now: float, wall: float) -> list[Row]:
@@ -180,14 +182,13 @@ class Board:
 
     def _device(
         self,
-        kind: str,
-        name: str,
-        heard: Heard[words.Stated],
+        key: Device,
+        state: words.Stated,
         found: Sequence[Diagnosis],
         now: float,
         wall: float,
     ) -> Row:
-        state = heard.message
+        kind, name = key
         held_by = words.holder(state)
         if isinstance(state, d.DoorState):
             held_by = words.printable(self._requesters.get(state.door_name, ""))
@@ -198,7 +199,7 @@ class Board:
             held_by or "-",
             words.printable(", ".join(filter(None, (one.value("waiting") for one in found)))),
             _age(words.stamped_at(state), wall),
-            _mark(heard, now, wall),
+            _mark(state, now - self._heard_at[key], wall),
             any(one.kind == kind and self._simulated(one, now) for one in found),
             _faults(found),
         )
@@ -263,9 +264,8 @@ def _age(stamped_at: float, wall: float) -> str:
     return f"{age / 60:.0f} min" if age < 7200 else f"{age / 3600:.0f} h"
 
 
-def _mark(heard: Heard[words.Stated], now: float, wall: float) -> str:
-    silent_s = now - heard.at
-    age = wall - words.stamped_at(heard.message)
+def _mark(state: words.Stated, silent_s: float, wall: float) -> str:
+    age = wall - words.stamped_at(state)
     if silent_s > SILENT_AFTER_S:
         return f"SILENT {silent_s:.0f} s"
     if age < -SILENT_AFTER_S:

@@ -11,7 +11,6 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from nicegui import app, ui
 
-from bridges.commands import faults
 from bridges.explain.picture import svg
 from bridges.page import incidents
 from bridges.page.head import head, main, part
@@ -27,7 +26,6 @@ class IncidentViews:
         self._recording = recording
         self._login = login
         self._one_at_a_time = asyncio.Lock()
-        self._remedies = faults.told()
 
     def install(self) -> None:
         """Put the views at their addresses."""
@@ -81,7 +79,7 @@ class IncidentViews:
             box = part()
         async with self._one_at_a_time:
             try:
-                found = await asyncio.to_thread(incidents.read, path, self._remedies)
+                found = await incidents.read_apart(path)
             except incidents.BagError as error:
                 box.set_content(f"<p>{escape(str(error))}</p>")
                 return

@@ -9,7 +9,6 @@ from typing import Final
 
 from bridges.commands.board import KINDS as KIND_OF
 from bridges.commands.board import Board, Device, Row
-from bridges.commands.graph import Heard as Arrived
 from bridges.explain import site
 from bridges.explain.answer import Remedies
 from bridges.explain.explanation import Explanation
@@ -100,7 +99,7 @@ class Site:
         else:
             self._story.take(heard)
             self._heartbeat(heard)
-            self._board.take(Arrived(heard.message, heard.at))
+            self._board.take(heard)
 
     def devices(self, now: float, wall: float) -> list[Shown]:
         """All devices, coordinators and scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
@@ -151,7 +150,7 @@ class Site:
             self.crowded.add(device[0])
             return
         self._last_at[device], self._states[device] = heard.at, state
-        self._board.take(Arrived(heard.message, heard.at))
+        self._board.take(heard)
         self._story.take(heard)
         self._remember(device, heard)
 
@@ -194,7 +193,7 @@ class Site:
             if status.hardware_id in known or status.name.endswith(": daemon") or _is_graph(status)
         ]
         kept = replace(heard, message=replace(message, status=tuple(ours)))
-        self._board.take(Arrived(kept.message, heard.at))
+        self._board.take(kept)
         self._story.take(kept)
         for status in ours:
             device = _about(status)
