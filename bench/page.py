@@ -36,18 +36,19 @@ BROWSERS: Final = 3
 SECONDS: Final = float(os.environ.get("BENCH_PAGE_S", "60"))
 SETTLES_S: Final = 10.0
 PRESSED: Final = 20
+UPDATES: Final = os.environ.get("BENCH_PAGE_UPDATES")
 PRESSED_PAGE: Final = f"""
 import sys
-from bridges.page import buttons, gallery, site_views, web
+from bridges.page import buttons, connections, gallery, site_views, web
 web.PUMP_S /= {PRESSED}
-web.MOST_WAITING *= {PRESSED}
+connections.MOST_WAITING *= {PRESSED}
 web.MOST_HISTORY *= {PRESSED}
 for one in (buttons, gallery, site_views):
     one.AGES_S /= {PRESSED}
 from bridges.cli import main
 sys.exit(main())
 """
-AN_HOUR: Final = int(3600 / web.PUMP_S)
+AN_HOUR: Final = int(UPDATES or 3600 / web.PUMP_S)
 """Updates of the site; at most one for each turn."""
 WARM: Final = AN_HOUR // 6
 """Updates until everything that is kept in bounds has filled them."""
