@@ -4,9 +4,9 @@ A lift's session carries the time of its publishing; a script in each browser no
 the screen. `a tenth changes`: as on a busy site. `all change`: no card is ever the same twice. Each
 device's daemon publishes its diagnostics too.
 
-`an hour in minutes`: the page turns 20 times as often, until each browser of the site was sent as many
-updates as an hour can bring at all, and one browser of a device its own. The heaps are those after a
-collection: of all three browsers together.
+`an hour in minutes`: the page turns 20 times as often, and ages are still drawn once a second, until
+each browser of the site was sent as many updates as an hour can bring at all, and one browser of a
+device its own. The heaps are those after a collection: of all three browsers together.
 """
 
 import os
@@ -39,11 +39,11 @@ PRESSED: Final = 20
 UPDATES: Final = os.environ.get("BENCH_PAGE_UPDATES")
 PRESSED_PAGE: Final = f"""
 import sys
-from bridges.page import buttons, connections, gallery, site_views, web
+from bridges.page import buttons, connections, site_views, web
 web.PUMP_S /= {PRESSED}
 connections.MOST_WAITING *= {PRESSED}
 web.MOST_HISTORY *= {PRESSED}
-for one in (buttons, gallery, site_views):
+for one in (buttons, site_views):
     one.AGES_S /= {PRESSED}
 from bridges.cli import main
 sys.exit(main())
