@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from bridges import log
 from bridges.commands.graph import add_graph_arguments, command_line, complain, open_graph
 from bridges.serve import places
 
@@ -88,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
     """0 after Ctrl-C or SIGTERM; 64, 69 or 78 with what to do."""
     from bridges.page.access import PasswordError, users
 
+    log.start()
     try:
         if args.add_user:
             return _add_user(args)
