@@ -124,9 +124,9 @@ class World:
         until = self.timeline.now + most_s
         while not stage.done and self.timeline.now < until:
             self.timeline.run(self.timeline.now + 0.5)
-            counts = [end.matched() for end in ends]
+            publishing, retaining, supervisors = (end.matched() for end in ends)
             now = self.timeline.now
-            stage.judge.fire_ends(*counts, now, EPOCH + now)
+            stage.judge.fire_ends(publishing, retaining, supervisors, now, EPOCH + now)
         place.close()
         return stage
 
