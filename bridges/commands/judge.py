@@ -272,7 +272,9 @@ class Live:
         if self._looks_at_fire and now > self._looked_at + 1.0:
             self._looked_at = now
             publishers = self._ear.ends[FIRE.name].matched()
-            stage.judge.fire_ends(publishers, self._retained.matched(), now, wall)
+            supervisors = self._ear.ends[topics.LIFT_REQUESTS.name].matched()
+            retaining = self._retained.matched()
+            stage.judge.fire_ends(publishers, retaining, supervisors, now, wall)
         self._say(stage.turn(now, wall))
 
     def _say(self, said: list[Said]) -> None:

@@ -14,7 +14,7 @@ from bridges.rmf.definitions import LiftRequest
 from bridges.rmf.stamps import stamp
 from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
-from tests.lift.story import AGV, END, WALL, Controller, Story
+from tests.lift.story import AGV, END, WALL, Building, Controller, Story
 from tests.lift.test_with_rmf import A, B, ons, sessions, world
 
 
@@ -83,8 +83,8 @@ def test_an_end_that_was_lost_while_another_robot_waits_is_heard_from_its_adapte
 class Overheard:
     """A lift that `A` holds, open at L2. `adapter`: what is said in its name, without a supervisor."""
 
-    def __init__(self) -> None:
-        self.story = Story(Controller())
+    def __init__(self, building: Building | None = None) -> None:
+        self.story = Story(building or Controller())
         self.story.run(1.0)
         self.story.asks(A, "L2")
         self.story.run(12.0)

@@ -6,10 +6,10 @@ import pytest
 
 from bridges.lift.memory import Doubted, Session
 from bridges.lift.replayed import LASTS_S, MOST, doubt, noted
-from bridges.lift.signals import Ended, Requested
+from bridges.lift.signals import Door, Ended, LiftSample, Motion, Requested
 from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
-from tests.lift.story import AGV, END
+from tests.lift.story import AGV, END, Building
 from tests.lift.test_forgotten import Overheard
 from tests.lift.test_with_rmf import A, B, ons, sessions, world
 
@@ -73,6 +73,30 @@ def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_f
     rmf.finds_again(robot)
     rmf.run(rmf.story.now + 1.0)
     assert rmf.story.edges == before
+
+
+@pytest.mark.parametrize("after_s", [2.8, 3.2], ids=["within the grace", "after it"])
+def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let_go(
+    after_s: float,
+) -> None:
+    """As a robot's next ride began where the last one had ended, while RMF's real supervisor was dead:
+    it went in on the earlier ride's state, and the door closed."""
+    lift = Overheard(Building(LiftSample("L2", Door.OPEN, motion=Motion.STOPPED, agv=True)))
+    assert lift.story.state == OPEN_FOR_A
+    lift.story.ends(A)
+    ended_at = lift.story.now
+    lift.adapter(AGV, "L2")
+    lift.story.run(ended_at + after_s)
+    assert not lift.story.outputs.hold_door
+    lift.story.asks(A, "L4")
+    lift.story.asks(A, "L2")
+    lift.story.until(lambda: lift.story.outputs.hold_door)
+    assert [state for _, state in lift.story.states][-4:] == [
+        "AGV, open at L2",
+        "AGV, moving at L2, fleet/a to L4",
+        "AGV, moving at L2, fleet/a to L2",
+        OPEN_FOR_A,
+    ]
 
 
 def test_a_floor_that_only_the_supervisor_asks_for_counts_after_a_while() -> None:
