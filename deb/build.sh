@@ -12,7 +12,7 @@ esac
 here=$(cd "$(dirname "$0")/.." && pwd)
 bin=$here/.venv/bin
 version=$("$bin/python" -c 'import bridges; print(bridges.__version__)')+$release
-maintainer="${DEBFULLNAME:-rmf-bridges maintainers} <${DEBEMAIL:-rmf-bridges@users.noreply.github.com}>"
+maintainer="${DEBFULLNAME:-rmf-bridges maintainers} <${DEBEMAIL:-rmf-bridges@localhost}>"
 work=$here/build/deb/$release-$arch
 root=$work/root page=$work/page wheels=$here/build/deb/wheels
 lib=usr/lib/rmf-bridges
@@ -21,7 +21,7 @@ next=3.$((${python#3.} + 1))
 SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$here" log -1 --format=%ct 2>/dev/null || date +%s)}
 export SOURCE_DATE_EPOCH
 
-rm -rf "$work"
+rm -rf "$work" "$here"/build/lib "$here"/build/bdist.* # else a wheel keeps modules that are gone
 umask 022
 mkdir -p "$root/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$page/$lib/lib/python$python" "$work/wheel" "$wheels"
 
