@@ -108,13 +108,14 @@ CONTROL
   dpkg-deb --root-owner-group -Zxz --build "$2" "$here/dist/$1_${version}_$arch.deb"
   ! command -v lintian > /dev/null || lintian --allow-root --fail-on error "$here/dist/$1_${version}_$arch.deb"
 }
-package rmf-bridges "$root" "python3 (>= $python~), python3 (<< $next~), libc6 (>= 2.34), systemd (>= 252)" \
+libc='libc6 (>= 2.34)' # of the wheels' tags (wheels.py, lgpio.sh)
+package rmf-bridges "$root" "python3 (>= $python~), python3 (<< $next~), $libc, systemd (>= 252)" \
   "connect Open-RMF to lifts, doors and chargers" <<'DESCRIPTION'
  Small daemons, one for each controller, that stand between Open-RMF and a
  building: dry contacts, Modbus, HTTP and CAN. Each is configured by one YAML
  and run by systemd.
 DESCRIPTION
-package rmf-bridges-page "$page" "rmf-bridges (= $version)" \
+package rmf-bridges-page "$page" "rmf-bridges (= $version), $libc" \
   "web page of Open-RMF's lifts, doors and chargers" <<'DESCRIPTION'
  What rmf-bridge page needs: a web page of what is on RMF's graph, of each
  device and of what was recorded, as a service with a user of its own.
