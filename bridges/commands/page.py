@@ -17,6 +17,7 @@ from bridges import log
 from bridges.commands.graph import add_graph_arguments, command_line, complain, open_graph
 from bridges.serve import places
 
+INSTALL: Final = "pip install 'rmf-bridges[page]', or apt install ./rmf-bridges-page_*.deb"
 PORT: Final = 8080
 LOOPBACK: Final = "127.0.0.1"
 RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
@@ -103,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         from bridges.page import web
     except ImportError as error:
-        complain("page", f"{error}: install the extra: pip install 'rmf-bridges[page]'")
+        complain("page", f"{error}: to install it: {INSTALL}")
         return os.EX_UNAVAILABLE
     return web.serve(args, known, lambda: open_graph(args, "rmf_bridge_page"), _graph(args))
 
