@@ -1,0 +1,126 @@
+"""The package, and services made of YAMLs."""
+
+import grp
+from pathlib import Path
+
+from tests.vm.guest import header
+from tests.vm.guest.system import (
+    Wrong,
+    enable,
+    far_side,
+    is_active,
+    ready_s,
+    restarts,
+    sh,
+    shown,
+    unit,
+    until,
+)
+
+
+def package() -> str:
+    """`apt install ./rmf-bridges_….deb` on a fresh Debian."""
+    sh("mount", "--mkdir", "-t", "9p", "-o", "ro,trans=virtio,version=9p2000.L", "packages", "/srv")
+    (deb,) = Path("/srv").glob("*.deb")
+    sh("apt-get", "install", "--yes", "--no-install-recommends", str(deb))
+    chip = (header.CONFIGFS / "bank0/chip_name").read_text().strip()
+    group = grp.getgrgid(Path(f"/dev/{chip}").stat().st_gid).gr_name
+    if group != "gpio":
+        raise Wrong(f"/dev/{chip} belongs to the group {group}")
+    return f"{deb.name}: {sh('rmf-bridge', '--version').strip()}; /dev/{chip} is the group gpio's"
+
+
+def lift() -> str:
+    """`rmf-bridge enable lift.yaml`: the service starts, and is ready."""
+    far_side("lift")
+    name = enable("lift")
+    return f"ready after {ready_s(name):.2f} s"
+
+
+def door() -> str:
+    """The same for a door on RS-485, whose port is a pseudo-terminal."""
+    far_side("door")
+    return f"ready after {ready_s(enable('door')):.2f} s"
+
+
+def charger() -> str:
+    """The same for a charger on SocketCAN."""
+    sh("ip", "link", "add", "vcan0", "type", "vcan")
+    sh("ip", "link", "set", "vcan0", "up")
+    far_side("charger")
+    return f"ready after {ready_s(enable('charger')):.2f} s"
+
+
+def supervisors() -> str:
+    """The same for RMF's two supervisors."""
+    took = [ready_s(enable(name)) for name in ("lift_supervisor", "door_supervisor")]
+    return f"ready after {took[0]:.2f} and {took[1]:.2f} s"
+
+
+def recorder() -> str:
+    """The recorder of incidents runs since the package was installed."""
+    until(lambda: is_active("rmf-bridge-recorder.service"), "the recorder is ready")
+    return f"ready after {ready_s('rmf-bridge-recorder.service'):.2f} s"
+
+
+def page() -> str:
+    """The web page starts and answers."""
+    sh("systemctl", "start", "rmf-bridge-page.service")
+    ask = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:8080', timeout=30).status)"
+    until(lambda: _answers(ask), "the page answers")
+    sh("systemctl", "stop", "rmf-bridge-page.service")
+    return "answers"
+
+
+def _answers(ask: str) -> bool:
+    try:
+        return sh("python3", "-c", ask).strip() == "200"
+    except Wrong:
+        state = shown("rmf-bridge-page.service", "ActiveState", "ExecMainStatus")
+        if state["ActiveState"] == "failed":
+            raise Wrong(f"the page ended with exit code {state['ExecMainStatus']}") from None
+        return False
+
+
+def security() -> str:
+    """`systemd-analyze security` of each live unit: 2.0 or less."""
+    names = [unit(n) for n in ("lift", "door", "charger", "lift_supervisor")]
+    names += ["rmf-bridge-recorder.service", "rmf-bridge-page.service"]
+    scores = {name: _score(name) for name in names}
+    if too_exposed := {n: s for n, s in scores.items() if s > 2.0}:
+        raise Wrong(f"too exposed: {too_exposed}")
+    short = (f"{n.split('@')[-1].removesuffix('.service')} {s}" for n, s in scores.items())
+    return ", ".join(short)
+
+
+def _score(name: str) -> float:
+    text = sh("systemd-analyze", "security", "--no-pager", name)
+    return float(text.rpartition("Overall exposure level for ")[2].split()[1])
+
+
+def wrong_yaml() -> str:
+    """A YAML that cannot be right: exit code 78, and no restart."""
+    file = Path("/etc/rmf-bridges/wrong.yaml")
+    file.write_text("kind: lift\nflors: [L1]\n")
+    service = unit("wrong")
+    sh("systemctl", "start", service, fails=True)
+    state = shown(service, "ActiveState", "ExecMainStatus")
+    count = restarts(service)
+    file.unlink()
+    sh("systemctl", "reset-failed", service)
+    if (state, count) != ({"ActiveState": "failed", "ExecMainStatus": "78"}, 0):
+        raise Wrong(f"{state}, {count} restarts")
+    return "exit code 78, failed, 0 restarts"
+
+
+def upgrade() -> str:
+    """The package is installed again while services run: they are restarted, outputs off in between."""
+    (deb,) = Path("/srv").glob("*.deb")
+    names = [unit(n) for n in ("lift", "door", "charger")]
+    before = {name: shown(name, "InvocationID") for name in names}
+    sh("apt-get", "install", "--yes", "--reinstall", "--no-install-recommends", str(deb))
+    for name in names:
+        until(lambda name=name: is_active(name), f"{name} is ready")  # type: ignore[misc]
+        if shown(name, "InvocationID") == before[name]:
+            raise Wrong(f"{name} was not restarted")
+    return "three services restarted, and ready"
