@@ -1,6 +1,7 @@
 #!/bin/sh
 # Builds the Debian package of one architecture and one Python: deb/build.sh ARCH PYTHON (`make deb`).
-# As an ordinary user, on any machine: wheels are fetched for the target, and nothing is compiled or run there.
+# As an ordinary user, on any machine: wheels are fetched for the target. lgpio has none for Python 3.13: lgpio.sh
+# builds it.
 set -eu
 arch=$1 python=$2
 case $python in
@@ -19,12 +20,12 @@ export SOURCE_DATE_EPOCH
 
 rm -rf "$work"
 umask 022
-mkdir -p "$root/DEBIAN" "$root/$lib/bin" "$work/wheel"
-# lgpio has no wheel for Python 3.13: there the system's python3-lgpio is taken.
-extra=--extra=gpio; [ "$python" = 3.13 ] && extra=--extra=
+wheels=$here/build/deb/wheels
+mkdir -p "$root/DEBIAN" "$root/$lib/bin" "$work/wheel" "$wheels"
+[ "$python" != 3.13 ] || "$here/deb/lgpio.sh" "$arch" "$wheels"
 "$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work/wheel" "$here"
 "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
-  --target "$root/$lib/lib/python$python/site-packages" $extra --extra=recording
+  --find-links "$wheels" --target "$root/$lib/lib/python$python/site-packages" --extra=gpio --extra=recording
 rm -rf "$root/$lib/lib/python$python/site-packages/bin"
 
 # A virtual environment that sees the system's packages (rclpy, lgpio), on the system's own Python.
@@ -76,7 +77,6 @@ Architecture: $arch
 Maintainer: rmf-bridges maintainers <rmf-bridges@localhost>
 Installed-Size: $(du -sk --apparent-size "$root" | cut -f1)
 Depends: python3 (>= $python~), python3 (<< $next~), libc6 (>= 2.34), systemd (>= 252)
-Recommends: python3-lgpio
 Suggests: can-utils
 Section: net
 Priority: optional

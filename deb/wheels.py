@@ -45,6 +45,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("wheel", type=Path, help="the wheel to begin with")
     parser.add_argument("--target", type=Path, required=True, help="the site-packages to fill")
+    parser.add_argument("--find-links", type=Path, required=True, help="a directory of more wheels")
     parser.add_argument("--arch", choices=MACHINES, required=True)
     parser.add_argument("--python", required=True, help="such as 3.11")
     parser.add_argument("--extra", action="append", default=[], help="an extra of the wheel")
@@ -61,7 +62,7 @@ def _fetch(what: list[str], args: argparse.Namespace) -> None:
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     with tempfile.TemporaryDirectory() as fresh:  # pip leaves out what is there in part
         place = ["--no-deps", "--no-compile", "--only-binary", ":all:", "--target", fresh]
-        subprocess.run([*pip, *place, *options, *what], check=True)
+        subprocess.run([*pip, "--find-links", str(args.find_links), *place, *options, *what], check=True)
         shutil.copytree(fresh, args.target, dirs_exist_ok=True)
 
 

@@ -1,0 +1,32 @@
+#!/bin/sh
+# Builds lgpio's wheel for a Python that PyPI has none for: deb/lgpio.sh ARCH DIRECTORY.
+# From its sdist, with swig and the cross compiler zig, both from PyPI: as an ordinary user, on any machine. The
+# module keeps to CPython's stable ABI, so that this machine's Python.h serves every later Python as well.
+set -eu
+arch=$1 wheels=$2
+case $arch in amd64) machine=x86_64 ;; arm64) machine=aarch64 ;; esac
+here=$(cd "$(dirname "$0")/.." && pwd)
+bin=$here/.venv/bin
+glibc=34 # as of PyPI's own wheels: Debian 12 has 2.36
+[ -z "$(find "$wheels" -name "lgpio-*_${machine}.whl" 2>/dev/null)" ] || exit 0
+
+headers=$("$bin/python" -c 'import sysconfig; print(sysconfig.get_path("include"))')
+[ -f "$headers/Python.h" ] || { echo "Python.h is missing: sudo apt install python3-dev" >&2; exit 1; }
+"$bin/pip" install --quiet --disable-pip-version-check -e "$here[deb]"
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+# Debian's pyconfig.h includes that of the architecture. For the stable ABI the two are the same.
+for each in x86_64 aarch64; do ln -s "/usr/include/$(uname -m)-linux-gnu" "$work/$each-linux-gnu"; done
+cat > "$work/setup.cfg" <<CONFIG
+[build_ext]
+swig_opts = -DPy_LIMITED_API=0x030b0000
+[bdist_wheel]
+py_limited_api = cp311
+plat_name = manylinux_2_${glibc}_$machine
+CONFIG
+compiler="$bin/python-zig cc -target $machine-linux-gnu.2.$glibc"
+PATH=$bin:$PATH PYPI=1 DIST_EXTRA_CONFIG=$work/setup.cfg SETUPTOOLS_EXT_SUFFIX=.abi3.so \
+  ZIG_GLOBAL_CACHE_DIR=$work/zig CC="$compiler" LDSHARED="$compiler -shared -s -Wl,-z,relro,-z,now" \
+  CFLAGS="-DPy_LIMITED_API=0x030b0000 -I$work -O2 -fstack-protector-strong" \
+  "$bin/pip" wheel --quiet --disable-pip-version-check --no-cache-dir --no-deps --no-binary lgpio \
+  --use-pep517 --no-build-isolation --wheel-dir "$wheels" 'lgpio>=0.2.2'
