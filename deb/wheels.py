@@ -60,9 +60,12 @@ def _fetch(what: list[str], args: argparse.Namespace) -> None:
     options += ["--python-version", args.python, "--implementation", "cp", "--abi"]
     options += [f"cp{args.python.replace('.', '')}", "--abi", "abi3", "--abi", "none"]
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    with tempfile.TemporaryDirectory() as fresh:  # pip leaves out what is there in part
+    with tempfile.TemporaryDirectory() as closed:  # pip leaves out what is there in part
+        fresh = f"{closed}/fresh"  # open to all users, as a daemon's user must read the copy
         place = ["--no-deps", "--no-compile", "--only-binary", ":all:", "--target", fresh]
-        subprocess.run([*pip, "--find-links", str(args.find_links), *place, *options, *what], check=True)
+        subprocess.run(
+            [*pip, "--find-links", str(args.find_links), *place, *options, *what], check=True
+        )
         shutil.copytree(fresh, args.target, dirs_exist_ok=True)
 
 
