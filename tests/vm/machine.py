@@ -41,13 +41,6 @@ ARCHS: Final = {
         (*COUNTED, "-cpu", "max"),
         "ttyS0",
     ),
-    "arm64": Arch(
-        "qemu-system-aarch64",
-        "qemu-system-arm",
-        ("-M", "virt"),
-        (*COUNTED, "-cpu", "cortex-a72"),
-        "ttyAMA0",
-    ),
 }
 KVM: Final = ("-accel", "kvm", "-cpu", "host")
 
@@ -85,7 +78,7 @@ class Machine:
         self._sockets = {name: folder / f"{name}.sock" for name in ("checks", "qmp")}
         for path in self._sockets.values():
             path.unlink(missing_ok=True)
-        words = f"console={found.console} systemd.mask=serial-getty@{found.console}.service quiet"
+        words = f"console={found.console} systemd.mask=serial-getty@{found.console}.service"
         command = [found.program, *found.machine, *(KVM if kvm else found.tcg), "-m", "1024"]
         command += ["-nodefaults", "-no-user-config", "-display", "none", "-nic", "none"]
         command += ["-rtc", "base=utc,clock=vm", "-serial", f"file:{folder / 'console.log'}"]

@@ -3,15 +3,19 @@
 import json
 import subprocess
 import sys
+import time
+from pathlib import Path
 from typing import Final
 
-PORT: Final = "/dev/virtio-ports/checks"
+PORT: Final = Path("/dev/virtio-ports/checks")
 LONGEST_S: Final = 240.0
 
 
 def main() -> int:
     """Say that the machine is up, then read a name (`deaths.kill_9`) from each line, for ever."""
-    with open(PORT, "r+b", buffering=0) as port:
+    while not PORT.exists():  # udev names it, at about this time
+        time.sleep(0.1)
+    with PORT.open("r+b", buffering=0) as port:
         port.write(b'{"booted": true}\n')
         for line in iter(port.readline, b""):
             port.write(json.dumps(_run(line.decode().strip())).encode() + b"\n")

@@ -24,7 +24,7 @@ def main() -> int:
         except Exception as error:  # noqa: BLE001 - a check that breaks has failed
             found, passed = str(error) if isinstance(error, Wrong) else repr(error), False
             traceback.print_exc()
-            print(sh("journalctl", "-b", "-n", "150", "-o", "short-monotonic", "--no-hostname"))
+            sh("journalctl", "-b", "-n", "80", "-o", "short-monotonic", "--no-hostname")
     took_s = time.monotonic() - began
     ended = {"passed": passed, "found": found, "took_s": took_s, "says": check.__doc__}
     print(json.dumps(ended))

@@ -1,12 +1,13 @@
 """What services are for: requests from other processes, and equipment that does as it is told."""
 
-import re
+import json
 import socket
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from tests.vm.guest import header
-from tests.vm.guest.system import Wrong, cursor, journal, sh, unit, until
+from tests.vm.guest.system import LATE_S, Wrong, cursor, journal, sh, unit, until
 
 ROOM = ("--domain-id", "7", "--localhost")
 LIFT = dict.fromkeys((18, 16, 22, 23, 24), True)
@@ -51,11 +52,12 @@ def door() -> str:
 
 
 def charge() -> str:
-    """A robot charges on SocketCAN, and is released."""
-    send("charger", "charger_b", "--robot", "vm/robot")
-    text = sh("rmf-bridge", "status", fails=True)
-    request = re.findall(r"request[ =]+(\S+)", text)
-    return f"charging ({request})"
+    """A robot is charged on SocketCAN, and the charge is cancelled."""
+    tell("charger", "press charger_b robot on")
+    send("charger", "charger_b", "--robot", "vm/robot", "--request-id", "vm-1")
+    until(lambda: "state CHARGING" in sh("rmf-bridge", "status", "charger"), "it charges")
+    send("charger", "charger_b", "--cancel", "vm-1")
+    return "charging, then cancelled"
 
 
 def interface_down() -> str:
@@ -95,10 +97,25 @@ def adapter_pulled() -> str:
 def _is_well(name: str) -> bool:
     """Whether `rmf-bridge status` finds no fault of this service."""
     try:
-        sh("rmf-bridge", "status", f"/etc/rmf-bridges/{name}.yaml")
+        sh("rmf-bridge", "status", name)
     except Wrong:
         return False
     return True
+
+
+def relay_off_at(name: str, act: Callable[[], object]) -> float:
+    """When a relay of this far side goes off after `act` (monotonic s)."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as control, control.makefile() as lines:
+        control.settimeout(LATE_S)
+        control.connect(f"/run/far-{name}")
+        control.sendall(b"follow\n")
+        lines.readline()
+        act()
+        for line in lines:
+            edge = json.loads(line)
+            if edge["what"] == "relay" and not edge["value"]:
+                return float(edge["at"])
+    raise Wrong(f"the far side of {name} has hung up")
 
 
 def tell(name: str, words: str) -> None:

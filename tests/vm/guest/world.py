@@ -60,7 +60,7 @@ def labels() -> str:
 
 def _scans(service: str) -> bool:
     """Whether it has claimed its pins."""
-    return is_active(service) and "BCM" not in sh("rmf-bridge", "status", str(YAML))
+    return is_active(service) and "BCM" not in sh("rmf-bridge", "status", "lift")
 
 
 def clock() -> str:
