@@ -21,7 +21,7 @@ help:
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
 	@echo "make test-vm  boot a Debian in QEMU, install our package, and kill, hang, cut and ride there: minutes"
-	@echo "             (ONLY=deaths: checks with that in their name)"
+	@echo "             (a part: ONLY=deaths, ONLY=wires, ONLY=world)"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make man     the manual page, build/rmf-bridge.1"
 	@echo "make deb     Debian packages in dist/, for Debian 12 and 13 and Ubuntu 24.04, amd64 and arm64"

@@ -2,8 +2,8 @@
 
 from typing import Final
 
-REBOOT: Final = "reboot"
-CUT: Final = "power cut"
+REBOOT: Final = "deaths: reboot"
+CUT: Final = "deaths: power cut"
 FIRST: Final = ("install.package", "install.lift")
 """What the others need."""
 ORDER: Final = (
@@ -24,15 +24,15 @@ ORDER: Final = (
     REBOOT,
     "deaths.off_at_boot",
     "deaths.active_low",
-    "install.door",
-    "install.charger",
-    "rides.door",
-    "deaths.door_killed",
-    "rides.adapter_pulled",
-    "rides.charge",
-    "deaths.charger_killed",
-    "rides.interface_down",
-    "rides.bus_off",
+    "wires.door_service",
+    "wires.door",
+    "wires.door_killed",
+    "wires.adapter_pulled",
+    "wires.charger_service",
+    "wires.charge",
+    "wires.charger_killed",
+    "wires.interface_down",
+    "wires.bus_off",
     "install.supervisors",
     "install.recorder",
     "install.page",

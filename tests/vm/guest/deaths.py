@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from tests.vm.guest import header
-from tests.vm.guest.rides import LIFT, energise, relay_off_at, send, tell
+from tests.vm.guest.rides import LIFT, energise
 from tests.vm.guest.system import (
     Wrong,
     back,
@@ -21,7 +21,7 @@ from tests.vm.guest.system import (
 )
 
 SERVICE = unit("lift")
-KILLED_S, WIRE_KILLED_S, STOPPED_S = 1.0, 2.0, 4.0
+KILLED_S, STOPPED_S = 1.0, 4.0
 """What docs/reliability.md promises of a core of 1,000 MIPS."""
 
 
@@ -95,34 +95,6 @@ def clean_stop() -> str:
         raise Wrong("outputs-off ran once more")
     sh("systemctl", "start", SERVICE)
     return f"off after {took:.2f} s, stopped after {stopped:.2f} s"
-
-
-def door_killed() -> str:
-    """kill -9 of a door's service while a relay on RS-485 is on: off at the module."""
-    send("door", "ward_door", "open", "--direct")
-    return _killed("door")
-
-
-def charger_killed() -> str:
-    """kill -9 of a charger's service during a charge on CAN: the receiver is told to stop."""
-    tell("charger", "press charger_b robot on")
-    send("charger", "charger_b", "--robot", "vm/robot", "--request-id", "vm-2")
-    return _killed("charger")
-
-
-def _killed(name: str) -> str:
-    service = unit(name)
-    old, when = pid(service), header.now()
-    took = (
-        relay_off_at(
-            name, lambda: sh("systemctl", "kill", "-s", "KILL", "--kill-whom=main", service)
-        )
-        - when
-    )
-    back(service, old)
-    if took > WIRE_KILLED_S:
-        raise Wrong(f"off after {took:.2f} s, more than {WIRE_KILLED_S:g}")
-    return f"off after {took:.2f} s"
 
 
 def energised() -> str:

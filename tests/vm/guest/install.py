@@ -44,22 +44,8 @@ def lift() -> str:
     return f"ready after {ready_s(name):.2f} s"
 
 
-def door() -> str:
-    """The same for a door on RS-485, whose port is a pseudo-terminal."""
-    far_side("door")
-    return f"ready after {ready_s(enable('door')):.2f} s"
-
-
-def charger() -> str:
-    """The same for a charger on SocketCAN."""
-    sh("ip", "link", "add", "vcan0", "type", "vcan")
-    sh("ip", "link", "set", "vcan0", "up")
-    far_side("charger")
-    return f"ready after {ready_s(enable('charger')):.2f} s"
-
-
 def supervisors() -> str:
-    """The same for RMF's two supervisors."""
+    """`rmf-bridge enable` for RMF's two supervisors."""
     took = [ready_s(enable(name)) for name in ("lift_supervisor", "door_supervisor")]
     return f"ready after {took[0]:.2f} and {took[1]:.2f} s"
 
