@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from bridges.rmf.choose import missing_of_dds, missing_of_ros
 from hal_fakes.domain import domain_for_a_while
@@ -19,6 +20,16 @@ if not DEEP and missing_of_ros():
     os.environ.setdefault("TRANSPORT", "zenoh")
 """The wire between processes, where a story is not about it: zenoh, as on a Raspberry Pi. A daemon
 starts on it with half the CPU. In `make deep`, and beside ROS, these stories run on dds where it is."""
+
+settings.register_profile(
+    "here",
+    derandomize=True,
+    database=None,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("here")
+"""The same examples in each run, and no wall-clock limit on drawing or trying them."""
 
 signal.signal(
     signal.SIGHUP, signal.SIG_DFL

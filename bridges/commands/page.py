@@ -16,6 +16,7 @@ from typing import Final
 from bridges.commands.graph import add_graph_arguments, command_line, complain, open_graph
 from bridges.serve import places
 
+INSTALL: Final = "pip install 'rmf-bridges[page]', or of the .deb rmf-bridges-page"
 PORT: Final = 8080
 LOOPBACK: Final = "127.0.0.1"
 RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
@@ -101,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         from bridges.page import web
     except ImportError as error:
-        complain("page", f"{error}: install the extra: pip install 'rmf-bridges[page]'")
+        complain("page", f"{error}: {INSTALL}")
         return os.EX_UNAVAILABLE
     return web.serve(args, known, lambda: open_graph(args, "rmf_bridge_page"), _graph(args))
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from bridges.commands.graph import complain
 from bridges.explain import noted
+from bridges.explain.noted import OWN_TOPICS
 from bridges.recording.bags import Keep, all_in
 from bridges.recording.heard import Heard, Own
-from bridges.recording.mcap_bags import OWN_TOPICS
 from bridges.recording.sources import Notes
 from bridges.rmf import topics
 

@@ -11,6 +11,7 @@ from typing import Final
 
 from bridges.explain.timeline import Level
 
+OWN_TOPICS: Final = "rmf_bridge/"
 TOPICS: Final = ("samples", "outputs", "faults", "decisions")
 MOST: Final = 40
 """So many inputs, outputs or faults of one device are looked at."""

@@ -6,13 +6,13 @@ from typing import Final
 
 from mcap.records import Channel, Header, McapRecord, Message, Schema
 
+from bridges.explain.noted import OWN_TOPICS
 from bridges.recording.mcap_read import Damaged, records
 from bridges.recording.sources import Notes, Raw, Source, releases, source
 from bridges.rmf.releases import Release
 
 LIBRARY: Final = "rmf-bridges"
 """With this the `library` in the header of our own files begins."""
-OWN_TOPICS: Final = "rmf_bridge/"
 NO_CHANNEL: Final = Source("", None, "of no channel")
 
 

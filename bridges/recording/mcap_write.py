@@ -14,10 +14,11 @@ import msgspec
 from mcap.writer import CompressionType, Writer
 
 from bridges import __version__
+from bridges.explain.noted import OWN_TOPICS
 from bridges.recording import entries
 from bridges.recording.entries import AnyEntry, Spoken, Step
 from bridges.recording.incident import Incident, readable, timed
-from bridges.recording.mcap_bags import LIBRARY, OWN_TOPICS
+from bridges.recording.mcap_bags import LIBRARY
 from bridges.recording.texts import MESSAGES, text
 from bridges.recording.trees import Tree
 from bridges.rmf import cdr, topics

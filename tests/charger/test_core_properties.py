@@ -15,7 +15,7 @@ from tests.depth import examples
 steps = st.lists(st.sampled_from([*MOVES, 0.25, 1.0, 3.0, 10.0, 90.0]), max_size=60)
 
 
-@settings(derandomize=True, max_examples=examples(400), deadline=None)
+@settings(max_examples=examples(400))
 @given(st.sampled_from(list(SITES)), steps)
 def test_the_rules_hold_over_long_histories(site: str, history: list[str | float]) -> None:
     world, limits = World(), SITES[site]
@@ -26,7 +26,7 @@ def test_the_rules_hold_over_long_histories(site: str, history: list[str | float
             world = waited(world, step, limits, check)
 
 
-@settings(derandomize=True, max_examples=examples(200), deadline=None)
+@settings(max_examples=examples(200))
 @given(
     st.lists(st.tuples(st.sampled_from((s.HOT, s.IDLE, s.SILENT)), st.floats(0, 30)), max_size=200),
     st.integers(0, 60),

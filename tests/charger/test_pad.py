@@ -20,7 +20,7 @@ MISPLACED = st.one_of(
 )
 
 
-@settings(max_examples=examples(1000), deadline=None, derandomize=True)
+@settings(max_examples=examples(1000))
 @given(MISPLACED)
 def test_every_receiver_id_survives_the_error_text(misplaced: Misplaced) -> None:
     assert misplaced_in(misplaced.text) == misplaced

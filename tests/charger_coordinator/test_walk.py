@@ -231,7 +231,7 @@ def test_every_history_of_so_many_moves_ends_well() -> None:
         end.ends_well()
 
 
-@hypothesis_settings(max_examples=examples(150), deadline=None, derandomize=True, database=None)
+@hypothesis_settings(max_examples=examples(150))
 @given(st.lists(st.integers(0, len(MOVES) - 1), max_size=25))
 def test_every_long_history_ends_well(history: list[int]) -> None:
     ledger = Ledger()
@@ -292,7 +292,7 @@ EVENTS = st.one_of(
 HISTORIES = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 2.0, 11.0, 31.0]), EVENTS), max_size=40)
 
 
-@hypothesis_settings(max_examples=examples(400), deadline=None, derandomize=True, database=None)
+@hypothesis_settings(max_examples=examples(400))
 @given(HISTORIES)
 def test_in_every_history_no_two_robots_share_a_station_and_requests_go_out_in_turn(
     history: list[tuple[float, Any]],
@@ -320,7 +320,7 @@ def test_in_every_history_no_two_robots_share_a_station_and_requests_go_out_in_t
         assert keep.persist(keep.restore(kept, SETTINGS, now)) == kept
 
 
-@hypothesis_settings(max_examples=examples(200), deadline=None, derandomize=True, database=None)
+@hypothesis_settings(max_examples=examples(200))
 @given(st.binary(max_size=60))
 def test_a_damaged_file_is_refused_as_a_whole(kept: bytes) -> None:
     try:

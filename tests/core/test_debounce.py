@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bridges.core.debounce import Settled, forget, settle
@@ -65,7 +65,6 @@ def test_after_a_gap_the_believed_value_stays_and_a_half_seen_one_starts_again()
     assert forget(None) is None
 
 
-@settings(derandomize=True)
 @given(st.lists(st.tuples(st.floats(0.001, 0.1), st.booleans()), min_size=1, max_size=60))
 def test_a_believed_value_was_seen_throughout_its_debounce(steps: list[tuple[float, bool]]) -> None:
     now, seen, samples = 0.0, None, list[tuple[float, bool]]()

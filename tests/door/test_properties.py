@@ -97,7 +97,7 @@ def history(steps: list[tuple[float, Event]], limits: DoorLimits) -> Any:
         yield now, ledger, decided
 
 
-@settings(derandomize=True, max_examples=examples(400), deadline=None)
+@settings(max_examples=examples(400))
 @given(steps=STEPS, limits=LIMITS)
 def test_the_hold_is_on_for_a_reason_and_off_without_one(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -110,7 +110,7 @@ def test_the_hold_is_on_for_a_reason_and_off_without_one(
         assert not (obstructed and ledger.wanted)
 
 
-@settings(derandomize=True, max_examples=examples(400), deadline=None)
+@settings(max_examples=examples(400))
 @given(steps=STEPS, limits=LIMITS)
 def test_open_is_reported_from_fresh_contacts_only(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -124,7 +124,7 @@ def test_open_is_reported_from_fresh_contacts_only(
             assert decided.report.mode == DoorModeValue.MODE_OFFLINE
 
 
-@settings(derandomize=True, max_examples=examples(400), deadline=None)
+@settings(max_examples=examples(400))
 @given(steps=STEPS, limits=LIMITS)
 def test_the_relay_follows_the_hold_and_nothing_else(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -135,7 +135,7 @@ def test_the_relay_follows_the_hold_and_nothing_else(
             assert decided.outputs.hold_open == decided.report.hold
 
 
-@settings(derandomize=True, max_examples=examples(400), deadline=None)
+@settings(max_examples=examples(400))
 @given(steps=STEPS, limits=LIMITS)
 def test_the_stamp_is_the_time_of_the_last_reading(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -144,7 +144,7 @@ def test_the_stamp_is_the_time_of_the_last_reading(
         assert decided.report.read_at == ledger.read_at
 
 
-@settings(derandomize=True, max_examples=examples(400), deadline=None)
+@settings(max_examples=examples(400))
 @given(steps=STEPS, limits=LIMITS)
 def test_a_decision_repeated_is_the_same_decision(
     steps: list[tuple[float, Event]], limits: DoorLimits
@@ -160,7 +160,7 @@ def test_a_decision_repeated_is_the_same_decision(
         memory = once.memory
 
 
-@settings(derandomize=True, max_examples=examples(400), deadline=None)
+@settings(max_examples=examples(400))
 @given(steps=STEPS, limits=LIMITS)
 def test_the_decision_stays_the_same_until_the_time_the_core_asked_to_be_woken(
     steps: list[tuple[float, Event]], limits: DoorLimits

@@ -172,7 +172,7 @@ def _would_be_believed(ledger: Ledger, event: Any) -> bool:
     return ledger.now > requester.heard_at + 9.0 or requester.doubted_at > requester.doubted_since
 
 
-@settings(max_examples=examples(300), deadline=None, derandomize=True)
+@settings(max_examples=examples(300))
 @given(HISTORIES)
 def test_in_every_history_the_requests_follow_the_table_and_their_pace(
     history: list[tuple[float, Any]],
@@ -181,7 +181,7 @@ def test_in_every_history_the_requests_follow_the_table_and_their_pace(
     ledger.until(ledger.now + 10.0)
 
 
-@settings(max_examples=examples(300), deadline=None, derandomize=True)
+@settings(max_examples=examples(300))
 @given(HISTORIES)
 def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
     history: list[tuple[float, Any]],
@@ -199,7 +199,7 @@ def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
         ] == [2]
 
 
-@settings(max_examples=examples(200), deadline=None, derandomize=True)
+@settings(max_examples=examples(200))
 @given(st.binary(max_size=60))
 def test_a_damaged_file_is_refused_as_a_whole(kept: bytes) -> None:
     try:

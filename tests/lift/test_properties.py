@@ -18,8 +18,8 @@ from tests.lift.rmf_world import World as Rmf
 from tests.lift.story import AGV, END, HUMAN, Building, Controller, Story
 from tests.lift.walk import Step, World
 
-FEW = settings(derandomize=True, deadline=None, max_examples=examples(60))
-STORMS = settings(derandomize=True, deadline=None, max_examples=examples(40))
+FEW = settings(max_examples=examples(60))
+STORMS = settings(max_examples=examples(40))
 
 
 @dataclass

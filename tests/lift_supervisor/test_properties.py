@@ -46,7 +46,7 @@ def check_rates(requests: list[tuple[float, str]]) -> None:
 Restart = st.tuples(st.floats(0, 150), st.sampled_from(["supervisor", "Lift1", *NAMES]))
 
 
-@settings(derandomize=True, max_examples=examples(25), deadline=None)
+@settings(max_examples=examples(25))
 @given(
     seed=st.integers(0, 2**32 - 1),
     loss=st.sampled_from([0.0, 0.1, 0.3]),
@@ -76,7 +76,7 @@ def test_every_live_robot_is_served_whatever_is_lost_and_whoever_restarts(
         check_rates(requests(world))
 
 
-@settings(derandomize=True, max_examples=examples(20), deadline=None)
+@settings(max_examples=examples(20))
 @given(
     restarts=st.lists(st.tuples(st.floats(5, 60), st.sampled_from(["supervisor", "Lift1"]))),
     skews=st.tuples(*[st.sampled_from([0.0, -3600.0, 300.0])] * 3),
@@ -215,7 +215,7 @@ def histories(draw: st.DrawFn) -> list[tuple[float, int]]:
     return draw(st.lists(st.tuples(gap, st.integers(0, 9)), max_size=60))
 
 
-@settings(derandomize=True, max_examples=examples(300), deadline=None)
+@settings(max_examples=examples(300))
 @given(histories())
 @example([(0.0, 8), (0.0, 0), (0.05, 2), (0.0, 4), (0.1, 1)])
 def test_long_histories_keep_the_rules_too(history: list[tuple[float, int]]) -> None:
@@ -229,7 +229,7 @@ def test_long_histories_keep_the_rules_too(history: list[tuple[float, int]]) -> 
         desk.hears(events_at(desk.now)[number])
 
 
-@settings(derandomize=True, max_examples=examples(100), deadline=None)
+@settings(max_examples=examples(100))
 @given(histories())
 def test_from_every_state_a_lift_that_obeys_is_granted_to_a_robot_that_asks(
     history: list[tuple[float, int]],

@@ -20,7 +20,7 @@ NUMBERS: dict[str, st.SearchStrategy[Any]] = {
 }
 TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20)
 
-repeatable = settings(derandomize=True, deadline=None, database=None, max_examples=examples(40))
+repeatable = settings(max_examples=examples(40))
 """The same values in every run."""
 
 MESSAGE_TYPES: tuple[Any, ...] = typing.get_args(d.Message)

@@ -20,13 +20,15 @@ from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 PATIENT = "stale_after_s: 30"
-"""A busy machine that keeps the daemon from scanning for a while does not take its door away."""
+"""A busy machine that keeps the daemon from scanning for a while does not take its door away.
+
+For the same reason the module has 2 s to answer, and not the usual 0.3."""
 YAML = """
 kind: door
 driver: dry_contact
 rmf: {{transport: {transport}, network: localhost, domain_id: {domain}}}
 buses:
-  module: {{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}}}
+  module: {{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}, timeout_s: 2}}
 doors:
   ward_door:
     limits: {{close_grace_s: 0, stale_after_s: 30}}

@@ -11,7 +11,7 @@ from tests.settings.reading import RIGHT, problems_of
 from tests.settings.test_shipped import FILES
 from tests.settings.test_whole_file import BAD
 
-MANY = settings(derandomize=True, max_examples=examples(200), deadline=None, database=None)
+MANY = settings(max_examples=examples(200))
 BITS = [*"[]{}:,-?&*!|>'\"%@`#~<=\n\t \\\0", ": ", "- ", "\n  ", "&a ", "*a", "<<: ", "!!str "]
 BITS += ["017", "1:30", "no", "1e3", "null", "2024-01-01", ".inf", "0x10", "é", "\ud800", "---\n"]
 BITS += ["lanes", "inputs", "point", "active", "codes", "limits", "bus", "header", "type", "north"]

@@ -132,7 +132,7 @@ Quoting.add_representer(
 
 @pytest.mark.parametrize("flow", [True, False])
 def test_every_right_file_becomes_what_msgspec_makes_of_its_values(file: Path, flow: bool) -> None:
-    @settings(derandomize=True, max_examples=examples(60), deadline=None, database=None)
+    @settings(max_examples=examples(60))
     @given(st.dictionaries(NAMES, gates(), min_size=1, max_size=1))
     def check(devices: dict[str, Any]) -> None:
         raw = {"kind": "gate", "driver": "contact", "buses": {"b": {"type": "pins"}}}

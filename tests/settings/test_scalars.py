@@ -76,7 +76,7 @@ PLAIN = st.one_of(
 )
 
 
-@settings(derandomize=True, max_examples=examples(1500), deadline=None, database=None)
+@settings(max_examples=examples(1500))
 @given(PLAIN)
 def test_every_text_that_pyyaml_takes_for_something_else_is_known(text: str) -> None:
     loader = yaml.SafeLoader("")

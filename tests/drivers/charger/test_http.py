@@ -218,7 +218,7 @@ anything = st.recursive(
 )
 
 
-@settings(derandomize=True, max_examples=examples(400), deadline=None)
+@settings(max_examples=examples(400))
 @example({"state": 5.0})
 @example({"state": "5"})
 @example({"State": 5})

@@ -157,7 +157,7 @@ near = st.fixed_dictionaries(
 )
 
 
-@settings(derandomize=True, max_examples=examples(600), deadline=None)
+@settings(max_examples=examples(600))
 @given(near)
 def test_whatever_json_comes_it_is_a_driver_error_or_a_sample_and_charging_only_by_its_word(
     said: Any,

@@ -105,7 +105,7 @@ def test_only_the_answer_yes_is_in_range_and_only_when_it_is_the_last_checks(res
 any_word = st.integers(0, 0xFFFF)
 
 
-@settings(derandomize=True, max_examples=examples(300), deadline=None)
+@settings(max_examples=examples(300))
 @given(
     st.fixed_dictionaries(
         dict.fromkeys(("error_low", "error_high"), st.just(0) | any_word)

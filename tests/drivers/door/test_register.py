@@ -91,7 +91,7 @@ def test_only_its_own_bit_means_an_obstruction() -> None:
     ]
 
 
-@tries(derandomize=True, max_examples=examples(500))
+@tries(max_examples=examples(500))
 @given(
     st.fixed_dictionaries(
         {

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bridges.lift.signals import Hazard
@@ -123,7 +123,6 @@ SAFEST = ("agv_mode", "normal", "fire_alarm")
 """From where most may be driven to where nothing may."""
 
 
-@settings(derandomize=True, deadline=None)
 @given(
     st.lists(st.sampled_from([*SAFEST, "fault"]), min_size=8, max_size=8),
     st.lists(st.sampled_from([line, alarm]), min_size=3, max_size=3),

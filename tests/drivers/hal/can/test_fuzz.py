@@ -71,7 +71,7 @@ def says_charging(message: can.Message) -> bool:
     return plain and status and message.data[7] & 0x0F in (1, 2, 3, 4, 5)
 
 
-@settings(derandomize=True, deadline=None, max_examples=examples(400))
+@settings(max_examples=examples(400))
 @example([frame(STATUS, bytes(7) + b"\5", True), frame(SERIAL, bytes(8), True)])
 @example([frame(STATUS, bytes(6) + b"\5", True), frame(SERIAL, bytes(8), True)])
 @given(frames)
@@ -145,7 +145,7 @@ spoils = st.one_of(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=examples(400))
+@settings(max_examples=examples(400))
 @given(st.lists(spoils, min_size=1, max_size=8), frames)
 def test_no_answers_break_the_canopen_driver_or_make_a_charge(
     spoiled: list[Callable[[can.Message], list[can.Message]]], between: list[can.Message]

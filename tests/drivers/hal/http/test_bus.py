@@ -254,7 +254,7 @@ def test_an_answer_that_is_not_a_json_object_is_an_error_that_says_what_to_look_
     assert re.search(text, failure(once(reply)))
 
 
-@settings(derandomize=True, max_examples=examples(150), deadline=None)
+@settings(max_examples=examples(150))
 @given(
     st.binary(max_size=200),
     st.sampled_from([b"", b"HTTP/1.1 200 OK\r\n", answer(b"")[:-4], CHUNKED]),

@@ -92,8 +92,6 @@ def _attempt(step: Callable[[], object], clock: Time) -> object:
 
 
 @settings(
-    derandomize=True,
-    deadline=None,
     max_examples=examples(250),
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
@@ -162,8 +160,6 @@ class SpoiledLine:
 
 
 @settings(
-    derandomize=True,
-    deadline=None,
     max_examples=examples(150),
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
@@ -209,7 +205,7 @@ def saying(sort: type[Module], pdu: bytes) -> Iterator[tuple[Module, ModbusBus]]
 
 
 @SORTS
-@settings(derandomize=True, deadline=None, max_examples=examples(150))
+@settings(max_examples=examples(150))
 @given(pdu=PDUS)
 @example(pdu=b"\3\2\xab\xcd")
 @example(pdu=b"\3\2\xab\xcd" + crc(b"\1\3\2\xab\xcd")[:1])
@@ -225,7 +221,7 @@ def test_a_register_reads_as_what_was_sent_or_not_at_all(sort: type[Module], pdu
 
 
 @SORTS
-@settings(derandomize=True, deadline=None, max_examples=examples(100))
+@settings(max_examples=examples(100))
 @given(pdu=PDUS)
 @example(pdu=bytes.fromhex("0502000007"))
 def test_a_pulse_is_asked_for_once_and_believed_by_its_echo_alone(

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.hal.modbus.points import (
@@ -48,7 +48,6 @@ def test_a_point_has_one_spelling(spelled: str, one_spelling: str) -> None:
     assert canonical(spelled) == one_spelling
 
 
-@settings(derandomize=True)
 @given(POINTS)
 def test_the_canonical_spelling_reads_as_itself(point: Point) -> None:
     assert parse(str(point)) == point
@@ -124,7 +123,6 @@ def test_a_text_that_is_not_a_point_is_refused_with_an_example(text: str, reason
         canonical(text)
 
 
-@settings(derandomize=True)
 @given(st.text(max_size=40))
 def test_no_text_but_a_point_gets_through(text: str) -> None:
     try:
@@ -189,7 +187,6 @@ def test_a_wire_that_cannot_be_right_is_named(wire: Wire, problem: str) -> None:
     assert list(wire_problems(wire)) == [problem]
 
 
-@settings(derandomize=True)
 @given(st.lists(CELLS, max_size=20))
 def test_every_point_is_read_once_and_in_bounds(points: list[Point]) -> None:
     read = [point for bits in ranges(points) for point in bits.points()]
@@ -198,7 +195,6 @@ def test_every_point_is_read_once_and_in_bounds(points: list[Point]) -> None:
     assert all(point.address <= 65535 for point in read)
 
 
-@settings(derandomize=True)
 @given(BITS, st.integers(0, 65535))
 def test_a_bit_of_a_register_is_read_with_its_register(point: Point, word: int) -> None:
     assert point.cell == Point(point.unit, point.table, point.address)
