@@ -47,7 +47,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def _packages(arch: str, folder: Path) -> Path:
-    """A folder with the package of this architecture for Debian 13. Raises Unusable."""
+    """A folder with the packages of this architecture for Debian 13. Raises Unusable."""
     found = sorted((ROOT / "dist").glob(f"*+deb13_{arch}.deb"))
     if not found:
         raise Unusable(f"no package: make deb ARCHS={arch} PYTHONS=3.13")
@@ -55,7 +55,8 @@ def _packages(arch: str, folder: Path) -> Path:
     packages.mkdir(exist_ok=True)
     for old in packages.iterdir():
         old.unlink()
-    os.link(found[-1], packages / found[-1].name)
+    for each in found:
+        os.link(each, packages / each.name)
     return packages
 
 

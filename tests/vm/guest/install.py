@@ -21,7 +21,7 @@ from tests.vm.guest.system import (
 def package() -> str:
     """`apt install ./rmf-bridges_….deb` on a fresh Debian."""
     deb = _deb()
-    sh("apt-get", "install", "--yes", "--no-install-recommends", str(deb))
+    install(deb)
     chip = (header.CONFIGFS / "bank0/chip_name").read_text().strip()
     group = grp.getgrgid(Path(f"/dev/{chip}").stat().st_gid).gr_name
     if group != "gpio":
@@ -29,11 +29,17 @@ def package() -> str:
     return f"{deb.name}: {sh('rmf-bridge', '--version').strip()}; /dev/{chip} is the group gpio's"
 
 
-def _deb() -> Path:
-    """The package, which the host shares."""
+def install(deb: Path, *options: str) -> None:
+    """As people do it, but that nothing is asked."""
+    apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
+    sh(*apt, "--no-install-recommends", *options, str(deb))
+
+
+def _deb(name: str = "rmf-bridges") -> Path:
+    """The package of this name, which the host shares."""
     if not Path("/srv").is_mount():
         sh("mount", "-t", "9p", "-o", "ro,trans=virtio,version=9p2000.L", "packages", "/srv")
-    (deb,) = Path("/srv").glob("*.deb")
+    (deb,) = Path("/srv").glob(f"{name}_*.deb")
     return deb
 
 
@@ -57,7 +63,8 @@ def recorder() -> str:
 
 
 def page() -> str:
-    """The web page starts and answers."""
+    """The web page, a package of its own, starts and answers."""
+    install(_deb("rmf-bridges-page"))
     sh("systemctl", "start", "rmf-bridge-page.service")
     ask = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:8080', timeout=30).status)"
     until(lambda: _answers(ask), "the page answers")
@@ -111,7 +118,7 @@ def upgrade() -> str:
     deb = _deb()
     names = [unit(n) for n in ("lift", "door", "charger")]
     before = {name: shown(name, "InvocationID") for name in names}
-    sh("apt-get", "install", "--yes", "--reinstall", "--no-install-recommends", str(deb))
+    install(deb, "--reinstall")
     for name in names:
         until(lambda name=name: is_active(name), f"{name} is ready")  # type: ignore[misc]
         if shown(name, "InvocationID") == before[name]:
