@@ -23,7 +23,7 @@ from hal_fakes.realtime import RealTime
 from hal_fakes.wiring import Wiring
 from tests.vm.guest import header
 
-LOOK_S = 0.02
+LOOK_S = 0.05
 
 
 def main() -> int:
@@ -59,9 +59,11 @@ def _serve(config: Config, bus: str, stations: Sequence[object]) -> None:
 
 
 def _stand_at_header(wirings: Sequence[Wiring]) -> None:
-    """Follow the outputs, and pull the inputs."""
+    """Follow the outputs, and pull the inputs, also back from where a claim has pulled them.
+
+    On gpio-sim a claimed input with a resistor reads as the resistor pulls; on a Pi the wire wins.
+    """
     driven: dict[str, bool] = {}
-    pulled: dict[str, bool] = {}
     _ready()
     while True:
         now = time.monotonic()
@@ -72,9 +74,7 @@ def _stand_at_header(wirings: Sequence[Wiring]) -> None:
                     driven[point] = level
                     wiring.drive(point, level, now)
             for point, level in wiring.levels(now).items():
-                if pulled.get(point) != level:
-                    pulled[point] = level
-                    header.pull(_number(point), level)
+                header.pull(_number(point), level)
         time.sleep(LOOK_S)
 
 

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -49,13 +50,20 @@ def unplug() -> None:
     (CONFIGFS / "live").write_text("0")
     (CONFIGFS / "bank0").rmdir()
     CONFIGFS.rmdir()
+    _lines.cache_clear()
+
+
+@cache
+def _lines() -> Path:
+    """The directory of the chip that is plugged."""
+    device = (CONFIGFS / "dev_name").read_text().strip()
+    chip = (CONFIGFS / "bank0/chip_name").read_text().strip()
+    return Path(f"/sys/devices/platform/{device}/{chip}")
 
 
 def line(number: int) -> Path:
     """The directory of a line: `pull` sets what an input reads, `value` shows a level."""
-    device = (CONFIGFS / "dev_name").read_text().strip()
-    chip = (CONFIGFS / "bank0/chip_name").read_text().strip()
-    return Path(f"/sys/devices/platform/{device}/{chip}/sim_gpio{number}")
+    return _lines() / f"sim_gpio{number}"
 
 
 def level(number: int) -> bool:
@@ -65,7 +73,9 @@ def level(number: int) -> bool:
 
 def pull(number: int, high: bool) -> None:
     """What an input reads from now on."""
-    (line(number) / "pull").write_text("pull-up" if high else "pull-down")
+    wire, wanted = line(number) / "pull", "pull-up" if high else "pull-down"
+    if wire.read_text().strip() != wanted:
+        wire.write_text(wanted)
 
 
 def watch() -> None:
