@@ -99,11 +99,10 @@ def _traced() -> Iterator[Write]:
 
 
 def _base() -> int:
-    """The number that the kernel gives to the chip's first line."""
-    name = (CONFIGFS / "bank0/chip_name").read_text().strip()
-    found = re.search(rf"^{name}: GPIOs (\d+)-", Path("/sys/kernel/debug/gpio").read_text(), re.M)
-    assert found
-    return int(found[1])
+    """The number that the kernel's trace gives to the chip's first line."""
+    label = (CONFIGFS / "bank0/label").read_text()
+    chips = Path("/sys/class/gpio").glob("gpiochip*")
+    return next(int((c / "base").read_text()) for c in chips if (c / "label").read_text() == label)
 
 
 def on(lines: dict[int, bool], since: float = 0.0) -> dict[int, float]:
