@@ -12,7 +12,7 @@ esac
 here=$(cd "$(dirname "$0")/.." && pwd)
 bin=$here/.venv/bin
 version=$("$bin/python" -c 'import bridges; print(bridges.__version__)')+$release
-maintainer="${DEBFULLNAME:-rmf-bridges maintainers} <${DEBEMAIL:-rmf-bridges@users.noreply.github.com}>"
+maintainer="${DEBFULLNAME:-rmf-bridges maintainers} <${DEBEMAIL:-rmf-bridges@localhost}>"
 work=$here/build/deb/$release-$arch
 root=$work/root page=$work/page wheels=$here/build/deb/wheels
 lib=usr/lib/rmf-bridges
@@ -21,7 +21,7 @@ next=3.$((${python#3.} + 1))
 SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$here" log -1 --format=%ct 2>/dev/null || date +%s)}
 export SOURCE_DATE_EPOCH
 
-rm -rf "$work"
+rm -rf "$work" "$here"/build/lib "$here"/build/bdist.* # else a wheel keeps modules that are gone
 umask 022
 mkdir -p "$root/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$page/$lib/lib/python$python" "$work/wheel" "$wheels"
 
@@ -108,13 +108,14 @@ CONTROL
   dpkg-deb --root-owner-group -Zxz --build "$2" "$here/dist/$1_${version}_$arch.deb"
   ! command -v lintian > /dev/null || lintian --allow-root --fail-on error "$here/dist/$1_${version}_$arch.deb"
 }
-package rmf-bridges "$root" "python3 (>= $python~), python3 (<< $next~), libc6 (>= 2.34), systemd (>= 252)" \
+libc='libc6 (>= 2.34)' # of the wheels' tags (wheels.py, lgpio.sh)
+package rmf-bridges "$root" "python3 (>= $python~), python3 (<< $next~), $libc, systemd (>= 252)" \
   "connect Open-RMF to lifts, doors and chargers" <<'DESCRIPTION'
  Small daemons, one for each controller, that stand between Open-RMF and a
  building: dry contacts, Modbus, HTTP and CAN. Each is configured by one YAML
  and run by systemd.
 DESCRIPTION
-package rmf-bridges-page "$page" "rmf-bridges (= $version)" \
+package rmf-bridges-page "$page" "rmf-bridges (= $version), $libc" \
   "web page of Open-RMF's lifts, doors and chargers" <<'DESCRIPTION'
  What rmf-bridge page needs: a web page of what is on RMF's graph, of each
  device and of what was recorded, as a service with a user of its own.

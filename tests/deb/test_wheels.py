@@ -36,9 +36,11 @@ def fill(tmp_path: Path, arch: str) -> Path:
         "for_pc; platform_machine == 'x86_64'",
     )
     target = tmp_path / "site-packages"
-    command = [sys.executable, WHEELS, first, "--find-links", tmp_path, "--target", target]
+    places = [str(each) for each in (WHEELS, first, "--find-links", tmp_path, "--target", target)]
     subprocess.run(
-        [*command, "--arch", arch, "--python", "3.12"], check=True, env={"PIP_NO_INDEX": "1"}
+        [sys.executable, *places, "--arch", arch, "--python", "3.12"],
+        check=True,
+        env={"PIP_NO_INDEX": "1"},
     )
     return target
 
