@@ -1,23 +1,32 @@
 """The page with 50 lifts, 200 doors and 50 chargers at 1 Hz, looked at by three real browsers.
 
 A lift's session carries the time of its publishing; a script in each browser notes when it is on
-the screen. `a tenth changes`: as on a busy site. `all change`: no card is ever the same twice.
+the screen. `a tenth changes`: as on a busy site. `all change`: no card is ever the same twice. Each
+device's daemon publishes its diagnostics too.
+
+`an hour in minutes`: the page turns 20 times as often, and ages are still drawn once a second, until
+each browser of the site was sent as many updates as an hour can bring at all, and one browser of a
+device its own. The heaps are those after a collection: of all three browsers together.
 """
 
 import os
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from playwright.sync_api import BrowserContext, Page, sync_playwright
+from playwright.sync_api import Page, Playwright, sync_playwright
 
 from bench.figures import Row, Tables, percentiles
+from bridges.page import web
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
+from bridges.serve.diagnostics import diagnosis
 from hal_fakes.domain import free_domain
 from hal_fakes.wire import join, wire
 
@@ -26,6 +35,23 @@ DEVICES = LIFTS + DOORS + CHARGERS
 BROWSERS: Final = 3
 SECONDS: Final = float(os.environ.get("BENCH_PAGE_S", "60"))
 SETTLES_S: Final = 10.0
+PRESSED: Final = 20
+UPDATES: Final = os.environ.get("BENCH_PAGE_UPDATES")
+PRESSED_PAGE: Final = f"""
+import sys
+from bridges.page import buttons, connections, site_views, web
+web.PUMP_S /= {PRESSED}
+connections.MOST_WAITING *= {PRESSED}
+web.MOST_HISTORY *= {PRESSED}
+for one in (buttons, site_views):
+    one.AGES_S /= {PRESSED}
+from bridges.cli import main
+sys.exit(main())
+"""
+AN_HOUR: Final = int(UPDATES or 3600 / web.PUMP_S)
+"""Updates of the site; at most one for each turn."""
+WARM: Final = AN_HOUR // 6
+"""Updates until everything that is kept in bounds has filled them."""
 TICKS: Final = os.sysconf("SC_CLK_TCK")
 CHROMIUM: Final = "/usr/bin/chromium"
 FLAGS: Final = ("--headless", "--no-sandbox", "--disable-gpu")
@@ -39,24 +65,53 @@ WATCH: Final = """() => { window.late = []; const seen = new Set();
 
 def measure(scratch: Path) -> Tables:
     """Seconds from publishing to the screen, the page's processor and memory, the browsers' heaps."""
-    domain = free_domain()
     rows = {}
     for name, share in (("a tenth changes", 10), ("all change", 1)):
-        rows[name] = _measured(domain, share, scratch)
-    return {"page, 300 devices, 3 browsers": rows}
+        with _page(["-m", "bridges.cli"], share, scratch) as seen:
+            rows[name] = _looked_at(seen)
+    with _page(["-c", PRESSED_PAGE], 1, scratch) as seen:
+        hour = _an_hour(seen)
+    return {"page, 300 devices, 3 browsers": rows, "page, an hour in minutes": {"all change": hour}}
 
 
-def _measured(domain: int, share: int, scratch: Path) -> Row:
-    command = [sys.executable, "-m", "bridges.cli", "page", "--listen", "127.0.0.1:0"]
+@dataclass(frozen=True)
+class Seen:
+    """A page, what it is shown, and the browsers that look at it."""
+
+    pid: int
+    site: "_Site"
+    tabs: list[Page]
+
+    def live(self, seconds: float) -> None:
+        """The site goes on for so long."""
+        self.site.live(seconds, self.tabs[0])
+
+
+@contextmanager
+def _page(program: list[str], share: int, scratch: Path) -> Iterator[Seen]:
+    domain = free_domain()
+    command = [sys.executable, *program, "page", "--listen", "127.0.0.1:0"]
     command += ["--localhost", "--domain-id", str(domain), "--transport", wire()]
     command += ["--runtime-dirs", str(scratch)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as page:
+    site = _Site(domain, share)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as page, closing(site):
         try:
             assert page.stdout is not None
             address = page.stdout.readline().split()[4]
-            return _looked_at(page.pid, address, _Site(domain, share))
+            with sync_playwright() as playwright:
+                yield Seen(page.pid, site, _tabs(playwright, site, address))
         finally:
             page.terminate()
+
+
+def _tabs(playwright: Playwright, site: "_Site", address: str) -> list[Page]:
+    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=[*FLAGS])
+    tabs = [browser.new_context().new_page() for _ in range(BROWSERS)]
+    site.live(3.0, tabs[0])
+    for tab in tabs:
+        tab.goto(address)
+    site.live(SETTLES_S, tabs[0])
+    return tabs
 
 
 class _Site:
@@ -68,16 +123,28 @@ class _Site:
         self._publish_lift = self._transport.publisher(topics.LIFT_STATES).publish
         self._publish_door = self._transport.publisher(topics.DOOR_STATES).publish
         self._publish_charger = self._transport.publisher(topics.CHARGER_STATES).publish
+        self._diagnose = self._transport.publisher(topics.DIAGNOSTICS).publish
         idle = d.LiftState(available_floors=("L1", "L2", "L3"))
         self._lifts = [replace(idle, lift_name=f"lift{n:02}") for n in range(LIFTS)]
 
     def _say(self, number: int, turn: int) -> None:
         if number < LIFTS:
-            self._publish_lift(self._lift(number, turn))
+            lift = self._lift(number, turn)
+            self._publish_lift(lift)
+            self._told("lift", lift.lift_name)
         elif number < LIFTS + DOORS:
-            self._publish_door(self._door(number - LIFTS, turn))
+            door = self._door(number - LIFTS, turn)
+            self._publish_door(door)
+            self._told("door", door.door_name)
         else:
-            self._publish_charger(self._charger(number - LIFTS - DOORS, turn))
+            charger = self._charger(number - LIFTS - DOORS, turn)
+            self._publish_charger(charger)
+            self._told("charger", charger.charger_name)
+
+    def _told(self, kind: str, name: str) -> None:
+        """What the device's daemon says of itself."""
+        devices = {name: {"input_age_s": 0.05, "waiting": "-"}}
+        self._diagnose(diagnosis(f"{name}_node", kind, {}, devices, stamp(time.time())))
 
     def _changes(self, number: int, turn: int) -> bool:
         return (number + turn) % self._share == 0
@@ -111,46 +178,65 @@ class _Site:
         self._transport.close()
 
 
-def _looked_at(pid: int, address: str, site: _Site) -> Row:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=[*FLAGS])
-        contexts = [browser.new_context() for _ in range(BROWSERS)]
-        tabs = [context.new_page() for context in contexts]
-        site.live(3.0, tabs[0])
-        loads: list[str] = []
-        for tab in tabs:
-            tab.on("domcontentloaded", lambda _: loads.append("again"))
-            tab.goto(address)
-        site.live(SETTLES_S, tabs[0])
-        for tab in tabs:
-            tab.evaluate(WATCH)
-        loads.clear()
-        heap, used, began = _heaps(contexts, tabs), _cpu_s(pid), time.monotonic()
-        site.live(SECONDS, tabs[0])
-        took_s = time.monotonic() - began
-        late = [one / 1e3 for tab in tabs for one in tab.evaluate("window.late || []")]
-        p50, p99 = percentiles(late)
-        row = {
-            "p50 ms": p50 * 1e3,
-            "p99 ms": p99 * 1e3,
-            "CPU %": 100 * (_cpu_s(pid) - used) / took_s,
-            "RSS MB": _rss_mb(pid),
-            "heap MB": heap,
-            "heap + MB": _heaps(contexts, tabs) - heap,
-            "reloads": len(loads),
-            "load": os.getloadavg()[0],
-        }
-        browser.close()
-    site.close()
-    return row
+def _looked_at(seen: Seen) -> Row:
+    """From publishing to the screen, and what it costs."""
+    loads: list[str] = []
+    for tab in seen.tabs:
+        tab.evaluate(WATCH)
+        tab.on("domcontentloaded", lambda _: loads.append("again"))
+    used, began = _cpu_s(seen.pid), time.monotonic()
+    seen.live(SECONDS)
+    took_s = time.monotonic() - began
+    late = [one / 1e3 for tab in seen.tabs for one in tab.evaluate("window.late || []")]
+    p50, p99 = percentiles(late)
+    return {
+        "p50 ms": p50 * 1e3,
+        "p99 ms": p99 * 1e3,
+        "CPU %": 100 * (_cpu_s(seen.pid) - used) / took_s,
+        "RSS MB": _rss_mb(seen.pid),
+        "reloads": len(loads),
+        "load": os.getloadavg()[0],
+    }
 
 
-def _heaps(contexts: list[BrowserContext], tabs: list[Page]) -> float:
-    """What JavaScript keeps in the first browser after a collection (MB)."""
-    client = contexts[0].new_cdp_session(tabs[0])
+def _an_hour(seen: Seen) -> Row:
+    """What the browsers and the page keep, after as many updates as an hour can bring."""
+    *_, device = seen.tabs
+    device.goto(f"{device.url}lift/lift00")
+    _updated(seen, WARM)
+    heap, rss, began = _heaps(seen.tabs), _rss_mb(seen.pid), time.monotonic()
+    updates = _updated(seen, AN_HOUR)
+    return {
+        "updates": updates,
+        "took s": time.monotonic() - began,
+        "heap MB": heap,
+        "heap + MB": _heaps(seen.tabs) - heap,
+        "RSS MB": rss,
+        "RSS + MB": _rss_mb(seen.pid) - rss,
+        "load": os.getloadavg()[0],
+    }
+
+
+def _updated(seen: Seen, number: int) -> int:
+    """Go on until the first browser was sent so many updates; how many there were."""
+    first = seen.tabs[0]
+    before: int = first.evaluate("window.nextMessageId")
+    while (now := int(first.evaluate("window.nextMessageId"))) < before + number:
+        seen.live(1.0)
+    return now - before
+
+
+def _heaps(tabs: list[Page]) -> float:
+    """What JavaScript keeps after a collection (MB)."""
+    return sum(map(_heap, tabs))
+
+
+def _heap(tab: Page) -> float:
+    client = tab.context.new_cdp_session(tab)
     client.send("HeapProfiler.enable")
     client.send("HeapProfiler.collectGarbage")
     used: float = client.send("Runtime.getHeapUsage")["usedSize"]
+    client.detach()
     return used / 1e6
 
 

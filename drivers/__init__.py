@@ -4,7 +4,8 @@ A driver is the file `drivers/<kind>/<driver>.py`, named after the YAML's `kind:
 with a `DRIVER` (`drivers/driver_type.py`); the rest of the code uses nothing else of the file.
 """
 
-from typing import Protocol, TypeVar
+from collections.abc import Mapping
+from typing import Protocol, TypeVar, runtime_checkable
 
 Sample = TypeVar("Sample", covariant=True)
 Outputs = TypeVar("Outputs", contravariant=True)
@@ -35,3 +36,11 @@ class Driver(Protocol[Sample, Outputs]):
 
     def close(self) -> None:
         """Switch every output off and release it. Does not raise."""
+
+
+@runtime_checkable
+class OnContacts(Protocol):
+    """A driver whose device is on contacts, which a person can compare with a meter."""
+
+    def contacts(self) -> Mapping[str, bool]:
+        """Each signal as it was read or written last: asserted or not. What is unknown is left out."""

@@ -25,6 +25,9 @@ from hal_fakes.realtime import RealTime
 LogFormat = Literal["text", "json"]
 READY_S = 15.0
 """How long a child may take to serve (a busy Raspberry Pi imports slowly)."""
+PATIENCE_S = 1.5
+"""A simulated bus waits at least so long for an answer: its far side shares this machine, which may be
+busy. Not longer, as a call may take half of the shortest WatchdogSec (bridges/serve/drop_in.py)."""
 
 
 class Simulation:
@@ -101,8 +104,10 @@ class Simulation:
     def _pointed_at_child(self, name: str) -> msgspec.Struct:
         settings: msgspec.Struct = self._config.buses[name]
         child = self._children.pop(name) if name in self._children else self._start(name)
-        replace = _first_line(child, name)
-        return msgspec.convert({**msgspec.to_builtins(settings), **replace}, type(settings))
+        found = {**msgspec.to_builtins(settings), **_first_line(child, name)}
+        if "timeout_s" in found:
+            found["timeout_s"] = max(found["timeout_s"], PATIENCE_S)
+        return msgspec.convert(found, type(settings))
 
 
 def _first_line(child: "subprocess.Popen[bytes]", bus_name: str) -> dict[str, object]:

@@ -62,7 +62,7 @@ def told(memory: Memory, now: float, site: Site) -> Memory:
             before = nudges.get(who)
             count = before.count + 1 if before else 1
             nudges[who] = Nudge(one.why, count, now)
-    return memory if nudges == memory.nudges else replace(memory, nudges=nudges)
+    return replace(memory, nudges=nudges)
 
 
 def is_told(memory: Memory, who: Robot, now: float) -> bool:

@@ -229,8 +229,7 @@ class Memory(msgspec.Struct, frozen=True):
 
     def stands_at(self, robot: Robot, site: Site) -> str | None:
         """The station at which its fleet saw it last; None for none."""
-        place = self.place_of(robot)
-        return None if place is None else site.station_at(robot.fleet, place)
+        return site.station_at(robot.fleet, self.place_of(robot))
 
     @property
     def assigns(self) -> bool:

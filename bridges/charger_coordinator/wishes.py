@@ -45,10 +45,10 @@ def sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memor
     if wish is None:
         return _begun(memory, standing, now, site)
     if wish.by == "operator":
-        return fulfilled(memory.takes_back(who), who, site) if _full(memory, who, site) else memory
-    if not memory.faulty(who) and _lasts(memory, wish, sighting, site):
+        return fulfilled(memory.takes_back(who), who, site) if _full(memory, wish, site) else memory
+    if _lasts(memory, wish, sighting, site):
         return memory
-    full = _full(memory, who, site)
+    full = _full(memory, wish, site)
     memory = memory.takes_back(who)
     return fulfilled(memory, who, site) if full else memory.without_wish(who)
 
@@ -209,9 +209,8 @@ def _goal(memory: Memory, wish: Wish, site: Site) -> float:
     return max(aim, site.again_percent)
 
 
-def _full(memory: Memory, who: Robot, site: Site) -> bool:
-    """It has been charged, and its fleet shows as much as it was to be charged."""
-    grant, wish = memory.grants.get(memory.station_of(who) or ""), memory.wish(who)
-    percent = memory.robots[who].sighting.battery_percent
-    goal = site.full_percent if wish is None else _goal(memory, wish, site)
-    return grant is not None and grant.started and percent >= goal
+def _full(memory: Memory, wish: Wish, site: Site) -> bool:
+    """Its robot has been charged, and its fleet shows as much as it was to be charged."""
+    grant = memory.grants.get(memory.station_of(wish.robot) or "")
+    percent = memory.robots[wish.robot].sighting.battery_percent
+    return grant is not None and grant.started and percent >= _goal(memory, wish, site)

@@ -7,12 +7,13 @@ RMF's states have no field for faults, queues and simulations. Our daemons publi
 import json
 import re
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Final
 
 from bridges.commands.columns import aligned
-from bridges.commands.graph import SILENT_AFTER_S, Heard
+from bridges.commands.graph import SILENT_AFTER_S
+from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import words
 from bridges.serve import diagnostics
@@ -22,7 +23,13 @@ SETTLES_S: Final = 1.5
 """A daemon's diagnostics come at 1 Hz."""
 COORDINATOR: Final = "charger_coordinator"
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
+MOST_DIAGNOSES: Final = 2000
+MOST_PLACES: Final = 500
+"""Of robots. Anybody can make names up, and the page listens for months."""
 SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
+
+Device = tuple[str, str]
+"""Its kind and its name on RMF's graph."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +82,17 @@ class Diagnosis:
         found = next((pair.value for pair in self.status.values if pair.key == key), "")
         return "" if found == "-" else found
 
+    def is_current(self, now: float) -> bool:
+        """Whether it was said so lately that it counts."""
+        return now - self.at <= SILENT_AFTER_S
+
     @property
     def of_daemon(self) -> bool:
         """Whether it is about the daemon itself, not about a device."""
         return self.status.name == f"{self.status.hardware_id}: daemon"
 
     @property
-    def device(self) -> tuple[str, str]:
+    def device(self) -> Device:
         """Kind and name of the device; for a supervisor those of its lift or door."""
         return self.kind.removesuffix("_supervisor"), self.status.hardware_id
 
@@ -96,13 +107,15 @@ class Board:
     """The latest state and diagnosis of each device."""
 
     def __init__(self) -> None:
-        self._latest: dict[tuple[str, str], Heard[words.Stated]] = {}
-        self._first_at: dict[tuple[str, str], float] = {}
+        self._latest: dict[Device, words.Stated] = {}
+        self._heard_at: dict[Device, float] = {}
+        self._first_at: dict[Device, float] = {}
         self._requesters: dict[str, str] = {}
         self._places: dict[str, str] = {}
         self._diagnoses: dict[str, Diagnosis] = {}
+        self._full_until = float("-inf")
 
-    def take(self, heard: Heard[d.Message]) -> None:
+    def take(self, heard: Heard) -> None:
         """Take one message that was heard."""
         match heard.message:
             case d.SupervisorHeartbeat():
@@ -113,16 +126,18 @@ class Board:
             case d.ChargingAssignments(fleet_name=fleet):
                 for one in heard.message.assignments:
                     place = f"{words.plain(d.ChargingMode, one.mode)} at {one.waypoint_name}"
-                    self._places[words.printable(f"{fleet}/{one.robot_name}")] = place
+                    who = words.printable(f"{fleet}/{one.robot_name}")
+                    if who in self._places or len(self._places) < MOST_PLACES:
+                        self._places[who] = place
             case d.DiagnosticArray():
                 for status in heard.message.status:
                     self._diagnose(status, heard.at)
             case d.LiftState() | d.DoorState() | d.ChargerState() as state:
                 key = (KINDS[type(state)], words.device(state))
-                self._latest[key] = Heard(state, heard.at)
+                self._latest[key], self._heard_at[key] = state, heard.at
                 self._first_at.setdefault(key, heard.at)
 
-    def unsettled(self, now: float) -> set[tuple[str, str]]:
+    def unsettled(self, now: float) -> set[Device]:
         """Kind and name of devices heard only just now, whose daemon may yet say that it simulates."""
         known = {(one.kind, one.status.hardware_id) for one in self._current(now)}
         young = {key for key, at in self._first_at.items() if now - at < SETTLES_S}
@@ -132,35 +147,48 @@ class Board:
         """A device that is silent gives way to another."""
         self._latest.pop((kind, name), None)
 
-    def row(self, kind: str, name: str, now: float, wall: float) -> Row | None:
-        """One device's row; None if it has published no state."""
-        heard = self._latest.get((kind, name))
-        return self._device(kind, name, heard, now, wall) if heard else None
+    def rows_of(self, devices: Iterable[Device], now: float, wall: float) -> list[Row]:
+        """The rows of these devices, in their order; none of one that has published no state."""
+        about: dict[Device, list[Diagnosis]] = {}
+        for one in self._current(now):
+            if not one.of_daemon:
+                about.setdefault(one.device, []).append(one)
+        return [
+            self._device(key, self._latest[key], about.get(key, ()), now, wall)
+            for key in devices
+            if key in self._latest
+        ]
 
     def rows(self, now: float, wall: float) -> list[Row]:
         """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
-        devices = sorted(self._latest.items(), key=_order)
-        rows = [self._device(kind, name, heard, now, wall) for (kind, name), heard in devices]
-        return [*rows, *self._coordinators(now), *self._robots()]
+        devices = self.rows_of(sorted(self._latest, key=_order), now, wall)
+        return [*devices, *self._coordinators(now), *self._robots()]
 
     def _diagnose(self, status: d.DiagnosticStatus, at: float) -> None:
         """Keep a status of our daemons under `<node>: <device>`. Other nodes' have no `kind`."""
         kind = next((pair.value for pair in status.values if pair.key == "kind"), "")
         diagnosis = Diagnosis(at, kind, status)
-        if (
-            diagnosis.device in self._latest
-            or kind == COORDINATOR
-            or (kind and diagnosis.of_daemon)
-        ):
+        of_daemon = bool(kind) and diagnosis.of_daemon
+        ours = of_daemon or kind == COORDINATOR or diagnosis.device in self._latest
+        if ours and (status.name in self._diagnoses or self._room(at)):
             self._diagnoses[status.name] = diagnosis
 
+    def _room(self, now: float) -> bool:
+        """For one more diagnosis: anybody can make names up, and a silent one gives way."""
+        if len(self._diagnoses) >= MOST_DIAGNOSES and now > self._full_until:
+            self._diagnoses = {one.status.name: one for one in self._current(now)}
+            self._full_until = now + SILENT_AFTER_S
+        return len(self._diagnoses) < MOST_DIAGNOSES
+
     def _device(
-        self, kind: str, name: str, heard: Heard[words.Stated], now: float, wall: float
+        self,
+        key: Device,
+        state: words.Stated,
+        found: Sequence[Diagnosis],
+        now: float,
+        wall: float,
     ) -> Row:
-        state = heard.message
-        found = [
-            one for one in self._current(now) if one.device == (kind, name) and not one.of_daemon
-        ]
+        kind, name = key
         held_by = words.holder(state)
         if isinstance(state, d.DoorState):
             held_by = words.printable(self._requesters.get(state.door_name, ""))
@@ -171,7 +199,7 @@ class Board:
             held_by or "-",
             words.printable(", ".join(filter(None, (one.value("waiting") for one in found)))),
             _age(words.stamped_at(state), wall),
-            _mark(heard, now, wall),
+            _mark(state, now - self._heard_at[key], wall),
             any(one.kind == kind and self._simulated(one, now) for one in found),
             _faults(found),
         )
@@ -197,12 +225,12 @@ class Board:
             yield Row("robot", who, words.printable(place))
 
     def _current(self, now: float) -> list[Diagnosis]:
-        return [one for one in self._diagnoses.values() if now - one.at <= SILENT_AFTER_S]
+        return [one for one in self._diagnoses.values() if one.is_current(now)]
 
     def _daemon(self, diagnosis: Diagnosis, now: float) -> Diagnosis | None:
         node = diagnosis.status.name.partition(": ")[0]
         daemon = self._diagnoses.get(f"{node}: daemon")
-        return daemon if daemon in self._current(now) else None
+        return daemon if daemon and daemon.is_current(now) else None
 
     def _simulated(self, diagnosis: Diagnosis, now: float) -> bool:
         daemon = self._daemon(diagnosis, now)
@@ -222,8 +250,8 @@ def _faults(found: Iterable[Diagnosis]) -> str:
     return words.printable("; ".join(dict.fromkeys(texts)))
 
 
-def _order(entry: tuple[tuple[str, str], Heard[words.Stated]]) -> tuple[int, str]:
-    (kind, name), _ = entry
+def _order(device: Device) -> tuple[int, str]:
+    kind, name = device
     return list(KINDS.values()).index(kind), name
 
 
@@ -236,9 +264,8 @@ def _age(stamped_at: float, wall: float) -> str:
     return f"{age / 60:.0f} min" if age < 7200 else f"{age / 3600:.0f} h"
 
 
-def _mark(heard: Heard[words.Stated], now: float, wall: float) -> str:
-    silent_s = now - heard.at
-    age = wall - words.stamped_at(heard.message)
+def _mark(state: words.Stated, silent_s: float, wall: float) -> str:
+    age = wall - words.stamped_at(state)
     if silent_s > SILENT_AFTER_S:
         return f"SILENT {silent_s:.0f} s"
     if age < -SILENT_AFTER_S:

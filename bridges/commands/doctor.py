@@ -19,7 +19,7 @@ from bridges import log
 from bridges.commands.by_hand import NoDevice, device_of
 from bridges.commands.completion import completed_by, device_names
 from bridges.commands.doctoring.finding import Finding, exit_code
-from bridges.commands.graph import TRANSPORTS, interruptible, overridden
+from bridges.commands.graph import TRANSPORTS, interruptible, overridden, seconds
 from bridges.commands.paint import bold, red
 from bridges.rmf.words import printable
 from bridges.settings.load import Config, SettingsError, load
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--listen",
-        type=_seconds,
+        type=seconds(0, 60),
         default=LISTEN_S,
         metavar="SECONDS",
         help="how long to hear RMF's graph (default 3; 0: do not join it)",
@@ -68,16 +68,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     kill.add_argument("--output", metavar="NAME", help="which output, as walk names it")
     kill.add_argument("--yes", action="store_true", help="do not ask again")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = -1.0
-    if not 0 <= seconds <= 60:
-        raise argparse.ArgumentTypeError(f"'{text}': write 0 to 60 seconds")
-    return seconds
 
 
 def run(args: argparse.Namespace) -> int:

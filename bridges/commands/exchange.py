@@ -70,11 +70,11 @@ def _reason(request: Request, seen: Seen, now: float) -> str:
     """Why the request timed out, and where to look next."""
     if missed := _missed(request, seen):
         return _given_up("", seen) if _said(missed) in seen.hinted else _said(missed)
-    silent_s = now - seen.states[-1].at
+    silent_s = now - seen.stated_at
     if silent_s > SILENT_AFTER_S:
         return f"{request.name} fell silent {silent_s:.0f} s ago: is its daemon still running?"
     obstacle = _first(request.obstacles(seen))
-    state = words.described(seen.states[-1].message)
+    state = words.described(seen.states[-1])
     whole = _said(obstacle._replace(text=f"{obstacle.text} (last state: {state})"))
     return (
         whole if _said(obstacle) not in seen.hinted else _given_up(f"; last state: {state}", seen)

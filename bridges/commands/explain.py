@@ -20,6 +20,7 @@ from bridges.commands.graph import (
     complain,
     interruptible,
     open_graph,
+    seconds,
 )
 from bridges.commands.live import Ear
 from bridges.commands.recordings import Span, add_span_arguments, told_between
@@ -50,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--for",
         dest="for_s",
-        type=_seconds,
+        type=seconds(0.1, 86400),
         default=LISTENS_S,
         metavar="SECONDS",
         help=f"with --live: listen so long (default {LISTENS_S:.0f})",
@@ -65,18 +66,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="the explanation as JSON")
     add_span_arguments(parser)
     add_graph_arguments(parser)
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = -1.0
-    if not 0.1 <= seconds <= 86400:
-        raise argparse.ArgumentTypeError(
-            f"'{text}' is no time to listen: write seconds, 0.1 to 86400"
-        )
-    return seconds
 
 
 def run(args: argparse.Namespace) -> int:

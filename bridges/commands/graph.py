@@ -1,26 +1,21 @@
-"""What `watch` and `send` share: the options that name a graph, joining it, and listening."""
+"""What the commands of a graph share: the options that name it, joining it, seconds, and an end."""
 
 import argparse
 import os
 import shlex
 import signal
 import sys
-import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from types import FrameType
-from typing import Generic, TypeVar
 
 import msgspec
 
 from bridges.rmf import words
-from bridges.rmf.definitions import Message
 from bridges.rmf.renamed import Renamed
 from bridges.rmf.settings import Rmf
-from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Transport, TransportError
 
 SILENT_AFTER_S = 3.0
@@ -55,6 +50,18 @@ def _domain(text: str) -> int:
     if not text.isascii() or not text.isdigit() or int(text) > 232:
         raise argparse.ArgumentTypeError(f"'{text}' is not a DDS domain id: write 0 to 232")
     return int(text)
+
+
+def seconds(least: float, most: float) -> Callable[[str], float]:
+    """What reads an option's number of seconds, for argparse."""
+
+    def read(text: str) -> float:
+        with suppress(ValueError):
+            if least <= float(text) <= most:
+                return float(text)
+        raise argparse.ArgumentTypeError(f"'{text}': write {least:g} to {most:g} seconds")
+
+    return read
 
 
 def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
@@ -154,42 +161,3 @@ def command_line(args: argparse.Namespace) -> CommandLine:
     if args.localhost:
         options += ["--localhost"]
     return CommandLine(tuple(args.typed), tuple(options))
-
-
-M_co = TypeVar("M_co", bound=Message, covariant=True)
-
-
-@dataclass(frozen=True, slots=True)
-class Heard(Generic[M_co]):
-    """A message and when it arrived (monotonic s)."""
-
-    message: M_co
-    at: float
-
-
-class Inbox:
-    """Messages of several topics, in order of arrival."""
-
-    def __init__(
-        self,
-        transport: Transport,
-        *topics: AnyTopic,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._waiting: SimpleQueue[Heard[Message]] = SimpleQueue()
-        self._clock = clock
-        for topic in topics:
-            transport.subscribe(topic, self._received)
-
-    def _received(self, message: Message) -> None:
-        self._waiting.put(Heard(message, self._clock()))
-
-    def listen(self, timeout_s: float) -> list[Heard[Message]]:
-        """Everything that has arrived, in order; waits up to `timeout_s` for the first."""
-        heard = []
-        try:
-            heard.append(self._waiting.get(timeout=max(0.0, timeout_s)))
-            while True:
-                heard.append(self._waiting.get_nowait())
-        except Empty:
-            return heard

@@ -10,7 +10,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
@@ -21,17 +21,17 @@ from bridges.commands.graph import (
     ended_by,
     interruptible,
     open_graph,
+    seconds,
 )
 from bridges.commands.live import OF_DEVICES, Ear
-from bridges.commands.recordings import Time, add_span_arguments
+from bridges.commands.recordings import Span, add_span_arguments, within
 from bridges.judge.judge import KINDS, Judge, Kind
 from bridges.judge.law import Verdict, shown
 from bridges.judge.plays import FLEET, Charge, Passages, Performance, Ride
 from bridges.judge.report import Report, as_json, junit, markdown, report, text, verdict
 from bridges.judge.stage import Stage
-from bridges.recording.bags import heard_in
 from bridges.recording.heard import Heard
-from bridges.recording.sources import BagError, Notes
+from bridges.recording.sources import BagError
 from bridges.rmf import topics
 from bridges.rmf.definitions import Message
 from bridges.rmf.transport import Publisher, Transport, TransportError
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_graph_arguments(parser)
     parser.add_argument(
         "--for",
-        type=_seconds,
+        type=seconds(0.1, 7 * 86400),
         dest="for_s",
         default=NEVER,
         metavar="S",
@@ -116,18 +116,11 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--patience",
-        type=_seconds,
+        type=seconds(0.1, 7 * 86400),
         default=120.0,
         metavar="S",
         help="how long a robot waits for one thing (default: 120)",
     )
-
-
-def _seconds(written: str) -> float:
-    with suppress(ValueError):
-        if 0 < float(written) <= 7 * 86400:
-            return float(written)
-    raise argparse.ArgumentTypeError(f"'{written}' is not a number of seconds up to a week")
 
 
 def performance_of(args: argparse.Namespace) -> Performance | None:
@@ -187,27 +180,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _recorded(args: argparse.Namespace) -> int:
-    judge, notes = Judge(args.kind, args.name), Notes()
+    judge = Judge(args.kind, args.name)
     last: Heard | None = None
-    for last in _span(heard_in(args.recording, notes), args.from_, args.to):
+    for last in within(args.recording, Span(args.from_, args.to), "judge"):
         judge.hear(last)
-    if notes.damage:
-        complain("judge", notes.damage)
     if last is None or judge.first is None:
         complain("judge", f"{args.recording} holds nothing of RMF's then")
         return os.EX_UNAVAILABLE
     return tell(report(judge, judge.end(last.at, last.wall), last.at - judge.first.at), args)
-
-
-def _span(heard: Iterable[Heard], begin: Time | None, end: Time | None) -> Iterator[Heard]:
-    """Every message from one time to the other; none is left out, as each may break a law."""
-    began: float | None = None
-    for one in heard:
-        began = one.wall if began is None else began
-        if end is not None and one.wall > end.wall(began):
-            return
-        if begin is None or one.wall >= begin.wall(began):
-            yield one
 
 
 def _live(args: argparse.Namespace, performance: Performance | None) -> int:
@@ -292,7 +272,9 @@ class Live:
         if self._looks_at_fire and now > self._looked_at + 1.0:
             self._looked_at = now
             publishers = self._ear.ends[FIRE.name].matched()
-            stage.judge.fire_ends(publishers, self._retained.matched(), now, wall)
+            supervisors = self._ear.ends[topics.LIFT_REQUESTS.name].matched()
+            retaining = self._retained.matched()
+            stage.judge.fire_ends(publishers, retaining, supervisors, now, wall)
         self._say(stage.turn(now, wall))
 
     def _say(self, said: list[Said]) -> None:

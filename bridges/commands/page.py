@@ -13,10 +13,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from bridges import log
 from bridges.commands.graph import add_graph_arguments, command_line, complain, open_graph
 from bridges.serve import places
 
-INSTALL: Final = "pip install 'rmf-bridges[page]', or of the .deb rmf-bridges-page"
+INSTALL: Final = "pip install 'rmf-bridges[page]', or apt install ./rmf-bridges-page_*.deb"
 PORT: Final = 8080
 LOOPBACK: Final = "127.0.0.1"
 RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
@@ -89,6 +90,7 @@ def run(args: argparse.Namespace) -> int:
     """0 after Ctrl-C or SIGTERM; 64, 69 or 78 with what to do."""
     from bridges.page.access import PasswordError, users
 
+    log.start()
     try:
         if args.add_user:
             return _add_user(args)
@@ -102,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         from bridges.page import web
     except ImportError as error:
-        complain("page", f"{error}: {INSTALL}")
+        complain("page", f"{error}: to install it: {INSTALL}")
         return os.EX_UNAVAILABLE
     return web.serve(args, known, lambda: open_graph(args, "rmf_bridge_page"), _graph(args))
 

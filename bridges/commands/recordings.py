@@ -150,3 +150,11 @@ def between(
         yield heard
     if notes.damage:
         complain(command, notes.damage)
+
+
+def within(path: Path, span: Span, command: str) -> Iterator[Heard]:
+    """The messages of the span alone, none left out. Damage is told. Raises BagError."""
+    for heard in between(path, span, command):
+        has_begun = span.from_ is None or heard.at >= span.begins_at > float("-inf")
+        if has_begun and isinstance(heard, Heard):
+            yield heard

@@ -7,26 +7,27 @@ after Ctrl-C.
 import argparse
 import sys
 import time
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import replace
 from typing import TextIO
 from uuid import uuid4
 
 from bridges.commands.exchange import step
 from bridges.commands.graph import (
-    Heard,
-    Inbox,
     add_graph_arguments,
     command_line,
     complain,
     graph_of,
     interruptible,
     open_graph,
+    seconds,
 )
+from bridges.commands.live import Ear
 from bridges.commands.requests import Done, Failed, Request, Seen
 from bridges.commands.requests.charger import Charge, ChargeCancel, QueuedCancel, QueuedCharge
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
+from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.stamps import stamp
@@ -63,7 +64,7 @@ def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> No
     add_graph_arguments(parser)
     parser.add_argument(
         "--timeout",
-        type=_seconds,
+        type=seconds(0, 86400),
         default=60.0,
         metavar="S",
         help="give up after S seconds (default: 60)",
@@ -75,13 +76,6 @@ def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> No
             help="ask the device's own daemon, not RMF's supervisor",
         )
     parser.set_defaults(usage=parser.error)
-
-
-def _seconds(text: str) -> float:
-    with suppress(ValueError):
-        if 0 <= float(text) <= 86400:
-            return float(text)
-    raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds from 0 to 86400")
 
 
 def _lift_arguments(parser: argparse.ArgumentParser) -> None:
@@ -121,7 +115,7 @@ def _charger_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--request-id", metavar="ID", help="default: a new one")
     parser.add_argument(
         "--start-timeout",
-        type=_seconds,
+        type=seconds(0, 86400),
         default=0.0,
         metavar="S",
         help="cancel if charging has not begun after S seconds (default: the charger's own limit)",
@@ -226,7 +220,7 @@ class _Exchange:
         self.request, self.out, self.transport = request, out, transport
         self.publishers: dict[str, Publisher[d.Message]] = {}
         self.publisher = self._publisher(request.topic)
-        self.inbox = Inbox(transport, *STATES, *request.answers, topics.DIAGNOSTICS)
+        self.ear = Ear(transport, (*STATES, *request.answers, topics.DIAGNOSTICS))
         self.supervisor = (
             None
             if request.supervisor is None
@@ -238,7 +232,7 @@ class _Exchange:
 
     def look(self) -> int | None:
         """Take what was heard and do the next step; returns an exit code at the end."""
-        for heard in self.inbox.listen(LOOK_EVERY_S):
+        for heard in self.ear.listen(LOOK_EVERY_S):
             self._take(heard)
         now = time.monotonic()
         self.seen = replace(self.seen, listeners=self._listeners())
@@ -264,7 +258,7 @@ class _Exchange:
             return 0
         return self.publisher.matched()
 
-    def _take(self, heard: Heard[d.Message]) -> None:
+    def _take(self, heard: Heard) -> None:
         if isinstance(heard.message, d.DiagnosticArray):
             boarded = _boarded(heard.message, self.request.name)
             self.seen = replace(self.seen, boarded=boarded or self.seen.boarded)
@@ -272,7 +266,7 @@ class _Exchange:
         before, self.seen = self.seen, self.seen.hears(heard, self.request.about)
         if self.seen.states == before.states:
             return
-        text = words.described(self.seen.states[-1].message)
+        text = words.described(self.seen.states[-1])
         if text != self.described:
             self.described = text
             self._line(heard.at, "state", text)

@@ -38,7 +38,7 @@ UNIT: Final = "rmf-bridge@"
 ASK_SYSTEMD_S: Final = 3.0
 WELL, FAULTY, DOWN, NONE = 0, 1, 2, 3
 """Exit codes, as monitoring plugins have them: OK, WARNING, CRITICAL, UNKNOWN."""
-NOT_TOLD: Final = ("faults", "input_age_s", "outputs", "refused")
+NOT_TOLD: Final = ("contacts", "faults", "input_age_s", "outputs", "refused")
 LEVEL_OF: Final = {
     "serving": WELL,
     "old": DOWN,

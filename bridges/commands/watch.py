@@ -16,12 +16,12 @@ from typing import TextIO
 
 from bridges.commands.board import Board, Row, change_line, changes, json_line, repaint, table
 from bridges.commands.graph import (
-    Inbox,
     add_graph_arguments,
     complain,
     interruptible,
     open_graph,
 )
+from bridges.commands.live import Ear
 from bridges.commands.paint import coloured
 from bridges.rmf import topics
 from bridges.rmf.transport import Transport, TransportError
@@ -50,11 +50,11 @@ def run(args: argparse.Namespace) -> int:
     """0; 1 when `--once` heard nothing or the graph cannot be joined."""
     try:
         with interruptible(), closing(open_graph(args, "rmf_bridge_watch")) as transport:
-            inbox = listen_on(transport)
+            ear = listen_on(transport)
             if args.once is not None:
-                return show_once(inbox, args.once, sys.stdout, as_json=args.json)
+                return show_once(ear, args.once, sys.stdout, as_json=args.json)
             live = sys.stdout.isatty() and not args.json
-            show(inbox, sys.stdout, live=live, line=json_line if args.json else change_line)
+            show(ear, sys.stdout, live=live, line=json_line if args.json else change_line)
     except TransportError as error:
         complain("watch", error)
         return 1
@@ -63,10 +63,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def listen_on(transport: Transport) -> Inbox:
-    """An inbox for every topic that `watch` shows."""
-    return Inbox(
-        transport,
+def listen_on(transport: Transport) -> Ear:
+    """An ear for every topic that `watch` shows."""
+    shown = (
         topics.LIFT_STATES,
         topics.DOOR_STATES,
         topics.CHARGER_STATES,
@@ -74,13 +73,14 @@ def listen_on(transport: Transport) -> Inbox:
         topics.CHARGING_ASSIGNMENTS,
         topics.DIAGNOSTICS,
     )
+    return Ear(transport, shown)
 
 
-def show_once(inbox: Inbox, seconds: float, out: TextIO, *, as_json: bool = False) -> int:
+def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -> int:
     """Listen for `seconds` and print the table, or JSON. Returns 0, or 1 if nothing was heard."""
     board, until = Board(), time.monotonic() + seconds
     while (left_s := until - time.monotonic()) > 0:
-        for heard in inbox.listen(left_s):
+        for heard in ear.listen(left_s):
             board.take(heard)
     rows = board.rows(time.monotonic(), time.time())
     if not rows:
@@ -99,13 +99,13 @@ def settled(board: Board, now: float, wall: float) -> list[Row]:
 
 
 def show(
-    inbox: Inbox, out: TextIO, *, live: bool, line: Callable[[Row, float], str] = change_line
+    ear: Ear, out: TextIO, *, live: bool, line: Callable[[Row, float], str] = change_line
 ) -> None:
     """Show the rows until interrupted: redrawn in place, or a line for each change."""
     board, rows, drawn = Board(), list[Row](), 0
     next_at = 0.0
     while True:
-        for heard in inbox.listen(REDRAW_S):
+        for heard in ear.listen(REDRAW_S):
             board.take(heard)
         now, wall = time.monotonic(), time.time()
         before, rows = rows, settled(board, now, wall)

@@ -63,6 +63,7 @@ class Judge:
         self.scene = SCENES[kind](name)
         self.first: Heard | None = None
         self.broken = False
+        self._volatile_before: bool | None = None
         self._tallies = [_Tally(law) for law in LAWS[kind] if law.id in ids]
 
     def hear(self, heard: Heard) -> None:
@@ -73,11 +74,18 @@ class Judge:
                 self._check(tally, heard.at, heard.wall)
         self._resolve(heard.at)
 
-    def fire_ends(self, publishers: int, retaining: int, at: float, wall: float) -> None:
-        """How many publishers the fire topic has, and how many of them retain; of a lift alone on the
-        graph, because the topic does not say whose alarm it is."""
+    def fire_ends(
+        self, publishers: int, retaining: int, supervisors: int, at: float, wall: float
+    ) -> None:
+        """How many publishers the fire topic has, how many of them retain, and how many supervisors
+        there are; of a lift alone on the graph, because the topic does not say whose alarm it is.
+        Jazzy's lift supervisor has a volatile publisher, and never uses it (rmf_ros2 7eef65a,
+        lift_supervisor/Node.cpp:52). Only what is found twice counts: ends are met one by one."""
         if isinstance(self.scene, LiftScene) and publishers and not self.scene.others:
-            self.scene.volatile = retaining < publishers
+            volatile = publishers - retaining
+            found = None if 0 < volatile <= supervisors else volatile > 0
+            self.scene.volatile = found if found == self._volatile_before else None
+            self._volatile_before = found
             for tally in self._tallies:
                 if tally.law.id == "L12.retained":
                     self._check(tally, at, wall)

@@ -22,6 +22,9 @@ Rules, in the order in which they are applied:
    - After that a robot may be inside. The true door is shown in any mode, so that it can get out.
    - A door is not shown OPEN while its hold is wanted but the relay must rest first: such a door may
      close by itself while a robot drives through.
+   - Nor is a door that nobody holds, at the floor that the robot itself asks for, while the session is
+     served and the car is to leave: RMF's supervisor may be passing on an earlier ride, and the robot
+     would go in.
 """
 
 from msgspec.structs import replace

@@ -56,7 +56,7 @@ def report(
     floor = limits.floor_name(view.level, destination) if view.fresh and view.level else ""
     mode = _mode(view, faults, relays)
     door, estimated = _door(session, view, floor, limits)
-    if door is LiftDoor.DOOR_OPEN and not _may_enter(session, mode, wanted, relays, faults):
+    if door is LiftDoor.DOOR_OPEN and not _may_enter(memory, floor, mode, wanted, faults):
         door, estimated = LiftDoor.DOOR_MOVING, False
     return LiftReport(
         read_at=memory.senses.read_at,
@@ -73,24 +73,30 @@ def report(
 
 
 def _may_enter(
-    session: Session | None,
+    memory: Memory,
+    floor: str,
     mode: LiftMode,
     wanted: LiftOutputs,
-    relays: Relays,
     faults: tuple[Fault, ...],
 ) -> bool:
     """May an open door be shown as OPEN? A robot that sees OPEN drives through.
 
     Not while the hold is wanted and its relay must rest: the door stands open only for its own dwell
-    time, and would then close on the robot. For a session that has not boarded, only in AGV mode, while
-    it is served, and without a fault other than that RMF's supervisor has forgotten it.
+    time, and would then close on the robot. Nor, while the session is served, at the floor that the
+    robot itself asks for, if the car is to leave it: RMF's supervisor may be passing on an earlier
+    ride. For a session that has not boarded, only in AGV mode, while it is served, and without a fault
+    other than that RMF's supervisor has forgotten it.
     """
-    if wanted.hold_door is not None and relays.hold.on is None:
+    session, held = memory.session, memory.relays.hold.on is not None
+    if wanted.hold_door is not None and not held:
         return False
-    if session is None or session.boarded:
+    if session is None:
         return True
+    served = mode is LiftMode.MODE_AGV and wanted.agv_request
+    if served and not held and memory.own.get(session.id) == floor:
+        return False
     hinders = any(fault.code != forgotten.CODE for fault in faults)
-    return mode is LiftMode.MODE_AGV and wanted.agv_request and not hinders
+    return session.boarded or (served and not hinders)
 
 
 def _mode(view: View, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:

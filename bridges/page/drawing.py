@@ -9,7 +9,7 @@ from html import escape
 from typing import Final
 from urllib.parse import quote
 
-from bridges.page.site import Robot, Shown
+from bridges.page.site import Robot, Shown, Stands
 from bridges.rmf import definitions as d
 from bridges.rmf import words
 
@@ -65,8 +65,18 @@ def _facts(shown: Shown) -> Iterable[str]:
     yield _fact("now" if not row.mark else "was", row.state)
     if row.held_by not in ("-", ""):
         yield _fact("for" if row.kind == "charger" else "held by", row.held_by)
+    if shown.stands is not None:
+        yield _fact("has it for", had(shown.stands))
     if row.waiting:
         yield _fact("waiting", row.waiting)
+
+
+def had(stands: Stands) -> str:
+    """In minutes, so that a card is not another each second: `at least 12 min`."""
+    minutes = int(stands.for_s // 60)
+    if stands.at_least:
+        return f"at least {minutes} min" if minutes else "since before this page heard of it"
+    return f"{minutes} min" if minutes else "less than a minute"
 
 
 def _fact(name: str, value: str) -> str:

@@ -15,16 +15,21 @@ from bridges.commands.plants import ask
 from bridges.commands.status import Daemon, daemons
 from bridges.page.actions import Local
 from bridges.page.levels import Levels, Rows
+from bridges.serve.diagnostics import CONTACTS
 from bridges.serve.places import runtimes
 
 
 @dataclass(frozen=True, slots=True)
 class Served:
-    """A device that a daemon here serves: its YAML, what it senses and what it drives now."""
+    """A device that a daemon here serves: its YAML, what it senses and what it drives now.
+
+    `contacts`: each signal that is known: is it asserted?
+    """
 
     local: Local
     sensed: Rows
     driven: Rows
+    contacts: Mapping[str, bool]
 
 
 class Here:
@@ -55,7 +60,7 @@ def _devices(
     daemon: Daemon, folder: Path, levels: Levels
 ) -> Iterator[tuple[tuple[str, str], Served]]:
     plant = _plant(folder) if daemon.status.get("simulated") else {}
-    for name in daemon.devices:
+    for name, status in daemon.devices.items():
         can = plant.get(name, {})
         local = Local(
             str(daemon.status.get("file", "")),
@@ -63,7 +68,12 @@ def _devices(
             tuple(can.get("fail", ())),
             str(folder),
         )
-        served = Served(local, levels.sensed.get(name, {}), levels.driven.get(name, {}))
+        served = Served(
+            local,
+            levels.sensed.get(name, {}),
+            levels.driven.get(name, {}),
+            status.get(CONTACTS, {}),
+        )
         yield (str(daemon.status.get("kind")), name), served
 
 

@@ -9,9 +9,8 @@ from urllib.parse import quote
 
 from fastapi import Request, Response
 from fastapi.responses import FileResponse
-from nicegui import app, ui
+from nicegui import Client, app, ui
 
-from bridges.commands import faults
 from bridges.explain.picture import svg
 from bridges.page import incidents
 from bridges.page.head import head, main, part
@@ -27,7 +26,6 @@ class IncidentViews:
         self._recording = recording
         self._login = login
         self._one_at_a_time = asyncio.Lock()
-        self._remedies = faults.told()
 
     def install(self) -> None:
         """Put the views at their addresses."""
@@ -43,14 +41,16 @@ class IncidentViews:
         with main():
             part(self._list())
 
-    async def one(self, name: str, request: Request) -> None:
+    async def one(self, name: str, request: Request, client: Client) -> None:
         """A recording of the folder."""
-        await self._view(name, self._path(name), request, _download(name))
+        head(name, self._login, request)
+        await self._view(self._path(name), client, _download(name))
 
-    async def alone(self, request: Request) -> None:
+    async def alone(self, request: Request, client: Client) -> None:
         """The recording that the page was started for."""
         assert self._recording is not None
-        await self._view(self._recording.name, self._recording, request)
+        head(self._recording.name, self._login, request)
+        await self._view(self._recording, client)
 
     def download(self, name: str) -> Response:
         """The file itself."""
@@ -72,16 +72,19 @@ class IncidentViews:
             return f"<p>{escape(f'{self._folder}: {error.strerror}. There is no incident.')}</p>"
         return f'<ul class="incidents">{items}</ul>' if items else "<p>There is none.</p>"
 
-    async def _view(self, name: str, path: Path | None, request: Request, link: str = "") -> None:
-        head(name, self._login, request)
+    async def _view(self, path: Path | None, client: Client, link: str = "") -> None:
+        """It is shown at once, and filled when the recording is read: that may take long."""
         with main():
             if path is None:
                 part("<p>There is no incident of that name.</p>")
                 return
-            box = part()
+            box = part('<p role="status">The recording is being read …</p>')
+        await client.connected()
         async with self._one_at_a_time:
+            if client.is_deleted:
+                return
             try:
-                found = await asyncio.to_thread(incidents.read, path, self._remedies)
+                found = await incidents.read_apart(path)
             except incidents.BagError as error:
                 box.set_content(f"<p>{escape(str(error))}</p>")
                 return

@@ -1,11 +1,21 @@
-"""The folder of recordings: what is in it, and one of them understood. No other folder is ever read."""
+"""The folder of recordings: what is in it, and one of them understood. No other folder is ever read.
 
+A recording may come from elsewhere and be made to hurt, so it is read in a process of its own
+(`python -m bridges.page.incidents FILE`), which may take only so much memory and time.
+"""
+
+import asyncio
+import resource
+import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import msgspec
+
+from bridges.commands import faults
 from bridges.explain import site
 from bridges.explain.answer import Remedies
 from bridges.explain.explanation import Explanation
@@ -21,6 +31,11 @@ MOST_DEVICES: Final = 50
 """Of one recording; more are counted."""
 LONGEST_S: Final = 20.0
 """A recording is read for so long at most; the rest of it is left out, and that is said."""
+
+ENDED_S: Final = 60.0
+"""Then its process is ended: nothing of RMF's is in it, and much else."""
+MOST_MEMORY: Final = 128 << 20
+"""What its process may take, beside the page in the unit's 256 MB (bytes)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +73,44 @@ def path_in(folder: Path, name: str) -> Path | None:
     return next((folder / one.name for one in _files(folder) if one.name == name), None)
 
 
+async def read_apart(path: Path) -> Recording:
+    """`read`, in a process of its own. Raises BagError."""
+    child = await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-P",
+        "-m",
+        __name__,
+        str(path.absolute()),
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+    )
+    try:
+        told, _ = await asyncio.wait_for(child.communicate(), ENDED_S)
+    except TimeoutError:
+        raise BagError(f"{path} takes more than {ENDED_S:.0f} s to read") from None
+    finally:
+        if child.returncode is None:
+            child.kill()
+    if child.returncode:
+        raise BagError(told.decode() or f"{path} cannot be read")
+    return _RECORDING.decode(told)
+
+
+def main(path: Path) -> int:
+    """Read, and write the recording to standard output, or why it cannot be read."""
+    resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
+    try:
+        code, told = 0, msgspec.msgpack.encode(read(path, faults.told()))
+    except BagError as error:
+        code, told = 1, str(error).encode()
+    except MemoryError:
+        code, told = 1, f"{path} takes too much memory to read".encode()
+    sys.stdout.buffer.write(told)
+    return code
+
+
 def read(path: Path, remedies: Remedies) -> Recording:
-    """The whole recording, in bounded time and memory. Raises BagError if it is none."""
+    """The whole recording, in bounded time. Raises BagError if it is none."""
     notes, story = Notes(), site.Site()
     cut = not _all_of(path, notes, story.take)
     devices = story.devices()
@@ -93,4 +144,9 @@ def _notes(notes: Notes, devices: int, *, cut: bool) -> Iterator[str]:
         yield f"{more} more devices are not shown."
 
 
-__all__ = ["BagError", "File", "Recording", "listed", "path_in", "read"]
+_RECORDING: Final = msgspec.msgpack.Decoder(Recording)
+
+__all__ = ["BagError", "File", "Recording", "listed", "path_in", "read", "read_apart"]
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

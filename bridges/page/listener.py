@@ -45,6 +45,13 @@ class Listener:
         self._ended.set()
         self._thread.join(timeout=5.0)
 
+    def hear(self, heard: Heard) -> None:
+        """Keep a message until the next turn. Called from any thread."""
+        try:
+            self._queue.put_nowait(heard)
+        except Full:
+            self.lost += 1
+
     def turn(self) -> bool:
         """Take what has arrived, on the caller's thread. Whether there was anything."""
         any_heard = False
@@ -83,9 +90,6 @@ class Listener:
 
     def _receive(self, topic: AnyTopic) -> Callable[[Message], None]:
         def receive(message: Message) -> None:
-            try:
-                self._queue.put_nowait(Heard(time.monotonic(), time.time(), topic.name, message))
-            except Full:
-                self.lost += 1
+            self.hear(Heard(time.monotonic(), time.time(), topic.name, message))
 
         return receive

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from bridges.commands.board import KINDS as KIND_OF
-from bridges.commands.board import Board, Row
-from bridges.commands.graph import Heard as Arrived
+from bridges.commands.board import Board, Device, Row
 from bridges.explain import site
 from bridges.explain.answer import Remedies
 from bridges.explain.explanation import Explanation
@@ -27,6 +26,8 @@ KEPT_S: Final = 600.0
 MOST_DEVICES: Final = 500
 """Of each kind; RMF's largest sites have a tenth of it."""
 MOST_ROBOTS: Final = 500
+UNSEEN_S: Final = 10.0
+"""Of a charger that was silent for longer nobody knows who was there."""
 GONE_AFTER_S: Final = 60.0
 """A device silent for so long gives way to a new one when there is no room."""
 
@@ -49,9 +50,6 @@ HEARD: Final[tuple[AnyTopic, ...]] = (
     topics.DIAGNOSTICS,
 )
 
-Device = tuple[str, str]
-"""Its kind and its name on RMF's graph."""
-
 
 @dataclass(frozen=True, slots=True)
 class Robot:
@@ -64,11 +62,23 @@ class Robot:
 
 
 @dataclass(frozen=True, slots=True)
+class Stands:
+    """How long a robot has had a charger (s). `at_least`: it had it when the page began to listen."""
+
+    for_s: float
+    at_least: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Shown:
-    """A device as the page draws it: its row, as `watch` has it, and its last state if it has one."""
+    """A device as the page draws it: its row, as `watch` has it, and its last state if it has one.
+
+    `stands`: how long its robot has had a charger.
+    """
 
     row: Row
     state: Stated | None = None
+    stands: Stands | None = None
 
 
 class Site:
@@ -80,6 +90,7 @@ class Site:
         self._states: dict[Device, Stated] = {}
         self._drawings: dict[Device, Drawing] = {}
         self._changed: set[Device] = set()
+        self._since: dict[str, tuple[str, float, bool]] = {}
         self._robots: dict[tuple[str, str], Robot] = {}
         self._story = site.Site(most=MOST_DEVICES)
         self.crowded: set[str] = set()
@@ -103,21 +114,24 @@ class Site:
         else:
             self._story.take(heard)
             self._heartbeat(heard)
-            self._board.take(Arrived(heard.message, heard.at))
+            self._board.take(heard)
 
     def devices(self, now: float, wall: float) -> list[Shown]:
         """All devices, coordinators and scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
         states = {(kind, words.printable(name)): s for (kind, name), s in self._states.items()}
         rows = self._board.rows(now, wall)
-        return [Shown(row, states.get((row.kind, row.name))) for row in rows]
+        stands = {("charger", words.printable(name)): self._standing(name) for name in self._since}
+        keys = ((row, (row.kind, row.name)) for row in rows)
+        return [Shown(row, states.get(key), stands.get(key)) for row, key in keys]
 
     def changed(self, now: float, wall: float) -> list[Shown]:
         """The devices that were heard of since this was asked last."""
         changed, self._changed = self._changed, set()
+        known = [device for device in changed if device in self._states]
+        rows = self._board.rows_of(known, now, wall)
         return [
-            Shown(row, self._states[device])
-            for device in changed
-            if device in self._states and (row := self._board.row(*device, now, wall))
+            Shown(row, self._states[device], self._standing(device[1]))
+            for device, row in zip(known, rows, strict=True)
         ]
 
     def knows(self, kind: str, name: str) -> bool:
@@ -155,10 +169,27 @@ class Site:
         if device not in self._last_at and not self._room(device[0], heard.at):
             self.crowded.add(device[0])
             return
+        if isinstance(state, d.ChargerState):
+            self._stood(state, heard.at)
         self._last_at[device], self._states[device] = heard.at, state
-        self._board.take(Arrived(heard.message, heard.at))
+        self._board.take(heard)
         self._story.take(heard)
         self._remember(device, heard)
+
+    def _stood(self, state: d.ChargerState, at: float) -> None:
+        """Note who has the charger, and since when. What was while it was silent is not known."""
+        who = f"{state.robot_fleet}/{state.robot_name}" if state.robot_name else ""
+        before, _, _ = self._since.get(state.charger_name, ("", 0.0, False))
+        last_at = self._last_at.get(("charger", state.charger_name), float("-inf"))
+        unseen = at - last_at > UNSEEN_S
+        if unseen or before != who:
+            self._since[state.charger_name] = who, at, unseen
+
+    def _standing(self, charger: str) -> Stands | None:
+        """As of the last state: what came after it is not known."""
+        who, since, at_least = self._since.get(charger, ("", 0.0, False))
+        last_at = self._last_at.get(("charger", charger), since)
+        return Stands(last_at - since, at_least) if who else None
 
     def _room(self, kind: str, at: float) -> bool:
         if at <= self._full_until.get(kind, float("-inf")):
@@ -172,6 +203,8 @@ class Site:
             return False
         for table in (self._last_at, self._states, self._drawings):
             table.pop(oldest, None)
+        if kind == "charger":
+            self._since.pop(oldest[1], None)
         self._board.forget(*oldest)
         return True
 
@@ -199,7 +232,7 @@ class Site:
             if status.hardware_id in known or status.name.endswith(": daemon") or _is_graph(status)
         ]
         kept = replace(heard, message=replace(message, status=tuple(ours)))
-        self._board.take(Arrived(kept.message, heard.at))
+        self._board.take(kept)
         self._story.take(kept)
         for status in ours:
             device = _about(status)

@@ -16,7 +16,7 @@ from bridges.page import tables
 from bridges.page.actions import Deeds
 from bridges.page.buttons import Buttons
 from bridges.page.drawing import path_of
-from bridges.page.gallery import AGES_S, Gallery, Key
+from bridges.page.gallery import AGES_S, ROBOTS, STATUS, Gallery, Key, place_of
 from bridges.page.head import head, main, part
 from bridges.page.here import Here
 from bridges.page.login import Login
@@ -31,59 +31,57 @@ SECTIONS: Final = (
     ("robot", "Charging schedule"),
 )
 WIDE: Final = "panel wide-part"
-NOT_HERE: Final = "Its daemon is not on this machine, or the page's user may not see it."
+NOT_HERE: Final = (
+    "Its daemon is not on this machine, or the page's user may not see it: wiring, limits and live"
+    " levels are shown by a page on the daemon's own machine."
+)
 
 
 class SiteWall:
-    """One browser's view of the site."""
+    """One browser's view of the site: few elements of the library's, which a browser goes through at
+    each update."""
 
-    def __init__(self, gallery: Gallery) -> None:
+    def __init__(self, gallery: Gallery, client: Client) -> None:
         self._gallery = gallery
-        self._cards: dict[Key, ui.html] = {}
-        self._status = part(gallery.status())
+        self._client = client
+        self._missed = False
+        self._built = 0
+        part(f'<div id="{STATUS}">{gallery.status()}</div>')
         self._find = ui.input("Find a device").props("dense clearable").classes("find")
-        self._box = ui.element("div")
-        self._robots = part(gallery.robots())
+        self._box = part()
+        part(f'<div id="{ROBOTS}">{gallery.robots()}</div>')
         self._find.on_value_change(self.rebuild)
         self.rebuild()
 
-    def change(self, key: Key, html: str) -> None:
-        """This card is another now."""
-        if card := self._cards.get(key):
-            card.set_content(html)
-
-    def tell(self, status: str, robots: str) -> None:
-        """The lines that change each second."""
-        self._status.set_content(status)
-        self._robots.set_content(robots)
+    def change(self, script: str) -> None:
+        """Nothing is kept for a browser that is away; when it is back, all is built again."""
+        if not self._client.has_socket_connection:
+            self._missed = True
+        elif self._missed:
+            self.rebuild()
+        else:
+            self._client.run_javascript(script)
 
     def rebuild(self) -> None:
         """All cards whose name is looked for, by kind and name."""
+        self._missed = not self._client.has_socket_connection
+        self._built += 1  # what is the same as before would not be sent
         wanted = str(self._find.value or "").lower()
-        self._box.clear()
-        self._cards = {}
-        with self._box:
-            for kind, title in SECTIONS:
-                self._section(title, [k for k in self._gallery.cards if k[0] == kind], wanted)
-            if not self._cards:
-                part("<p>No device is shown.</p>")
+        html = "".join(self._section(*section, wanted) for section in SECTIONS)
+        none = "<p>No device is shown.</p>"
+        self._box.set_content(f'<div data-built="{self._built}">{html or none}</div>')
 
-    def _section(self, title: str, keys: Sequence[Key], wanted: str) -> None:
-        found = sorted(key for key in keys if wanted in key[1].lower())
-        if not found:
-            return
-        part(f"<h2>{title}</h2>")
-        with ui.element("div").classes("cards"):
-            for key in found:
-                self._card(key)
+    def _section(self, kind: str, title: str, wanted: str) -> str:
+        keys = [key for key in self._gallery.cards if key[0] == kind and wanted in key[1].lower()]
+        slots = "".join(map(self._slot, sorted(keys)))
+        return f'<h2>{title}</h2><div class="cards">{slots}</div>' if keys else ""
 
-    def _card(self, key: Key) -> None:
+    def _slot(self, key: Key) -> str:
         """The link stands beside what is drawn again, so that it keeps the keyboard's focus."""
-        with ui.element("div").classes("slot"):
-            self._cards[key] = part(self._gallery.cards[key])
-            if key[0] in KINDS:
-                link = ui.link(target=path_of(*key)).classes("cover")
-                link.props["aria-label"] = key[1]
+        card = f'<div id="{place_of(key)}">{self._gallery.cards[key]}</div>'
+        name, path = escape(key[1]), path_of(*key)
+        link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if key[0] in KINDS else ""
+        return f'<div class="slot">{card}{link}</div>'
 
 
 class SiteViews:
@@ -114,7 +112,7 @@ class SiteViews:
         """Everything, as a wall of cards."""
         head("Site", self._login, request)
         with main():
-            wall = SiteWall(self._gallery)
+            wall = SiteWall(self._gallery, client)
         self._gallery.walls.append(wall)
         client.on_delete(lambda: self._gallery.walls.remove(wall))
 
@@ -175,4 +173,4 @@ class SiteViews:
         served = self._here.served.get(key)
         if served is None or not served.local.file:
             return f"<p>{NOT_HERE}</p>"
-        return tables.wiring(served.local.file, key[1])
+        return tables.wiring(served.local.file, key[1], served.contacts)

@@ -5,7 +5,7 @@ from functools import lru_cache
 from html import escape
 from pathlib import Path
 
-from bridges.commands.sheets.findings import findings
+from bridges.commands.sheets.findings import WIRES, findings
 from bridges.core.table import Table
 from bridges.settings.load import SettingsError, load
 
@@ -25,12 +25,29 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) 
     )
 
 
-def wiring(file: str, device: str) -> str:
-    """The tables of the device's YAML, wires and limits, as `rmf-bridge check` prints them."""
+def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:
+    """The tables of the device's YAML, wires and limits, as `rmf-bridge check` prints them.
+
+    `contacts`: each signal that is known: is it asserted? The wires have it in a column.
+    """
     found = _tables(file, _changed_at(file), device)
     if isinstance(found, str):
         return f"<p>{escape(found)}</p>"
-    return "".join(table(one.headings, one.rows, one.title) for one in found)
+    live = (_live(one, contacts) if one.title == WIRES else one for one in found)
+    return "".join(table(one.headings, one.rows, one.title) for one in live)
+
+
+def _live(wires: Table, contacts: Mapping[str, bool]) -> Table:
+    active = wires.headings.index("active")
+    rows = tuple((row[0], _now(contacts.get(row[0]), row[active]), *row[1:]) for row in wires.rows)
+    return Table(wires.title, (wires.headings[0], "now", *wires.headings[1:]), rows)
+
+
+def _now(asserted: bool | None, active: str) -> str:
+    if asserted is None:
+        return "? not known"
+    level = "high" if asserted == (active == "high") else "low"
+    return f"{'● asserted' if asserted else '○ not asserted'} ({level})"
 
 
 def levels(sensed: Mapping[str, str], driven: Mapping[str, str]) -> str:

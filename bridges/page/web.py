@@ -16,9 +16,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from nicegui import app, core, ui
+from nicegui import app, ui
 
 from bridges.commands.graph import interruptible
+from bridges.page import connections
 from bridges.page.access import Door
 from bridges.page.actions import Deeds
 from bridges.page.gallery import Gallery
@@ -43,8 +44,6 @@ MOST_HISTORY: Final = 100
 MOST_CONNECTIONS: Final = 200
 MOST_BYTES: Final = 64 * 1024
 """Of one message from a browser; the library's own are a hundredth of it."""
-MOST_WAITING: Final = 200
-"""Packets for a browser that does not read them; a browser that reads has a few."""
 
 
 def serve(
@@ -76,7 +75,7 @@ def serve(
         listener = _live(args, join, login, graph)
     gate = Gate(login, closed=not ipaddress.ip_address(address).is_loopback)
     app.add_middleware(Guard, hosts=_hosts(address, netloc, args.host), gate=gate)
-    app.on_startup(lambda: _drop_deaf())
+    app.on_startup(lambda: connections.watch())
     app.on_startup(lambda: _say(f"the page is at http://{netloc}/ (Ctrl-C ends it)"))
     try:
         with interruptible(), suppress(KeyboardInterrupt):
@@ -127,16 +126,6 @@ async def _pump(gallery: Gallery) -> None:
             gallery.turn()
         except Exception:  # the page goes on, whatever a message does to one card
             log.exception("page")
-
-
-async def _drop_deaf() -> None:
-    """End the connection of a browser that does not read what it is sent."""
-    while True:
-        await asyncio.sleep(HERE_S)
-        for socket_ in list(core.sio.eio.sockets.values()):
-            if socket_.queue.qsize() > MOST_WAITING:
-                with suppress(Exception):  # it may be closing already
-                    await socket_.close(wait=False)
 
 
 async def _look(here: Here) -> None:

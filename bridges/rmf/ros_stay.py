@@ -24,6 +24,10 @@ ON_LOOPBACK: Final = {
 }
 """The variables that an RMW reads when it joins. With these it only finds this machine's nodes, and
 Cyclone stays on the loopback interface."""
+FAST_DDS_SPEAKS: Final = "FASTDDS_BUILTIN_TRANSPORTS"
+"""The variable of Fast DDS. UDPv4 leaves its shared memory out: that carries nothing between nodes of
+two users or two containers, although they find each other. `LOCALHOST` brings it back (rmw_fastrtps,
+participant.cpp), and a profile with transports of its own prevails."""
 REFUSALS: Final = (RuntimeError, NameValidationException)
 """How rclpy refuses: RCLError and InvalidHandle are RuntimeErrors."""
 
@@ -36,7 +40,7 @@ class Stay:
     ) -> None:
         self._context = Context()
         try:
-            with _environment(ON_LOOPBACK if loopback else {"CYCLONEDDS_URI": for_ros(os.environ)}):
+            with _environment(ON_LOOPBACK if loopback else _on_the_network()):
                 self._join(name, domain_id, ros_args)
         except REFUSALS:
             self._context.try_shutdown()
@@ -73,6 +77,11 @@ class Stay:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._leaving = self.node.create_guard_condition(lambda: None)
+
+
+def _on_the_network() -> dict[str, str | None]:
+    speaks = os.environ.get(FAST_DDS_SPEAKS, "UDPv4")
+    return {"CYCLONEDDS_URI": for_ros(os.environ), FAST_DDS_SPEAKS: speaks}
 
 
 @contextmanager

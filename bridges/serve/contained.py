@@ -6,14 +6,14 @@ ends, and `outputs-off` tries from a new process.
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final, Generic, TypeVar
 
 from bridges.core.decision import O, X
 from bridges.core.durations import AGES_AGO
 from bridges.log import pairs
 from bridges.serve.clock import Clock
-from drivers import Driver, DriverError
+from drivers import Driver, DriverError, OnContacts
 
 log = logging.getLogger(__name__)
 
@@ -34,6 +34,10 @@ class Contained(Generic[X, O]):
     def __init__(self, name: str, driver: Driver[X, O], clock: Clock) -> None:
         self._name = name
         self._driver = driver
+        self.contacts: Callable[[], Mapping[str, bool]] = dict
+        """`OnContacts.contacts`; none of a device without."""
+        if isinstance(driver, OnContacts):
+            self.contacts = driver.contacts
         self._clock = clock
         self._failure = ""
         self._pause_s = 0.0

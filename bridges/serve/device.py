@@ -5,7 +5,7 @@ owns the device's bus calls it; nothing here waits or keeps a thread.
 """
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, Generic
 
 from bridges.core.decision import (
@@ -28,6 +28,7 @@ from bridges.log import pairs, plain
 from bridges.rmf.definitions import Message
 from bridges.rmf.stamps import ClockError
 from bridges.rmf.topics import Topic
+from bridges.serve import diagnostics
 from bridges.serve.answers import Answers
 from bridges.serve.clock import Clock, Pace
 from bridges.serve.contained import Contained
@@ -73,6 +74,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._answers = Answers()
         self._open = False
         self._has_read = False
+        self._contacts: Mapping[str, bool] = {}
         self._io_fault = ""
         self._bus_words: set[str] = set()
         self._failing = False
@@ -113,6 +115,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
                 self._open = self._open and not self._io_fault
             self._decide(event)
         self._write()
+        self._contacts = {} if self._failing else self._driver.contacts()
         self._tell()
         self._answer()
         self._log()
@@ -136,13 +139,14 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """For the status file: the state shown to RMF, outputs, faults, and the age of the inputs."""
+        """For the status file: what RMF is shown, outputs, faults, the inputs' age, contacts."""
         decision = self.subject.decision
         if decision is None:
             return {}
         outputs = plain(decision.outputs)
         shown = {**self.subject.status(), "outputs": outputs, "refused": self.refused}
-        return {**shown, **self._answers.shown()}
+        contacts = {diagnostics.CONTACTS: self._contacts} if self._contacts else {}
+        return {**shown, **contacts, **self._answers.shown()}
 
     def _read(self) -> Sampled[X] | IoFailed:
         try:

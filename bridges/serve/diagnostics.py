@@ -30,6 +30,8 @@ MOST: Final = 100
 """At most this many devices: a supervisor learns names from the network, which may flood it."""
 SIMULATED: Final = "SIMULATED"
 PASSIVE: Final = "PASSIVE"
+CONTACTS: Final = "contacts"
+"""In the status file alone: on the graph they would be most of what is said."""
 
 
 def diagnosis(
@@ -77,6 +79,8 @@ def _values(status: Status) -> tuple[KeyValue, ...]:
 def _pairs(status: Status) -> Iterator[tuple[str, str]]:
     """Flatten a status: a fault becomes code and detail, a table one value for each entry."""
     for key, value in status.items():
+        if key == CONTACTS:
+            continue
         if key == "faults":
             yield from ((fault["code"], fault["detail"]) for fault in value)
         elif isinstance(value, Mapping):

@@ -147,6 +147,10 @@ class DryContactCharger:
             self._enabled = outputs.power
         self._points.write({ENABLE: self._enabled})
 
+    def contacts(self) -> Mapping[str, bool]:
+        """Each contact and relay as it was read or written last."""
+        return self._points.shown()
+
     def make_safe(self) -> None:
         """Switch the relay off and verify it."""
         self._enabled = False

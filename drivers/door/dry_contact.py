@@ -181,6 +181,10 @@ class DryContactDoor:
         elif outputs.hold_open and not asked:
             self._points.flash("hold_open")
 
+    def contacts(self) -> Mapping[str, bool]:
+        """Each contact and relay as it was read or written last."""
+        return self._points.shown()
+
     def make_safe(self) -> None:
         """Switch the hold relay off and verify it."""
         self._asked = False

@@ -160,6 +160,7 @@ class Points:
             {point: w.pull for w, point in self._in.values()},
             {point: w.level(False) for w, point in self._out.values()},
         )
+        self._read: dict[str, bool] = {}
         self._written: dict[str, bool] | None = None
 
     def open(self) -> None:
@@ -172,7 +173,12 @@ class Points:
         written, self._written = self._written, None
         levels = self._lines.read()
         self._written = written
-        return {signal: w.asserted(levels[point]) for signal, (w, point) in self._in.items()}
+        self._read = {s: w.asserted(levels[point]) for s, (w, point) in self._in.items()}
+        return self._read
+
+    def shown(self) -> dict[str, bool]:
+        """Each input as it was read last, and each output as it was written, if that is known."""
+        return {**self._read, **(self._written or {})}
 
     def write(self, asserted: Mapping[str, bool]) -> None:
         """Set every output, off first, so that exclusive outputs never overlap."""

@@ -84,6 +84,10 @@ class LiftDryContact:
         """Set every output to this level, those that go off first."""
         self._points.write(encode(self._settings, outputs))
 
+    def contacts(self) -> Mapping[str, bool]:
+        """Each contact and relay as it was read or written last."""
+        return self._points.shown()
+
     def make_safe(self) -> None:
         """Switch every output off and verify it where possible."""
         self._points.make_safe()

@@ -131,12 +131,12 @@ class Page(Program):
     def address(self) -> str:
         """Where it is, once it has said so."""
         deadline = time.monotonic() + CONNECT_WITHIN_S
-        while "http://" not in (said := self.tail()):
+        while not (said := [line for line in self.tail().splitlines() if "http://" in line]):
             self.check()
             if time.monotonic() > deadline:
                 raise Wrong("the page did not say where it is")
             time.sleep(0.05)
-        return f"{said.splitlines()[0]}; log in as demo, password {self._password}"
+        return f"{said[0]}; log in as demo, password {self._password}"
 
 
 def _page_port() -> str:

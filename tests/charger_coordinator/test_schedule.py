@@ -117,10 +117,29 @@ def test_a_schedule_that_cannot_be_kept_is_refused(
     assert problem in "\n".join(map(str, refused.value.problems))
 
 
-def test_a_target_above_full_percent_is_refused() -> None:
-    one = Charging(at="22:00", until="05:00", percent=96.0)
-    (problem,) = settings(schedule=[one], full_percent=95.0).problems()
-    assert problem == (
-        ("schedule", "0", "percent"),
-        "is above full_percent (95 %): it is never reached",
-    )
+def test_every_problem_of_a_schedule_is_named_with_its_place() -> None:
+    night = Charging(at="22:00", until="05:00", percent=95.0)
+    schedule = [
+        night,
+        Charging(at="22:00", until="05:00", percent=96.0, fleets=["tiny", "big"]),
+        Charging(at="12:00", until="13:00", percent=90.0, robots=["tiny/AMR01", "tiny/X"]),
+    ]
+    assert list(settings(schedule=schedule, full_percent=95.0).problems()) == [
+        (("schedule", "1", "fleets", "1"), "no 'big' among the fleets (tiny)"),
+        (("schedule", "1", "percent"), "is above full_percent (95 %): it is never reached"),
+        (
+            ("schedule", "2", "robots", "1"),
+            "no 'tiny/X' among the robots (tiny/AMR01, tiny/AMR02, tiny/AMR03)",
+        ),
+        (
+            ("schedule", "2", "percent"),
+            "is not above again_percent (90 %): below that they are charged anyway",
+        ),
+    ]
+
+
+def test_minutes_count_at_both_ends_of_a_time() -> None:
+    lunch = Charging(at="11:45", until="13:20", days=["mon"], fleets=["tiny"], robots=["big/B01"])
+    times = ("11:44", "11:45", "13:19", "13:20")
+    assert [lunch.under_way(at(clock)) for clock in times] == [False, True, True, False]
+    assert lunch.text(None) == "11:45-13:20 mon tiny big/B01 to 100 %"

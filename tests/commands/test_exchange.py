@@ -8,11 +8,12 @@ import pytest
 
 from bridges.charger.refusals import Refusal
 from bridges.commands.exchange import step
-from bridges.commands.graph import CommandLine, Heard
+from bridges.commands.graph import CommandLine
 from bridges.commands.requests import Done, Failed, Request, Seen
 from bridges.commands.requests.charger import Charge, ChargeCancel, QueuedCancel, QueuedCharge
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
+from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import topics, words
 from bridges.rmf.topics import Topic
@@ -57,7 +58,8 @@ def tell(
     for tick in range(10_000):
         now = round(tick * 0.1, 1)
         while left and left[0][0] <= now:
-            seen = seen.hears(Heard(left[0][1], left.pop(0)[0]), request.about)
+            at, message = left.pop(0)
+            seen = seen.hears(Heard(at, at, "", message), request.about)
         seen = replace(seen, listeners=listeners if now >= listen_from else 0)
         todo = step(request, seen, now)
         if todo.hint and todo.hint not in ran.hints:
@@ -173,8 +175,8 @@ def test_a_floor_that_is_not_served_fails_at_once_with_the_nearest_name() -> Non
 
 
 def test_where_a_robot_may_be_in_the_car_the_remedy_asks_to_look_into_it() -> None:
-    held = Heard(replace(LIFT, session_id=OTHER, current_mode=d.LiftMode(2)), 1.0)
-    seen = replace(Seen(0.0, 10.0), states=(held,), boarded="yes")
+    held = replace(LIFT, session_id=OTHER, current_mode=d.LiftMode(2))
+    seen = replace(Seen(0.0, 10.0), states=(held,), stated_at=1.0, boarded="yes")
     assert next(iter(RIDE.obstacles(seen))).remedy == (
         "a robot may be in the car; if it is empty:"
         " rmf-bridge release Lift1 --car-empty --localhost"

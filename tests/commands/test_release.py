@@ -9,9 +9,10 @@ import pytest
 
 from bridges.commands import send
 from bridges.commands.exchange import step
-from bridges.commands.graph import CommandLine, Heard
+from bridges.commands.graph import CommandLine
 from bridges.commands.requests import Done, Failed, Seen
 from bridges.commands.requests.lift import LiftEnd
+from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
@@ -32,7 +33,7 @@ def told(
     seen = Seen(0.0, 10.0, listeners, boarded=boarded)
     sent, hints = list[tuple[int, str]](), list[str]()
     for now, state in enumerate(states):
-        seen = seen.hears(Heard(state, now), request.about)
+        seen = seen.hears(Heard(now, now, "", state), request.about)
         todo = step(request, seen, now)
         if todo.outcome is not None:
             return sent, hints, todo.outcome

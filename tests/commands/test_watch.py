@@ -7,8 +7,17 @@ from dataclasses import replace
 import pytest
 
 from bridges.commands import watch
-from bridges.commands.board import Board, Row, change_line, changes, json_line, repaint, table
-from bridges.commands.graph import Heard
+from bridges.commands.board import (
+    MOST_PLACES,
+    Board,
+    Row,
+    change_line,
+    changes,
+    json_line,
+    repaint,
+    table,
+)
+from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import stamp
 from bridges.serve.diagnostics import diagnosis
@@ -29,7 +38,7 @@ CHARGER = d.ChargerState(stamp(WALL), 1, "a")
 def board(*messages: d.Message, at: float = 100.0) -> Board:
     made = Board()
     for message in messages:
-        made.take(Heard(message, at))
+        made.take(Heard(at, WALL, "", message))
     return made
 
 
@@ -98,7 +107,7 @@ def test_a_row_names_the_faults_that_its_daemon_and_its_supervisor_tell() -> Non
     )
     (row,) = heard.rows(100.0, WALL)
     assert row.faults == "RMF_SILENT; OVERLOAD; HOLDER_SILENT"
-    heard.take(Heard(told("lift", "Lift1"), 101.0))
+    heard.take(Heard(101.0, WALL, "", told("lift", "Lift1")))
     assert [row.faults for row in heard.rows(101.0, WALL)] == ["HOLDER_SILENT"]
     assert [row.faults for row in heard.rows(104.0, WALL)] == [""]
 
@@ -106,7 +115,9 @@ def test_a_row_names_the_faults_that_its_daemon_and_its_supervisor_tell() -> Non
 def test_diagnostics_of_others_and_of_the_daemon_itself_name_no_fault_of_a_device() -> None:
     stranger = d.DiagnosticStatus(2, "camera: lens", "DIRTY", "Lift1")
     heard = board(LIFT, d.DiagnosticArray(d.Header(), (stranger,)))
-    heard.take(Heard(diagnosis("Lift1", "lift", {"simulated": True}, {}, d.Time()), 100.0))
+    heard.take(
+        Heard(100.0, WALL, "", diagnosis("Lift1", "lift", {"simulated": True}, {}, d.Time()))
+    )
     assert [row.faults for row in heard.rows(100.0, WALL)] == [""]
 
 
@@ -131,9 +142,9 @@ def test_a_device_is_shown_once_it_is_known_whether_it_is_simulated() -> None:
     young = board(LIFT)
     assert watch.settled(young, 100.0, WALL) == []
     assert [row.simulated for row in watch.settled(young, 101.5, WALL)] == [False]
-    young.take(Heard(told("lift_supervisor", "Lift1"), 100.0))
+    young.take(Heard(100.0, WALL, "", told("lift_supervisor", "Lift1")))
     assert watch.settled(young, 100.0, WALL) == []
-    young.take(Heard(told("lift", "Lift1"), 100.0))
+    young.take(Heard(100.0, WALL, "", told("lift", "Lift1")))
     assert [row.name for row in watch.settled(young, 100.0, WALL)] == ["Lift1"]
 
 
@@ -307,3 +318,19 @@ def test_the_coordinator_has_a_row_with_its_queue_its_faults_and_whether_it_assi
     )
     assert board(told(passive=False)).rows(100.0, WALL) == [replace(row, state=beside)]
     assert board(told(passive=False)).rows(104.0, WALL) == []
+
+
+def test_made_up_daemons_and_robots_are_bounded_and_give_way_when_they_fall_silent() -> None:
+    made = board(LIFT)
+    for number in range(5000):
+        flood = diagnosis(f"made_up{number}", "lift", {}, {}, stamp(WALL))
+        made.take(Heard(100.0, WALL, "", flood))
+        place = d.ChargingAssignment(f"robot{number}", "pad", d.ChargingMode(1))
+        made.take(Heard(100.0, WALL, "", d.ChargingAssignments("fleet", (place,))))
+    told = diagnosis("node", "lift", {"simulated": True}, {"Lift1": {}}, stamp(WALL))
+    made.take(Heard(100.1, WALL, "", told))
+    assert [row.simulated for row in made.rows(100.2, WALL) if row.kind == "lift"] == [False]
+    made.take(Heard(104.0, WALL, "", told))
+    rows = made.rows(104.1, WALL)
+    assert [row.simulated for row in rows if row.kind == "lift"] == [True]
+    assert len([row for row in rows if row.kind == "robot"]) == MOST_PLACES

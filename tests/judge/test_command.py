@@ -29,7 +29,7 @@ CORPUS = Path(__file__).parents[1] / "recording" / "corpus"
         ("judge lift Lift1 --active --ride L1 L3 --restarts", "--restarts needs --localhost"),
         ("judge charger a --charge", "this moves the charger 'a'"),
         ("judge lift Lift1 --active --ride L1 L3 --recording x", "a recording cannot be played"),
-        ("judge lift Lift1 --for 0", "'0' is not a number of seconds"),
+        ("judge lift Lift1 --for 0", "'0': write 0.1 to 604800 seconds"),
     ],
 )
 def test_a_command_line_that_contradicts_itself_exits_2(

@@ -11,7 +11,7 @@ from tests.judge.nodes.end_needs_a_floor import EndNeedsAFloor
 from tests.judge.nodes.fire_boards import FireBoards
 from tests.judge.nodes.fire_frees import FireFrees
 from tests.judge.nodes.fire_grants import FireGrants
-from tests.judge.nodes.fire_is_volatile import FireIsVolatile
+from tests.judge.nodes.fire_is_volatile import ALARM, FireIsVolatile
 from tests.judge.nodes.fire_says_false import FireSaysFalse
 from tests.judge.nodes.floor_by_last_character import FloorByLastCharacter
 from tests.judge.nodes.floor_flickers import FloorFlickers
@@ -113,6 +113,18 @@ def test_with_two_lifts_nobody_knows_whose_alarm_it_is() -> None:
         name = "Lift2"
 
     assert watched("lift", "Lift1", FireSaysFalse(), Other())["broken"] == set()
+
+
+@pytest.mark.parametrize(
+    ("node", "broken"), [(RightLift, set()), (FireIsVolatile, {"L12.retained"})]
+)
+def test_the_volatile_publisher_of_jazzys_supervisor_is_not_the_lifts(
+    node: type[RightLift], broken: set[str]
+) -> None:
+    jazzys = Script(
+        (1.0, ALARM, d.Bool(True)), (1.0, topics.LIFT_REQUESTS, lift(RED, "L1", "Lift2"))
+    )
+    assert watched("lift", "Lift1", node(), jazzys)["broken"] == broken
 
 
 def test_an_end_without_a_floor_that_is_refused_is_found_by_watching_three_rides() -> None:

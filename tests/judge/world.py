@@ -118,14 +118,15 @@ class World:
             place.subscribe(topic, lambda message: None)
             for topic in (topics.FIRE_ALARM_TRIGGER.live(), topics.FIRE_ALARM_TRIGGER)
         ]
+        ends.append(place.subscribe(topics.LIFT_REQUESTS, lambda message: None, others_only=True))
         say([])
         also(stage)
         until = self.timeline.now + most_s
         while not stage.done and self.timeline.now < until:
             self.timeline.run(self.timeline.now + 0.5)
-            stage.judge.fire_ends(
-                ends[0].matched(), ends[1].matched(), self.timeline.now, EPOCH + self.timeline.now
-            )
+            publishing, retaining, supervisors = (end.matched() for end in ends)
+            now = self.timeline.now
+            stage.judge.fire_ends(publishing, retaining, supervisors, now, EPOCH + now)
         place.close()
         return stage
 

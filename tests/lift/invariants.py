@@ -111,6 +111,9 @@ def open_is_the_truth(step: Step) -> None:
         assert sample.door is Door.OPEN
         assert sample.motion in (None, Motion.STOPPED)
         assert shown.floor == sample.level != ""
+    if session and step.decision.outputs.agv_request and shown.mode.name == "MODE_AGV":
+        asked_here = step.decision.memory.own.get(session.id) == shown.floor
+        assert step.decision.outputs.hold_door or not asked_here
     if session and not session.boarded:
         assert {fault.code for fault in shown.faults} <= {"FORGOTTEN_BY_SUPERVISOR"}
         assert shown.mode.name == "MODE_AGV"

@@ -14,7 +14,7 @@ from bridges.rmf.definitions import LiftRequest
 from bridges.rmf.stamps import stamp
 from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
-from tests.lift.story import AGV, END, WALL, Controller, Story
+from tests.lift.story import AGV, END, WALL, Building, Controller, Story
 from tests.lift.test_with_rmf import A, B, ons, sessions, world
 
 
@@ -83,8 +83,8 @@ def test_an_end_that_was_lost_while_another_robot_waits_is_heard_from_its_adapte
 class Overheard:
     """A lift that `A` holds, open at L2. `adapter`: what is said in its name, without a supervisor."""
 
-    def __init__(self) -> None:
-        self.story = Story(Controller())
+    def __init__(self, building: Building | None = None) -> None:
+        self.story = Story(building or Controller())
         self.story.run(1.0)
         self.story.asks(A, "L2")
         self.story.run(12.0)
@@ -181,3 +181,26 @@ def test_the_other_robots_end_is_the_end_of_it() -> None:
     lift.adapter(AGV, "L4")
     assert (lift.story.faults, lift.story.state) == ([], "AGV, open at L2, fleet/a to L2")
     assert ons(lift.story, "call") == 1
+
+
+def test_the_end_of_a_third_robot_is_not_and_before_anything_is_forgotten_no_end_is() -> None:
+    lift = Overheard()
+    lift.story.ends(B)
+    assert (lift.story.faults, sessions(lift.story)) == ([], ["", A])
+    lift.story.asks(B, "L1")
+    lift.story.run(lift.story.now + 4.0)
+    lift.story.ends("fleet/c")
+    lift.adapter(AGV, "L4")
+    assert lift.story.faults == ["FORGOTTEN_BY_SUPERVISOR"]
+    assert lift.story.state.endswith("fleet/a to L4")
+
+
+def test_one_message_that_is_delivered_twice_is_heard_once() -> None:
+    lift = Overheard()
+    lift.story.asks(B, "L1")
+    at = WALL + lift.story.now
+    lift.adapter(END, at=at)
+    lift.adapter(END, at=at)
+    assert sessions(lift.story) == ["", A]
+    lift.adapter(END, at=at + 1.0)
+    assert sessions(lift.story) == ["", A, ""]

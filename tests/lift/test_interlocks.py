@@ -184,3 +184,13 @@ def test_a_pulse_lasts_its_whole_width(pulse_s: float) -> None:
     story.run(5.0)
     on, off = [at for at, name, _ in story.edges if name == "call"]
     assert round(off - on, 2) == pulse_s
+
+
+def test_a_cycle_counts_for_a_minute_to_the_instant() -> None:
+    once = Channel[str](ons=(0.0, 30.0))
+    assert [once.recent(now) for now in (59.9, 60.0, 89.9, 90.0)] == [
+        (0.0, 30.0),
+        (30.0,),
+        (30.0,),
+        (),
+    ]

@@ -38,9 +38,16 @@ ASKED = Requested("A", True, "L1")
 class Alone:
     """A core alone, told one event after the other; `decision`: the last."""
 
-    def __init__(self, debounce: dict[str, float] | None = None, **limits: Any) -> None:
+    def __init__(
+        self, debounce: dict[str, float] | None = None, by_call: bool = False, **limits: Any
+    ) -> None:
         floors = {"L1": Floor(), "L2": Floor(side=Side.REAR), "L3": Floor()}
-        settings = LiftSettings(floors=floors, limits=Durations(**limits), fire_reset="manual")
+        settings = LiftSettings(
+            floors=floors,
+            limits=Durations(**limits),
+            fire_reset="manual",
+            agv_mode="by_call" if by_call else "requested",
+        )
         self.limits = LiftLimits.of(settings, debounce or {})
         self.memory = Memory()
 
@@ -303,3 +310,82 @@ def test_after_a_sleep_everything_is_forgotten_but_the_last_landing() -> None:
 def test_an_illegal_door_number_names_the_rear_door() -> None:
     alone = Alone()(0.0, replace(AT_L1, rear_door=Door.UNKNOWN))
     assert alone.faults == (Fault("DOOR_CODE_ILLEGAL", "the rear door's number means nothing"),)
+
+
+def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_anew() -> None:
+    def history(reset_at: float) -> list[tuple[float, bool, list[str]]]:
+        """(s, AGV request, faults) at each change, scanned twice a second."""
+        alone = Alone(agv_timeout_s=5.0)
+        alone(0.0, replace(CLOSED, agv=False), ASKED)
+        shown: list[tuple[float, bool, list[str]]] = []
+        for n in range(1, 60):
+            now = n / 2
+            alone(now, replace(CLOSED, agv=False), *[OperatorReset()] * (now == reset_at))
+            line = (alone.decision.outputs.agv_request, [fault.code for fault in alone.faults])
+            if not shown or shown[-1][1:] != line:
+                shown.append((now, *line))
+        return shown
+
+    failed = "AGV_MODE_NOT_GRANTED"
+    before = [(0.5, True, []), (5.0, False, [failed]), (15.0, True, [failed])]
+    assert history(reset_at=99.0) == [*before, (20.0, False, [failed])]
+    assert history(reset_at=17.0) == [*before, (17.0, True, []), (22.0, False, [failed])]
+
+
+def test_a_car_that_a_call_has_brought_is_not_called_again_because_its_floor_is_not_seen() -> None:
+    """With `by_call`, while AGV mode is on: only a car that is seen elsewhere is called again."""
+    alone = Alone(by_call=True)
+    below = replace(CLOSED, level="L2", agv=False)
+    readings = [
+        (0.0, below),
+        (0.5, replace(below, agv=True)),
+        (1.0, CLOSED),
+        (1.5, CLOSED),
+        (2.0, replace(CLOSED, level=None)),
+        (9.0, replace(CLOSED, level=None)),
+    ]
+    shown = []
+    alone(0.0, ASKED)
+    for now, reading in readings:
+        outputs = alone(now, reading, ASKED).decision.outputs
+        shown.append((now, outputs.call, outputs.hold_door))
+    assert shown == [
+        (0.0, "L1", None),
+        (0.5, "L1", None),
+        (1.0, None, None),
+        (1.5, None, Side.FRONT),
+        (2.0, None, None),
+        (9.0, None, None),
+    ]
+
+
+def test_a_car_that_stands_there_is_called_again_when_agv_mode_has_ended_without_us() -> None:
+    """With `by_call`: an overload has ended the call, and the floor was not seen, so nothing was on."""
+    alone = Alone(by_call=True)
+    below, gone = replace(CLOSED, level="L2"), replace(CLOSED, level=None)
+    readings = [
+        (0.0, replace(below, agv=False)),
+        (0.5, below),
+        (1.0, CLOSED),
+        (1.5, CLOSED),
+        (2.0, replace(gone, hazards=frozenset({Hazard.OVERLOAD}))),
+        (3.0, replace(gone, agv=False)),
+        (3.5, replace(CLOSED, agv=False)),
+        (4.0, CLOSED),
+        (4.5, CLOSED),
+    ]
+    shown = []
+    for now, reading in readings:
+        outputs = alone(now, reading, ASKED).decision.outputs
+        shown.append((now, outputs.call, outputs.hold_door))
+    assert shown == [
+        (0.0, "L1", None),
+        (0.5, "L1", None),
+        (1.0, None, None),
+        (1.5, None, Side.FRONT),
+        (2.0, None, None),
+        (3.0, "L1", None),
+        (3.5, "L1", None),
+        (4.0, None, None),
+        (4.5, None, Side.FRONT),
+    ]

@@ -4,11 +4,12 @@ from collections.abc import Mapping
 
 import pytest
 
-from bridges.lift.replayed import LASTS_S, MOST, noted
-from bridges.lift.signals import Ended, Requested
+from bridges.lift.memory import Doubted, Session
+from bridges.lift.replayed import LASTS_S, MOST, doubt, noted
+from bridges.lift.signals import Door, Ended, LiftSample, Motion, Requested
 from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
-from tests.lift.story import AGV, END
+from tests.lift.story import AGV, END, Building
 from tests.lift.test_forgotten import Overheard
 from tests.lift.test_with_rmf import A, B, ons, sessions, world
 
@@ -74,15 +75,47 @@ def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_f
     assert rmf.story.edges == before
 
 
+@pytest.mark.parametrize("after_s", [2.8, 3.2], ids=["within the grace", "after it"])
+def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let_go(
+    after_s: float,
+) -> None:
+    """As a robot's next ride began where the last one had ended, while RMF's real supervisor was dead:
+    it went in on the earlier ride's state, and the door closed."""
+    lift = Overheard(Building(LiftSample("L2", Door.OPEN, motion=Motion.STOPPED, agv=True)))
+    assert lift.story.state == OPEN_FOR_A
+    lift.story.ends(A)
+    ended_at = lift.story.now
+    lift.adapter(AGV, "L2")
+    lift.story.run(ended_at + after_s)
+    assert not lift.story.outputs.hold_door
+    lift.story.asks(A, "L4")
+    lift.story.asks(A, "L2")
+    lift.story.until(lambda: lift.story.outputs.hold_door)
+    assert [state for _, state in lift.story.states][-4:] == [
+        "AGV, open at L2",
+        "AGV, moving at L2, fleet/a to L4",
+        "AGV, moving at L2, fleet/a to L2",
+        OPEN_FOR_A,
+    ]
+
+
 def test_a_floor_that_only_the_supervisor_asks_for_counts_after_a_while() -> None:
     lift = Overheard()
     lift.adapter(AGV, "L2")
     began = lift.story.now
-    while lift.story.outputs.hold_door:
+    while lift.story.outputs.hold_door and lift.story.now < began + 2 * LASTS_S:
         lift.story.asks(A, "L4")
         lift.story.run(lift.story.now + 0.25)
     assert began + LASTS_S <= lift.story.now <= began + LASTS_S + 0.5
     assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
+
+
+def test_a_doubt_lasts_three_seconds_to_the_instant() -> None:
+    doubted = Doubted("L4", 10.0)
+    session = Session(A, True, "L2", 0.0, doubted=doubted)
+    request = Requested(A, True, "L4")
+    lasts = [doubt(session, request, "L2", True, now) for now in (12.9, 13.0)]
+    assert lasts == [doubted, None]
 
 
 def test_a_request_for_the_present_floor_ends_the_doubt_and_the_next_one_begins_anew() -> None:

@@ -3,11 +3,13 @@
 import math
 
 from bridges.core.decision import Fault
-from bridges.core.durations import FORGOTTEN_S, REPEAT_S, SILENT_S
-from bridges.core.freshness import MAX_REQUESTERS
+from bridges.core.durations import FORGOTTEN_S, NEVER, REPEAT_S, SILENT_S
+from bridges.core.freshness import FUTURE_S, MAX_REQUESTERS, Rules
 from bridges.core.graph_kind import MaySpeak
 from bridges.lift_supervisor import core
-from bridges.lift_supervisor.memory import Limits
+from bridges.lift_supervisor.memory import Limits, Memory
+from bridges.lift_supervisor.settings import Settings
+from bridges.lift_supervisor.signals import StateHeard
 from bridges.rmf.definitions import LiftRequest
 from tests.lift_supervisor.alone import Alone
 
@@ -132,3 +134,31 @@ def test_each_alarm_says_which_session_it_is_about() -> None:
     assert shown_each_second(desk, "a", 50) == (
         Fault("END_NOT_OBEYED", "the lift does not release a"),
     )
+
+
+def test_a_request_may_be_as_old_as_we_have_been_up_unless_the_clocks_agree() -> None:
+    memory = Memory("Lift1", started_at=100.0)
+    assert memory.rules(130.0, Limits()) == Rules(30.0, future_s=FUTURE_S)
+    speaks = Memory("Lift1", started_at=100.0, may_speak=True)
+    assert speaks.rules(130.0, Limits()) == Rules(30.0, future_s=NEVER)
+    agreed = Limits(clock_synchronised=True, max_request_age_s=7.0)
+    assert memory.rules(130.0, agreed) == Rules(7.0, known_clocks=False)
+
+
+def test_states_flow_for_three_seconds_after_the_last_to_the_instant() -> None:
+    state = StateHeard("", "L1", "", 0, 2)
+    memory = Memory("Lift1", 0.0, shown=state, shown_at=10.0)
+    assert [memory.flows(now) for now in (13.0, 13.1)] == [True, False]
+
+
+def test_the_limits_are_the_yamls() -> None:
+    settings = Settings(
+        silent_after_s=11.0,
+        quiet_start_s=4.0,
+        holder_alarm_s=61.0,
+        holder_ttl_s=600.0,
+        clock_synchronised=True,
+        max_request_age_s=9.0,
+    )
+    assert Limits.of(settings) == Limits(11.0, 4.0, 61.0, 600.0, True, 9.0)
+    assert Limits.of(Settings()).holder_ttl_s == NEVER

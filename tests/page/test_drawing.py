@@ -6,7 +6,7 @@ import pytest
 
 from bridges.commands.board import Row
 from bridges.page import drawing
-from bridges.page.site import Robot, Shown
+from bridges.page.site import Robot, Shown, Stands
 from bridges.rmf import definitions as d
 from bridges.rmf.words import Stated
 
@@ -68,6 +68,21 @@ def test_what_is_old_says_so_and_how_old_it_is() -> None:
     assert "OLD: silent 12 s, last reading 12.0 s old" in text
     assert "was" in text
     assert "now" not in text
+
+
+@pytest.mark.parametrize(
+    ("stands", "told"),
+    [
+        (Stands(59.0, at_least=False), "less than a minute"),
+        (Stands(185.0, at_least=False), "3 min"),
+        (Stands(185.0, at_least=True), "at least 3 min"),
+        (Stands(5.0, at_least=True), "since before this page heard of it"),
+    ],
+)
+def test_a_charger_says_how_long_its_robot_has_it(stands: Stands, told: str) -> None:
+    html = drawing.card(Shown(Row("charger", "pad", "charging", "fleet/R1"), stands=stands))
+    texts = [one.text for one in well_formed(html).iter("dd")]
+    assert texts == ["charging", "fleet/R1", told]
 
 
 def test_a_robot_whose_fleet_is_silent_is_old() -> None:

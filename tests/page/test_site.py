@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from bridges.page.site import GONE_AFTER_S, MOST_DEVICES, MOST_ROBOTS, Site
+from bridges.page.site import GONE_AFTER_S, MOST_DEVICES, MOST_ROBOTS, Site, Stands
 from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -35,6 +35,30 @@ def test_a_device_is_shown_with_its_state_and_its_row() -> None:
     (shown,) = site.devices(1.2, WALL + 1.2)
     assert (shown.row.state, shown.row.age) == ("car at L1, door open, mode UNKNOWN", "0.2 s")
     assert isinstance(shown.state, d.LiftState)
+
+
+def charger(at: float, robot: str = "") -> Heard:
+    state = d.ChargerState(stamp(WALL + at), 2, "pad", robot_fleet="fleet", robot_name=robot)
+    return heard(at, topics.CHARGER_STATES, state)
+
+
+def test_how_long_a_robot_has_a_charger_is_told_as_far_as_it_was_seen() -> None:
+    site, told = Site(), []
+    for at in (0, 1, 2, 3, 4, 5, 6, 30, 31):  # silent from 6 to 30
+        site.take(charger(float(at), "R1" if at < 3 else "" if at == 3 else "R2"))
+        told.append(next(one.stands for one in site.changed(at, WALL + at)))
+    assert told == [
+        Stands(0.0, at_least=True),
+        Stands(1.0, at_least=True),
+        Stands(2.0, at_least=True),
+        None,
+        Stands(0.0, at_least=False),
+        Stands(1.0, at_least=False),
+        Stands(2.0, at_least=False),
+        Stands(0.0, at_least=True),
+        Stands(1.0, at_least=True),
+    ]
+    assert [one.stands for one in site.devices(90.0, WALL + 90)] == [Stands(1.0, at_least=True)]
 
 
 def test_only_what_was_heard_of_since_is_drawn_again() -> None:

@@ -57,12 +57,14 @@ class Machine:
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
 
     def goes_down(self) -> None:
-        """It has no network: Cyclone finds no interface, and rclpy finds no middleware."""
+        """It has no network: Cyclone finds no interface, Fast DDS no peer, and rclpy no middleware."""
         self._monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace('"lo"', '"no-such-interface"'))
+        self._monkeypatch.setenv("ROS_STATIC_PEERS", "no such host")
         self.addresses = frozenset()
 
     def comes_back(self) -> None:
         """It has a network: loopback."""
+        self._monkeypatch.delenv("ROS_STATIC_PEERS", raising=False)
         self._monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
 
 

@@ -19,7 +19,7 @@ from tests.rmf import golden_qos, peer
 from tests.rmf.conftest import ROS2
 from tests.rmf.domains import domain_of_this_run
 from tests.rmf.golden_qos import GOLDEN
-from tests.rmf.joining import RELEASE, Join, joining
+from tests.rmf.joining import RELEASE, Join, joining, on_fast_dds
 from tests.rmf.observing import PUBLICATION, SUBSCRIPTION, seen
 from tests.rmf.values import repeatable, values
 from tests.waiting import LEASE_S, wait_until
@@ -98,17 +98,21 @@ def test_what_a_supervisor_retained_is_not_replayed_to_a_lift_that_starts_later(
     domain: int, ours: str, theirs: str
 ) -> None:
     received: list[d.LiftRequest] = []
+    before, after = d.LiftRequest("before"), d.LiftRequest("after")
     node = joining(ours, domain)("supervisor")
     try:
         publisher = node.publisher(LIFT_REQUESTS.named("ping_lift_requests"))
         node.subscribe(LIFT_REQUESTS.named("pong_lift_requests"), received.append)
-        publisher.publish(d.LiftRequest("before"))
+        publisher.publish(before)
         with peer.running("echo", domain, theirs):
-            after = d.LiftRequest("after")
-            wait_until(lambda: received or peer.sent(publisher, after), "a new one comes back")
+            wait_until(
+                lambda: after in received or peer.sent(publisher, after), "a new one comes back"
+            )
     finally:
         node.close()
-    assert set(received) == {after}
+    # Fast DDS asks Cyclone for what was before, and gets it: docs/ros.md.
+    asked_for = {before} if theirs == "ros2" and ours == "dds" and on_fast_dds() else set()
+    assert set(received) - asked_for == {after}
 
 
 @OURS
@@ -122,9 +126,12 @@ def test_a_process_that_leaves_is_gone_at_once_for_the_others(
         subscription = node.subscribe(LIFT_STATES.named("pong_lift_states"), print)
         with peer.running("echo", domain, theirs):
             wait_until(lambda: publisher.matched() and subscription.matched(), "it is found")
-        # Without a farewell it would be missed only when its lease runs out.
+        # Without a farewell it would be missed only when its lease runs out. Fast DDS misses Cyclone's.
+        unheard = theirs == "dds" and ours == "ros2" and on_fast_dds()
         wait_until(
-            lambda: not publisher.matched() and not subscription.matched(), "it is gone", LEASE_S
+            lambda: not publisher.matched() and not subscription.matched(),
+            "it is gone",
+            LEASE_S * (2 if unheard else 1),
         )
     finally:
         node.close()
@@ -199,13 +206,15 @@ def test_each_end_has_the_type_the_type_hash_and_the_qos_of_the_golden_table(
     ros_type, *golden = GOLDEN[topic.name]
     wire_type = ros_type.replace("/", "::msg::dds_::") + "_"
     assert {end.type_name for end in ends} == {wire_type}
-    assert [as_ros_shows(end.qos) for end in ends] == golden
+    unannounced = node.speaks == "ros2" and on_fast_dds()
+    wanted = [qos._replace(depth=1) if unannounced else qos for qos in golden]
+    assert [as_ros_shows(end.qos) for end in ends] == wanted
     for end in ends:
         assert end.qos[Policy.DataRepresentation] == Policy.DataRepresentation(True, False)
         assert (
             end.qos[Policy.Userdata].data.decode() == f"typehash={type_hash(topic.type, RELEASE)};"
         )
-    if golden[0].durability == "TRANSIENT_LOCAL":
+    if golden[0].durability == "TRANSIENT_LOCAL" and not unannounced:
         kept = ends[0].qos[Policy.DurabilityService].history
         assert kept == Policy.History.KeepLast(golden[0].depth)
 

@@ -17,7 +17,7 @@ from tests.serve.site import Graph, Module, command, daemon, environment, hold_o
 from tests.waiting import wait_until
 
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
-WATCHDOG = {**SERVICE, "WATCHDOG_USEC": "600000"}
+WATCHDOG = {**SERVICE, "WATCHDOG_USEC": "3000000"}
 HURT = "tests.serve.hurt"
 
 

@@ -99,7 +99,7 @@ def test_systemd_hears_ready_then_finished_scans_then_stopping(
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
         systemd.bind(path)
         systemd.settimeout(PATIENCE_S)
-        env = {"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "600000"}
+        env = {"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "3000000"}
         with daemon(module.file, tmp_path / "run", **env) as running:
             heard = [systemd.recv(64)]
             while heard.count(b"WATCHDOG=1") < 3 or heard[-1] != b"WATCHDOG=1":

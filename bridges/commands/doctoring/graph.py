@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from bridges.commands.doctoring.finding import Finding, note, ok, warning, wrong
-from bridges.commands.graph import Inbox
+from bridges.commands.live import Ear
 from bridges.core.graph_kind import GraphKind
 from bridges.rmf import words
 from bridges.rmf.addresses import addresses
@@ -93,10 +93,10 @@ def _heard(config: Config, transport: Transport, look: Look) -> Iterator[Finding
     }
     if isinstance(kind, GraphKind):
         rivals = [transport.subscribe(named_by(config, topic), _ignore) for topic in kind.sole]
-        _listened(Inbox(transport), look.listen_s)
+        _listened(Ear(transport, ()), look.listen_s)
         found = _rivals(rivals, look.serving)
     else:
-        messages = _listened(Inbox(transport, named_by(config, kind.states)), look.listen_s)
+        messages = _listened(Ear(transport, [named_by(config, kind.states)]), look.listen_s)
         found = _ours(list(config.devices), set(map(kind.device_name, messages)), look.serving)
     yield ok(GRAPH, f"joined by {transport.speaks} for {look.listen_s:g} s")
     for topic, end in ends.items():
@@ -104,11 +104,11 @@ def _heard(config: Config, transport: Transport, look: Look) -> Iterator[Finding
     yield from found
 
 
-def _listened(inbox: Inbox, listen_s: float) -> list[Any]:
+def _listened(ear: Ear, listen_s: float) -> list[Any]:
     """Every message that comes in so long."""
     until, messages = time.monotonic() + listen_s, list[Any]()
     while (left_s := until - time.monotonic()) > 0:
-        messages += [heard.message for heard in inbox.listen(left_s)]
+        messages += [heard.message for heard in ear.listen(left_s)]
     return messages
 
 

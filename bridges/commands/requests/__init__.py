@@ -12,12 +12,14 @@ from difflib import get_close_matches
 from typing import ClassVar, Final, NamedTuple, TypeVar
 
 from bridges.charger.refusals import Refusal, read
-from bridges.commands.graph import CommandLine, Heard
+from bridges.commands.graph import CommandLine
+from bridges.recording.heard import Heard
 from bridges.rmf import words
-from bridges.rmf.definitions import DiagnosticStatus, Message, SupervisorHeartbeat
+from bridges.rmf.definitions import DiagnosticStatus, SupervisorHeartbeat
 from bridges.rmf.topics import AnyTopic
 
 State = TypeVar("State", bound=words.Stated)
+NEVER_AT: Final = float("-inf")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +27,9 @@ class Seen:
     """What has happened since the command began; times are monotonic s.
 
     `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
-    request, in order. `there`: kind and name of every device that was heard. `graph`: where we listen,
-    for people. `hinted`: the hints that were said. `heartbeat`: the latest of the door supervisor.
+    request, in order, the last at `stated_at`. `there`: kind and name of every device that was heard.
+    `graph`: where we listen, for people. `hinted`: the hints that were said. `heartbeat`: the latest
+    of the door supervisor, at `heartbeat_at`.
     `boarded`: what the lift's diagnostics say of a robot inside, "yes" or "no"; "" if
     they were not heard. `refusals`: those of chargers, after our first request.
     """
@@ -36,27 +39,30 @@ class Seen:
     listeners: int = 0
     first_sent_at: float | None = None
     last_sent_at: float | None = None
-    states: tuple[Heard[words.Stated], ...] = ()
+    states: tuple[words.Stated, ...] = ()
+    stated_at: float = NEVER_AT
     there: frozenset[tuple[str, str]] = frozenset()
     graph: str = ""
     hinted: frozenset[str] = frozenset()
-    heartbeat: Heard[SupervisorHeartbeat] | None = None
+    heartbeat: SupervisorHeartbeat | None = None
+    heartbeat_at: float = NEVER_AT
     boarded: str = ""
     refusals: tuple[Refusal, ...] = ()
 
-    def hears(self, heard: Heard[Message], about: Callable[[words.Stated], bool]) -> "Seen":
+    def hears(self, heard: Heard, about: Callable[[words.Stated], bool]) -> "Seen":
         """Take a message that was heard. `about(state)`: does the state concern the request?"""
         message = heard.message
         if isinstance(message, SupervisorHeartbeat):
-            return replace(self, heartbeat=Heard(message, heard.at))
+            return replace(self, heartbeat=message, heartbeat_at=heard.at)
         if isinstance(message, DiagnosticStatus):
             refusal = read(message) if self.first_sent_at is not None else None
             return replace(self, refusals=(*self.refusals, refusal)) if refusal else self
         if not isinstance(message, words.Stated):
             return self
-        states = (*self.states, Heard(message, heard.at)) if about(message) else self.states
-        this = words.kind(message), words.device(message)
-        return replace(self, there=self.there | {this}, states=states)
+        there = self.there | {(words.kind(message), words.device(message))}
+        if not about(message):
+            return replace(self, there=there)
+        return replace(self, there=there, states=(*self.states, message), stated_at=heard.at)
 
     def names(self, kind: str) -> list[str]:
         """Every device of this kind that was heard, sorted."""
@@ -69,23 +75,23 @@ class Seen:
 
     def states_of(self, kind: type[State]) -> list[State]:
         """The states heard, in order. `kind`: their type."""
-        return [heard.message for heard in self.states if isinstance(heard.message, kind)]
+        return [state for state in self.states if isinstance(state, kind)]
 
     def answer(self, kind: type[State]) -> State | None:
         """The last state if it was heard after our first request, else None."""
         sent_at = self.first_sent_at
-        if sent_at is None or not self.states or self.states[-1].at < sent_at:
+        if sent_at is None or not self.states or self.stated_at < sent_at:
             return None
         return self.states_of(kind)[-1]
 
     def requesters(self, door: str) -> list[str] | None:
         """Who holds the door, by a heartbeat heard after our first request; None without one."""
         sent_at = self.first_sent_at
-        if self.heartbeat is None or sent_at is None or self.heartbeat.at < sent_at:
+        if self.heartbeat is None or sent_at is None or self.heartbeat_at < sent_at:
             return None
         return [
             session.requester_id
-            for sessions in self.heartbeat.message.all_sessions
+            for sessions in self.heartbeat.all_sessions
             if sessions.door_name == door
             for session in sessions.sessions
         ]

@@ -10,7 +10,8 @@ from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.settings.load import load
 from drivers import DriverError
 from drivers.charger.http import Settings, create
-from drivers.charger.rules import ErrorBits, ErrorNumber, Errors, Test
+from drivers.charger.rules import ErrorBits, ErrorNumber, Errors
+from drivers.charger.rules import Test as Condition  # pytest would collect a class named Test
 from hal_fakes.charger_values import values
 from tests.drivers.charger.test_http import Station
 from tests.settings.reading import changed, texts_of
@@ -83,11 +84,11 @@ def test_rules_come_before_codes_and_errors_before_both() -> None:
 
 
 def test_a_test_holds_for_what_it_says_and_nothing_else() -> None:
-    assert [Test(one_of=[1, "on"]).holds(v) for v in (1, 1.0, "on", True, 0, None)] == [
+    assert [Condition(one_of=[1, "on"]).holds(v) for v in (1, 1.0, "on", True, 0, None)] == [
         *[True] * 3,
         *[False] * 3,
     ]
-    assert [Test(above=0, below=2).holds(v) for v in (1, 0.5, True, 0, 2, "1", None)] == [
+    assert [Condition(above=0, below=2).holds(v) for v in (1, 0.5, True, 0, 2, "1", None)] == [
         *[True] * 3,
         *[False] * 4,
     ]

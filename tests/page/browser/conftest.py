@@ -5,19 +5,21 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Final, Literal
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
 from bridges.page import access
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
+from bridges.rmf.transport import Transport, TransportError
 from hal_fakes.wire import join, wire
 from tests.page import recorded
 
@@ -42,9 +44,9 @@ SHOTS = Path("build/screenshots")
 class Graph:
     """The daemons of a site, as they are heard: each state once a second while `going`."""
 
-    def __init__(self, domain: int) -> None:
+    def __init__(self, domain: int, transport: Transport | None = None) -> None:
         self.options = on_graph(domain)
-        self._transport = join("site", domain)
+        self._transport = transport or join("site", domain)
         self._lifts = self._transport.publisher(topics.LIFT_STATES)
         self._doors = self._transport.publisher(topics.DOOR_STATES)
         self._chargers = self._transport.publisher(topics.CHARGER_STATES)
@@ -72,7 +74,13 @@ class Graph:
         """Publish what is due."""
         if time.monotonic() - self._said_at < 1.0:
             return
-        self._said_at, now = time.monotonic(), stamp(time.time())
+        self._said_at = time.monotonic()
+        with suppress(TransportError):  # it has gone, and comes back
+            self.say()
+
+    def say(self) -> None:
+        """Publish everything, now."""
+        now = stamp(time.time())
         for lift in self.lifts.values():
             self._lifts.publish(replace(lift, lift_time=now))
         for door in self.doors.values():
@@ -94,7 +102,7 @@ def graph(module_domain: int) -> Iterator[Graph]:
 
 @contextmanager
 def program(
-    *words: str, ends: int = 0, state: Path | None = None
+    *words: str, ends: int = 0, state: Path | None = None, log: Path = Path("/dev/stderr")
 ) -> Iterator[subprocess.Popen[str]]:
     """A process of ours; it is ended by SIGTERM, and exits with `ends`."""
     command = [sys.executable, "-m", "bridges.cli", *words]
@@ -102,7 +110,11 @@ def program(
     environment = {k: v for k, v in os.environ.items() if k != "PYTEST_CURRENT_TEST"}
     if state is not None:
         environment["STATE_DIRECTORY"] = str(state)
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as started:
+    pipe = subprocess.PIPE
+    with (
+        log.open("a") as said,
+        subprocess.Popen(command, stdout=pipe, stderr=said, text=True, env=environment) as started,
+    ):
         try:
             yield started
             started.terminate()
@@ -112,9 +124,14 @@ def program(
 
 
 @contextmanager
-def page(*words: str, listen: str = "127.0.0.1:0", state: Path | None = None) -> Iterator[str]:
+def page(
+    *words: str,
+    listen: str = "127.0.0.1:0",
+    state: Path | None = None,
+    log: Path = Path("/dev/stderr"),
+) -> Iterator[str]:
     """A page at a free port; its address. `state`: where it keeps who did what."""
-    with program("page", "--listen", listen, *words, state=state) as started:
+    with program("page", "--listen", listen, *words, state=state, log=log) as started:
         assert started.stdout is not None
         yield started.stdout.readline().split()[4]
 
@@ -187,6 +204,18 @@ def log_in(tab: Page, address: str, password: str, to: str = "/lift/Lift1") -> N
     tab.get_by_label("User").fill(USER)
     tab.get_by_label("Password").fill(password)
     tab.get_by_role("button", name="Log in").click()
+
+
+def settled(tab: Page) -> None:
+    """Wait until nothing fades in or out any more: what is half transparent has no contrast."""
+    tab.wait_for_function("document.getAnimations().every(one => one.playState !== 'running')")
+
+
+def serious_faults(tab: Page) -> list[tuple[str, list[str]]]:
+    """What axe-core finds that keeps somebody from using the page, and where."""
+    found = Axe().run(tab).response["violations"]
+    serious = [one for one in found if one["impact"] in ("serious", "critical")]
+    return [(one["id"], [node["html"] for node in one["nodes"]]) for one in serious]
 
 
 Shot = Callable[[str], None]

@@ -4,12 +4,14 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
 import pytest
 from playwright.sync_api import Page
 
 from tests.page.browser.conftest import (
     PASSWORD,
+    SCHEMES,
     USER,
     Graph,
     Until,
@@ -17,9 +19,15 @@ from tests.page.browser.conftest import (
     on_graph,
     page,
     program,
+    serious_faults,
+    settled,
 )
 
 pytestmark = pytest.mark.browser
+COLOURS = """selector => { const style = getComputedStyle(document.querySelector(selector));
+  return [style.color, style.backgroundColor]; }"""
+"""Under a dialog axe-core takes the body's colour for every background. So a dialog has the colours of
+the buttons and panels that it has found good without one."""
 DOOR = Path("config/door_modbus.yaml").absolute()
 LIFT = Path("config/lift_dry_contact.yaml").absolute()
 
@@ -41,8 +49,19 @@ def confirm(tab: Page, button: str, until: Until) -> None:
     tab.get_by_role("button", name="Yes").click()
 
 
+def now_of(tab: Page, signal: str) -> str:
+    """What the wiring table says that a contact is now."""
+    row = tab.locator("tr", has=tab.locator("td:first-child", has_text=re.compile(f"^{signal}$")))
+    return row.first.locator("td").nth(1).inner_text() if row.count() else ""
+
+
 def main(tab: Page) -> str:
     return tab.locator("#main").inner_text()
+
+
+def logged(folder: Path) -> str:
+    """What the page has said in its log."""
+    return (folder / "log").read_text()
 
 
 def deeds(folder: Path) -> list[tuple[str, int, str]]:
@@ -57,7 +76,9 @@ def deeds(folder: Path) -> list[tuple[str, int, str]]:
 def address(module_domain: int, folder: Path) -> Iterator[str]:
     (folder / "state").mkdir()
     words = ["--passwords", str(folder / "passwords"), "--runtime-dirs", str(folder / "run")]
-    with page(*on_graph(module_domain), *words, state=folder / "state") as found:
+    with page(
+        *on_graph(module_domain), *words, state=folder / "state", log=folder / "log"
+    ) as found:
         yield found
 
 
@@ -71,12 +92,16 @@ def test_a_simulation_is_pressed_and_failed_and_each_deed_is_kept(
     until(lambda: "SIMULATED" in main(tab), "the daemon's diagnostics")
     confirm(tab, "Press", until)
     until(lambda: "fire" in tab.locator("article.card").inner_text().lower(), "the fire")
+    until(lambda: now_of(tab, "fire_alarm").startswith("● asserted ("), "the contact itself")
     until(lambda: f"{USER}\tPress fire_alarm" in main(tab), "who did what")
     confirm(tab, "Let go", until)
     until(lambda: len(deeds(folder)) == 2, "the release of the button")
+    until(lambda: now_of(tab, "fire_alarm").startswith("○ not asserted ("), "its contact again")
     confirm(tab, "Let it fail", until)
     until(lambda: len(deeds(folder)) == 3, "three deeds")
     assert deeds(folder) == [(USER, 0, "press"), (USER, 0, "press"), (USER, 0, "fail")]
+    said = re.findall(r"action user=(\w+) command=\"rmf-bridge (\w+) .* exit=(\d)", logged(folder))
+    assert said == [(USER, "press", "0"), (USER, "press", "0"), (USER, "fail", "0")]
 
 
 def test_what_the_driver_senses_is_seen_live(tab: Page, address: str, until: Until) -> None:
@@ -112,3 +137,24 @@ def test_a_session_that_has_ended_can_do_nothing(
     confirm(tab, "Let it fail", until)
     tab.get_by_text("nothing was done").wait_for()
     assert len(deeds(folder)) == before
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(
+    "button", ["Reset faults", "Press", "Let go", "Let it fail"], ids=lambda name: str(name)
+)
+def test_axe_finds_no_serious_fault_in_the_question_of_an_action(
+    tab: Page, address: str, until: Until, button: str, scheme: Literal["light", "dark"]
+) -> None:
+    tab.emulate_media(color_scheme=scheme)
+    log_in(tab, address, PASSWORD, "/lift/Lift1")
+    until(lambda: tab.get_by_role("button", name=button, exact=True).count() == 1, button)
+    tab.get_by_role("button", name=button, exact=True).click()
+    tab.get_by_role("dialog").get_by_role("button", name="Yes").wait_for()
+    settled(tab)
+    found = [one for one in serious_faults(tab) if one[0] != "color-contrast"]
+    assert found == []
+    assert tab.evaluate(COLOURS, ".q-dialog .q-btn") == tab.evaluate(COLOURS, ".actions .q-btn")
+    assert tab.evaluate(COLOURS, ".q-dialog .q-card") == tab.evaluate(COLOURS, "section.panel")
+    tab.keyboard.press("Escape")
+    tab.get_by_role("dialog").wait_for(state="detached")

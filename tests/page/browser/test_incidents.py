@@ -2,13 +2,18 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
 import pytest
+from mcap.writer import CompressionType
 from playwright.sync_api import Page
+from zstandard import compress
 
 from bridges.recording.bags import heard_in
+from bridges.recording.mcap_read import LONGEST_RECORD, MAGIC
 from tests.page import recorded
-from tests.page.browser.conftest import Shot, page
+from tests.page.browser.conftest import SCHEMES, Shot, page, serious_faults
+from tests.recording.test_hostile_bags import chunk, states
 
 pytestmark = pytest.mark.browser
 HOSTILE = "<img src=x onerror=alert(1)>.mcap"
@@ -20,6 +25,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     whole = recorded.write(made / "ride.mcap")
     (made / "cut.mcap").write_bytes(whole.read_bytes()[:3000])
     (made / HOSTILE).write_bytes(b"nothing of ours")
+    (made / "bomb.mcap").write_bytes(MAGIC + chunk(b"zstd", compress(bytes(4 * LONGEST_RECORD)), 9))
+    (made / "rosbag2.mcap").write_bytes(states(20, compression=CompressionType.ZSTD))
     (made / "notes.txt").write_text("secret")
     (made / "passwd.mcap").symlink_to("/etc/passwd")
     recorded.write(made / "hostile.mcap", lift="<img src=x onerror=alert(1)>")
@@ -37,7 +44,14 @@ def test_the_list_has_the_recordings_and_nothing_else(tab: Page, address: str, s
     tab.goto(f"{address}incidents")
     tab.locator(".incidents li").first.wait_for()
     found = sorted(tab.locator(".incidents a").all_inner_texts())
-    assert found == [HOSTILE, "cut.mcap", "hostile.mcap", "ride.mcap"]
+    assert found == [
+        HOSTILE,
+        "bomb.mcap",
+        "cut.mcap",
+        "hostile.mcap",
+        "ride.mcap",
+        "rosbag2.mcap",
+    ]
     assert tab.locator("main img").count() == 0
     shot("incidents")
 
@@ -68,13 +82,54 @@ def test_a_recording_is_shown_without_any_graph(tab: Page, address: str) -> None
 
 @pytest.mark.parametrize(
     ("name", "told"),
-    [("cut.mcap", "damaged"), (HOSTILE, "no recording"), ("passwd.mcap", "no incident")],
+    [
+        ("cut.mcap", "damaged"),
+        ("bomb.mcap", "unpacks to more than"),
+        (HOSTILE, "no recording"),
+        ("passwd.mcap", "no incident"),
+    ],
 )
 def test_a_recording_from_elsewhere_is_told_to_be_damaged_or_none(
     tab: Page, address: str, name: str, told: str
 ) -> None:
     tab.goto(f"{address}incidents/{name}")
     tab.get_by_text(told).first.wait_for()
+
+
+def test_a_recording_of_rosbag2_is_shown(tab: Page, address: str) -> None:
+    tab.goto(f"{address}incidents/rosbag2.mcap")
+    tab.get_by_role("heading", name="lift Lift19").wait_for()
+    assert tab.locator(".timeline svg").count() == 20
+
+
+@pytest.mark.parametrize("name", ["cut.mcap", "bomb.mcap", HOSTILE, "rosbag2.mcap", "none.mcap"])
+def test_a_file_from_elsewhere_is_opened_by_its_name_too(
+    tab: Page, folder: Path, complaints: list[str], name: str
+) -> None:
+    told = {
+        "cut.mcap": "damaged",
+        "bomb.mcap": "unpacks to more than",
+        HOSTILE: "no recording",
+        "rosbag2.mcap": "lift Lift19",
+        "none.mcap": "No such file",
+    }
+    with page(str(folder / name)) as alone:
+        tab.goto(alone)
+        tab.get_by_text(told[name]).first.wait_for()
+        tab.close()
+    complaints.clear()  # the tab is of another page than its fixture's
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_axe_finds_no_serious_fault_in_an_opened_incident(
+    tab: Page, address: str, scheme: Literal["light", "dark"]
+) -> None:
+    tab.emulate_media(color_scheme=scheme)
+    tab.goto(f"{address}incidents/ride.mcap")
+    tab.locator(".timeline svg").wait_for()
+    tab.locator("summary").first.click()
+    tab.locator("details[open]").wait_for()
+    assert serious_faults(tab) == []
 
 
 def test_a_device_of_a_hostile_name_in_a_recording_is_text(tab: Page, address: str) -> None:

@@ -1,11 +1,10 @@
 """The page in a real browser, beside a graph that the test plays."""
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import BrowserContext, Page
 
 from bridges.rmf import definitions as d
-from tests.page.browser.conftest import PASSWORD, Graph, Shot, Until, log_in
+from tests.page.browser.conftest import PASSWORD, Graph, Shot, Until, log_in, serious_faults
 
 pytestmark = pytest.mark.browser
 FOCUSED = """() => { const e = document.activeElement;
@@ -24,13 +23,6 @@ def drawn(tab: Page, name: str) -> str:
     """What the drawing of a device says it shows."""
     found = tab.locator("article.card", has=tab.locator("h3", has_text=name)).locator("svg")
     return (found.first.get_attribute("aria-label") or "") if found.count() else ""
-
-
-def serious_faults(tab: Page) -> list[tuple[str, list[str]]]:
-    """What axe-core finds that keeps somebody from using the page, and where."""
-    found = Axe().run(tab).response["violations"]
-    serious = [one for one in found if one["impact"] in ("serious", "critical")]
-    return [(one["id"], [node["html"] for node in one["nodes"]]) for one in serious]
 
 
 def test_a_ride_is_seen_moving(

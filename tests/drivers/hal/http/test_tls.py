@@ -50,7 +50,11 @@ class Site:
 
     def bus(self, **also: Any) -> HttpBus:
         """A bus to it."""
-        return HttpBus(Settings(**{"api_base": self.base, "ca_file": str(self.ca_file), **also}))
+        return HttpBus(
+            Settings(
+                **{"api_base": self.base, "ca_file": str(self.ca_file), "timeout_s": 5.0, **also}
+            )
+        )
 
 
 @pytest.fixture
