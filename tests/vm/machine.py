@@ -118,7 +118,7 @@ class Machine:
 
     def reboot(self) -> None:
         """Let the machine restart itself, in good order."""
-        self._port.sendall(b"machine.reboot\n")
+        self._port.sendall(b"deaths.reboot\n")
         self.booted()
 
     def cut_power(self) -> None:

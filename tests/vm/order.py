@@ -1,15 +1,11 @@
-"""The checks, in turn: functions in `guest/`, and what the host does to the machine between them."""
+"""The checks in turn: functions in `guest/`, and what the host does to the machine between them."""
 
 from typing import Final
 
 REBOOT: Final = "deaths: reboot"
 CUT: Final = "deaths: power cut"
-FIRST: Final = ("install.package", "install.lift")
-"""What the others need."""
-ORDER: Final = (
-    *FIRST,
-    "install.wrong_yaml",
-    "rides.ride",
+LIFT: Final = ("install.package", "install.lift")
+DEATHS: Final = (
     "deaths.kill_9",
     "deaths.hang",
     "deaths.crash",
@@ -23,16 +19,22 @@ ORDER: Final = (
     "deaths.energised",
     REBOOT,
     "deaths.off_at_boot",
+    "deaths.equipment",
     "deaths.active_low",
-    "wires.door_service",
+)
+SERVICES: Final = ("wires.door_service", "wires.charger_service")
+WIRES: Final = (
     "wires.door",
     "wires.door_killed",
     "wires.adapter_pulled",
-    "wires.charger_service",
     "wires.charge",
     "wires.charger_killed",
     "wires.interface_down",
     "wires.bus_off",
+)
+WORLD: Final = (
+    "install.wrong_yaml",
+    "rides.ride",
     "install.supervisors",
     "install.recorder",
     "install.page",
@@ -48,3 +50,10 @@ ORDER: Final = (
     "install.upgrade",
     "world.said",
 )
+PARTS: Final = {
+    "": (*LIFT, *DEATHS, *SERVICES, *WIRES, *WORLD),
+    "deaths": (*LIFT, *DEATHS),
+    "wires": ("install.package", *SERVICES, *WIRES),
+    "world": (*LIFT, *SERVICES, *WORLD),
+}
+"""The whole, and its parts, each with what it needs."""

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from bridges.settings.load import Config, load
@@ -49,13 +50,24 @@ def _serve(config: Config, bus: str, stations: Sequence[object]) -> None:
         threading.Event().wait()
     elif isinstance(settings, ModbusSettings):
         assert settings.serial
-        line = RtuLine(stations, settings.serial, slow_s=2 * settings.timeout_s)  # type: ignore[arg-type]
-        assert os.path.realpath(line.adapter.path) == settings.serial.port, line.adapter.path
-        os.chmod(settings.serial.port, 0o666)
-        _ready()
-        threading.Event().wait()
+        line = RtuLine(stations, settings.serial, 2 * settings.timeout_s, "/run")  # type: ignore[arg-type]
+        _be_udev(line.adapter.path, Path(settings.serial.port))
     else:
         _stand_at_header([s for s in stations if isinstance(s, Wiring)])
+
+
+def _be_udev(adapter: Path, port: Path) -> None:
+    """Give the adapter a name that stays, and the daemon its rights, also when it is plugged again."""
+    adapter.parent.chmod(0o755)
+    port.parent.mkdir(parents=True, exist_ok=True)
+    port.unlink(missing_ok=True)
+    port.symlink_to(adapter)
+    port.chmod(0o666)
+    _ready()
+    while True:
+        with suppress(FileNotFoundError):
+            port.chmod(0o666)
+        time.sleep(LOOK_S)
 
 
 def _stand_at_header(wirings: Sequence[Wiring]) -> None:

@@ -1,10 +1,10 @@
 """A door on RS-485 and a charger on CAN: services whose relays are at the far end of a wire."""
 
 import json
+import re
 import socket
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Final
 
 from tests.vm.guest.rides import send
@@ -48,15 +48,12 @@ def door_killed() -> str:
 
 
 def adapter_pulled() -> str:
-    """The RS-485 adapter is pulled and plugged again: a fault with a name, then none."""
-    mark = cursor()
-    tell("door", "fail ward_door server off")
-    until(lambda: "ward_door" in journal(mark, unit("door")), "the log names the door")
-    tell("door", "fail ward_door server ok")
-    began = time.monotonic()
-    Path("/dev/pts/0").chmod(0o666)
-    until(lambda: _is_well("door"), "the door is back")
-    return f"back after {time.monotonic() - began:.1f} s"
+    """The RS-485 adapter is pulled and plugged again: a fault, and its end."""
+    return _fault_ends(
+        "door ward_door usb-rs485",
+        lambda: tell("door", "fail ward_door server off"),
+        lambda: tell("door", "fail ward_door server ok"),
+    )
 
 
 def charger_service() -> str:
@@ -69,67 +66,70 @@ def charger_service() -> str:
 
 def charge() -> str:
     """A robot is charged on SocketCAN, and the charge is cancelled."""
-    tell("charger", "press charger_b robot on")
-    send("charger", "charger_b", "--robot", "vm/robot", "--request-id", "vm-1")
-    until(lambda: "state CHARGING" in sh("rmf-bridge", "status", "charger"), "it charges")
+    _charge("vm-1")
+    mark = cursor()
     send("charger", "charger_b", "--cancel", "vm-1")
+    until(lambda: "state=IDLE" in journal(mark, unit("charger")), "it is idle")
     return "charging, then cancelled"
+
+
+def _charge(request: str) -> None:
+    mark = cursor()
+    tell("charger", "press charger_b robot off")
+    tell("charger", "press charger_b robot on")
+    send("charger", "charger_b", "--robot", "vm/robot", "--request-id", request)
+    until(lambda: "state=CHARGING" in journal(mark, unit("charger")), "it charges")
 
 
 def charger_killed() -> str:
     """kill -9 of a charger's service during a charge on CAN: the receiver is told to stop."""
-    tell("charger", "press charger_b robot on")
-    send("charger", "charger_b", "--robot", "vm/robot", "--request-id", "vm-2")
+    _charge("vm-2")
     return _killed("charger")
 
 
 def interface_down() -> str:
-    """CAN's interface goes down during a charge and comes back: a fault with a name, then none."""
-    mark = cursor()
-    sh("ip", "link", "set", "vcan0", "down")
-    until(lambda: "vcan0" in journal(mark, unit("charger")), "the log names the interface")
-    sh("ip", "link", "set", "vcan0", "up")
-    began = time.monotonic()
-    until(lambda: _is_well("charger"), "the charger is back")
-    return f"back {time.monotonic() - began:.1f} s after the interface"
+    """CAN's interface goes down and comes back: a fault that names it, and its end."""
+    return _fault_ends(
+        "charger charger_b vcan0",
+        lambda: sh("ip", "link", "set", "vcan0", "down"),
+        lambda: sh("ip", "link", "set", "vcan0", "up"),
+    )
 
 
 def bus_off() -> str:
-    """CAN's controller reports bus-off and its end: a fault, then none."""
-    mark = cursor()
-    tell("charger", "fail charger_b bus wrong")
-    until(lambda: "bus-off" in journal(mark, unit("charger")), "the log says bus-off")
-    tell("charger", "fail charger_b bus ok")
-    began = time.monotonic()
-    until(lambda: _is_well("charger"), "the charger is back")
-    return f"back after {time.monotonic() - began:.1f} s"
+    """CAN's controller reports bus-off and its end: a fault that says so, and its end."""
+    return _fault_ends(
+        "charger charger_b bus-off",
+        lambda: tell("charger", "fail charger_b bus wrong"),
+        lambda: tell("charger", "fail charger_b bus ok"),
+    )
+
+
+def _fault_ends(what: str, breaks: Callable[[], object], mends: Callable[[], object]) -> str:
+    """`what`: service, device, and a word of its fault."""
+    name, device, word = what.split()
+    mark, began = cursor(), time.monotonic()
+    breaks()
+    fault = re.compile(f"fault device={device} .*{word}")
+    until(lambda: fault.search(journal(mark, unit(name))), f"a fault with {word!r}")
+    seen = time.monotonic()
+    mends()
+    until(lambda: f"fault_over device={device}" in journal(mark, unit(name)), "its end")
+    return f"a fault after {seen - began:.1f} s, over after {time.monotonic() - seen:.1f} s"
 
 
 def _killed(name: str) -> str:
     service = unit(name)
     old, when = pid(service), time.monotonic()
-    took = (
-        relay_off_at(
-            name, lambda: sh("systemctl", "kill", "-s", "KILL", "--kill-whom=main", service)
-        )
-        - when
-    )
+    kill = ("systemctl", "kill", "-s", "KILL", "--kill-whom=main", service)
+    took = _relay_off_at(name, lambda: sh(*kill)) - when
     back(service, old)
     if took > KILLED_S:
         raise Wrong(f"off after {took:.2f} s, more than {KILLED_S:g}")
     return f"off after {took:.2f} s"
 
 
-def _is_well(name: str) -> bool:
-    """Whether `rmf-bridge status` finds no fault of this service."""
-    try:
-        sh("rmf-bridge", "status", name)
-    except Wrong:
-        return False
-    return True
-
-
-def relay_off_at(name: str, act: Callable[[], object]) -> float:
+def _relay_off_at(name: str, act: Callable[[], object]) -> float:
     """When a relay of this far side goes off after `act` (monotonic s)."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as control, control.makefile() as lines:
         control.settimeout(LATE_S)

@@ -47,9 +47,7 @@ def labels() -> str:
         header.unplug()
         header.plug(label)
         sh("udevadm", "settle")
-        sh("systemctl", "start", SERVICE)
-        until(lambda: _scans(SERVICE), f"the lift is read on {label}")
-        sh("systemctl", "stop", SERVICE)
+        _claims(label)
     header.unplug()
     header.plug(header.PI_4)
     sh("udevadm", "settle")
@@ -58,9 +56,15 @@ def labels() -> str:
     return ", ".join(header.LABELS)
 
 
-def _scans(service: str) -> bool:
-    """Whether it has claimed its pins."""
-    return is_active(service) and "BCM" not in sh("rmf-bridge", "status", "lift")
+def _claims(label: str) -> None:
+    """Start the service until it has written each output, and stop it."""
+    when = header.now()
+    sh("systemctl", "start", SERVICE)
+    until(
+        lambda: {each.line for each in header.writes(when)} >= LIFT.keys(),
+        f"the outputs are claimed on {label}",
+    )
+    sh("systemctl", "stop", SERVICE)
 
 
 def clock() -> str:
