@@ -10,7 +10,7 @@ from typing import Any
 
 from tests.vm.image import Unusable, image
 from tests.vm.machine import ARCHS, Machine, accelerated
-from tests.vm.order import CUT, PARTS, REBOOT
+from tests.vm.order import PARTS
 
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / "build/vm"
@@ -65,15 +65,10 @@ def _run(machine: Machine, steps: Iterable[str], log: Path) -> int:
     failed = 0
     with log.open("w") as out:
         for step in steps:
-            began = time.monotonic()
-            if step in (CUT, REBOOT):
-                (machine.cut_power if step == CUT else machine.reboot)()
-                line = f"      {time.monotonic() - began:6.1f} s  ({step})"
-            else:
-                result = machine.check(step)
-                failed += not result["passed"]
-                line = _line(step, result)
-                out.write(result["log"])
+            result = machine.check(step)
+            failed += not result["passed"]
+            line = _line(step, result)
+            out.write(result["log"])
             print(line, flush=True)
             out.write(f"{line}\n\n")
             out.flush()
@@ -82,9 +77,8 @@ def _run(machine: Machine, steps: Iterable[str], log: Path) -> int:
 
 def _line(step: str, result: dict[str, Any]) -> str:
     mark = "ok" if result["passed"] else "FAIL"
-    return (
-        f"{mark:4}  {result.get('took_s', 0.0):6.1f} s  {step}: {result['says']}: {result['found']}"
-    )
+    says = result.get("says", "").rstrip(".")
+    return f"{mark:4}  {result.get('took_s', 0.0):6.1f} s  {step}: {says}: {result['found']}"
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""QEMU with our image: boot, run a check, cut the power. KVM where it really boots, else TCG.
+"""QEMU with our image: boot, run a check. KVM where it really boots, else TCG.
 
 Under TCG the machine's clock counts instructions, one a nanosecond (`-icount shift=0`): times that are
 measured inside are those of a core of 1,000 MIPS, however busy the host is.
@@ -65,9 +65,9 @@ def _kernel(image: Image, words: str) -> list[str]:
 
 
 class Machine:
-    """A running machine. Its disk forgets everything when it ends, but not at a power cut.
+    """A running machine. Its disk forgets everything when it ends.
 
-    `shared`: folders by their 9p tags. `folder`: where the console is kept, and QEMU's sockets.
+    `shared`: folders by their 9p tags. `folder`: where the console is kept, and the checks' socket.
     """
 
     def __init__(
@@ -75,18 +75,16 @@ class Machine:
     ) -> None:
         found = ARCHS[arch]
         needed({found.program: found.package})
-        self._sockets = {name: folder / f"{name}.sock" for name in ("checks", "qmp")}
-        for path in self._sockets.values():
-            path.unlink(missing_ok=True)
+        self._socket = folder / "checks.sock"
+        self._socket.unlink(missing_ok=True)
         words = f"console={found.console} systemd.mask=serial-getty@{found.console}.service"
         command = [found.program, *found.machine, *(KVM if kvm else found.tcg), "-m", "1024"]
         command += ["-nodefaults", "-no-user-config", "-display", "none", "-nic", "none"]
         command += ["-rtc", "base=utc,clock=vm", "-serial", f"file:{folder / 'console.log'}"]
         command += ["-drive", f"file={image.root},format=raw,if=virtio,snapshot=on"]
-        command += ["-qmp", f"unix:{self._sockets['qmp']},server=on,wait=off"]
         command += [
             "-chardev",
-            f"socket,id=checks,path={self._sockets['checks']},server=on,wait=off",
+            f"socket,id=checks,path={self._socket},server=on,wait=off",
         ]
         command += [
             "-device",
@@ -100,7 +98,7 @@ class Machine:
                 f"local,path={path},mount_tag={tag},security_model=none,readonly=on",
             ]
         self._process = subprocess.Popen([*command, *_kernel(image, words)])
-        self._port = self._connect("checks")
+        self._port = self._connect()
         self._lines = self._port.makefile("rb")
         self.booted()
 
@@ -115,20 +113,6 @@ class Machine:
         self._port.settimeout(ANSWER_S)
         self._port.sendall(name.encode() + b"\n")
         return self._heard()
-
-    def reboot(self) -> None:
-        """Let the machine restart itself, in good order."""
-        self._port.sendall(b"deaths.reboot\n")
-        self.booted()
-
-    def cut_power(self) -> None:
-        """Reset it: what was not on the disk is lost."""
-        with self._connect("qmp") as qmp, qmp.makefile("rb") as answers:
-            for command in ("qmp_capabilities", "system_reset"):
-                qmp.sendall(json.dumps({"execute": command}).encode())
-                while "return" not in json.loads(answers.readline()):
-                    continue
-        self.booted()
 
     def close(self) -> None:
         """End it. May be called twice."""
@@ -146,12 +130,12 @@ class Machine:
         heard: dict[str, Any] = json.loads(line)
         return heard
 
-    def _connect(self, name: str) -> socket.socket:
+    def _connect(self) -> socket.socket:
         deadline = time.monotonic() + PROBE_S
         connected = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         while True:
             try:
-                connected.connect(str(self._sockets[name]))
+                connected.connect(str(self._socket))
             except OSError as error:
                 if self._process.poll() is not None or time.monotonic() > deadline:
                     raise Unusable(f"QEMU has not started: {error}") from error

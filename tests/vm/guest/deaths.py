@@ -8,9 +8,6 @@ from tests.vm.guest.system import (
     Wrong,
     back,
     cursor,
-    disable,
-    enable,
-    far_side,
     journal,
     pid,
     sh,
@@ -97,55 +94,6 @@ def clean_stop() -> str:
         raise Wrong("outputs-off ran once more")
     sh("systemctl", "start", SERVICE)
     return f"off after {took:.2f} s, stopped after {stopped:.2f} s"
-
-
-def energised() -> str:
-    """(two relays are on when the machine goes down)"""
-    energise()
-    Path("/var/lib/rmf-was-on").touch()
-    sh("sync")
-    return "two relays on"
-
-
-def reboot() -> str:
-    """(the machine restarts in good order)"""
-    sh("systemctl", "reboot")
-    return "it does"
-
-
-def off_at_boot() -> str:
-    """The machine is up again: no relay has been on since the kernel started."""
-    Path("/var/lib/rmf-was-on").unlink()
-    until(lambda: shown(SERVICE, "ActiveState")["ActiveState"] == "active", "the service is ready")
-    on = [each for each in header.writes() if LIFT.get(each.line) == bool(each.level)]
-    off = sorted({each.line for each in header.writes() if each.line in LIFT})
-    if on or off != sorted(LIFT):
-        raise Wrong(f"written on: {on}; written off: {off}")
-    text = sh("journalctl", "-b", "-u", SERVICE, "--no-hostname")
-    by = "by the dead daemon's record" if "outputs_off" in text else "as claimed"
-    ready_at = int(shown(SERVICE, "ActiveEnterTimestampMonotonic")["ActiveEnterTimestampMonotonic"])
-    first = min(each.at for each in header.writes() if each.line in LIFT)
-    return f"all written off {by} at {first:.1f} s, ready at {ready_at / 1e6:.1f} s"
-
-
-def equipment() -> str:
-    """(the lift stands at its wires again)"""
-    far_side("lift")
-    return "it does"
-
-
-def active_low() -> str:
-    """Ten starts with a relay that is on at low: never on, not for a moment."""
-    lines = {7: False}
-    service, began = enable("low"), header.now()
-    for _ in range(9):
-        sh("systemctl", "restart", service)
-    found = [each for each in header.writes(began - 30) if each.line in lines]
-    glitches = [each for each in found if not each.level]
-    disable("low")
-    if glitches or len(found) < 10:
-        raise Wrong(f"{len(glitches)} of {len(found)} writes switched it on")
-    return f"{len(found)} writes, all of them high"
 
 
 def two_on_one_pin() -> str:

@@ -45,14 +45,6 @@ def plug(label: str) -> None:
     (CONFIGFS / "live").write_text("1")
 
 
-def unplug() -> None:
-    """Take it away."""
-    (CONFIGFS / "live").write_text("0")
-    (CONFIGFS / "bank0").rmdir()
-    CONFIGFS.rmdir()
-    _lines.cache_clear()
-
-
 @cache
 def _lines() -> Path:
     """The directory of the chip that is plugged."""

@@ -50,52 +50,10 @@ def lift() -> str:
     return f"ready after {ready_s(name):.2f} s"
 
 
-def supervisors() -> str:
-    """`rmf-bridge enable` for RMF's two supervisors."""
-    took = [ready_s(enable(name)) for name in ("lift_supervisor", "door_supervisor")]
-    return f"ready after {took[0]:.2f} and {took[1]:.2f} s"
-
-
 def recorder() -> str:
     """The recorder of incidents runs since the package was installed."""
     until(lambda: is_active("rmf-bridge-recorder.service"), "the recorder is ready")
     return f"ready after {ready_s('rmf-bridge-recorder.service'):.2f} s"
-
-
-def page() -> str:
-    """The web page, a package of its own, starts and answers."""
-    install(_deb("rmf-bridges-page"))
-    sh("systemctl", "start", "rmf-bridge-page.service")
-    ask = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:8080', timeout=30).status)"
-    until(lambda: _answers(ask), "the page answers")
-    sh("systemctl", "stop", "rmf-bridge-page.service")
-    return "answers"
-
-
-def _answers(ask: str) -> bool:
-    try:
-        return sh("python3", "-c", ask).strip() == "200"
-    except Wrong:
-        state = shown("rmf-bridge-page.service", "ActiveState", "ExecMainStatus")
-        if state["ActiveState"] == "failed":
-            raise Wrong(f"the page ended with exit code {state['ExecMainStatus']}") from None
-        return False
-
-
-def security() -> str:
-    """`systemd-analyze security` of each live unit: 2.0 or less."""
-    names = [unit(n) for n in ("lift", "door", "charger", "lift_supervisor")]
-    names += ["rmf-bridge-recorder.service", "rmf-bridge-page.service"]
-    scores = {name: _score(name) for name in names}
-    if too_exposed := {n: s for n, s in scores.items() if s > 2.0}:
-        raise Wrong(f"too exposed: {too_exposed}")
-    short = (f"{n.split('@')[-1].removesuffix('.service')} {s}" for n, s in scores.items())
-    return ", ".join(short)
-
-
-def _score(name: str) -> float:
-    text = sh("systemd-analyze", "security", "--no-pager", name)
-    return float(text.rpartition("Overall exposure level for ")[2].split()[1])
 
 
 def wrong_yaml() -> str:
@@ -111,16 +69,3 @@ def wrong_yaml() -> str:
     if (state, count) != ({"ActiveState": "failed", "ExecMainStatus": "78"}, 0):
         raise Wrong(f"{state}, {count} restarts")
     return "exit code 78, failed, 0 restarts"
-
-
-def upgrade() -> str:
-    """The package is installed again while services run: they are restarted, outputs off in between."""
-    deb = _deb()
-    names = [unit(n) for n in ("lift", "door", "charger")]
-    before = {name: shown(name, "InvocationID") for name in names}
-    install(deb, "--reinstall")
-    for name in names:
-        until(lambda name=name: is_active(name), f"{name} is ready")  # type: ignore[misc]
-        if shown(name, "InvocationID") == before[name]:
-            raise Wrong(f"{name} was not restarted")
-    return "three services restarted, and ready"

@@ -1,31 +1,16 @@
-"""What services are for: requests from other processes, and equipment that does as it is told."""
+"""Requests of RMF's from outside of the services."""
 
 from tests.vm.guest import header
-from tests.vm.guest.system import Wrong, sh, until
+from tests.vm.guest.system import sh, until
 
 ROOM = ("--domain-id", "7", "--localhost")
 LIFT = dict.fromkeys((18, 16, 22, 23, 24), True)
 """The outputs of lift.yaml: each is on at high."""
-AGV, DOOR = 18, 16
 
 
 def send(*words: str) -> str:
     """A request of RMF's, and its effect."""
     return sh("rmf-bridge", "send", *words, *ROOM)
-
-
-def ride() -> str:
-    """A robot rides from L1 to L3: requests from outside of the service, lines of the header."""
-    began = header.now()
-    send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
-    send("lift", "Lift1", "L3", "--session", "vm/robot", "--direct")
-    held = sorted(header.on(LIFT, began))
-    send("lift", "Lift1", "--end", "--session", "vm/robot", "--direct")
-    until(lambda: not header.on(LIFT, began), "every output is off after the session")
-    called = [each.line for each in header.writes(began) if each.level and each.line in (22, 24)]
-    if held != [DOOR, AGV] or called != [22, 24]:
-        raise Wrong(f"held at L3: {held}, calls: {called}")
-    return "to L1, to L3, doors held there, all off after the end"
 
 
 def energise() -> float:

@@ -1,6 +1,5 @@
 """Commands, units of systemd and waiting, for the checks."""
 
-import re
 import subprocess
 import time
 from collections.abc import Callable
@@ -34,7 +33,7 @@ def until(look: Callable[[], Found], what: str, within_s: float = LATE_S) -> Fou
     while not (seen := look()):
         if time.monotonic() > deadline:
             raise Wrong(f"not within {within_s:g} s: {what}")
-        time.sleep(0.05)
+        time.sleep(0.2)
     return seen
 
 
@@ -89,22 +88,11 @@ def journal(after: str, service: str) -> str:
     return sh("journalctl", *words, "-u", service)
 
 
-def pss_mb(process: int) -> float:
-    """Its share of the memory (smaps_rollup's Pss), in MB."""
-    text = Path(f"/proc/{process}/smaps_rollup").read_text()
-    return int(re.findall(r"^Pss: +(\d+) kB", text, re.MULTILINE)[0]) / 1000
-
-
 def enable(name: str) -> str:
     """Make a service of one of our YAMLs; returns its unit, ready."""
     sh("rmf-bridge", "enable", str(CONFIG / f"{name}.yaml"))
     until(lambda: is_active(unit(name)), f"{name} is ready")
     return unit(name)
-
-
-def disable(name: str) -> None:
-    """Stop it, and keep it from starting at boot."""
-    sh("rmf-bridge", "disable", name)
 
 
 def far_side(name: str) -> None:
