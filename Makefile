@@ -48,7 +48,7 @@ demo-page: .venv/ready
 # Many tests wait for a process or a wire: more of them than there are cores run side by side.
 # Each test goes to the next free worker, in the order of conftest.py: long ones first. Tests that share a
 # process stay together (mark xdist_group).
-SIDE_BY_SIDE := -n 4 --dist loadgroup --no-loadscope-reorder
+SIDE_BY_SIDE := -n 8 --dist loadgroup --no-loadscope-reorder
 # mypy uses one core only, so it runs beside the tests.
 test: .venv/ready style
 	@$(MAKE) --no-print-directory -j 2 types suite

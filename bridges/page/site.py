@@ -127,7 +127,7 @@ class Site:
     def changed(self, now: float, wall: float) -> list[Shown]:
         """The devices that were heard of since this was asked last."""
         changed, self._changed = self._changed, set()
-        known = [device for device in changed if device in self._states]
+        known = [device for device in sorted(changed) if device in self._states]
         rows = self._board.rows_of(known, now, wall)
         return [
             Shown(row, self._states[device], self._standing(device[1]))
