@@ -73,11 +73,14 @@ class Station(Protocol):
 
 
 class VirtualBus:
-    """python-can's `virtual` bus: `channel` names it for whoever opens it as well."""
+    """python-can's `virtual` bus: `channel` names it for whoever opens it as well.
 
-    def __init__(self, channel: str) -> None:
+    `interface`: another of python-can's, such as `socketcan` with its channel vcan0.
+    """
+
+    def __init__(self, channel: str, interface: str = "virtual") -> None:
         self.replace: dict[str, object] = {}
-        self._bus: can.BusABC | None = can.Bus(channel, interface="virtual")
+        self._bus: can.BusABC | None = can.Bus(channel, interface=interface)
         self._noise = random.Random("can")
         self._off_told = False
 

@@ -1,0 +1,1 @@
+"""A real machine: Debian on a kernel with gpio-sim and vcan, booted in QEMU. `make test-vm`."""

@@ -1,0 +1,85 @@
+"""`make test-vm`: boots the machine and prints a line for each check. 1: one failed; 69: none ran."""
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from tests.vm.image import Unusable, image
+from tests.vm.machine import ARCHS, Machine, accelerated
+from tests.vm.order import PARTS
+
+ROOT = Path(__file__).parents[2]
+CACHE = ROOT / "build/vm"
+
+
+def main() -> int:
+    """Build what is missing, then run."""
+    args = _arguments()
+    folder = CACHE / f"last-{args.arch}"
+    folder.mkdir(parents=True, exist_ok=True)
+    began = time.monotonic()
+    try:
+        booted = image(args.arch, CACHE)
+        kvm = accelerated(args.arch, booted)
+        print(f"{args.arch} on {'KVM' if kvm else 'TCG, a core of 1,000 MIPS'}", flush=True)
+        shared = {"checks": Path(__file__).parent, "packages": _packages(args.arch, folder)}
+        machine = Machine(args.arch, booted, kvm, shared, folder)
+        try:
+            failed = _run(machine, PARTS[args.only], folder / "checks.log")
+        finally:
+            machine.close()
+    except Unusable as error:
+        print(error, file=sys.stderr)
+        return os.EX_UNAVAILABLE
+    print(f"{failed} failed; {time.monotonic() - began:.0f} s; the log is {folder}/checks.log")
+    return 1 if failed else 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tests.vm", description=__doc__)
+    parser.add_argument("--arch", choices=ARCHS, default="amd64")
+    parser.add_argument("--only", choices=PARTS, default="", help="a part")
+    return parser.parse_args()
+
+
+def _packages(arch: str, folder: Path) -> Path:
+    """A folder with the packages of this architecture for Debian 13. Raises Unusable."""
+    found = sorted((ROOT / "dist").glob(f"*+deb13_{arch}.deb"))
+    if not found:
+        raise Unusable(f"no package: make deb ARCHS={arch} PYTHONS=3.13")
+    packages = folder / "packages"
+    packages.mkdir(exist_ok=True)
+    for old in packages.iterdir():
+        old.unlink()
+    for each in found:
+        os.link(each, packages / each.name)
+    return packages
+
+
+def _run(machine: Machine, steps: Iterable[str], log: Path) -> int:
+    """Take every step; returns how many checks failed."""
+    failed = 0
+    with log.open("w") as out:
+        for step in steps:
+            result = machine.check(step)
+            failed += not result["passed"]
+            line = _line(step, result)
+            out.write(result["log"])
+            print(line, flush=True)
+            out.write(f"{line}\n\n")
+            out.flush()
+    return failed
+
+
+def _line(step: str, result: dict[str, Any]) -> str:
+    mark = "ok" if result["passed"] else "FAIL"
+    says = result.get("says", "").rstrip(".")
+    return f"{mark:4}  {result.get('took_s', 0.0):6.1f} s  {step}: {says}: {result['found']}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,121 @@
+"""Deaths of a daemon whose relays are on. "Off" is a write that the kernel has traced."""
+
+from pathlib import Path
+
+from tests.vm.guest import header
+from tests.vm.guest.rides import LIFT, energise
+from tests.vm.guest.system import (
+    Wrong,
+    back,
+    cursor,
+    journal,
+    pid,
+    sh,
+    shown,
+    unit,
+    until,
+)
+
+SERVICE = unit("lift")
+KILLED_S, STOPPED_S = 1.0, 4.0
+"""What docs/reliability.md promises of a core of 1,000 MIPS."""
+
+
+def _off_after(began: float, when: float, within_s: float) -> float:
+    """How long after `when` (s) the last of the relays that were on was written off."""
+    relays = {line: LIFT[line] for line in header.on(LIFT, began)}
+    if not relays:
+        relays = {each.line: True for each in header.writes(began) if each.level}
+    found = until(lambda: _all_off(relays, when), "each relay is written off", 30.0)
+    took = max(found.values()) - when
+    if took > within_s:
+        raise Wrong(f"off after {took:.2f} s, more than {within_s:g}")
+    return took
+
+
+def _all_off(relays: dict[int, bool], when: float) -> dict[int, float]:
+    found = header.off_at(relays, when)
+    return found if found.keys() == relays.keys() else {}
+
+
+def kill_9() -> str:
+    """kill -9, two relays on: off, and the service is back."""
+    began, old = energise(), pid(SERVICE)
+    when = header.now()
+    sh("systemctl", "kill", "-s", "KILL", "--kill-whom=main", SERVICE)
+    took = _off_after(began, when, KILLED_S)
+    back(SERVICE, old)
+    return f"off after {took:.2f} s"
+
+
+def hang() -> str:
+    """SIGSTOP, two relays on: the watchdog ends it; off, and the service is back."""
+    began, old = energise(), pid(SERVICE)
+    when = header.now()
+    sh("systemctl", "kill", "-s", "STOP", "--kill-whom=main", SERVICE)
+    took = _off_after(began, when, STOPPED_S)
+    back(SERVICE, old)
+    return f"off after {took:.2f} s"
+
+
+def crash() -> str:
+    """A crash in C code (SIGSEGV by the kernel), two relays on: off, and the service is back."""
+    began, old = energise(), pid(SERVICE)
+    when = header.now()
+    sh("systemctl", "kill", "-s", "SEGV", "--kill-whom=main", SERVICE)
+    took = _off_after(began, when, KILLED_S)
+    back(SERVICE, old)
+    return f"off after {took:.2f} s"
+
+
+def out_of_memory() -> str:
+    """The unit's memory is used up, two relays on: off, and the service is back."""
+    began, old = energise(), pid(SERVICE)
+    limit = Path(f"/sys/fs/cgroup{shown(SERVICE, 'ControlGroup')['ControlGroup']}/memory.max")
+    before = limit.read_text()
+    when = header.now()
+    limit.write_text("4M")  # the kernel returns when it has killed
+    limit.write_text(before)
+    took = _off_after(began, when, KILLED_S)
+    back(SERVICE, old)
+    sh("journalctl", "-k", "--no-hostname", "-g", "Memory cgroup out of memory")
+    return f"off after {took:.2f} s"
+
+
+def clean_stop() -> str:
+    """`systemctl stop`, two relays on: off by the daemon; `outputs-off` has nothing to do."""
+    began, mark = energise(), cursor()
+    when = header.now()
+    sh("systemctl", "stop", SERVICE)
+    stopped = header.now() - when
+    took = _off_after(began, when, KILLED_S)
+    text = journal(mark, SERVICE)
+    if "nothing_to_switch_off" not in text:
+        raise Wrong("outputs-off ran once more")
+    sh("systemctl", "start", SERVICE)
+    return f"off after {took:.2f} s, stopped after {stopped:.2f} s"
+
+
+def two_on_one_pin() -> str:
+    """Another service on the lift's pins: refused by `enable`; by hand it says who has the pin."""
+    copy = Path("/etc/rmf-bridges/second.yaml")
+    copy.write_text(Path("/etc/rmf-bridges/lift.yaml").read_text().replace("Lift1", "Lift2"))
+    sh("rmf-bridge", "enable", str(copy), fails=True)
+    before = pid(SERVICE)
+    service, mark = unit("second"), cursor()
+    drop_in = Path(f"/run/systemd/system/{service}.d/10-enable.conf")
+    drop_in.parent.mkdir(parents=True)
+    drop_in.write_text(Path(f"/etc/systemd/system/{SERVICE}.d/10-enable.conf").read_text())
+    sh("systemctl", "daemon-reload")
+    sh("systemctl", "start", "--no-block", service)
+    until(
+        lambda: SERVICE in journal(mark, service) or "held by" in journal(mark, service),
+        "the holder's name",
+    )
+    sh("systemctl", "stop", service)
+    drop_in.unlink()
+    copy.unlink()
+    sh("systemctl", "daemon-reload")
+    if pid(SERVICE) != before:
+        raise Wrong("the first service did not live on")
+    return "the first one serves on"

@@ -1,0 +1,104 @@
+"""The equipment at the wires of a YAML: `python3 -m tests.vm.guest.far_side FILE`.
+
+It runs in the package's own Python. The plants of `hal_fakes/` stand behind real wires here: lines of
+gpio-sim, a pseudo-terminal, an interface of SocketCAN. They live on when the daemon dies.
+"""
+
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from bridges.settings.load import Config, load
+from drivers.hal.can import Settings as CanSettings
+from drivers.hal.modbus import Settings as ModbusSettings
+from hal_fakes.can.side import CanSide, VirtualBus, slow_s
+from hal_fakes.control import Control
+from hal_fakes.fake import plants_on, stations_on
+from hal_fakes.modbus.rtu import RtuLine
+from hal_fakes.realtime import RealTime
+from hal_fakes.wiring import Wiring
+from tests.vm.guest import header
+
+LOOK_S = 0.05
+
+
+def main() -> int:
+    """Serve until killed. The socket /run/far-<name> takes commands (`hal_fakes/control.py`)."""
+    config = load(Path(sys.argv[1]))
+    (bus,) = config.buses
+    world = RealTime(plants_on(config, bus))
+    stations = stations_on(config, bus, world.plants)
+    threading.excepthook = lambda failed: os._exit(
+        1
+    )  # an interface that went down: systemd starts anew
+    Control(Path(f"/run/far-{config.path.stem}"), world.plants)
+    _serve(config, bus, stations)
+    return 0
+
+
+def _serve(config: Config, bus: str, stations: Sequence[object]) -> None:
+    settings = config.buses[bus]
+    if isinstance(settings, CanSettings):
+        medium = VirtualBus(str(settings.socketcan), interface="socketcan")
+        CanSide(medium, stations, slow_s(settings))  # type: ignore[arg-type]
+        _ready()
+        threading.Event().wait()
+    elif isinstance(settings, ModbusSettings):
+        assert settings.serial
+        line = RtuLine(stations, settings.serial, 2 * settings.timeout_s, "/run")  # type: ignore[arg-type]
+        _be_udev(line.adapter.path, Path(settings.serial.port))
+    else:
+        _stand_at_header([s for s in stations if isinstance(s, Wiring)])
+
+
+def _be_udev(adapter: Path, port: Path) -> None:
+    """Give the adapter a name that stays, and the daemon its rights, also when it is plugged again."""
+    adapter.parent.chmod(0o755)
+    port.parent.mkdir(parents=True, exist_ok=True)
+    port.unlink(missing_ok=True)
+    port.symlink_to(adapter)
+    port.chmod(0o666)
+    _ready()
+    while True:
+        with suppress(FileNotFoundError):
+            port.chmod(0o666)
+        time.sleep(LOOK_S)
+
+
+def _stand_at_header(wirings: Sequence[Wiring]) -> None:
+    """Follow the outputs, and pull the inputs, also back from where a claim has pulled them.
+
+    On gpio-sim a claimed input with a resistor reads as the resistor pulls; on a Pi the wire wins.
+    """
+    driven: dict[str, bool] = {}
+    _ready()
+    while True:
+        now = time.monotonic()
+        for wiring in wirings:
+            for point in wiring.outputs:
+                level = header.level(_number(point))
+                if driven.get(point) != level:
+                    driven[point] = level
+                    wiring.drive(point, level, now)
+            for point, level in wiring.levels(now).items():
+                header.pull(_number(point), level)
+        time.sleep(LOOK_S)
+
+
+def _number(point: str) -> int:
+    return int(point.removeprefix("BCM"))
+
+
+def _ready() -> None:
+    """Type=notify."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told:
+        told.sendto(b"READY=1", os.environ["NOTIFY_SOCKET"])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

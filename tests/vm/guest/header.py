@@ -1,0 +1,121 @@
+"""The chip of a Raspberry Pi's header, simulated by gpio-sim, and every write to its outputs.
+
+Kernel documentation: admin-guide/gpio/gpio-sim.rst, and trace events of the group `gpio`. gpio-sim
+lets an output fall when its line is released, so a level proves nothing after a death: a write does.
+"""
+
+import re
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+CONFIGFS: Final = Path("/sys/kernel/config/gpio-sim/header")
+TRACING: Final = Path("/sys/kernel/tracing")
+LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-bcm2711": 58, "pinctrl-rp1": 54}
+"""Chips of the header, and their lines: Raspberry Pi 3 and older, 4, 5."""
+PI_4: Final = "pinctrl-bcm2711"
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """A line was written at this time (monotonic s)."""
+
+    at: float
+    line: int
+    level: int
+
+
+def main() -> int:
+    """At boot: watch first, so that no write is missed."""
+    watch()
+    plug(PI_4)
+    return 0
+
+
+def plug(label: str) -> None:
+    """Make the chip."""
+    bank = CONFIGFS / "bank0"
+    bank.mkdir(parents=True)
+    (bank / "num_lines").write_text(str(LABELS[label]))
+    (bank / "label").write_text(label)
+    (CONFIGFS / "live").write_text("1")
+
+
+@cache
+def _lines() -> Path:
+    """The directory of the chip that is plugged."""
+    device = (CONFIGFS / "dev_name").read_text().strip()
+    chip = (CONFIGFS / "bank0/chip_name").read_text().strip()
+    return Path(f"/sys/devices/platform/{device}/{chip}")
+
+
+def line(number: int) -> Path:
+    """The directory of a line: `pull` sets what an input reads, `value` shows a level."""
+    return _lines() / f"sim_gpio{number}"
+
+
+def level(number: int) -> bool:
+    """The level of a line."""
+    return (line(number) / "value").read_text().strip() == "1"
+
+
+def pull(number: int, high: bool) -> None:
+    """What an input reads from now on."""
+    wire, wanted = line(number) / "pull", "pull-up" if high else "pull-down"
+    if wire.read_text().strip() != wanted:
+        wire.write_text(wanted)
+
+
+def watch() -> None:
+    """Write down each write of a line, with its time."""
+    (TRACING / "trace_clock").write_text("mono")
+    event = TRACING / "events/gpio/gpio_value"
+    (event / "filter").write_text("get == 0")
+    (event / "enable").write_text("1")
+
+
+def writes(since: float = 0.0) -> list[Write]:
+    """Every write since then, in turn."""
+    return [each for each in _traced() if each.at >= since]
+
+
+def _traced() -> Iterator[Write]:
+    base = _base()
+    for text in (TRACING / "trace").read_text().splitlines():
+        if found := re.search(r" ([0-9.]+): gpio_value: (\d+) set (-?\d+)", text):
+            yield Write(float(found[1]), int(found[2]) - base, int(found[3]))
+
+
+def _base() -> int:
+    """The number that the kernel's trace gives to the chip's first line."""
+    label = (CONFIGFS / "bank0/label").read_text()
+    chips = Path("/sys/class/gpio").glob("gpiochip*")
+    return next(int((c / "base").read_text()) for c in chips if (c / "label").read_text() == label)
+
+
+def on(lines: dict[int, bool], since: float = 0.0) -> dict[int, float]:
+    """Outputs that the last write has left on, and since when. `lines`: each with its level for on."""
+    last = {each.line: each for each in writes(since)}
+    return {n: last[n].at for n, high in lines.items() if n in last and last[n].level == high}
+
+
+def off_at(lines: dict[int, bool], after: float) -> dict[int, float]:
+    """When each of these lines was first written off after that time (monotonic s)."""
+    found: dict[int, float] = {}
+    for each in writes(after):
+        if each.line in lines and each.level != lines[each.line]:
+            found.setdefault(each.line, each.at)
+    return found
+
+
+def now() -> float:
+    """The trace's clock."""
+    return time.monotonic()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,35 @@
+"""One check: `python3 -m tests.vm.guest.one deaths.kill_9` prints how that function ended, as JSON.
+
+A check returns what it has found, and raises Wrong if that is not right. What it prints is the log.
+"""
+
+import json
+import sys
+import time
+import traceback
+from contextlib import redirect_stdout
+from importlib import import_module
+
+from tests.vm.guest.system import Wrong, sh
+
+
+def main() -> int:
+    """Run it; after a failure the journal goes to the log too."""
+    module, _, function = sys.argv[1].partition(".")
+    check = getattr(import_module(f"tests.vm.guest.{module}"), function)
+    began = time.monotonic()
+    with redirect_stdout(sys.stderr):
+        try:
+            found, passed = check(), True
+        except Exception as error:  # noqa: BLE001 - a check that breaks has failed
+            found, passed = str(error) if isinstance(error, Wrong) else repr(error), False
+            traceback.print_exc()
+            sh("journalctl", "-b", "-n", "80", "-o", "short-monotonic", "--no-hostname")
+    took_s = time.monotonic() - began
+    ended = {"passed": passed, "found": found, "took_s": took_s, "says": check.__doc__}
+    print(json.dumps(ended))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,108 @@
+"""Commands, units of systemd and waiting, for the checks."""
+
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, TypeVar
+
+CONFIG: Final = Path("/mnt/tests/vm/guest/config")
+PYTHON: Final = "/usr/lib/rmf-bridges/bin/python3"
+LATE_S: Final = 60.0
+"""For what has no time of its own."""
+
+Found = TypeVar("Found")
+
+
+class Wrong(Exception):
+    """A check has found something that is not right; the text says what."""
+
+
+def sh(*words: str, fails: bool = False) -> str:
+    """A command's output. Raises Wrong if its exit code is not 0; with `fails`, if it is."""
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    print(f"{time.monotonic():.3f} $ {' '.join(words)} -> {done.returncode}\n{done.stdout}", end="")
+    if (done.returncode != 0) is not fails:
+        raise Wrong(f"{' '.join(words)}: exit code {done.returncode}: {done.stdout.strip()[-300:]}")
+    return done.stdout
+
+
+def until(look: Callable[[], Found], what: str, within_s: float = LATE_S) -> Found:
+    """What `look` sees, as soon as that is true. Raises Wrong when it is not in time."""
+    deadline = time.monotonic() + within_s
+    while not (seen := look()):
+        if time.monotonic() > deadline:
+            raise Wrong(f"not within {within_s:g} s: {what}")
+        time.sleep(0.2)
+    return seen
+
+
+def unit(name: str) -> str:
+    """The service of a YAML."""
+    return f"rmf-bridge@{name}.service"
+
+
+def shown(service: str, *names: str) -> dict[str, str]:
+    """These properties of a unit."""
+    text = sh("systemctl", "show", service, *(f"-p{name}" for name in names))
+    return dict(line.split("=", 1) for line in text.splitlines())
+
+
+def is_active(service: str) -> bool:
+    """Whether it runs, and has said that it is ready."""
+    return shown(service, "ActiveState")["ActiveState"] == "active"
+
+
+def pid(service: str) -> int:
+    """Its main process; 0 for none."""
+    return int(shown(service, "MainPID")["MainPID"])
+
+
+def restarts(service: str) -> int:
+    """How often systemd has started it again."""
+    return int(shown(service, "NRestarts")["NRestarts"])
+
+
+def ready_s(service: str) -> float:
+    """How long it took from the start of its process to its "ready"."""
+    names = ("ExecMainStartTimestampMonotonic", "ActiveEnterTimestampMonotonic")
+    began, ready = (int(shown(service, name)[name]) for name in names)
+    return (ready - began) / 1e6
+
+
+def back(service: str, old: int) -> None:
+    """Wait until another process of this service is ready."""
+    until(lambda: pid(service) not in (0, old) and is_active(service), f"{service} is back")
+
+
+def cursor() -> str:
+    """The journal's end."""
+    text = sh("journalctl", "-n", "0", "--show-cursor")
+    return text.partition("-- cursor: ")[2].strip()
+
+
+def journal(after: str, service: str) -> str:
+    """What a service has said since then."""
+    sh("journalctl", "--sync")
+    words = ("--no-hostname", "-o", "short-monotonic", f"--after-cursor={after}")
+    return sh("journalctl", *words, "-u", service)
+
+
+def enable(name: str) -> str:
+    """Make a service of one of our YAMLs; returns its unit, ready."""
+    sh("rmf-bridge", "enable", str(CONFIG / f"{name}.yaml"))
+    until(lambda: is_active(unit(name)), f"{name} is ready")
+    return unit(name)
+
+
+def far_side(name: str) -> None:
+    """Let the equipment of a YAML stand at its wires, until the next boot."""
+    given = (
+        "Restart=always",
+        "Type=notify",
+        "WorkingDirectory=/mnt",
+        "Environment=PYTHONPATH=/mnt",
+    )
+    words = ["--collect", f"--unit=far-{name}", *(f"--property={each}" for each in given)]
+    file = str(CONFIG / f"{name}.yaml")
+    sh("systemd-run", *words, PYTHON, "-m", "tests.vm.guest.far_side", file)

@@ -1,0 +1,154 @@
+"""A door on RS-485 and a charger on CAN: services whose relays are at the far end of a wire."""
+
+import json
+import re
+import socket
+import time
+from collections.abc import Callable
+from typing import Final
+
+from tests.vm.guest.rides import send
+from tests.vm.guest.system import (
+    LATE_S,
+    Wrong,
+    back,
+    cursor,
+    enable,
+    far_side,
+    journal,
+    pid,
+    ready_s,
+    sh,
+    unit,
+    until,
+)
+
+KILLED_S: Final = 2.0
+
+
+def door_service() -> str:
+    """`rmf-bridge enable` for a door on RS-485, whose port is a pseudo-terminal."""
+    far_side("door")
+    return f"ready after {ready_s(enable('door')):.2f} s"
+
+
+def door() -> str:
+    """A door on RS-485 is held open, and closes."""
+    began = time.monotonic()
+    send("door", "ward_door", "open", "--direct")
+    opened = time.monotonic() - began
+    send("door", "ward_door", "close", "--direct")
+    return f"open after {opened:.1f} s"
+
+
+def door_killed() -> str:
+    """kill -9 of a door's service while a relay on RS-485 is on: off at the module."""
+    send("door", "ward_door", "open", "--direct")
+    return _killed("door")
+
+
+def adapter_pulled() -> str:
+    """The RS-485 adapter is pulled and plugged again: a fault, and its end."""
+    return _fault_ends(
+        "door ward_door usb-rs485",
+        lambda: tell("door", "fail ward_door server off"),
+        lambda: tell("door", "fail ward_door server ok"),
+    )
+
+
+def charger_service() -> str:
+    """`rmf-bridge enable` for a charger on SocketCAN."""
+    sh("ip", "link", "add", "vcan0", "type", "vcan")
+    sh("ip", "link", "set", "vcan0", "up")
+    far_side("charger")
+    return f"ready after {ready_s(enable('charger')):.2f} s"
+
+
+def charge() -> str:
+    """A robot is charged on SocketCAN, and the charge is cancelled."""
+    _charge("vm-1")
+    mark = cursor()
+    send("charger", "charger_b", "--cancel", "vm-1")
+    until(lambda: "state=IDLE" in journal(mark, unit("charger")), "it is idle")
+    return "charging, then cancelled"
+
+
+def _charge(request: str) -> None:
+    mark = cursor()
+    tell("charger", "press charger_b robot off")
+    tell("charger", "press charger_b robot on")
+    send("charger", "charger_b", "--robot", "vm/robot", "--request-id", request)
+    until(lambda: "state=CHARGING" in journal(mark, unit("charger")), "it charges")
+
+
+def charger_killed() -> str:
+    """kill -9 of a charger's service during a charge on CAN: the receiver is told to stop."""
+    _charge("vm-2")
+    return _killed("charger")
+
+
+def interface_down() -> str:
+    """CAN's interface goes down and comes back: a fault that names it, and its end."""
+    return _fault_ends(
+        "charger charger_b vcan0",
+        lambda: sh("ip", "link", "set", "vcan0", "down"),
+        lambda: sh("ip", "link", "set", "vcan0", "up"),
+    )
+
+
+def bus_off() -> str:
+    """CAN's controller reports bus-off and its end: a fault that says so, and its end."""
+    return _fault_ends(
+        "charger charger_b bus-off",
+        lambda: tell("charger", "fail charger_b bus wrong"),
+        lambda: tell("charger", "fail charger_b bus ok"),
+    )
+
+
+def _fault_ends(what: str, breaks: Callable[[], object], mends: Callable[[], object]) -> str:
+    """`what`: service, device, and a word of its fault."""
+    name, device, word = what.split()
+    mark, began = cursor(), time.monotonic()
+    breaks()
+    fault = re.compile(f"fault device={device} .*{word}")
+    until(lambda: fault.search(journal(mark, unit(name))), f"a fault with {word!r}")
+    seen = time.monotonic()
+    mends()
+    until(lambda: f"fault_over device={device}" in journal(mark, unit(name)), "its end")
+    return f"a fault after {seen - began:.1f} s, over after {time.monotonic() - seen:.1f} s"
+
+
+def _killed(name: str) -> str:
+    service = unit(name)
+    old, when = pid(service), time.monotonic()
+    kill = ("systemctl", "kill", "-s", "KILL", "--kill-whom=main", service)
+    took = _relay_off_at(name, lambda: sh(*kill)) - when
+    back(service, old)
+    if took > KILLED_S:
+        raise Wrong(f"off after {took:.2f} s, more than {KILLED_S:g}")
+    return f"off after {took:.2f} s"
+
+
+def _relay_off_at(name: str, act: Callable[[], object]) -> float:
+    """When a relay of this far side goes off after `act` (monotonic s)."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as control, control.makefile() as lines:
+        control.settimeout(LATE_S)
+        control.connect(f"/run/far-{name}")
+        control.sendall(b"follow\n")
+        lines.readline()
+        act()
+        for line in lines:
+            edge = json.loads(line)
+            if edge["what"] == "relay" and not edge["value"]:
+                return float(edge["at"])
+    raise Wrong(f"the far side of {name} has hung up")
+
+
+def tell(name: str, words: str) -> None:
+    """A story for a far side (`hal_fakes/control.py`)."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as control:
+        control.connect(f"/run/far-{name}")
+        control.sendall(words.encode() + b"\n")
+        answer = control.recv(1000).decode().strip()
+    if answer != "ok":
+        raise Wrong(f"{words}: {answer}")

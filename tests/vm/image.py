@@ -1,0 +1,154 @@
+"""A bootable Debian, built as an ordinary user and cached by its kernel and its list of packages.
+
+`mmdebstrap` makes an archive of it, and `mke2fs -d` a file system of that, under fakeroot, so that
+nothing is mounted. The first RAM disk is ours (`ram_disk.py`): a program of the target makes Debian's.
+"""
+
+import hashlib
+import os
+import shutil
+import subprocess
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from tests.vm.ram_disk import ram_disk
+
+KERNEL: Final = "7.3.4+deb13"
+"""Of trixie-backports, which keeps its old kernels. Debian 13's own has no gpio-sim."""
+MIRROR: Final = "http://deb.debian.org/debian"
+SUITES: Final = ("trixie", "trixie-backports")
+SIZE: Final = "1500M"
+PACKAGES: Final = (
+    "busybox-static",
+    "dbus",
+    "iproute2",
+    "kmod",
+    "procps",
+    "python3",
+    "systemd",
+    "systemd-sysv",
+    "udev",
+)
+MODULES: Final = (
+    "crypto",
+    "drivers/block/virtio_blk",
+    "drivers/char/virtio_console",
+    "drivers/gpio",
+    "drivers/net/can",
+    "drivers/net/dummy",
+    "drivers/net/veth",
+    "drivers/usb/common",
+    "drivers/usb/core",
+    "drivers/usb/serial/usbserial",
+    "drivers/virtio",
+    "fs",
+    "lib",
+    "net/9p",
+    "net/can",
+)
+"""What is kept of the kernel's modules, of which there are 400 MB."""
+LEFT_OUT: Final = ("usr/share/doc", "usr/share/locale", "usr/share/man")
+TOOLS: Final = {
+    "depmod": "kmod",
+    "dpkg-deb": "dpkg",
+    "fakeroot": "fakeroot",
+    "mke2fs": "e2fsprogs",
+    "mmdebstrap": "mmdebstrap",
+}
+"""Program -> the package that has it."""
+FILES: Final = Path(__file__).parent / "root"
+"""Copied over the tree: what makes this Debian run the checks."""
+
+
+class Unusable(Exception):
+    """This machine cannot build the image or boot it; the text says what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """What QEMU boots."""
+
+    kernel: Path
+    ram_disk: Path
+    root: Path
+
+
+def image(arch: str, cache: Path) -> Image:
+    """The cached image of this architecture, built first where there is none. Raises Unusable."""
+    folder = cache / f"{arch}-{KERNEL}-{_key()}"
+    made = Image(folder / "vmlinuz", folder / "initrd", folder / "root.ext4")
+    if not folder.exists():
+        needed(TOOLS)
+        print(f"building the image, once: {folder}", flush=True)
+        fresh = folder.with_name(f"{folder.name}.new")
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir(parents=True)
+        _build(arch, fresh)
+        fresh.rename(folder)
+    return made
+
+
+def needed(tools: dict[str, str]) -> None:
+    """Raises Unusable that names the packages of those that are not here."""
+    path = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
+    missing = sorted({deb for tool, deb in tools.items() if not shutil.which(tool, path=path)})
+    if missing:
+        raise Unusable(f"missing here: sudo apt install {' '.join(missing)}")
+
+
+def _key() -> str:
+    files = (p.read_text() for p in sorted(FILES.rglob("*")) if p.is_file())
+    words = (KERNEL, *SUITES, *PACKAGES, *MODULES, SIZE, *files)
+    return hashlib.sha256("\n".join(words).encode()).hexdigest()[:10]
+
+
+def _build(arch: str, folder: Path) -> None:
+    archive, tree = folder / "root.tar", folder / "tree"
+    with (folder / "build.log").open("w") as log:
+        _run([*_mmdebstrap(arch), SUITES[0], str(archive), *_sources()], log.fileno())
+        steps = [
+            f"mkdir {tree}",
+            f"tar -C {tree} -xpf {archive} --exclude=./dev",
+            f"mkdir {tree}/dev",
+            f"cp -R {FILES}/. {tree}/",
+            f"chown -R 0:0 {tree}/etc",
+            f"depmod -b {tree} {KERNEL}-{arch}",
+            f"mke2fs -q -t ext4 -L root -d {tree} {folder}/root.ext4 {SIZE}",
+        ]
+        _run(["fakeroot", "sh", "-ec", "\n".join(steps)], log.fileno())
+    shutil.copy(tree / f"usr/lib/modules/{KERNEL}-{arch}/vmlinuz", folder / "vmlinuz")
+    (folder / "initrd").write_bytes(ram_disk(tree, f"{KERNEL}-{arch}"))
+    shutil.rmtree(tree)
+    archive.unlink()
+
+
+def _run(words: Iterable[str], log: int) -> None:
+    path = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
+    done = subprocess.run([*words], stdout=log, stderr=log, env={**os.environ, "PATH": path})
+    if done.returncode:
+        name = os.readlink(f"/proc/self/fd/{log}")
+        raise Unusable(f"the image could not be built; the end of {name} says why")
+
+
+def _mmdebstrap(arch: str) -> list[str]:
+    """An ordinary user needs a user namespace, and uidmap's programs for it."""
+    if os.geteuid() != 0:
+        needed({"newuidmap": "uidmap"})
+    packages = [*PACKAGES, *(f"linux-{part}-{KERNEL}-{arch}" for part in ("binary", "modules"))]
+    return [
+        "mmdebstrap",
+        f"--mode={'unshare' if os.geteuid() else 'root'}",
+        f"--architectures={arch}",
+        "--variant=apt",
+        f"--include={','.join(packages)}",
+        '--aptopt=Apt::Install-Recommends "false"',
+        *(f"--dpkgopt=path-exclude=/{folder}/*" for folder in LEFT_OUT),
+        "--dpkgopt=path-exclude=/usr/lib/modules/*/kernel/*",
+        *(f"--dpkgopt=path-include=/usr/lib/modules/*/kernel/{name}*" for name in MODULES),
+    ]
+
+
+def _sources() -> list[str]:
+    return [f"deb {MIRROR} {suite} main" for suite in SUITES]

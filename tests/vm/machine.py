@@ -1,0 +1,144 @@
+"""QEMU with our image: boot, run a check. KVM where it really boots, else TCG.
+
+Under TCG the machine's clock counts instructions, one a nanosecond (`-icount shift=0`): times that are
+measured inside are those of a core of 1,000 MIPS, however busy the host is.
+"""
+
+import json
+import os
+import socket
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from tests.vm.image import Image, Unusable, needed
+
+PROBE_S: Final = 10.0
+BOOT_S: Final = 600.0
+ANSWER_S: Final = 1200.0
+"""Far above what is needed: both are of the host's time, and it may be busy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arch:
+    """What QEMU wants for an architecture. `tcg`: with instructions counted."""
+
+    program: str
+    package: str
+    machine: tuple[str, ...]
+    tcg: tuple[str, ...]
+    console: str
+
+
+COUNTED: Final = ("-accel", "tcg", "-icount", "shift=0")
+ARCHS: Final = {
+    "amd64": Arch(
+        "qemu-system-x86_64",
+        "qemu-system-x86",
+        ("-M", "q35"),
+        (*COUNTED, "-cpu", "max"),
+        "ttyS0",
+    ),
+}
+KVM: Final = ("-accel", "kvm", "-cpu", "host")
+
+
+def accelerated(arch: str, image: Image) -> bool:
+    """Whether KVM boots this kernel here: a device that can be opened may hang all the same."""
+    if not os.access("/dev/kvm", os.R_OK | os.W_OK):
+        return False
+    found = ARCHS[arch]
+    console = f"console={found.console} earlyprintk=serial panic=-1 rdinit=/bin/busybox"
+    words = [found.program, *found.machine, *KVM, "-m", "512", "-nodefaults", "-no-user-config"]
+    words += ["-display", "none", "-no-reboot", "-serial", "stdio", *_kernel(image, console)]
+    try:
+        done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, timeout=PROBE_S)
+    except subprocess.TimeoutExpired:
+        return False
+    return b"Run /bin/busybox" in done.stdout
+
+
+def _kernel(image: Image, words: str) -> list[str]:
+    return ["-kernel", str(image.kernel), "-initrd", str(image.ram_disk), "-append", words]
+
+
+class Machine:
+    """A running machine. Its disk forgets everything when it ends.
+
+    `shared`: folders by their 9p tags. `folder`: where the console is kept, and the checks' socket.
+    """
+
+    def __init__(
+        self, arch: str, image: Image, kvm: bool, shared: dict[str, Path], folder: Path
+    ) -> None:
+        found = ARCHS[arch]
+        needed({found.program: found.package})
+        self._socket = folder / "checks.sock"
+        self._socket.unlink(missing_ok=True)
+        words = f"console={found.console} systemd.mask=serial-getty@{found.console}.service"
+        command = [found.program, *found.machine, *(KVM if kvm else found.tcg), "-m", "1024"]
+        command += ["-nodefaults", "-no-user-config", "-display", "none", "-nic", "none"]
+        command += ["-rtc", "base=utc,clock=vm", "-serial", f"file:{folder / 'console.log'}"]
+        command += ["-drive", f"file={image.root},format=raw,if=virtio,snapshot=on"]
+        command += [
+            "-chardev",
+            f"socket,id=checks,path={self._socket},server=on,wait=off",
+        ]
+        command += [
+            "-device",
+            "virtio-serial",
+            "-device",
+            "virtserialport,chardev=checks,name=checks",
+        ]
+        for tag, path in shared.items():
+            command += [
+                "-virtfs",
+                f"local,path={path},mount_tag={tag},security_model=none,readonly=on",
+            ]
+        self._process = subprocess.Popen([*command, *_kernel(image, words)])
+        self._port = self._connect()
+        self._lines = self._port.makefile("rb")
+        self.booted()
+
+    def booted(self) -> None:
+        """Wait until the machine says that it is up."""
+        self._port.settimeout(BOOT_S)
+        while "booted" not in self._heard():
+            continue
+
+    def check(self, name: str) -> dict[str, Any]:
+        """Run one check; how it ended."""
+        self._port.settimeout(ANSWER_S)
+        self._port.sendall(name.encode() + b"\n")
+        return self._heard()
+
+    def close(self) -> None:
+        """End it. May be called twice."""
+        self._process.kill()
+        self._process.wait()
+        self._port.close()
+
+    def _heard(self) -> dict[str, Any]:
+        try:
+            line = self._lines.readline()
+        except TimeoutError:
+            line = b""
+        if not line:
+            raise Unusable("the machine is silent: the end of console.log may say why")
+        heard: dict[str, Any] = json.loads(line)
+        return heard
+
+    def _connect(self) -> socket.socket:
+        deadline = time.monotonic() + PROBE_S
+        connected = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        while True:
+            try:
+                connected.connect(str(self._socket))
+            except OSError as error:
+                if self._process.poll() is not None or time.monotonic() > deadline:
+                    raise Unusable(f"QEMU has not started: {error}") from error
+                time.sleep(0.1)
+            else:
+                return connected
