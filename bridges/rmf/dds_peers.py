@@ -3,7 +3,7 @@
 import re
 import threading
 from collections.abc import Hashable
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 from cyclonedds import builtin
 from cyclonedds.core import InstanceState
@@ -18,8 +18,6 @@ TYPE: Final = re.compile(r"(\w+)::msg::dds_::(\w+)_")
 """A message's name, as ROS writes it in DDS."""
 
 _reading = threading.Lock()
-"""cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*). Only one
-thread at a time may do so, or an end gets another's user data: a process may have several nodes."""
 
 
 class _State(Protocol):
@@ -36,17 +34,31 @@ class _End(Protocol):
     sample_info: _State
 
 
+class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TID251
+    """Reads what participants and their ends announce, one thread of the process at a time.
+
+    cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*): where two
+    threads read at once, an end gets another's user data. A process may have several nodes.
+    """
+
+    def take(self, count: int) -> list[Any]:
+        """At most so many of what was announced since."""
+        with _reading:
+            taken: list[Any] = super().take(count)
+        return taken
+
+
 class DdsPeers:
     """Reads DDS's own topics, on which each end is announced, and tells `peers`."""
 
     def __init__(self, peers: Peers) -> None:
         self._peers = peers
-        self._readers: list[tuple[bool, builtin.BuiltinDataReader]] = []
+        self._readers: list[tuple[bool, BuiltinReader]] = []
 
-    def join(self, participant: DomainParticipant) -> list[builtin.BuiltinDataReader]:
+    def join(self, participant: DomainParticipant) -> list[BuiltinReader]:
         """Begin anew; the readers are the caller's to wait for and to delete."""
         topics = (builtin.BuiltinTopicDcpsSubscription, builtin.BuiltinTopicDcpsPublication)
-        readers = [builtin.BuiltinDataReader(participant, topic) for topic in topics]
+        readers = [BuiltinReader(participant, topic) for topic in topics]
         self._readers = list(enumerate(readers))  # type: ignore[arg-type]
         self._peers.clear()
         return readers
@@ -55,17 +67,11 @@ class DdsPeers:
         """Take what was announced since; False if nothing was."""
         news = False
         for publishes, reader in self._readers:
-            while samples := self._announced(reader):
+            while samples := reader.take(AT_ONCE):
                 news = True
                 for sample in samples:
                     self._take(sample, bool(publishes))
         return news
-
-    @staticmethod
-    def _announced(reader: builtin.BuiltinDataReader) -> list[_End]:
-        with _reading:
-            taken: list[_End] = reader.take(AT_ONCE)
-        return taken
 
     def _take(self, sample: _End, publishes: bool) -> None:
         if sample.sample_info.instance_state != InstanceState.Alive:

@@ -4,6 +4,7 @@ from typing import Any
 
 from cyclonedds import builtin
 
+from bridges.rmf.dds_peers import BuiltinReader
 from bridges.rmf.topics import Topic
 from tests.waiting import wait_until
 
@@ -16,7 +17,7 @@ def seen(observer: Any, kind: Any, topic: Topic[Any]) -> Any:
     found: list[Any] = []
 
     def look() -> bool:
-        reader = builtin.BuiltinDataReader(observer, kind)  # a new one sees who is there now
+        reader = BuiltinReader(observer, kind)  # a new one sees who is there now
         found[:] = [end for end in reader.take(100) if end.topic_name == f"rt/{topic.name}"]
         return len(found) == 1
 

@@ -15,6 +15,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf import graph
 from bridges.rmf.cyclone import LOOPBACK
 from bridges.rmf.dds import DdsTransport
+from bridges.rmf.dds_peers import BuiltinReader
 from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import TransportError
 from tests.rmf import peer
@@ -92,7 +93,7 @@ def test_the_node_and_its_ends_stand_on_the_ros_graph(join_dds: Join, observer: 
     assert (entry.node_namespace, participant) == ("/", states.participant_key.bytes)
     assert [bytes(gid.data) for gid in entry.writer_gid_seq] == [states.key.bytes]
     assert [bytes(gid.data) for gid in entry.reader_gid_seq] == [requests.key.bytes]
-    participants = builtin.BuiltinDataReader(observer, builtin.BuiltinTopicDcpsParticipant)
+    participants = BuiltinReader(observer, builtin.BuiltinTopicDcpsParticipant)
     enclaves = {one.key.bytes: one.qos[Policy.Userdata] for one in participants.take(50)}
     assert enclaves[participant].data == b"enclave=/;"
 
