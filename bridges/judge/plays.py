@@ -1,5 +1,6 @@
 """What is played for a lift, a door and a charger, when it may be, and how it is left."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
@@ -41,7 +42,7 @@ def busy(state: words.Stated) -> str:
     return "" if idle else f"{shown(words.device(state))} is not idle: {words.described(state)}"
 
 
-class Performance:
+class Performance(ABC):
     """A play, its topics, and its end. `speaks`: where we publish; `sole`: of those, where nobody else
     may, because two opinions are no test. `leave` is called each REPEAT_S after the play, however it
     ended, until `left`."""
@@ -81,14 +82,14 @@ class Performance:
         """When it is."""
         return self.play.wake_at()
 
+    @abstractmethod
     def leave(self, now: float) -> list[Said]:
         """Let go of the device."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def left(self) -> bool:
         """It is let go."""
-        raise NotImplementedError
 
 
 class Ride(Performance):

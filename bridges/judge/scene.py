@@ -4,6 +4,7 @@ A scene takes messages and decides nothing; laws read it. What all three kinds h
 the pace of states, their stamps, and what followed a request.
 """
 
+from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import replace
 from typing import ClassVar, Final, Generic, TypeVar
@@ -36,7 +37,7 @@ def keep(known: dict[str, V], key: str, value: V) -> None:
         del known[next(iter(known))]
 
 
-class Scene(Generic[T]):
+class Scene(ABC, Generic[T]):
     """One device. Times are those of what was heard (s).
 
     `news`: the message taken last, None when only time has passed. `state`, `before`: the two latest
@@ -77,13 +78,13 @@ class Scene(Generic[T]):
         """It is later, and nothing was heard."""
         self.now, self.news = now, None
 
+    @abstractmethod
     def take_other(self, heard: Heard) -> bool:
         """Take what is no state."""
-        raise NotImplementedError
 
+    @abstractmethod
     def settle(self, state: T) -> None:
         """Note what the new state means; `before` and `state` are set."""
-        raise NotImplementedError
 
     def forget(self) -> None:
         """A silence is over: what was under way may have ended in it."""

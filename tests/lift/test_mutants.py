@@ -1,5 +1,6 @@
 """What a mutation run found that no story had told: texts, wake times, names, the edge of an age."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -332,6 +333,17 @@ def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_anew() -> Non
     assert history(reset_at=17.0) == [*before, (17.0, True, []), (22.0, False, [failed])]
 
 
+def calls_and_holds(
+    alone: Alone, readings: Sequence[tuple[float, LiftSample]]
+) -> list[tuple[float, str | None, Side | None]]:
+    """(s, landing that is called, door that is held) after each reading, while a robot asks."""
+    shown = []
+    for now, reading in readings:
+        outputs = alone(now, reading, ASKED).decision.outputs
+        shown.append((now, outputs.call, outputs.hold_door))
+    return shown
+
+
 def test_a_car_that_a_call_has_brought_is_not_called_again_because_its_floor_is_not_seen() -> None:
     """With `by_call`, while AGV mode is on: only a car that is seen elsewhere is called again."""
     alone = Alone(by_call=True)
@@ -344,12 +356,8 @@ def test_a_car_that_a_call_has_brought_is_not_called_again_because_its_floor_is_
         (2.0, replace(CLOSED, level=None)),
         (9.0, replace(CLOSED, level=None)),
     ]
-    shown = []
     alone(0.0, ASKED)
-    for now, reading in readings:
-        outputs = alone(now, reading, ASKED).decision.outputs
-        shown.append((now, outputs.call, outputs.hold_door))
-    assert shown == [
+    assert calls_and_holds(alone, readings) == [
         (0.0, "L1", None),
         (0.5, "L1", None),
         (1.0, None, None),
@@ -374,11 +382,7 @@ def test_a_car_that_stands_there_is_called_again_when_agv_mode_has_ended_without
         (4.0, CLOSED),
         (4.5, CLOSED),
     ]
-    shown = []
-    for now, reading in readings:
-        outputs = alone(now, reading, ASKED).decision.outputs
-        shown.append((now, outputs.call, outputs.hold_door))
-    assert shown == [
+    assert calls_and_holds(alone, readings) == [
         (0.0, "L1", None),
         (0.5, "L1", None),
         (1.0, None, None),

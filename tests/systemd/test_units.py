@@ -65,19 +65,14 @@ def test_no_shipped_file_needs_a_service_that_is_more_exposed_than_this(
 
 
 @needs_systemd
-def test_the_recorder_is_less_exposed_than_any_daemon(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("service", "most"), [(RECORDER, 1.0), (PAGE, 1.5)])
+def test_the_recorder_and_the_page_are_less_exposed_than_any_daemon(
+    tmp_path: Path, service: Path, most: float
+) -> None:
     units = tmp_path / "etc/systemd/system"
     units.mkdir(parents=True)
-    shutil.copy(RECORDER, units)
-    assert exposure(tmp_path, RECORDER.name) <= 1.0
-
-
-@needs_systemd
-def test_the_page_is_less_exposed_than_any_daemon(tmp_path: Path) -> None:
-    units = tmp_path / "etc/systemd/system"
-    units.mkdir(parents=True)
-    shutil.copy(PAGE, units)
-    assert exposure(tmp_path, PAGE.name) <= 1.5
+    shutil.copy(service, units)
+    assert exposure(tmp_path, service.name) <= most
 
 
 @needs_systemd

@@ -74,12 +74,17 @@ def test_the_timeline_of_a_device_grows(
     shot("device")
 
 
-def test_without_a_login_nothing_can_be_done(
-    tab: Page, address: str, graph: Graph, until: Until
-) -> None:
+def see_lift_held(tab: Page, address: str, graph: Graph, until: Until) -> None:
+    """fleet/robot has a lift, and the site shows it."""
     graph.lift("Lift1", "L1", 2, "fleet/robot")
     tab.goto(address)
     until(lambda: "fleet/robot" in card(tab, "Lift1"), "the lift")
+
+
+def test_without_a_login_nothing_can_be_done(
+    tab: Page, address: str, graph: Graph, until: Until
+) -> None:
+    see_lift_held(tab, address, graph, until)
     tab.goto(f"{address}lift/Lift1")
     until(lambda: tab.locator("article.card").count() == 1, "its card")
     assert tab.get_by_role("button", name="Release").count() == 0
@@ -95,9 +100,7 @@ def test_a_wrong_password_is_refused(tab: Page, address: str, complaints: list[s
 def test_who_has_logged_in_is_asked_once_more_and_releases_a_lift(
     tab: Page, context: BrowserContext, address: str, graph: Graph, until: Until
 ) -> None:
-    graph.lift("Lift1", "L1", 2, "fleet/robot")
-    tab.goto(address)
-    until(lambda: "fleet/robot" in card(tab, "Lift1"), "the lift")
+    see_lift_held(tab, address, graph, until)
     log_in(tab, address, PASSWORD)
     until(lambda: tab.get_by_role("button", name="Release the lift").count() == 1, "the button")
     tab.get_by_role("button", name="Release the lift").click()
@@ -115,10 +118,8 @@ def test_who_has_logged_in_is_asked_once_more_and_releases_a_lift(
 def test_axe_finds_no_serious_fault(
     tab: Page, address: str, graph: Graph, until: Until, path: str, scheme: str
 ) -> None:
-    graph.lift("Lift1", "L1", 2, "fleet/robot")
     tab.emulate_media(color_scheme="dark" if scheme == "dark" else "light")
-    tab.goto(address)
-    until(lambda: "fleet/robot" in card(tab, "Lift1"), "the lift")
+    see_lift_held(tab, address, graph, until)
     tab.goto(address + path)
     until(lambda: tab.locator("h1").count() == 1, "the page")
     assert serious_faults(tab) == []
@@ -151,9 +152,7 @@ def test_on_a_phone_nothing_is_wider_than_the_screen(
 def test_everything_can_be_reached_by_keyboard_and_the_focus_is_seen(
     tab: Page, address: str, graph: Graph, until: Until
 ) -> None:
-    graph.lift("Lift1", "L1", 2, "fleet/robot")
-    tab.goto(address)
-    until(lambda: "fleet/robot" in card(tab, "Lift1"), "the lift")
+    see_lift_held(tab, address, graph, until)
     reached = []
     for _ in range(6):
         tab.keyboard.press("Tab")

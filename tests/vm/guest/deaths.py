@@ -1,14 +1,16 @@
 """Deaths of a daemon whose relays are on. "Off" is a write that the kernel has traced."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from tests.vm.guest import header
-from tests.vm.guest.rides import LIFT, energise
+from tests.vm.guest.rides import energise
 from tests.vm.guest.system import (
     Wrong,
     back,
     cursor,
     journal,
+    kill,
     pid,
     sh,
     shown,
@@ -21,11 +23,47 @@ KILLED_S, STOPPED_S = 1.0, 4.0
 """What docs/reliability.md promises of a core of 1,000 MIPS."""
 
 
-def _off_after(began: float, when: float, within_s: float) -> float:
-    """How long after `when` (s) the last of the relays that were on was written off."""
-    relays = {line: LIFT[line] for line in header.on(LIFT, began)}
-    if not relays:
-        relays = {each.line: True for each in header.writes(began) if each.level}
+def kill_9() -> str:
+    """kill -9, two relays on: off, and the service is back."""
+    return _dies(lambda: kill(SERVICE, "KILL"))
+
+
+def hang() -> str:
+    """SIGSTOP, two relays on: the watchdog ends it; off, and the service is back."""
+    return _dies(lambda: kill(SERVICE, "STOP"), STOPPED_S)
+
+
+def crash() -> str:
+    """A crash in C code (SIGSEGV by the kernel), two relays on: off, and the service is back."""
+    return _dies(lambda: kill(SERVICE, "SEGV"))
+
+
+def out_of_memory() -> str:
+    """The unit's memory is used up, two relays on: off, and the service is back."""
+    limit = Path(f"/sys/fs/cgroup{shown(SERVICE, 'ControlGroup')['ControlGroup']}/memory.max")
+    before = limit.read_text()
+
+    def starve() -> None:
+        limit.write_text("4M")  # the kernel returns when it has killed
+        limit.write_text(before)
+
+    found = _dies(starve)
+    sh("journalctl", "-k", "--no-hostname", "-g", "Memory cgroup out of memory")
+    return found
+
+
+def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> str:
+    """`act` ends the daemon while two relays are on."""
+    relays, old = energise(), pid(SERVICE)
+    when = header.now()
+    act()
+    took = _off_after(relays, when, within_s)
+    back(SERVICE, old)
+    return f"off after {took:.2f} s"
+
+
+def _off_after(relays: Mapping[int, bool], when: float, within_s: float) -> float:
+    """How long after `when` (s) the last of these relays was written off."""
     found = until(lambda: _all_off(relays, when), "each relay is written off", 30.0)
     took = max(found.values()) - when
     if took > within_s:
@@ -33,62 +71,18 @@ def _off_after(began: float, when: float, within_s: float) -> float:
     return took
 
 
-def _all_off(relays: dict[int, bool], when: float) -> dict[int, float]:
+def _all_off(relays: Mapping[int, bool], when: float) -> dict[int, float]:
     found = header.off_at(relays, when)
     return found if found.keys() == relays.keys() else {}
 
 
-def kill_9() -> str:
-    """kill -9, two relays on: off, and the service is back."""
-    began, old = energise(), pid(SERVICE)
-    when = header.now()
-    sh("systemctl", "kill", "-s", "KILL", "--kill-whom=main", SERVICE)
-    took = _off_after(began, when, KILLED_S)
-    back(SERVICE, old)
-    return f"off after {took:.2f} s"
-
-
-def hang() -> str:
-    """SIGSTOP, two relays on: the watchdog ends it; off, and the service is back."""
-    began, old = energise(), pid(SERVICE)
-    when = header.now()
-    sh("systemctl", "kill", "-s", "STOP", "--kill-whom=main", SERVICE)
-    took = _off_after(began, when, STOPPED_S)
-    back(SERVICE, old)
-    return f"off after {took:.2f} s"
-
-
-def crash() -> str:
-    """A crash in C code (SIGSEGV by the kernel), two relays on: off, and the service is back."""
-    began, old = energise(), pid(SERVICE)
-    when = header.now()
-    sh("systemctl", "kill", "-s", "SEGV", "--kill-whom=main", SERVICE)
-    took = _off_after(began, when, KILLED_S)
-    back(SERVICE, old)
-    return f"off after {took:.2f} s"
-
-
-def out_of_memory() -> str:
-    """The unit's memory is used up, two relays on: off, and the service is back."""
-    began, old = energise(), pid(SERVICE)
-    limit = Path(f"/sys/fs/cgroup{shown(SERVICE, 'ControlGroup')['ControlGroup']}/memory.max")
-    before = limit.read_text()
-    when = header.now()
-    limit.write_text("4M")  # the kernel returns when it has killed
-    limit.write_text(before)
-    took = _off_after(began, when, KILLED_S)
-    back(SERVICE, old)
-    sh("journalctl", "-k", "--no-hostname", "-g", "Memory cgroup out of memory")
-    return f"off after {took:.2f} s"
-
-
 def clean_stop() -> str:
     """`systemctl stop`, two relays on: off by the daemon; `outputs-off` has nothing to do."""
-    began, mark = energise(), cursor()
+    relays, mark = energise(), cursor()
     when = header.now()
     sh("systemctl", "stop", SERVICE)
     stopped = header.now() - when
-    took = _off_after(began, when, KILLED_S)
+    took = _off_after(relays, when, KILLED_S)
     text = journal(mark, SERVICE)
     if "nothing_to_switch_off" not in text:
         raise Wrong("outputs-off ran once more")

@@ -7,7 +7,7 @@ lets an output fall when its line is released, so a level proves nothing after a
 import re
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -15,9 +15,9 @@ from typing import Final
 
 CONFIGFS: Final = Path("/sys/kernel/config/gpio-sim/header")
 TRACING: Final = Path("/sys/kernel/tracing")
-LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-bcm2711": 58, "pinctrl-rp1": 54}
-"""Chips of the header, and their lines: Raspberry Pi 3 and older, 4, 5."""
-PI_4: Final = "pinctrl-bcm2711"
+LABEL: Final = "pinctrl-bcm2711"
+LINES: Final = 58
+"""Of the chip of a Raspberry Pi 4."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,16 +32,16 @@ class Write:
 def main() -> int:
     """At boot: watch first, so that no write is missed."""
     watch()
-    plug(PI_4)
+    plug()
     return 0
 
 
-def plug(label: str) -> None:
+def plug() -> None:
     """Make the chip."""
     bank = CONFIGFS / "bank0"
     bank.mkdir(parents=True)
-    (bank / "num_lines").write_text(str(LABELS[label]))
-    (bank / "label").write_text(label)
+    (bank / "num_lines").write_text(str(LINES))
+    (bank / "label").write_text(LABEL)
     (CONFIGFS / "live").write_text("1")
 
 
@@ -92,9 +92,9 @@ def _traced() -> Iterator[Write]:
 
 def _base() -> int:
     """The number that the kernel's trace gives to the chip's first line."""
-    label = (CONFIGFS / "bank0/label").read_text()
     chips = Path("/sys/class/gpio").glob("gpiochip*")
-    return next(int((c / "base").read_text()) for c in chips if (c / "label").read_text() == label)
+    ours = (c for c in chips if (c / "label").read_text().strip() == LABEL)
+    return next(int((c / "base").read_text()) for c in ours)
 
 
 def on(lines: dict[int, bool], since: float = 0.0) -> dict[int, float]:
@@ -103,7 +103,7 @@ def on(lines: dict[int, bool], since: float = 0.0) -> dict[int, float]:
     return {n: last[n].at for n, high in lines.items() if n in last and last[n].level == high}
 
 
-def off_at(lines: dict[int, bool], after: float) -> dict[int, float]:
+def off_at(lines: Mapping[int, bool], after: float) -> dict[int, float]:
     """When each of these lines was first written off after that time (monotonic s)."""
     found: dict[int, float] = {}
     for each in writes(after):

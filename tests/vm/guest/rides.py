@@ -13,9 +13,9 @@ def send(*words: str) -> str:
     return sh("rmf-bridge", "send", *words, *ROOM)
 
 
-def energise() -> float:
-    """A session of the lift holds two relays; returns the time before that."""
+def energise() -> dict[int, bool]:
+    """A session of the lift holds two relays; returns their lines, each with its level for on."""
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
     until(lambda: len(header.on(LIFT, began)) == 2, "two relays are on")
-    return began
+    return {line: LIFT[line] for line in header.on(LIFT, began)}

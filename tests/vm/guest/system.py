@@ -70,6 +70,11 @@ def ready_s(service: str) -> float:
     return (ready - began) / 1e6
 
 
+def kill(service: str, name: str) -> None:
+    """Send this signal to its main process alone."""
+    sh("systemctl", "kill", "-s", name, "--kill-whom=main", service)
+
+
 def back(service: str, old: int) -> None:
     """Wait until another process of this service is ready."""
     until(lambda: pid(service) not in (0, old) and is_active(service), f"{service} is back")

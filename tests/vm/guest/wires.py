@@ -16,6 +16,7 @@ from tests.vm.guest.system import (
     enable,
     far_side,
     journal,
+    kill,
     pid,
     ready_s,
     sh,
@@ -121,8 +122,7 @@ def _fault_ends(what: str, breaks: Callable[[], object], mends: Callable[[], obj
 def _killed(name: str) -> str:
     service = unit(name)
     old, when = pid(service), time.monotonic()
-    kill = ("systemctl", "kill", "-s", "KILL", "--kill-whom=main", service)
-    took = _relay_off_at(name, lambda: sh(*kill)) - when
+    took = _relay_off_at(name, lambda: kill(service, "KILL")) - when
     back(service, old)
     if took > KILLED_S:
         raise Wrong(f"off after {took:.2f} s, more than {KILLED_S:g}")
