@@ -1,5 +1,6 @@
 """What is told of every sort of device: its states' coming and age, its daemons' faults, the story."""
 
+import sys
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -89,7 +90,7 @@ class Device:
     def tell(self, moment: Moment, text: str) -> None:
         """A line of the story."""
         self.told += 1
-        self.lines.append(Line(moment.at, moment.wall, label(text, 200)))
+        self.lines.append(Line(moment.at, moment.wall, sys.intern(label(text, 200))))
 
     def lines_since(self, at: float) -> tuple[Line, ...]:
         """The story from this time on."""

@@ -220,7 +220,7 @@ class Site:
         if device in self._last_at:
             drawing = self._drawings.get(device)
             if drawing is None:
-                drawing = self._drawings[device] = Drawing(_kind(device[0]), device[1])
+                drawing = self._drawings[device] = Drawing(_kind(device[0]), device[1], KEPT_S)
             drawing.take(heard)
             self._changed.add(device)
 
