@@ -97,6 +97,8 @@ def test_a_simulation_is_pressed_and_failed_and_each_deed_is_kept(
     until(lambda: "floor_bit0" in main(tab), "the wiring of the daemon beside the page")
     until(lambda: "SIMULATED" in main(tab), "the daemon's diagnostics")
     confirm(tab, "Press", until)
+    said = tab.locator(".q-notification")
+    assert said.evaluate("one => getComputedStyle(one).backgroundColor") == "rgb(0, 103, 76)"
     until(lambda: "fire" in tab.locator("article.card").inner_text().lower(), "the fire")
     until(lambda: now_of(tab, "fire_alarm").startswith("● asserted ("), "the contact itself")
     until(lambda: f"{USER}\tPress fire_alarm" in main(tab), "who did what")
@@ -107,8 +109,8 @@ def test_a_simulation_is_pressed_and_failed_and_each_deed_is_kept(
     confirm(tab, "Let it fail", until)
     until(lambda: len(deeds(folder)) == 3, "three deeds")
     assert deeds(folder) == [(USER, 0, "press"), (USER, 0, "press"), (USER, 0, "fail")]
-    said = re.findall(r"action user=(\w+) command=\"rmf-bridge (\w+) .* exit=(\d)", logged(folder))
-    assert said == [(USER, "press", "0"), (USER, "press", "0"), (USER, "fail", "0")]
+    told = re.findall(r"action user=(\w+) command=\"rmf-bridge (\w+) .* exit=(\d)", logged(folder))
+    assert told == [(USER, "press", "0"), (USER, "press", "0"), (USER, "fail", "0")]
 
 
 def test_what_the_driver_senses_is_seen_live(tab: Page, address: str, until: Until) -> None:
