@@ -255,12 +255,12 @@ def until(graph: Graph, tab: Page) -> Until:
 
 @pytest.fixture
 def shot(tab: Page) -> Shot:
-    """Keep pictures of what the tab shows: on a phone, a desk and a wall, by day and by night."""
+    """Keep pictures of what the tab shows: on a phone and on a wall, by day and by night."""
 
     def take(name: str) -> None:
         SHOTS.mkdir(parents=True, exist_ok=True)
         before = tab.viewport_size
-        for width, scheme in product((390, 1200, 1920), SCHEMES):
+        for width, scheme in product((390, 1920), SCHEMES):
             tab.emulate_media(color_scheme=scheme)
             tab.set_viewport_size({"width": width, "height": 800})
             tab.screenshot(path=str(SHOTS / f"{name}_{width}_{scheme}.png"), full_page=True)
