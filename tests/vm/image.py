@@ -113,6 +113,7 @@ def _build(arch: str, folder: Path) -> None:
             f"tar -C {tree} -xpf {archive} --exclude=./dev",
             f"mkdir {tree}/dev",
             f"cp -R {FILES}/. {tree}/",
+            f"chmod -R u+rX {tree}",  # /etc/gshadow may be read by nobody: mke2fs is not root
             f"chown -R 0:0 {tree}/etc",
             f"depmod -b {tree} {KERNEL}-{arch}",
             f"mke2fs -q -t ext4 -L root -d {tree} {folder}/root.ext4 {SIZE}",
