@@ -1,0 +1,60 @@
+"""What a boot does to relays. The host cuts the power, or lets the machine restart, in between."""
+
+from pathlib import Path
+
+from tests.vm.guest import header
+from tests.vm.guest.rides import LIFT, energise
+from tests.vm.guest.system import (
+    Wrong,
+    disable,
+    enable,
+    far_side,
+    is_active,
+    sh,
+    shown,
+    unit,
+    until,
+)
+
+SERVICE = unit("lift")
+LOW = 7
+"""The output of low.yaml: it is on at low."""
+STARTS = 10
+
+
+def energised() -> str:
+    """Two relays are on when the machine goes down."""
+    return f"lines {sorted(energise())}"
+
+
+def reboot() -> str:
+    """(the machine restarts in good order)"""
+    sh("systemctl", "reboot")
+    return "it does"
+
+
+def off() -> str:
+    """The machine is up again: no relay has been on since the kernel started."""
+    up = float(Path("/proc/uptime").read_text().split()[0])
+    until(lambda: is_active(SERVICE), "the service is ready")
+    writes = [each for each in header.writes() if each.line in LIFT]
+    on = [each for each in writes if each.level == LIFT[each.line]]
+    if on or {each.line for each in writes} != LIFT.keys():
+        raise Wrong(f"written on: {on}; written at all: {writes}")
+    ready = int(shown(SERVICE, "ActiveEnterTimestampMonotonic")["ActiveEnterTimestampMonotonic"])
+    far_side("lift")
+    first = min(each.at for each in writes)
+    return f"all written off at {first:.1f} s, ready at {ready / 1e6:.1f} s, looked at {up:.0f} s"
+
+
+def active_low() -> str:
+    """Ten starts with a relay that is on at low: never on, not for a moment."""
+    began = header.now()
+    service = enable("low")
+    for _ in range(STARTS - 1):
+        sh("systemctl", "restart", service)
+    disable("low")
+    levels = [each.level for each in header.writes(began) if each.line == LOW]
+    if 0 in levels or len(levels) < STARTS:
+        raise Wrong(f"{levels.count(0)} of {len(levels)} writes switched it on")
+    return f"{len(levels)} writes, all of them high"

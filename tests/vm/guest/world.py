@@ -1,0 +1,132 @@
+"""What happens around a service: its file, its disks, its clock, the kind of Pi."""
+
+import os
+import re
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+from tests.vm.guest import header
+from tests.vm.guest.rides import HELD, LIFT, energise, ride
+from tests.vm.guest.system import Wrong, back, far_side, is_active, kill, pid, sh, unit, until
+
+SERVICE = unit("lift")
+YAML = Path("/etc/rmf-bridges/lift.yaml")
+MOVED = {"BCM18": "BCM25", "BCM16": "BCM26"}
+"""Pins of the outputs that a session holds, and others that are free."""
+SYSRQ = Path("/proc/sysrq-trigger")
+
+
+def edited_yaml() -> str:
+    """The YAML gets other pins while two relays are on, then kill -9: the old pins are off."""
+    relays, old, text = energise(), pid(SERVICE), YAML.read_text()
+    YAML.write_text(re.sub("|".join(MOVED), lambda found: MOVED[found[0]], text))
+    when = header.now()
+    try:
+        kill(SERVICE, "KILL")
+        took = _off(relays, when) - when
+        back(SERVICE, old)
+        new = {each.line for each in header.writes(when)} & {25, 26}
+    finally:
+        YAML.write_text(text)
+        sh("systemctl", "restart", SERVICE)
+    if new != {25, 26}:
+        raise Wrong(f"of the new pins {new} are written")
+    return f"old pins off after {took:.2f} s, back with the new ones"
+
+
+def _off(relays: dict[int, bool], when: float) -> float:
+    """Wait until each of these lines has been written off since `when`; the last one's time."""
+    until(lambda: header.off_at(relays, when).keys() == relays.keys(), "each relay is off")
+    return max(header.off_at(relays, when).values())
+
+
+def full_run() -> str:
+    """/run is full, two relays on, kill -9: off; back as soon as there is room, or before."""
+    relays, old = energise(), pid(SERVICE)
+    filler = Path("/run/filler")
+    with filler.open("wb") as out:
+        room = os.statvfs("/run")
+        os.posix_fallocate(out.fileno(), 0, room.f_bavail * room.f_frsize)
+    when = header.now()
+    try:
+        kill(SERVICE, "KILL")
+        took = _off(relays, when) - when
+        time.sleep(10)
+        text = "back" if is_active(SERVICE) else "not back until there is room"
+    finally:
+        filler.unlink()
+    back(SERVICE, old)
+    return f"off after {took:.2f} s, {text}"
+
+
+def clock() -> str:
+    """The clock steps by ten years, forth, back and back, with two relays on: nothing moves."""
+    began = header.now()
+    energise()
+    old = pid(SERVICE)
+    for years in (10, -10, -10, 10):
+        sh("date", "-s", f"{years:+d} years")
+        time.sleep(4)
+        on = sorted(header.on(LIFT, began))
+        if on != HELD or pid(SERVICE) != old:
+            raise Wrong(f"{years:+d} years: on are {on}, the process was {old}: {pid(SERVICE)}")
+    return f"two relays stayed on, no restart; then {ride()}"
+
+
+def read_only_root() -> str:
+    """The root file system is read only: the service starts, serves, dies, and is off."""
+    sh("systemctl", "stop", SERVICE)
+    sh("journalctl", "--relinquish-var")
+    SYSRQ.write_text("u")  # whoever writes there, as when the kernel has seen a damaged disk
+    until(lambda: _options("/") >= {"ro"}, "the root is read only")
+    try:
+        sh("systemctl", "start", SERVICE)
+        until(lambda: is_active(SERVICE), "the service is ready")
+        found = ride()
+        relays, when = energise(), header.now()
+        kill(SERVICE, "KILL")
+        took = _off(relays, when) - when
+    finally:
+        sh("mount", "-o", "remount,rw", "/")
+        sh("journalctl", "--flush")
+    return f"a ride: {found}; killed, off after {took:.2f} s"
+
+
+def _options(mount: str) -> set[str]:
+    lines = (line.split() for line in Path("/proc/self/mounts").read_text().splitlines())
+    return next(set(words[3].split(",")) for words in lines if words[1] == mount)
+
+
+def labels() -> str:
+    """The header's chip is found by its label: Raspberry Pi 3, 4 and 5."""
+    sh("systemctl", "stop", SERVICE, "far-lift.service")
+    for label in (*header.LABELS, header.PI_4):
+        header.unplug()
+        header.plug(label)
+        sh("udevadm", "settle")
+        _claims(label, LIFT)
+    far_side("lift")
+    sh("systemctl", "start", SERVICE)
+    return ", ".join(header.LABELS)
+
+
+def _claims(label: str, lines: Iterable[int]) -> None:
+    """Start the service until it has written each output, and stop it."""
+    when = header.now()
+    sh("systemctl", "start", SERVICE)
+    written = {each.line for each in header.writes(when)}
+    sh("systemctl", "stop", SERVICE)
+    if not written.issuperset(lines):
+        raise Wrong(f"on {label} the service has written {sorted(written)}")
+
+
+def said() -> str:
+    """The journal is readable: a line for each event, key=value, no traceback."""
+    text = sh("journalctl", "-b", "-u", SERVICE, "-o", "cat", "-t", "rmf-bridge")
+    lines = text.splitlines()
+    if "Traceback" in text or not lines:
+        raise Wrong(f"{text.count('Traceback')} tracebacks in {len(lines)} lines")
+    events = sum(bool(re.match(r"[a-z_]+( [a-z_]+=\S|$)", line)) for line in lines)
+    longest = max(map(len, lines))
+    return f"{len(lines)} lines, {events} are event key=value, the longest has {longest} characters"
