@@ -21,7 +21,7 @@ help:
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
 	@echo "make test-vm  boot Debian 13 in QEMU (amd64 alone), install our package, and kill and hang it there"
-	@echo "             (a part: ONLY=deaths, ONLY=wires, ONLY=world)"
+	@echo "             (one of its machines: ONLY=lift, ONLY=site, ONLY=page)"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make man     the manual page, build/rmf-bridge.1"
 	@echo "make deb     Debian packages in dist/, for Debian 12 and 13 and Ubuntu 24.04, amd64 and arm64"

@@ -19,6 +19,7 @@ PARTS: Final = {
         "world.clock",
         "world.read_only_root",
         "world.labels",
+        "world.said",
         "boots.energised",
         CUT,
         "boots.off",
@@ -26,7 +27,6 @@ PARTS: Final = {
         REBOOT,
         "boots.off",
         "boots.active_low",
-        "world.said",
     ),
     "site": (
         *LIFT,

@@ -14,6 +14,7 @@ SERVICE = unit("lift")
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 MOVED = {"BCM18": "BCM25", "BCM16": "BCM26"}
 """Pins of the outputs that a session holds, and others that are free."""
+EVENT = re.compile(r"[a-z_]+( [a-z_]+=\S|$)")
 SYSRQ = Path("/proc/sysrq-trigger")
 
 
@@ -125,8 +126,6 @@ def said() -> str:
     """The journal is readable: a line for each event, key=value, no traceback."""
     text = sh("journalctl", "-b", "-u", SERVICE, "-o", "cat", "-t", "rmf-bridge")
     lines = text.splitlines()
-    if "Traceback" in text or not lines:
-        raise Wrong(f"{text.count('Traceback')} tracebacks in {len(lines)} lines")
-    events = sum(bool(re.match(r"[a-z_]+( [a-z_]+=\S|$)", line)) for line in lines)
-    longest = max(map(len, lines))
-    return f"{len(lines)} lines, {events} are event key=value, the longest has {longest} characters"
+    if others := [line for line in lines if not EVENT.match(line)]:
+        raise Wrong(f"{len(others)} of {len(lines)} lines: {others[0]}")
+    return f"{len(lines)} lines, the longest has {max(map(len, lines))} characters"
