@@ -16,8 +16,8 @@ from typing import Any, Final
 from tests.vm.image import Image, Unusable, needed
 
 PROBE_S: Final = 10.0
-BOOT_S: Final = 600.0
-ANSWER_S: Final = 1200.0
+BOOT_S: Final = 1800.0
+ANSWER_S: Final = 3600.0
 """Far above what is needed: both are of the host's time, and it may be busy."""
 
 

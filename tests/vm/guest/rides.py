@@ -28,7 +28,7 @@ def ride() -> str:
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
     send("lift", "Lift1", "L3", "--session", "vm/robot", "--direct")
-    held = sorted(header.on(LIFT, began))
+    held = sorted(header.on(LIFT))
     send("lift", "Lift1", "--end", "--session", "vm/robot", "--direct")
     until(lambda: not header.on(LIFT, began), "every output is off after the session")
     called = [each.line for each in header.writes(began) if each.level and each.line in (22, 24)]
