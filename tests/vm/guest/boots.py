@@ -4,8 +4,6 @@ from tests.vm.guest import header
 from tests.vm.guest.rides import LIFT, energise
 from tests.vm.guest.system import (
     Wrong,
-    disable,
-    enable,
     far_side,
     is_active,
     sh,
@@ -42,16 +40,3 @@ def off() -> str:
     far_side("lift")
     first = min(each.at for each in writes)
     return f"all written off {first:.1f} s after the kernel's start, ready at {ready / 1e6:.1f} s"
-
-
-def active_low() -> str:
-    """Ten starts with a relay that is on at low: never on, not for a moment."""
-    began = header.now()
-    service = enable("low")
-    for _ in range(STARTS - 1):
-        sh("systemctl", "restart", service)
-    disable("low")
-    levels = [each.level for each in header.writes(began) if each.line == LOW]
-    if 0 in levels or len(levels) < STARTS:
-        raise Wrong(f"{levels.count(0)} of {len(levels)} writes switched it on")
-    return f"{len(levels)} writes, all of them high"

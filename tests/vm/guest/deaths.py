@@ -10,7 +10,6 @@ from tests.vm.guest.system import (
     back,
     cursor,
     journal,
-    keep,
     kill,
     pid,
     sh,
@@ -26,19 +25,17 @@ KILLED_S, STOPPED_S = 1.0, 4.0
 
 def kill_9() -> str:
     """kill -9, two relays on: off, and the service is back."""
-    took = _dies(lambda: kill(SERVICE, "KILL"))
-    keep("lift", took)
-    return f"off after {took:.2f} s"
+    return _dies(lambda: kill(SERVICE, "KILL"))
 
 
 def hang() -> str:
     """SIGSTOP, two relays on: the watchdog ends it; off, and the service is back."""
-    return f"off after {_dies(lambda: kill(SERVICE, 'STOP'), STOPPED_S):.2f} s"
+    return _dies(lambda: kill(SERVICE, "STOP"), STOPPED_S)
 
 
 def crash() -> str:
     """A crash in C code (SIGSEGV by the kernel), two relays on: off, and the service is back."""
-    return f"off after {_dies(lambda: kill(SERVICE, 'SEGV')):.2f} s"
+    return _dies(lambda: kill(SERVICE, "SEGV"))
 
 
 def out_of_memory() -> str:
@@ -50,19 +47,19 @@ def out_of_memory() -> str:
         limit.write_text("4M")  # the kernel returns when it has killed
         limit.write_text(before)
 
-    took = _dies(starve)
+    found = _dies(starve)
     sh("journalctl", "-k", "--no-hostname", "-g", "Memory cgroup out of memory")
-    return f"off after {took:.2f} s"
+    return found
 
 
-def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> float:
-    """`act` ends the daemon while two relays are on; how long until they were off (s)."""
+def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> str:
+    """`act` ends the daemon while two relays are on."""
     relays, old = energise(), pid(SERVICE)
     when = header.now()
     act()
     took = _off_after(relays, when, within_s)
     back(SERVICE, old)
-    return took
+    return f"off after {took:.2f} s"
 
 
 def _off_after(relays: Mapping[int, bool], when: float, within_s: float) -> float:

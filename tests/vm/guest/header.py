@@ -15,9 +15,9 @@ from typing import Final
 
 CONFIGFS: Final = Path("/sys/kernel/config/gpio-sim/header")
 TRACING: Final = Path("/sys/kernel/tracing")
-LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-bcm2711": 58, "pinctrl-rp1": 54}
-"""Chips of the header, and their lines: Raspberry Pi 3 and older, 4, 5."""
-PI_4: Final = "pinctrl-bcm2711"
+LABEL: Final = "pinctrl-bcm2711"
+LINES: Final = 58
+"""Of the chip of a Raspberry Pi 4."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,25 +32,17 @@ class Write:
 def main() -> int:
     """At boot: watch first, so that no write is missed."""
     watch()
-    plug(PI_4)
+    plug()
     return 0
 
 
-def plug(label: str) -> None:
+def plug() -> None:
     """Make the chip."""
     bank = CONFIGFS / "bank0"
     bank.mkdir(parents=True)
-    (bank / "num_lines").write_text(str(LABELS[label]))
-    (bank / "label").write_text(label)
+    (bank / "num_lines").write_text(str(LINES))
+    (bank / "label").write_text(LABEL)
     (CONFIGFS / "live").write_text("1")
-
-
-def unplug() -> None:
-    """Take it away."""
-    (CONFIGFS / "live").write_text("0")
-    (CONFIGFS / "bank0").rmdir()
-    CONFIGFS.rmdir()
-    _lines.cache_clear()
 
 
 @cache
@@ -100,9 +92,8 @@ def _traced() -> Iterator[Write]:
 
 def _base() -> int:
     """The number that the kernel's trace gives to the chip's first line."""
-    label = (CONFIGFS / "bank0/label").read_text().strip()
     chips = Path("/sys/class/gpio").glob("gpiochip*")
-    ours = (c for c in chips if (c / "label").read_text().strip() == label)
+    ours = (c for c in chips if (c / "label").read_text().strip() == LABEL)
     return next(int((c / "base").read_text()) for c in ours)
 
 

@@ -1,12 +1,9 @@
 """The package, and services made of YAMLs."""
 
 import grp
-import time
 from pathlib import Path
 
 from tests.vm.guest import header
-from tests.vm.guest.figures import pss_mb
-from tests.vm.guest.rides import energise
 from tests.vm.guest.system import (
     Wrong,
     enable,
@@ -82,60 +79,3 @@ def wrong_yaml() -> str:
     if (state, count) != ({"ActiveState": "failed", "ExecMainStatus": "78"}, 0):
         raise Wrong(f"{state}, {count} restarts")
     return "exit code 78, failed, 0 restarts"
-
-
-def page() -> str:
-    """The web page, a package of its own: started by systemd it answers, below its memory limit."""
-    install(_deb("rmf-bridges-page"))
-    began = time.monotonic()
-    sh("systemctl", "start", PAGE)
-    until(_answers, "the page answers")
-    took = time.monotonic() - began
-    memory = shown(PAGE, "MemoryPeak", "MemoryMax", "User", "NRestarts")
-    peak, most = int(memory["MemoryPeak"]) / 1e6, int(memory["MemoryMax"]) / 1e6
-    if peak >= most or (memory["User"], memory["NRestarts"]) != ("rmf-bridge-page", "0"):
-        raise Wrong(str(memory))
-    return (
-        f"answers after {took:.1f} s, {pss_mb(PAGE):.0f} MB (PSS), at most {peak:.0f} of {most:.0f}"
-    )
-
-
-def _answers() -> bool:
-    ask = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:8080', timeout=30).status)"
-    try:
-        return sh("python3", "-c", ask).strip() == "200"
-    except Wrong:
-        state = shown(PAGE, "ActiveState", "ExecMainStatus")
-        if state["ActiveState"] == "active":
-            return False
-        raise Wrong(f"the page has ended: {state}") from None
-
-
-def security() -> str:
-    """`systemd-analyze security` of each live unit: 2.0 or less."""
-    names = [unit(n) for n in ("lift", "door", "charger", "lift_supervisor")]
-    scores = {name: _score(name) for name in (*names, "rmf-bridge-recorder.service", PAGE)}
-    if too_exposed := {n: s for n, s in scores.items() if s > EXPOSED}:
-        raise Wrong(f"too exposed: {too_exposed}")
-    short = (f"{n.split('@')[-1].removesuffix('.service')} {s}" for n, s in scores.items())
-    return ", ".join(short)
-
-
-def _score(name: str) -> float:
-    text = sh("systemd-analyze", "security", "--no-pager", name)
-    return float(text.rpartition("Overall exposure level for ")[2].split()[1])
-
-
-def upgrade() -> str:
-    """The package is installed again, two relays on: they go off, each service is restarted."""
-    names = [unit(n) for n in ("lift", "door", "charger")]
-    before = {name: shown(name, "InvocationID") for name in names}
-    relays, when = energise(), header.now()
-    install(_deb("rmf-bridges"), "--reinstall")
-    for name in names:
-        until(lambda name=name: is_active(name), f"{name} is ready")  # type: ignore[misc]
-        if shown(name, "InvocationID") == before[name]:
-            raise Wrong(f"{name} was not restarted")
-    if header.off_at(relays, when).keys() != relays.keys():
-        raise Wrong(f"of {sorted(relays)} only {header.off_at(relays, when)} went off")
-    return "relays off, three services restarted and ready"

@@ -1,21 +1,18 @@
-"""What happens around a service: its file, its disks, its clock, the kind of Pi."""
+"""What happens around a service: its file, its disks."""
 
 import os
 import re
 import time
-from collections.abc import Iterable
 from pathlib import Path
 
 from tests.vm.guest import header
-from tests.vm.guest.rides import HELD, LIFT, energise, ride
-from tests.vm.guest.system import Wrong, back, far_side, is_active, kill, pid, sh, unit, until
+from tests.vm.guest.rides import energise
+from tests.vm.guest.system import Wrong, back, is_active, kill, pid, sh, unit, until
 
 SERVICE = unit("lift")
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 MOVED = {"BCM18": "BCM25", "BCM16": "BCM26"}
 """Pins of the outputs that a session holds, and others that are free."""
-EVENT = re.compile(r"[a-z_]+( [a-z_]+=\S|$)")
-SYSRQ = Path("/proc/sysrq-trigger")
 
 
 def edited_yaml() -> str:
@@ -59,73 +56,3 @@ def full_run() -> str:
         filler.unlink()
     back(SERVICE, old)
     return f"off after {took:.2f} s, {text}"
-
-
-def clock() -> str:
-    """The clock steps by ten years, forth, back and back, with two relays on: nothing moves."""
-    began = header.now()
-    energise()
-    old = pid(SERVICE)
-    for years in (10, -10, -10, 10):
-        sh("date", "-s", f"{years:+d} years")
-        time.sleep(4)
-        on = sorted(header.on(LIFT, began))
-        if on != HELD or pid(SERVICE) != old:
-            raise Wrong(f"{years:+d} years: on are {on}, the process was {old}: {pid(SERVICE)}")
-    return f"two relays stayed on, no restart; then {ride()}"
-
-
-def read_only_root() -> str:
-    """The root file system is read only: the service starts, serves, dies, and is off."""
-    sh("systemctl", "stop", SERVICE)
-    sh("journalctl", "--relinquish-var")
-    SYSRQ.write_text("u")  # whoever writes there, as when the kernel has seen a damaged disk
-    until(lambda: _options("/") >= {"ro"}, "the root is read only")
-    try:
-        sh("systemctl", "start", SERVICE)
-        until(lambda: is_active(SERVICE), "the service is ready")
-        found = ride()
-        relays, when = energise(), header.now()
-        kill(SERVICE, "KILL")
-        took = _off(relays, when) - when
-    finally:
-        sh("mount", "-o", "remount,rw", "/")
-        sh("journalctl", "--flush")
-    return f"a ride: {found}; killed, off after {took:.2f} s"
-
-
-def _options(mount: str) -> set[str]:
-    lines = (line.split() for line in Path("/proc/self/mounts").read_text().splitlines())
-    return next(set(words[3].split(",")) for words in lines if words[1] == mount)
-
-
-def labels() -> str:
-    """The header's chip is found by its label: Raspberry Pi 3, 4 and 5."""
-    sh("systemctl", "stop", SERVICE, "far-lift.service")
-    for label in (*header.LABELS, header.PI_4):
-        header.unplug()
-        header.plug(label)
-        sh("udevadm", "settle")
-        _claims(label, LIFT)
-    far_side("lift")
-    sh("systemctl", "start", SERVICE)
-    return ", ".join(header.LABELS)
-
-
-def _claims(label: str, lines: Iterable[int]) -> None:
-    """Start the service until it has written each output, and stop it."""
-    when = header.now()
-    sh("systemctl", "start", SERVICE)
-    written = {each.line for each in header.writes(when)}
-    sh("systemctl", "stop", SERVICE)
-    if not written.issuperset(lines):
-        raise Wrong(f"on {label} the service has written {sorted(written)}")
-
-
-def said() -> str:
-    """The journal is readable: a line for each event, key=value, no traceback."""
-    text = sh("journalctl", "-b", "-u", SERVICE, "-o", "cat", "-t", "rmf-bridge")
-    lines = text.splitlines()
-    if others := [line for line in lines if not EVENT.match(line)]:
-        raise Wrong(f"{len(others)} of {len(lines)} lines: {others[0]}")
-    return f"{len(lines)} lines, the longest has {max(map(len, lines))} characters"
