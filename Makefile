@@ -20,8 +20,8 @@ help:
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
-	@echo "make test-vm  boot Debian 13 in QEMU (amd64 alone), install our package, and kill and hang it there"
-	@echo "             (a part: ONLY=deaths, ONLY=wires, ONLY=world)"
+	@echo "make test-vm  boot Debian 13 in QEMU, install our package, and kill and hang it there (ARCH=arm64)"
+	@echo "             (one of its machines: ONLY=lift, ONLY=site)"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make man     the manual page, build/rmf-bridge.1"
 	@echo "make deb     Debian packages in dist/, for Debian 12 and 13 and Ubuntu 24.04, amd64 and arm64"
@@ -124,7 +124,6 @@ torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))
 
 # The package that was built last; it is built if there is none. The image is built once, in build/vm.
-# There is no machine for arm64 yet.
 ARCH ?= amd64
 test-vm: .venv/ready
 	@ls dist/*+deb13_$(ARCH).deb >/dev/null 2>&1 || $(MAKE) --no-print-directory deb ARCHS=$(ARCH) PYTHONS=3.13
