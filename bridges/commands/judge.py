@@ -195,7 +195,8 @@ def _live(args: argparse.Namespace, performance: Performance | None) -> int:
         with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
             live = Live(transport, args.kind, args.beside, performance)
             stage = Stage(Judge(args.kind, args.name), performance, args.for_s, live.strangers)
-            complain("judge", _begins(args, performance))
+            if sys.stderr.isatty():
+                complain("judge", _begins(args, performance))
             live.judge(stage)
     except TransportError as error:
         complain("judge", error)
