@@ -63,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
     except NoDevice as error:
         print(error, file=sys.stderr)
         return os.EX_USAGE
+    args.file = args.file.absolute()  # `guarded` changes to another directory
     end = signals.End()
     signals.ignore_reset()
     try:
@@ -134,14 +135,14 @@ def _on(
     inputs = [Input(w, tap.canonical(w.point)) for w in wires if w.direction == "in"]
     tried = steps(config, device)
     bench = Bench(driver_type.create(device, settings, tap), tap, inputs, tried, OFF[config.kind])
-    file, begun = args.file.absolute(), datetime.now()
+    begun = datetime.now()
     by = args.by or getpass.getuser()
 
     def note(how: str) -> None:
         signed.write(
             path,
             signed.told(
-                file,
+                args.file,
                 device,
                 by,
                 begun,

@@ -21,16 +21,26 @@ SCRIPT = f"""
 trap '' HUP INT QUIT TERM TSTP TTIN TTOU USR1 USR2
 read -r word
 [ "$word" = off ] && exit 0
-"$@"
-[ $? = {os.EX_UNAVAILABLE} ] && sleep 1 && "$@"
+pause=5
+again=
+while [ $pause -le 60 ]; do
+    "$@"
+    case $? in
+        1) sleep $pause; pause=$((pause + 5)) ;;
+        {os.EX_UNAVAILABLE}) [ "$again" ] && exit; again=yes; sleep 1 ;;
+        *) exit ;;
+    esac
+done
 """
-"""EX_UNAVAILABLE: the dead daemon's lock was not free yet; one more try."""
+"""`outputs-off` ends with 1 while hardware does not answer: it is tried for some minutes, ever more
+seldom, for nobody starts this daemon again. EX_UNAVAILABLE: the dead daemon's lock was not free yet, or
+another daemon serves now, which switches off what was left on: one more try."""
 
 
 def command(file: Path, runtime_dir: str | None) -> list[str]:
     """The command that switches off what this process may leave on."""
     given = ["--runtime-dir", os.path.abspath(runtime_dir)] if runtime_dir else []
-    return [sys.executable, "-m", "bridges.cli", "outputs-off", str(file.absolute()), *given]
+    return [sys.executable, "-P", "-m", "bridges.cli", "outputs-off", str(file.absolute()), *given]
 
 
 class Guard:

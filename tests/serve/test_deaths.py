@@ -178,6 +178,19 @@ def test_a_daemon_by_hand_that_is_killed_has_a_guard_that_switches_off(
     assert [path.name for path in (tmp_path / "run").glob("claimed-*")] == []
 
 
+def test_the_guard_tries_until_hardware_that_was_silent_at_the_death_answers(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    with daemon(module.file, tmp_path / "run") as running:
+        hold_open(module, graph, running)
+        module.hang()
+        running.end(signal.SIGKILL)
+        wait_until(lambda: "outputs_not_off" in running.log.read_text(), "a first try fails")
+        assert module.relay() == [True]
+        module.go_on()
+        _off(module)
+
+
 def test_the_guard_ends_with_a_daemon_that_ends_in_good_order(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:

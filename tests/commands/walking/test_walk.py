@@ -12,6 +12,7 @@ from bridges.serve.places import Places
 from bridges.serve.record import Records, of
 from bridges.settings.load import load
 from tests.commands.terminal import Terminal
+from tests.processes import running
 from tests.serve.site import Module, daemon, environment
 from tests.waiting import wait_until
 
@@ -66,6 +67,7 @@ def test_however_it_ends_the_output_goes_off(module: Module, tmp_path: Path, how
         os.kill(terminal.pid, signal.SIGKILL if how == "kill -9" else signal.SIGTERM)
     terminal.wait()
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
+    wait_until(lambda: running(tmp_path / "run") == [], "its guard has ended too")
     assert "| the door is open | not tried |" not in (tmp_path / "record.md").read_text()
 
 

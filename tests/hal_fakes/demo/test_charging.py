@@ -11,7 +11,8 @@ from bridges.rmf import definitions as d
 from hal_fakes.demo.charging import CHARGED, problems
 from hal_fakes.demo.journal import Journal
 from hal_fakes.wire import wire
-from tests.hal_fakes.demo.test_demo import PATIENTLY, directory, running
+from tests.hal_fakes.demo.test_demo import PATIENTLY, directory
+from tests.processes import running
 
 __all__ = ["directory"]
 

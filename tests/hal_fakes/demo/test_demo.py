@@ -4,13 +4,14 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from hal_fakes.demo.daemons import Daemon, Wrong, stop_all
 from hal_fakes.wire import Wire, runs_here, wire
+from tests.processes import running
 from tests.waiting import PATIENCE_S, wait_until
 
 CONFIG = Path(__file__).parents[3] / "config"
@@ -33,17 +34,6 @@ def demo(directory: Path, *options: str, on: Wire | None = None) -> Iterator[sub
     finally:
         process.terminate()
         process.communicate(timeout=PATIENCE_S)
-
-
-def running(directory: Path) -> list[str]:
-    """The command lines of all processes that were told of this directory."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        with suppress(OSError):  # it has just ended
-            line = path.read_bytes().decode(errors="replace")
-            if str(directory) in line:
-                found.append(line)
-    return found
 
 
 @pytest.fixture
