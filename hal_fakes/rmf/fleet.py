@@ -13,6 +13,8 @@ FleetUpdateHandle.cpp) and seen with Jazzy's:
    (branch jazzy, 7eef65a) knows no spots, and goes where ChargeBattery would, at each assignment too.
 3. A robot without a task shows the mode IDLE and no task id, also while it charges. WaitForCharge
    alone sets CHARGING, and nothing sets it back: every later task shows it too.
+4. An EasyFullControl adapter that starts forgets the assignments: it takes the retained one, and a
+   moment later the charger of its file in its place.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,6 +29,7 @@ EVERY_S: Final = 1.0
 RECHARGE_PERCENT: Final = 100.0
 RETREAT_PERCENT: Final = 12.0
 TOO_LATE_PERCENT: Final = 10.0
+IDLE: Final = d.RobotModeValue.MODE_IDLE
 Graph = Mapping[str, tuple[str, float, float]]
 """Waypoint -> level, x, y (m)."""
 Finishing = Literal["charge", "park", "nothing"]
@@ -103,6 +106,12 @@ class Fleet(Party):
     def rests(self, who: str, now: float) -> None:
         """Its task is over, and the fleet's finishing request begins."""
         self._rest(self.robots[who], now)
+
+    def starts_again(self, now: float) -> None:
+        """The adapter was killed and is up again: each robot has the charger of its file."""
+        for robot in self.robots.values():
+            robot.dedicated, robot.waits, robot.mode = self._spots[robot.name], False, IDLE
+            self._rest(robot, now)
 
     def strays(self, who: str, place: str, now: float) -> None:
         """It drives there in the task that it has, whatever that wants."""

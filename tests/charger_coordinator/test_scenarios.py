@@ -77,6 +77,19 @@ def test_0_a_robot_without_a_task_is_served_if_its_finishing_request_brings_it(
     assert (robot.place, robot.battery_percent, site.faults) == (place, percent, [])
 
 
+def test_0_a_robot_whose_adapter_starts_again_on_its_way_is_told_again() -> None:
+    site = home_from_work("charge", 60.0)
+    site.run(17.0)
+    site.fleet.starts_again(site.now)
+    assert site.run(60.0) == [
+        (37.25, "charger_a: CHARGING AMR01"),
+        (45.5, "charger_a: RELEASED AMR01"),
+        (45.5, "AMR01 -> WAIT wait_1"),
+        (46.5, "charger_a: IDLE"),
+    ]
+    assert site.faults == []
+
+
 def test_0_jazzys_park_goes_to_the_charger_that_it_is_assigned_as_charge_does() -> None:
     site = home_from_work("park", 60.0, jazzy=True)
     assert site.run(300.0) == [*charged_at_a(16.25, 30.5), (31.5, "charger_a: IDLE")]
