@@ -46,15 +46,20 @@ demo-page: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo page
 
 # Many tests wait for a process or a wire: more of them than there are cores run side by side.
-# Each test goes to the next free worker, in the order of conftest.py: long ones first. Tests that share a
+# Each test goes to the next free worker, in the mixed order of conftest.py. Tests that share a
 # process stay together (mark xdist_group).
 SIDE_BY_SIDE := -n 8 --dist loadgroup --no-loadscope-reorder
 # mypy uses one core only, so it runs beside the tests.
 test: .venv/ready style
 	@$(MAKE) --no-print-directory -j 2 types suite
 
-suite: .venv/ready
+suite: .venv/compiled
 	$(BIN)/pytest $(SIDE_BY_SIDE)
+
+# In a new environment one process compiles every file, so that the workers need not all do so at once.
+.venv/compiled: .venv/ready
+	@$(BIN)/pytest --collect-only -qq >/dev/null
+	@touch $@
 
 # In Chromium from the distribution; as root, on a machine without one, it is installed.
 test-page: .venv/ready
@@ -64,7 +69,7 @@ test-page: .venv/ready
 	$(BIN)/pytest -m browser -n 2 --dist loadfile tests/page/browser
 
 # Walks to their full depth and every example. Run it before a release and after a change to a core.
-deep: .venv/ready
+deep: .venv/compiled
 	DEEP=1 $(BIN)/pytest $(SIDE_BY_SIDE)
 
 # rclpy needs ROS's own Python and its packages (numpy), so these tests have an environment on top of it.

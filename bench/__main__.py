@@ -9,6 +9,7 @@ import os
 import platform
 import sys
 import tempfile
+from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +28,13 @@ SECTIONS = {
 }
 
 
-def main(chosen: list[str]) -> int:
+def main(words: list[str]) -> int:
     """Measure, print, write."""
+    parser = ArgumentParser(prog="python -m bench", description="Measure all, or these parts.")
+    parser.add_argument("parts", nargs="*", help=", ".join(SECTIONS), metavar="PART")
+    chosen = parser.parse_args(words).parts
+    if unknown := set(chosen) - set(SECTIONS):
+        parser.error(f"no such part: {', '.join(sorted(unknown))} (parts: {', '.join(SECTIONS)})")
     figures: dict[str, Any] = {"machine": _machine()}
     print(figures["machine"], flush=True)
     for name in chosen or SECTIONS:

@@ -3,6 +3,7 @@ import os
 import signal
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from random import Random
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -64,14 +65,27 @@ def module_domain() -> Iterator[int]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What takes long is begun first; what hangs on a wire ends. Without cyclonedds, as on arm64, the
-    tests of the dds transport cannot be run."""
+    """Put the tests in order; what hangs on a wire ends. Without cyclonedds, as on arm64, the tests of
+    the dds transport cannot be run."""
     if missing_of_dds():
         items[:] = [item for item in items if not item.get_closest_marker("dds")]
-    items.sort(key=lambda item: item.get_closest_marker("long") is None)
-    for item in items:
-        if item.path.relative_to(Path(__file__).parent).parts[0] in ON_WIRES:
-            item.add_marker(pytest.mark.timeout(WIRES_HANG_AFTER_S))
+    items[:] = _mixed(items)
+    for item in filter(_is_on_wires, items):
+        item.add_marker(pytest.mark.timeout(WIRES_HANG_AFTER_S))
+
+
+def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
+    """In an order in which tests that wait and tests that compute are mixed, so that the workers keep
+    all cores busy: file by file, always the same. What takes long is begun early."""
+    random = Random(1)
+    place = {path: random.random() for path in sorted({item.path for item in items})}
+    early = [item for item in items if item.get_closest_marker("long")]
+    place_of_early = {item: random.random() / 4 for item in early}
+    return sorted(items, key=lambda item: place_of_early.get(item, place[item.path]))
+
+
+def _is_on_wires(item: pytest.Item) -> bool:
+    return item.path.relative_to(Path(__file__).parent).parts[0] in ON_WIRES
 
 
 def pytest_deselected(items: Sequence[pytest.Item]) -> None:

@@ -92,7 +92,7 @@ def _others(report: Report) -> str:
     return f"; heard: {some}" + (f" and {more} more" if more > 0 else "")
 
 
-class LawTold(msgspec.Struct, frozen=True):
+class LawJson(msgspec.Struct, frozen=True):
     """A law as JSON has it."""
 
     id: str
@@ -104,7 +104,7 @@ class LawTold(msgspec.Struct, frozen=True):
     evidence: tuple[Evidence, ...]
 
 
-class Told(msgspec.Struct, frozen=True):
+class ReportJson(msgspec.Struct, frozen=True):
     """A report as JSON has it."""
 
     kind: str
@@ -114,7 +114,7 @@ class Told(msgspec.Struct, frozen=True):
     heard_s: float
     states: int
     notes: tuple[str, ...]
-    laws: tuple[LawTold, ...]
+    laws: tuple[LawJson, ...]
 
 
 def verdict(report: Report) -> Verdict:
@@ -125,14 +125,14 @@ def verdict(report: Report) -> Verdict:
 def as_json(report: Report) -> str:
     """One JSON object."""
     laws = tuple(
-        LawTold(
+        LawJson(
             *(j.law.id, j.verdict, j.law.sentence, j.law.reason, j.law.source),
             times=j.times,
             evidence=j.evidence,
         )
         for j in report.judged
     )
-    told = Told(
+    told = ReportJson(
         *(report.kind, report.name, verdict(report), report.wall, report.heard_s, report.states),
         notes=report.notes,
         laws=laws,

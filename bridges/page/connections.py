@@ -3,7 +3,6 @@
 import asyncio
 import logging
 import time
-from collections.abc import Hashable, Iterable
 from contextlib import suppress
 from typing import Final
 
@@ -11,31 +10,18 @@ from nicegui import core
 from nicegui.server import Server
 
 from bridges.log import pairs
+from bridges.page.silent import Silent
 
 log = logging.getLogger(__name__)
 
 LOOK_S: Final = 1.0
 MOST_WAITING: Final = 50
 """Packets for a browser that does not read them: five seconds. A browser that reads has a few."""
-MOST_SILENT_S: Final = 10.0
-"""Until the first request has come whole. The library itself waits for ever."""
-
-
-class Waiting:
-    """Since when each of them waits."""
-
-    def __init__(self) -> None:
-        self._since: dict[Hashable, float] = {}
-
-    def too_long(self, there: Iterable[Hashable], now: float) -> list[Hashable]:
-        """Those of `there` that have waited for more than MOST_SILENT_S. Others are forgotten."""
-        self._since = {one: self._since.get(one, now) for one in there}
-        return [one for one, since in self._since.items() if now - since > MOST_SILENT_S]
 
 
 async def watch() -> None:
     """For ever."""
-    silent = Waiting()
+    silent = Silent()
     while True:
         await asyncio.sleep(LOOK_S)
         await _end_deaf()

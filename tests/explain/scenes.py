@@ -17,10 +17,10 @@ from bridges.rmf.stamps import stamp
 from tests.explain.scene import Guest, Scene
 from tests.site.timeline import EPOCH
 
-Told = tuple[list[Heard], Kind, str]
+Case = tuple[list[Heard], Kind, str]
 
 
-def held_by_another() -> Told:
+def held_by_another() -> Case:
     """A robot waits because another has the lift."""
     scene, red, blue = _two("Lift1")
     scene.until(red)
@@ -29,7 +29,7 @@ def held_by_another() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def holder_rides() -> Told:
+def holder_rides() -> Case:
     """A robot waits; the one that has the lift waits for the car itself."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
@@ -38,7 +38,7 @@ def holder_rides() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def holder_is_dead() -> Told:
+def holder_is_dead() -> Case:
     """The holder's fleet adapter died without END."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
@@ -47,7 +47,7 @@ def holder_is_dead() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def holder_alone_is_dead() -> Told:
+def holder_alone_is_dead() -> Case:
     """The holder's fleet adapter died without END, and nobody else asks."""
     scene = Scene("Lift1")
     red = scene.robot("fleet/red")
@@ -58,7 +58,7 @@ def holder_alone_is_dead() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def fire() -> Told:
+def fire() -> Case:
     """The lift goes into fire mode before the robot has boarded."""
     scene, _, _ = _two("Lift1")
     scene.press("Lift1", "fire_alarm", True)
@@ -66,7 +66,7 @@ def fire() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def fire_with_a_robot_inside() -> Told:
+def fire_with_a_robot_inside() -> Case:
     """The lift goes into fire mode while the robot is in the car."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
@@ -77,7 +77,7 @@ def fire_with_a_robot_inside() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def open_but_at_no_floor() -> Told:
+def open_but_at_no_floor() -> Case:
     """The door is shown open by a node that does not know its floor."""
     scene = Scene()
     red = scene.robot("fleet/red")
@@ -89,7 +89,7 @@ def open_but_at_no_floor() -> Told:
     return scene.heard, "lift", "Lift9"
 
 
-def floor_contact_lost() -> Told:
+def floor_contact_lost() -> Case:
     """The car stands at a floor that its code does not show."""
     scene = Scene("Lift2")
     red = scene.robot("fleet/red")
@@ -99,7 +99,7 @@ def floor_contact_lost() -> Told:
     return scene.heard, "lift", "Lift2"
 
 
-def forgotten_by_rmf() -> Told:
+def forgotten_by_rmf() -> Case:
     """RMF's supervisor has restarted and asks for another robot; the holder's adapter is dead."""
     scene = Scene("Lift1", rmf=True)
     red, blue = scene.robot("fleet/red"), scene.robot("fleet/blue")
@@ -115,7 +115,7 @@ def forgotten_by_rmf() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def unknown_floor() -> Told:
+def unknown_floor() -> Case:
     """A request to a floor that the lift does not serve."""
     scene = Scene("Lift1")
     scene.robot("fleet/red").asks("Lift1", "B2")
@@ -123,7 +123,7 @@ def unknown_floor() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def foreign_node_refuses() -> Told:
+def foreign_node_refuses() -> Case:
     """Another maker's node never grants a session, and says no reason."""
     scene = Scene(diagnoses=False)
     _Foreign(scene, available_floors=("L1", "L2"))
@@ -132,7 +132,7 @@ def foreign_node_refuses() -> Told:
     return scene.heard, "lift", "Lift9"
 
 
-def no_supervisor() -> Told:
+def no_supervisor() -> Case:
     """Nobody passes the adapters' requests on."""
     scene = Scene("Lift1")
     scene.supervisors["lift_supervisor"].kill()
@@ -143,7 +143,7 @@ def no_supervisor() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def reading_is_old() -> Told:
+def reading_is_old() -> Case:
     """The lift's bus does not answer any more."""
     scene, red, _ = _two("Lift2")
     scene.devices["Lift2"].far.down = "the module does not answer"
@@ -152,7 +152,7 @@ def reading_is_old() -> Told:
     return scene.heard, "lift", "Lift2"
 
 
-def nobody_publishes() -> Told:
+def nobody_publishes() -> Case:
     """The name is asked for, and nobody publishes its states."""
     scene = Scene("Lift2")
     scene.robot("fleet/red").asks("Lift1", "L3")
@@ -160,7 +160,7 @@ def nobody_publishes() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def daemon_is_gone() -> Told:
+def daemon_is_gone() -> Case:
     """The lift's daemon dies in the middle of a ride."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
@@ -169,7 +169,7 @@ def daemon_is_gone() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def stamps_of_another_clock() -> Told:
+def stamps_of_another_clock() -> Case:
     """The robots' machine lives an hour ago."""
     scene = Scene("Lift1")
     red = scene.robot("fleet/red")
@@ -185,7 +185,7 @@ def stamps_of_another_clock() -> Told:
     return heard, "lift", "Lift1"
 
 
-def two_nodes() -> Told:
+def two_nodes() -> Case:
     """Two nodes publish states under one name."""
     scene = Scene(diagnoses=False)
     _Foreign(scene)
@@ -196,7 +196,7 @@ def two_nodes() -> Told:
     return scene.heard, "lift", "Lift9"
 
 
-def all_is_well() -> Told:
+def all_is_well() -> Case:
     """A ride that is over."""
     scene = Scene("Lift1")
     scene.rides(scene.robot("fleet/red"), "Lift1", "L2", "L3")
@@ -204,7 +204,7 @@ def all_is_well() -> Told:
     return scene.heard, "lift", "Lift1"
 
 
-def door_held_by_a_dead_robot() -> Told:
+def door_held_by_a_dead_robot() -> Case:
     """A robot has died in the doorway."""
     scene = Scene("ward")
     red = scene.robot("fleet/red")
@@ -215,7 +215,7 @@ def door_held_by_a_dead_robot() -> Told:
     return scene.heard, "door", "ward"
 
 
-def door_opens_not() -> Told:
+def door_opens_not() -> Case:
     """The door is told to open and stays shut."""
     scene = Scene("ward")
     scene.fail("ward", "operator", "stuck")
@@ -224,7 +224,7 @@ def door_opens_not() -> Told:
     return scene.heard, "door", "ward"
 
 
-def door_without_supervisor() -> Told:
+def door_without_supervisor() -> Case:
     """Nobody takes the adapters' requests."""
     scene = Scene("ward")
     scene.supervisors["door_supervisor"].kill()
@@ -235,7 +235,7 @@ def door_without_supervisor() -> Told:
     return scene.heard, "door", "ward"
 
 
-def door_of_people() -> Told:
+def door_of_people() -> Case:
     """A person keeps the door open."""
     scene = Scene("ward")
     scene.press("ward", "push", True)
@@ -243,7 +243,7 @@ def door_of_people() -> Told:
     return scene.heard, "door", "ward"
 
 
-def charger_refuses() -> Told:
+def charger_refuses() -> Case:
     """A second robot asks for a charger that another one has."""
     scene = Scene("bay1")
     scene.says(topics.CHARGER_REQUESTS, _charge("bay1", "red", "r1"))
@@ -253,7 +253,7 @@ def charger_refuses() -> Told:
     return scene.heard, "charger", "bay1"
 
 
-def wrong_station() -> Told:
+def wrong_station() -> Case:
     """A robot stands at a charger that is another's."""
     scene = Scene(diagnoses=False)
     who, whose = Robot("fleet", "red"), Robot("fleet", "blue")
@@ -266,7 +266,7 @@ def wrong_station() -> Told:
     return scene.heard, "charger", "bay1"
 
 
-def coordinator_queues() -> Told:
+def coordinator_queues() -> Case:
     """More robots than chargers: the queue and its reasons."""
     scene = Scene("bay1")
     scene.coordinate("red", "blue")
@@ -277,7 +277,7 @@ def coordinator_queues() -> Told:
     return scene.heard, "charger", "bay1"
 
 
-SCENES: Final[Mapping[str, Callable[[], Told]]] = {
+SCENES: Final[Mapping[str, Callable[[], Case]]] = {
     made.__name__: made
     for made in (
         held_by_another,

@@ -23,7 +23,7 @@ HEARD: tuple[AnyTopic, ...] = (
     *(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS),
     topics.CHARGER_REFUSALS,
 )
-Told = dict[str, set[str]]
+Verdicts = dict[str, set[str]]
 
 
 class Seat:
@@ -131,9 +131,9 @@ class World:
         return stage
 
 
-def told(stage: Stage, now: float) -> Told:
+def told(stage: Stage, now: float) -> Verdicts:
     """The ids of the laws, by verdict."""
-    found: Told = {verdict.value: set() for verdict in Verdict}
+    found: Verdicts = {verdict.value: set() for verdict in Verdict}
     for judged in stage.judge.end(now, EPOCH + now):
         found[judged.verdict.value].add(judged.law.id)
     return found
@@ -141,7 +141,7 @@ def told(stage: Stage, now: float) -> Told:
 
 def rides(
     *nodes: Party, robots: int = 1, restarts: bool = False, name: str = "Lift1"
-) -> tuple[Told, str]:
+) -> tuple[Verdicts, str]:
     """The verdict on a lift that robots ride from L1 to L3, and why they did not, if so."""
     world = World()
     world.add(*nodes)
@@ -150,7 +150,7 @@ def rides(
     return told(stage, world.timeline.now), stage.note
 
 
-def passes(*nodes: Party, times: int = 3, restarts: bool = False) -> tuple[Told, str]:
+def passes(*nodes: Party, times: int = 3, restarts: bool = False) -> tuple[Verdicts, str]:
     """The verdict on a door that a robot passes."""
     world = World()
     world.add(*nodes)
@@ -158,7 +158,7 @@ def passes(*nodes: Party, times: int = 3, restarts: bool = False) -> tuple[Told,
     return told(stage, world.timeline.now), stage.note
 
 
-def charges(*nodes: Party) -> tuple[Told, str]:
+def charges(*nodes: Party) -> tuple[Verdicts, str]:
     """The verdict on a charger that is requested."""
     world = World()
     world.add(*nodes)
@@ -166,7 +166,7 @@ def charges(*nodes: Party) -> tuple[Told, str]:
     return told(stage, world.timeline.now), stage.note
 
 
-def watched(kind: Kind, name: str, *parties: Party, for_s: float = 60.0) -> Told:
+def watched(kind: Kind, name: str, *parties: Party, for_s: float = 60.0) -> Verdicts:
     """The verdict on who is only looked at."""
     world = World()
     world.add(*parties)
