@@ -20,8 +20,8 @@ help:
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
-	@echo "make test-vm  boot Debian 13 in QEMU (amd64 alone), install our package, and kill and hang it there"
-	@echo "             (a part: ONLY=deaths, ONLY=wires, ONLY=world)"
+	@echo "make test-vm  boot Debian 13 in QEMU, install our package, and kill and hang it there (ARCH=arm64)"
+	@echo "             (one of its machines: ONLY=lift, ONLY=site)"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make man     the manual page, build/rmf-bridge.1"
 	@echo "make deb     Debian packages in dist/, for Debian 12 and 13 and Ubuntu 24.04, amd64 and arm64"
@@ -32,6 +32,7 @@ help:
 .venv/ready: pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(0 if (3, 11) <= v < (3, 14) else f"Python 3.11 to 3.13 is needed, this is {v.major}.{v.minor}: make PYTHON=python3.12 …")'
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "python3-venv is missing: sudo apt install python3-venv"; exit 1; }
+	@echo "making .venv: a minute or two, once"
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev]'
 	@touch $@
@@ -66,7 +67,7 @@ test-page: .venv/ready
 	@command -v chromium >/dev/null || { test "$$(id -u)" = 0 && apt-get update -q && \
 	  apt-get install -y -q --no-install-recommends chromium; } || { \
 	  echo "Chromium is missing: sudo apt install chromium"; exit 1; }
-	$(BIN)/pytest -m browser -n 2 --dist loadfile tests/page/browser
+	$(BIN)/pytest -m browser -n 3 --dist loadfile --no-loadscope-reorder tests/page/browser
 
 # Walks to their full depth and every example. Run it before a release and after a change to a core.
 deep: .venv/compiled
@@ -124,7 +125,6 @@ torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))
 
 # The package that was built last; it is built if there is none. The image is built once, in build/vm.
-# There is no machine for arm64 yet.
 ARCH ?= amd64
 test-vm: .venv/ready
 	@ls dist/*+deb13_$(ARCH).deb >/dev/null 2>&1 || $(MAKE) --no-print-directory deb ARCHS=$(ARCH) PYTHONS=3.13

@@ -4,16 +4,17 @@ A lift's session carries the time of its publishing; a script in each browser no
 the screen. `a tenth changes`: as on a busy site. `all change`: no card is ever the same twice. Each
 device's daemon publishes its diagnostics too.
 
-`many updates`, only with BENCH_PAGE_UPDATES=N: the page turns 20 times as often, and ages are still
-drawn once a second, until each browser of the site was sent N updates (an hour has 36000 at most), and
-one browser of a device its own. The heaps are those after a collection: of all three browsers together.
+`an hour`, only with BENCH_PAGE_HOUR_S=N, for so many seconds: what the page keeps, and what a browser
+of the site and one of a device keep after a collection, every half minute. The first ten minutes do not
+count: a device shows so much, and that has to fill. `first` and `last` are the lowest of ten minutes.
 """
 
 import os
+import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from typing import Final
 
 from playwright.sync_api import Page, Playwright, sync_playwright
 
-from bench.figures import Row, Tables, percentiles
+from bench.figures import Row, Rows, Tables, percentiles
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
@@ -34,22 +35,9 @@ DEVICES = LIFTS + DOORS + CHARGERS
 BROWSERS: Final = 3
 SECONDS: Final = float(os.environ.get("BENCH_PAGE_S", "60"))
 SETTLES_S: Final = 10.0
-PRESSED: Final = 20
-UPDATES: Final = int(os.environ.get("BENCH_PAGE_UPDATES", "0"))
-"""Updates of the site for `many updates`; at most one for each turn of the page."""
-WARM: Final = UPDATES // 6
-"""Until everything that is kept in bounds has filled them."""
-PRESSED_PAGE: Final = f"""
-import sys
-from bridges.page import buttons, connections, site_views, web
-web.PUMP_S /= {PRESSED}
-connections.MOST_WAITING *= {PRESSED}
-web.MOST_HISTORY *= {PRESSED}
-for one in (buttons, site_views):
-    one.AGES_S /= {PRESSED}
-from bridges.cli import main
-sys.exit(main())
-"""
+HOUR_S: Final = float(os.environ.get("BENCH_PAGE_HOUR_S", "0"))
+FILLS_S: Final = 600.0
+EVERY_S: Final = 30.0
 TICKS: Final = os.sysconf("SC_CLK_TCK")
 CHROMIUM: Final = "/usr/bin/chromium"
 FLAGS: Final = ("--headless", "--no-sandbox", "--disable-gpu")
@@ -65,12 +53,12 @@ def measure(scratch: Path) -> Tables:
     """Seconds from publishing to the screen, the page's processor and memory, the browsers' heaps."""
     rows = {}
     for name, share in (("a tenth changes", 10), ("all change", 1)):
-        with _page(["-m", "bridges.cli"], share, scratch) as seen:
+        with _page(share, scratch) as seen:
             rows[name] = _looked_at(seen)
     tables: Tables = {"page, 300 devices, 3 browsers": rows}
-    if UPDATES:
-        with _page(["-c", PRESSED_PAGE], 1, scratch) as seen:
-            tables["page, many updates"] = {"all change": _many(seen, UPDATES)}
+    if HOUR_S:
+        with _page(10, scratch) as seen:
+            tables["page, an hour"] = _hour(seen)
     return tables
 
 
@@ -88,9 +76,9 @@ class Seen:
 
 
 @contextmanager
-def _page(program: list[str], share: int, scratch: Path) -> Iterator[Seen]:
+def _page(share: int, scratch: Path) -> Iterator[Seen]:
     domain = free_domain()
-    command = [sys.executable, *program, "page", "--listen", "127.0.0.1:0"]
+    command = [sys.executable, "-m", "bridges.cli", "page", "--listen", "127.0.0.1:0"]
     command += ["--localhost", "--domain-id", str(domain), "--transport", wire()]
     command += ["--runtime-dirs", str(scratch)]
     site = _Site(domain, share)
@@ -199,36 +187,29 @@ def _looked_at(seen: Seen) -> Row:
     }
 
 
-def _many(seen: Seen, number: int) -> Row:
-    """What the browsers and the page keep, after so many updates."""
-    *_, device = seen.tabs
+def _hour(seen: Seen) -> Rows:
+    """What is kept, and whether it grows."""
+    *_, site, device = seen.tabs
     device.goto(f"{device.url}lift/lift00")
-    _updated(seen, WARM)
-    heap, rss, began = _heaps(seen.tabs), _rss_mb(seen.pid), time.monotonic()
-    updates = _updated(seen, number)
+    kept: list[tuple[float, float, float, float]] = []
+    began = time.monotonic()
+    while (at := time.monotonic() - began) < HOUR_S:
+        seen.live(EVERY_S)
+        kept.append((at, _heap(site), _heap(device), _rss_mb(seen.pid)))
+    ats, *columns = zip(*[one for one in kept if one[0] >= FILLS_S], strict=True)
+    names = ("the site's heap", "a device's heap", "the page's process")
+    return {name: _growth(ats, column) for name, column in zip(names, columns, strict=True)}
+
+
+def _growth(ats: Sequence[float], kept: Sequence[float]) -> Row:
+    some = round(FILLS_S / EVERY_S)
     return {
-        "updates": updates,
-        "took s": time.monotonic() - began,
-        "heap MB": heap,
-        "heap + MB": _heaps(seen.tabs) - heap,
-        "RSS MB": rss,
-        "RSS + MB": _rss_mb(seen.pid) - rss,
+        "first MB": min(kept[:some]),
+        "last MB": min(kept[-some:]),
+        "MB per hour": 3600 * statistics.linear_regression(ats, kept).slope,
+        "samples": len(kept),
         "load": os.getloadavg()[0],
     }
-
-
-def _updated(seen: Seen, number: int) -> int:
-    """Go on until the first browser was sent so many updates; how many there were."""
-    first = seen.tabs[0]
-    before: int = first.evaluate("window.nextMessageId")
-    while (now := int(first.evaluate("window.nextMessageId"))) < before + number:
-        seen.live(1.0)
-    return now - before
-
-
-def _heaps(tabs: list[Page]) -> float:
-    """What JavaScript keeps after a collection (MB)."""
-    return sum(map(_heap, tabs))
 
 
 def _heap(tab: Page) -> float:

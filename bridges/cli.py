@@ -108,7 +108,9 @@ def main(argv: list[str] | None = None) -> int:
         argcomplete.autocomplete(parser(COMMANDS))
     arguments, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
     typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
-    parsed = parser(arguments).parse_args(arguments, typed)
+    parsed, unknown = parser(arguments).parse_known_args(arguments, typed)
+    if unknown:
+        parsed.usage(f"unrecognized arguments: {' '.join(unknown)}")
     try:
         return int(_module(parsed.command).run(parsed))
     except BrokenPipeError:  # the reader of a pipe has closed it, as `head` does
@@ -144,6 +146,7 @@ def parser(whole: Container[str]) -> argparse.ArgumentParser:
             description=text[0].upper() + text[1:] + ".",
             epilog=f"example: rmf-bridge {example}",
         )
+        subparser.set_defaults(usage=subparser.error)
         if name in whole:
             _module(name).add_arguments(subparser)
     return top

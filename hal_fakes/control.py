@@ -23,7 +23,7 @@ from typing import cast
 import msgspec
 
 from bridges.log import pairs
-from drivers import DriverError
+from drivers.hal.points import HalError
 from hal_fakes.plants.plant import Edge, FailureMode, Plant
 
 log = logging.getLogger(__name__)
@@ -143,7 +143,7 @@ def _listen(path: Path) -> socket.socket:
         listener.bind(str(path))
     except OSError as error:
         listener.close()
-        raise DriverError(f"cannot make the plant's control socket {path}: {error}") from error
+        raise HalError(f"cannot make the plant's control socket {path}: {error}") from error
     listener.listen()
     return listener
 

@@ -6,6 +6,7 @@ from typing import Any
 from bridges.serve import directory, guard, places, record
 from bridges.settings.load import Config
 from drivers import Driver, DriverError
+from drivers.hal import Bus
 
 
 class NoDevice(Exception):
@@ -25,21 +26,23 @@ def device_of(config: Config, name: str | None) -> str:
 
 
 def guarded(
-    config: Config, held: directory.RuntimeDirectory, outputs_off: Sequence[str]
-) -> Callable[[], None]:
-    """Before the first output is claimed: the record, and a guard that runs `outputs_off` if we die.
+    config: Config, device: str, held: directory.RuntimeDirectory, outputs_off: Sequence[str]
+) -> tuple[Bus, Callable[[], None]]:
+    """The device's bus, and what to call when every output is verified off. Raises HalError.
 
-    Returns what to call when every output is verified off.
+    Once the bus is open, and before an output is claimed: the record, and a guard that runs
+    `outputs_off` if we die. A bus that cannot be opened leaves nothing to switch off.
     """
+    places.work_somewhere(held.places)
+    bus = config.open_bus(config.bus_of(device))
     held.claim(record.of(config))
     watching = guard.Guard(outputs_off)
-    places.work_somewhere(held.places)
 
     def all_off() -> None:
         held.released()
         watching.dismiss()
 
-    return all_off
+    return bus, all_off
 
 
 def not_off(driver: Driver[Any, Any], insist: Callable[[], None]) -> str:

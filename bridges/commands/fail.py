@@ -19,7 +19,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     completed_by(part, names("fail"))
     parser.add_argument("mode", nargs="?", choices=MODES, help="how it fails; ok mends it")
-    parser.set_defaults(usage=parser.error)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,6 +1,8 @@
 """`rmf-bridge incident FILE`: a recording of a daemon's last minutes, because a person wants one."""
 
 import argparse
+import errno
+import os
 import sys
 import time
 from datetime import datetime
@@ -43,35 +45,58 @@ def run(args: argparse.Namespace) -> int:
     except ImportError as error:
         print(f"to write a recording, {error.name} is needed: {INSTALL}", file=sys.stderr)
         return EX_UNAVAILABLE
+    path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
+    if why := _no_folder(path):  # before the wait
+        return _not_written(path, why)
     try:
         places = runtime.find(args.file.absolute(), args.runtime_dir)
-        incident = _incident(places.runtime / (DIED if args.died else NAME), args)
+        follows = not args.died and runtime.holder(places) is not None
+        incident = _incident(places.runtime / (DIED if args.died else NAME), args, follows)
     except (runtime.Unknown, RingError) as error:
-        print(f"{error}. Does its daemon run, and does its YAML keep a ring?", file=sys.stderr)
+        print(f"{error}. {_hint(died=args.died)}", file=sys.stderr)
         return EX_UNAVAILABLE
     if args.anonymous:
         from bridges.recording.anonymous import anonymous
 
         incident = anonymous(incident)
-    path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
     try:
         mcap_write.write(path, incident)
     except OSError as error:
-        print(f"{path} cannot be written: {error.strerror}", file=sys.stderr)
-        return EX_CANTCREAT
+        return _not_written(path, error.strerror)
     print(f"{path}: {len(incident.entries)} entries")
     return 0
 
 
-def _incident(ring: Path, args: argparse.Namespace) -> Incident:
-    """From 120 s before now on, and what follows. Raises RingError."""
+def _no_folder(path: Path) -> str:
+    """Why nothing can be written there, as far as its folder shows; "" if it can."""
+    if not path.parent.is_dir():
+        return os.strerror(errno.ENOENT)
+    return "" if os.access(path.parent, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)
+
+
+def _not_written(path: Path, why: str | None) -> int:
+    print(f"{path} cannot be written: {why}", file=sys.stderr)
+    return EX_CANTCREAT
+
+
+def _hint(*, died: bool) -> str:
+    if died:
+        return "--died is the run before the last one: of the last one, leave it out"
+    return "Does its daemon run, and does its YAML keep a ring?"
+
+
+def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
+    """From 120 s before now on, and what `follows` from a daemon that runs. Raises RingError."""
     before = Read(ring)
     if args.died:
         entries = list(before.entries())
         at = entries[-1].at if entries else 0.0
         return Incident(before.head, part(entries, at - BEFORE_S, at), _notes(at, args.note))
     at = machine_s()
-    _wait(args.after)
+    if follows:
+        _wait(args.after)
+    else:
+        print(f"no daemon serves {args.file} now: nothing follows")
     try:
         after = Read(ring)
     except RingError:

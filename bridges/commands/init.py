@@ -142,6 +142,8 @@ def run(args: argparse.Namespace) -> int:
     """0; 64: answers are missing or do not go together; 66: the map; 73: the file is there already."""
     if os.path.lexists(args.file):  # before anything is asked
         return _there_already(args.file)
+    if not args.file.parent.is_dir():
+        return _not_written(args.file, f"{args.file.parent} is no folder")
     try:
         given = answered(args, load_map(args.map) if args.map else None)
     except SettingsError as error:
@@ -161,6 +163,11 @@ def _there_already(file: Path) -> int:
     return EX_CANTCREAT
 
 
+def _not_written(file: Path, why: str | None) -> int:
+    print(f"{file} is not written: {why}", file=sys.stderr)
+    return EX_CANTCREAT
+
+
 def _written(file: Path, given: Given) -> int:
     """Write what `check` finds right."""
     try:
@@ -177,8 +184,7 @@ def _written(file: Path, given: Given) -> int:
     except FileExistsError:
         return _there_already(file)
     except OSError as error:
-        print(f"{file} is not written: {error.strerror}", file=sys.stderr)
-        return EX_CANTCREAT
+        return _not_written(file, error.strerror)
     print(f"{file} is written. Compare it with the wires; then:")
     print(f"  rmf-bridge check {file}\n  rmf-bridge run {file} --simulate")
     return 0

@@ -79,7 +79,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_span_arguments(parser)
     _add_plays(parser)
-    parser.set_defaults(usage=parser.error)
 
 
 def _add_plays(parser: argparse.ArgumentParser) -> None:
@@ -196,6 +195,8 @@ def _live(args: argparse.Namespace, performance: Performance | None) -> int:
         with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
             live = Live(transport, args.kind, args.beside, performance)
             stage = Stage(Judge(args.kind, args.name), performance, args.for_s, live.strangers)
+            if sys.stderr.isatty():
+                complain("judge", _begins(args, performance))
             live.judge(stage)
     except TransportError as error:
         complain("judge", error)
@@ -207,6 +208,14 @@ def _live(args: argparse.Namespace, performance: Performance | None) -> int:
     judged = stage.judge.end(now, time.time())
     notes = [f"not played to its end: {stage.note}"] if stage.note else []
     return tell(report(stage.judge, judged, now - stage.began_at, *notes), args)
+
+
+def _begins(args: argparse.Namespace, performance: Performance | None) -> str:
+    """What is under way, for whoever waits for the verdict."""
+    if performance is not None:
+        return f"plays with {words_of(args)}; Ctrl-C lets it go, and judges"
+    until = "until Ctrl-C" if args.for_s == NEVER else f"for {args.for_s:g} s"
+    return f"listens to {words_of(args)} {until}"
 
 
 def tell(found: Report, args: argparse.Namespace) -> int:

@@ -8,8 +8,9 @@ import argparse
 import getpass
 import ipaddress
 import os
+import socket
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -101,12 +102,31 @@ def run(args: argparse.Namespace) -> int:
     if why := _unsafe(args):
         complain("page", why)
         return os.EX_USAGE
+    address, port = args.listen
+    try:
+        opened = socket.create_server(args.listen, family=_family(address))
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else str(error)
+        other = f"another port: --listen {address}:0 takes a free one"
+        complain("page", f"{address} port {port}: {why}; {other}")
+        return os.EX_UNAVAILABLE
+    with opened:
+        return _serve(args, opened, known)
+
+
+def _serve(args: argparse.Namespace, opened: socket.socket, known: Mapping[str, str]) -> int:
+    """With NiceGUI, whose import takes seconds on a Raspberry Pi: what is wrong was said before."""
     try:
         from bridges.page import web
     except ImportError as error:
         complain("page", f"{error}: to install it: {INSTALL}")
         return os.EX_UNAVAILABLE
-    return web.serve(args, known, lambda: open_graph(args, "rmf_bridge_page"), _graph(args))
+    web.serve(args, opened, known, lambda: open_graph(args, "rmf_bridge_page"), _graph(args))
+    return 0
+
+
+def _family(address: str) -> socket.AddressFamily:
+    return socket.AF_INET6 if ":" in address else socket.AF_INET
 
 
 def _graph(args: argparse.Namespace) -> Sequence[str]:

@@ -41,5 +41,5 @@ def _reset(file: Path, places: Places) -> int:
     except ProcessLookupError:
         print(f"the daemon of {file} has just ended", file=sys.stderr)
         return 1
-    print(f"reset sent; see {places.runtime / runtime.STATUS} or the log for what remains")
+    print("reset sent; what remains: rmf-bridge status, or the log")
     return 0

@@ -182,9 +182,14 @@ def run(args: argparse.Namespace) -> int:
     except TransportError as error:
         complain(args.command, error)
         return 1
-    except KeyboardInterrupt:
-        complain(args.command, "interrupted; the last request remains in effect")
-        return 130
+    except KeyboardInterrupt:  # before anything was sent
+        return _interrupted(args.command, sent=False)
+
+
+def _interrupted(command: str, *, sent: bool) -> int:
+    rest = "the last request remains in effect" if sent else "no request was sent"
+    complain(command, f"interrupted; {rest}")
+    return 130
 
 
 def send(
@@ -196,12 +201,15 @@ def send(
     command: str = "send",
     graph: str = "",
 ) -> int:
-    """0 when the effect was seen within `timeout_s`, else 1. `graph`: where we are, for people."""
+    """0 when the effect was seen within `timeout_s`, else 1; 130 after Ctrl-C. `graph`: for people."""
     exchange = _Exchange(transport, request, timeout_s, out, command, graph)
-    while True:
-        code = exchange.look()
-        if code is not None:
-            return code
+    try:
+        while True:
+            code = exchange.look()
+            if code is not None:
+                return code
+    except KeyboardInterrupt:
+        return _interrupted(command, sent=exchange.seen.first_sent_at is not None)
 
 
 class _Exchange:

@@ -92,6 +92,9 @@ def carry_out(steps: Iterable[Step], args: argparse.Namespace) -> int:
     if live and not args.dry_run and os.geteuid() != 0:
         print("only root may do that: use sudo, or --dry-run to see it", file=sys.stderr)
         return os.EX_NOPERM
+    if not args.root.is_dir():
+        print(f"{args.root} is no folder: is the card mounted?", file=sys.stderr)
+        return os.EX_NOINPUT
     for step in steps:
         if not live and (
             isinstance(step, SwitchOff) or (isinstance(step, Run) and step.running_only)

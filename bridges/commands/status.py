@@ -120,6 +120,8 @@ def run(args: argparse.Namespace) -> int:
         found = [one for one in found if one.name == Path(args.name).stem]
         if there and not found:
             print(f"no daemon {Path(args.name).stem}; there is {', '.join(there)}", file=sys.stderr)
+            if not args.json:
+                return NONE
     else:  # what was started by hand once is no news
         found = [one for one in found if one.state != "stopped" or one.unit]
     if args.json:
@@ -158,18 +160,23 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> Daemon:
         one.state = "serving" if fresh else "old"
     elif status:
         one.state = "died"
-    elif _unreleased(folder):
-        one.state = "left on"
+    elif left := _unreleased(folder):
+        one.state, one.why = "left on", left
     elif unit.startswith("failed"):
         one.state = "failed"
     return one
 
 
-def _unreleased(folder: Path) -> bool:
-    """Does a record there name outputs of a dead daemon that nobody has verified off?"""
+def _unreleased(folder: Path) -> str:
+    """What to do about outputs of a dead daemon that nobody has verified off; "" without a record."""
     state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
-    found = map(read, paths(Places(folder, state / folder.name)))
-    return any(record is not None for record in found)
+    for path in paths(Places(folder, state / folder.name)):
+        if record := read(path):
+            return (
+                f"do: rmf-bridge outputs-off {record.file}; if that hardware is gone, cut its"
+                f" supply and remove {path}"
+            )
+    return ""
 
 
 def _without_directory(unit: str) -> str:
@@ -256,7 +263,7 @@ def _state(one: Daemon) -> str:
             file = one.status.get("file") or "FILE"
             return f"has died; its next start tidies up, or `rmf-bridge outputs-off {file}`"
         case "left on":
-            return "has died, and its outputs were not verified off: see its log"
+            return "has died, and its outputs were not verified off"
         case "unknown":
             return "cannot be seen"
         case "serving" if one.status.get("passive"):

@@ -94,20 +94,19 @@ def _walk(
     held: runtime.RuntimeDirectory,
     end: signals.End,
 ) -> int:
-    if held.records.unreleased():
+    if not args.simulate and held.records.unreleased():
         print(f"a dead daemon may have left outputs on: rmf-bridge outputs-off {args.file}")
         return os.EX_UNAVAILABLE
     with ExitStack() as stack:
-        bus_name = config.bus_of(device)
         path = _record_path(args, device).absolute()
         if args.simulate:
             from hal_fakes.simulate import Simulation
 
             simulation = Simulation(config, held.path)
             stack.callback(simulation.close)
-            return _on(args, config, device, simulation.open_bus(bus_name), path, end)
-        all_off = guarded(config, held, guard.command(args.file, args.runtime_dir))
-        code = _on(args, config, device, config.open_bus(bus_name), path, end)
+            return _on(args, config, device, simulation.open_bus(config.bus_of(device)), path, end)
+        bus, all_off = guarded(config, device, held, guard.command(args.file, args.runtime_dir))
+        code = _on(args, config, device, bus, path, end)
         if code != NOT_OFF:
             all_off()
         return code

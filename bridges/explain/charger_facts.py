@@ -34,7 +34,7 @@ class ChargerFacts(Device):
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
-        self.claims = Claims()
+        self.claims = Claims(began)
         self.state = Fact("", began)
         self.robot = Fact(NOBODY, began)
         self.request = Fact("", began)

@@ -10,6 +10,8 @@ from bridges.explain.phrases import Moment
 MOST_CLAIMS: Final = 64
 ASKS_WITHIN_S: Final = 3.5
 """Who waits asks at each state or each second; after three that were missed it has stopped."""
+REPEATS_S: Final = 1.9
+"""Before we have listened so long, the first request heard of somebody may be one that it repeats."""
 
 
 @dataclass(slots=True)
@@ -43,9 +45,13 @@ class Claim:
 
 
 class Claims:
-    """All requesters of one device; a flood of names pushes out who has been silent longest."""
+    """All requesters of one device; a flood of names pushes out who has been silent longest.
 
-    def __init__(self) -> None:
+    `began`: when we began to listen.
+    """
+
+    def __init__(self, began: Moment) -> None:
+        self._began = began
         self._all: OrderedDict[str, Claim] = OrderedDict()
 
     def __iter__(self) -> Iterator[Claim]:
@@ -61,16 +67,19 @@ class Claims:
         if claim is None or claim.ended is not None:
             if claim is None and len(self._all) >= MOST_CLAIMS:
                 self._make_room(keep)
-            claim = self._all[who] = Claim(who, wants, moment, moment, moment)
+            since = self._known_since(moment)
+            claim = self._all[who] = Claim(who, wants, since, since, moment)
             new = True
-        else:
-            new = claim.wants != wants
-        if new:
+        elif new := claim.wants != wants:
             claim.wants, claim.since, claim.met = wants, moment, None
         claim.last, claim.gone = moment, False
         claim.times += 1
         self._all.move_to_end(who)
         return claim, new
+
+    def _known_since(self, moment: Moment) -> Moment:
+        early = moment.at - self._began.at < REPEATS_S
+        return Moment(moment.at, moment.wall, seen=moment.seen and not early)
 
     def drop(self, who: str) -> None:
         """It is forgotten."""

@@ -1,5 +1,6 @@
 """What is told of every sort of device: its states' coming and age, its daemons' faults, the story."""
 
+import sys
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -78,6 +79,7 @@ class Device:
         self.told = 0
         self.diagnoses: dict[str, Diagnosis] = {}
         self.noted: Diagnosis | None = None
+        self.notes_faults = False
         self.first_state: Moment | None = None
         self.last_state: Moment | None = None
         self.stamp_age_s = 0.0
@@ -89,7 +91,7 @@ class Device:
     def tell(self, moment: Moment, text: str) -> None:
         """A line of the story."""
         self.told += 1
-        self.lines.append(Line(moment.at, moment.wall, label(text, 200)))
+        self.lines.append(Line(moment.at, moment.wall, sys.intern(label(text, 200))))
 
     def lines_since(self, at: float) -> tuple[Line, ...]:
         """The story from this time on."""
@@ -150,8 +152,14 @@ class Device:
             known.values = {"outputs": ", ".join(on).replace(" on", " yes") or "-"}
         if note.faults is not None:
             self._set_faults(
-                known, moment, {label(code): label(text) for code, text in note.faults.items()}
+                known,
+                moment,
+                {
+                    label(code): "" if text == code else label(text)
+                    for code, text in note.faults.items()
+                },
             )
+            self.notes_faults = True
         if note.refused:
             self._refuses(known, moment, label(note.refused.partition(": ")[0]))
 
@@ -213,12 +221,22 @@ class Device:
         }
         self._set_faults(found, moment, codes)
 
+    def _of_its_own(self) -> Iterator[Diagnosis]:
+        """What its own daemon noted, and what it says on the graph."""
+        if self.noted is not None:
+            yield self.noted
+        yield from (one for one in self.diagnoses.values() if one.kind == self.kind)
+
     def _set_faults(self, found: Diagnosis, moment: Moment, codes: Mapping[str, str]) -> None:
+        """Take its faults. A daemon notes a fault, and says it on the graph later: it is told once."""
+        repeated = self.notes_faults and found is not self.noted and found.kind == self.kind
+        told = {code for one in self._of_its_own() for code in one.faults}
         for code in [code for code in found.faults if code not in codes]:
             del found.faults[code]
-            self.tell(moment, f"fault {code} is over")
+            if not repeated:
+                self.tell(moment, f"fault {code} is over")
         for code, detail in codes.items():
-            if code not in found.faults:
+            if not repeated and code not in found.faults and code not in told:
                 self.tell(moment, f"fault {code}" + (f": {detail}" if detail else ""))
             found.faults[code] = detail, found.faults.get(code, ("", moment))[1]
 

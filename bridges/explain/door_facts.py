@@ -21,7 +21,7 @@ class DoorFacts(Device):
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
-        self.claims = Claims()
+        self.claims = Claims(began)
         self.mode = Fact("", began)
         self.holders: dict[str, Moment] = {}
         self.last_heartbeat: Moment | None = None

@@ -50,11 +50,12 @@ def lanes(
 
 
 class Drawing:
-    """The timeline of one device while it grows."""
+    """The timeline of one device while it grows. What was over `past_s` (s) before is forgotten."""
 
-    def __init__(self, kind: Kind, device: str) -> None:
+    def __init__(self, kind: Kind, device: str, past_s: float = float("inf")) -> None:
         self._kind: Kind = kind
         self._device = device
+        self._past_s = past_s
         self._began_at: float | None = None
         self._now = float("-inf")
         self._wall = 0.0
@@ -120,7 +121,7 @@ class Drawing:
             if len(rows) >= MOST_ROWS:
                 del rows[min(rows, key=lambda one: rows[one].heard_at)]
                 self._left_out += 1
-            rows[part] = Row(keeps_s, fills=fills)
+            rows[part] = Row(keeps_s, fills=fills, past_s=self._past_s)
         return rows[part]
 
     def _say(self, lane: LaneName, text: str, tone: Tone) -> None:

@@ -37,7 +37,7 @@ class LiftFacts(Device):
 
     def __init__(self, name: str, began: Moment, focus: str = "") -> None:
         super().__init__(name, began)
-        self.claims = Claims()
+        self.claims = Claims(began)
         self.rides = Rides()
         self.focus = focus
         self.kept: tuple[Line, ...] = ()

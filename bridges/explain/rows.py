@@ -1,5 +1,6 @@
 """Rows of a timeline while they grow: what holds until something else is said, or nothing more is."""
 
+import sys
 from collections import deque
 from collections.abc import Iterator
 from typing import Final
@@ -22,14 +23,22 @@ def label(text: str, longest: int = LONGEST_LABEL) -> str:
 class Row:
     """Spans that never overlap, and marks.
 
-    What was said holds for `keeps_s` (s) and no longer; `fills`: then a span says NOT_HEARD.
+    What was said holds for `keeps_s` (s) and no longer; `fills`: then a span says NOT_HEARD. What was
+    over `past_s` (s) before the newest is forgotten.
     """
 
-    def __init__(self, keeps_s: float = float("inf"), *, fills: bool = False) -> None:
+    def __init__(
+        self,
+        keeps_s: float = float("inf"),
+        *,
+        fills: bool = False,
+        past_s: float = float("inf"),
+    ) -> None:
         self.heard_at = float("-inf")
         self.left_out = 0
         self._keeps_s = keeps_s
         self._fills = fills
+        self._past_s = past_s
         self._spans: deque[Span] = deque(maxlen=MOST_SPANS)
         self._marks: deque[Mark] = deque(maxlen=MOST_SPANS)
         self._open: tuple[float, str, Tone] | None = None
@@ -40,13 +49,15 @@ class Row:
         if self._open is not None and self._open[1:] != (text, tone):
             self._close(at)
         if text and self._open is None:
-            self._open = at, text, tone
+            self._open = at, sys.intern(text), tone  # thousands of spans say the same few words
         self.heard_at = at
 
     def mark(self, at: float, text: str, tone: Tone) -> None:
         """This happened now."""
         self.left_out += len(self._marks) == MOST_SPANS
         self._marks.append(Mark(at, text, tone))
+        while self._marks[0].at_s < at - self._past_s:
+            self._marks.popleft()
         self.heard_at = max(self.heard_at, at)
 
     def spans(self, from_s: float, to_s: float) -> Iterator[Span]:
@@ -86,3 +97,5 @@ class Row:
         if span.to_s > span.from_s:
             self.left_out += len(self._spans) == MOST_SPANS
             self._spans.append(span)
+            while self._spans[0].to_s < span.to_s - self._past_s:
+                self._spans.popleft()

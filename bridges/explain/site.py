@@ -4,6 +4,7 @@
 memory than a minute's.
 """
 
+from collections import deque
 from collections.abc import Mapping
 from datetime import tzinfo
 from typing import Final
@@ -13,7 +14,7 @@ from bridges.explain import answer as common
 from bridges.explain import charger, door, lift
 from bridges.explain.answer import Answer, Remedies
 from bridges.explain.charger_facts import ChargerFacts
-from bridges.explain.device import SILENT_S, Device
+from bridges.explain.device import MOST_LINES, SILENT_S, Device
 from bridges.explain.door_facts import DoorFacts
 from bridges.explain.explanation import Explanation, Line
 from bridges.explain.lift_facts import LiftFacts
@@ -42,9 +43,16 @@ class Site:
     `session`: whose last ride's story is kept, though others come after it.
     """
 
-    def __init__(self, name: str = "", session: str = "", most: int = MOST_DEVICES) -> None:
-        """`most`: how many devices of each kind are remembered."""
+    def __init__(
+        self,
+        name: str = "",
+        session: str = "",
+        most: int = MOST_DEVICES,
+        most_lines: int = MOST_LINES,
+    ) -> None:
+        """`most`: how many devices of each kind are remembered, and `most_lines` of what each did."""
         self._most = most
+        self._most_lines = most_lines
         self.messages = 0
         self._story_from = float("-inf")
         self._name = name
@@ -175,6 +183,7 @@ class Site:
         assert self._began is not None
         made = LiftFacts(name, self._began, self._session) if kind == "lift" else None
         found = self._devices[kind, name] = made or MAKES[kind](name, self._began)
+        found.lines = deque(maxlen=self._most_lines)
         return found
 
     def _state(self, moment: Moment, state: words.Stated) -> None:

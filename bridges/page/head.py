@@ -11,12 +11,14 @@ from bridges.rmf.words import printable
 
 BLUE: Final = "#005a93"
 """Of buttons: white is read on it by day and by night."""
+GREEN: Final = "#00674c"
+"""Of what says that a command was done; white is not read on the library's own."""
 
 
 def head(title: str, login: Login, request: Request) -> None:
     """The head of a view."""
     ui.dark_mode(None)
-    ui.colors(primary=BLUE)
+    ui.colors(primary=BLUE, positive=GREEN)
     ui.page_title(f"{printable(title)} · RMF bridges")
     who = login.form(request, login.user(request))
     links = '<a href="/">Site</a><a href="/incidents">Incidents</a>'

@@ -73,7 +73,7 @@ def _fields(tree: Tree) -> Iterator[tuple[str, str]]:
 def shown(value: Tree) -> str:
     """A value in a word or a few."""
     match value:
-        case None:
+        case None | "":
             return "-"
         case bool():
             return "on" if value else "off"

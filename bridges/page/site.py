@@ -25,6 +25,8 @@ KEPT_S: Final = 600.0
 """The past that a device's page shows."""
 MOST_DEVICES: Final = 500
 """Of each kind; RMF's largest sites have a tenth of it."""
+MOST_LINES: Final = 100
+"""Of what one device did. Its view shows forty; with six hundred of each a large site takes 150 MB."""
 MOST_ROBOTS: Final = 500
 UNSEEN_S: Final = 10.0
 """Of a charger that was silent for longer nobody knows who was there."""
@@ -92,7 +94,7 @@ class Site:
         self._changed: set[Device] = set()
         self._since: dict[str, tuple[str, float, bool]] = {}
         self._robots: dict[tuple[str, str], Robot] = {}
-        self._story = site.Site(most=MOST_DEVICES)
+        self._story = site.Site(most=MOST_DEVICES, most_lines=MOST_LINES)
         self.crowded: set[str] = set()
         self._full_until: dict[str, float] = {}
         self.heard_at: float | None = None
@@ -220,7 +222,7 @@ class Site:
         if device in self._last_at:
             drawing = self._drawings.get(device)
             if drawing is None:
-                drawing = self._drawings[device] = Drawing(_kind(device[0]), device[1])
+                drawing = self._drawings[device] = Drawing(_kind(device[0]), device[1], KEPT_S)
             drawing.take(heard)
             self._changed.add(device)
 

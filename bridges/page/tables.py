@@ -56,7 +56,7 @@ def levels(sensed: Mapping[str, str], driven: Mapping[str, str]) -> str:
         return f"<p>{NO_RING}</p>"
     rows = [(name, "sensed", value) for name, value in sensed.items()]
     rows += [(name, "driven", value) for name, value in driven.items()]
-    return table(("what", "way", "now"), rows, "Levels now, as the driver understands them")
+    return table(("what", "way", "now"), rows, "Levels now, as sensed and driven")
 
 
 def _changed_at(file: str) -> float:

@@ -48,20 +48,14 @@ MOST_BYTES: Final = 64 * 1024
 
 def serve(
     args: argparse.Namespace,
+    opened: socket.socket,
     known: Mapping[str, str],
     join: Callable[[], Transport],
     graph: Sequence[str],
-) -> int:
-    """Serve until a signal ends it; the exit code. `known`: users and their hashes. `graph`: the
-    options that name the page's graph, for its commands."""
-    address, port = args.listen
-    try:
-        opened = socket.create_server((address, port), family=_family(address))
-    except OSError as error:
-        why = os.strerror(error.errno) if error.errno else str(error)
-        other = f"another port: --listen {address}:0 takes a free one"
-        sys.stderr.write(f"rmf-bridge page: {address} port {port}: {why}; {other}\n")
-        return os.EX_UNAVAILABLE
+) -> None:
+    """Serve until a signal ends it. `opened`: listens at `args.listen`. `known`: users and their
+    hashes. `graph`: the options that name the page's graph, for its commands."""
+    address, _ = args.listen
     shown = f"[{address}]" if ":" in address else address
     netloc = f"{shown}:{opened.getsockname()[1]}"
     login = Login(Door(known) if known else None, proxy=args.proxy or "", header=args.proxy_header)
@@ -97,8 +91,6 @@ def serve(
     finally:
         if listener is not None:
             listener.end()
-        opened.close()
-    return 0
 
 
 def _live(
@@ -140,10 +132,6 @@ def _hosts(address: str, netloc: str, names: Sequence[str]) -> set[str]:
     port = netloc.rpartition(":")[2]
     loopback = ipaddress.ip_address(address).is_loopback
     return {netloc, *names, *((f"localhost:{port}",) if loopback else ())}
-
-
-def _family(address: str) -> socket.AddressFamily:
-    return socket.AF_INET6 if ":" in address else socket.AF_INET
 
 
 def _say(text: str) -> None:

@@ -210,7 +210,9 @@ def _top(path: Path) -> tuple[Head, int, int]:
         if magic != MAGIC or zlib.crc32(told) != checksum or size < PAGE:
             raise RingError(f"{path} is no ring of this version")
         return entries.decode_head(told), -(-(TOP.size + 4 + length) // PAGE) * PAGE, size
-    except (OSError, struct.error, msgspec.MsgspecError) as error:
+    except OSError as error:
+        raise RingError(f"{path} cannot be read: {error.strerror}") from None
+    except (struct.error, msgspec.MsgspecError) as error:
         raise RingError(f"{path} cannot be read as a ring: {error}") from None
 
 

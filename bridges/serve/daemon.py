@@ -77,14 +77,16 @@ class Daemon:
         self._transport = open_transport(
             config.rmf, node_name, localhost=localhost, ros_args=ros_args
         )
-        if config.buses and not simulated:
-            runtime.claim(ours)  # before any output is claimed: `outputs-off` reads this record
-            self._guard = Guard(outputs_off) if guard.needed() else None
         kept = None if simulated else KeptFile(state_file(config.path), runtime.path / KEPT)
         open_bus = open_bus or config.open_bus
         self._witness = self._witness_of(ours)
         self._service = service(config, self._transport, open_bus, kept, unsafe, self._witness)
         self._loops = self._service.loops
+        # Every bus is open, and no output is claimed before `serve`: a bus that cannot be opened leaves
+        # no record. `outputs-off` reads the record.
+        if config.buses and not simulated:
+            runtime.claim(ours)
+            self._guard = Guard(outputs_off) if guard.needed() else None
         self._health_topic = named_by(config, DIAGNOSTICS)
         self._told = 0
         self._diagnostics: Publisher[DiagnosticArray] | None = None

@@ -6,7 +6,7 @@ something fail every minute. It ends with Ctrl-C.
 
 import secrets
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import count, cycle
 from pathlib import Path
 from typing import Final
@@ -73,8 +73,10 @@ class Rider:
             self._until = now + self._step
 
 
-def errands(robot: Robot, lift: str, door: str, floors: tuple[str, str]) -> Iterator[Step]:
-    """Through a door, up or down in a lift, a rest; and again."""
+def errands(
+    robot: Robot, lift: str, door: str, floors: tuple[str, str], levels: dict[str, str]
+) -> Iterator[Step]:
+    """Through a door, up or down in a lift, a rest; and again. `levels`: where each robot is."""
     there = cycle((floors, floors[::-1]))
     for start, goal in there:
         yield DoorOpen(door)
@@ -86,6 +88,7 @@ def errands(robot: Robot, lift: str, door: str, floors: tuple[str, str]) -> Iter
         yield RequestLift(lift, goal, inside=True)
         yield DRIVES_S
         robot.in_car = False
+        levels[robot.requester_id] = goal
         yield EndLiftSession(lift)
         yield DRIVES_S
 
@@ -124,9 +127,10 @@ def live(world: World) -> None:
         ("R3", LIFT2, WARD, ("L4", "L1")),
     )
     robots = [Robot(f"{FLEET}/{name}") for name, *_ in rides]
+    levels = {f"{FLEET}/{name}": start for name, _, _, (start, _) in rides}
     world.join(*robots)
     riders = [
-        Rider(world, robot, errands(robot, lift, door, floors))
+        Rider(world, robot, errands(robot, lift, door, floors, levels))
         for robot, (_, lift, door, floors) in zip(robots, rides, strict=True)
     ]
     riders.append(Rider(world, Robot(f"{FLEET}/R4"), charges(world, "R4", PAD_A)))
@@ -140,7 +144,7 @@ def live(world: World) -> None:
             rider.go_on(now)
         if now >= fleet_at[0]:
             fleet_at[0] = now + 1.0
-            world.say([(topics.FLEET_STATES, _fleet(riders, now))])
+            world.say([(topics.FLEET_STATES, _fleet(riders, levels, now))])
             world.journal.forget()
         return False
 
@@ -152,6 +156,7 @@ def _troubles(world: World) -> Iterator[Step]:
         yield FAULT_EVERY_S - FAULT_LASTS_S
         act = world.fail if verb == "fail" else _press(world)
         world.note(f"{part} of {device}: {begins}")
+        world.note(world.page)
         act(device, part, begins)
         yield FAULT_LASTS_S
         world.note(f"{part} of {device}: {ends}")
@@ -164,17 +169,18 @@ def _press(world: World) -> Callable[[str, str, str], None]:
     return lambda device, part, how: world.press(device, part, how == "on")
 
 
-def _fleet(riders: list[Rider], now: float) -> d.FleetState:
+def _fleet(riders: list[Rider], levels: Mapping[str, str], now: float) -> d.FleetState:
     robots = []
-    for rider in riders:
-        name = rider.robot.requester_id.removeprefix(f"{FLEET}/")
-        level = "car" if rider.robot.in_car else "L1"
-        mode = d.RobotModeValue.MODE_MOVING
+    for number, rider in enumerate(riders):
+        name = rider.robot.requester_id
+        charges = name not in levels
+        mode = d.RobotModeValue.MODE_CHARGING if charges else d.RobotModeValue.MODE_MOVING
+        level = "car" if rider.robot.in_car else levels.get(name, "L1")
         robots.append(
             d.RobotState(
-                name,
+                name.removeprefix(f"{FLEET}/"),
                 mode=d.RobotMode(mode),
-                battery_percent=60 + now % 40,
+                battery_percent=60 + (now + 9 * number) % 40,
                 location=d.Location(level_name=level),
             )
         )

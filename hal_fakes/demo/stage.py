@@ -67,6 +67,7 @@ class Stage:
         self.daemons: dict[str, Daemon] = {}
         self.journal = Journal(time.monotonic(), sys.stdout.write, colour=sys.stdout.isatty())
         self.page: Page | None = None
+        self._page_says = ""
         self._interrupted = False
 
     def play(self) -> int:
@@ -119,6 +120,7 @@ class Stage:
         for device, part, mode in self.failures:
             world.note(f"{part} of {device} fails: {mode}")
             self.daemons[device].order(f"fail {device} {part} {mode}")
+        world.page = self._page_says
         self.demo.live(world)
 
     @contextmanager
@@ -135,7 +137,8 @@ class Stage:
                 self.daemons[device] = Daemon(file, directory, domain)
             if self.demo.page_password:
                 self.page = Page(directory, domain, self.demo.page_password)
-                self.journal.note("demo", self.page.address(), time.monotonic())
+                self._page_says = self.page.address()
+                self.journal.note("demo", self._page_says, time.monotonic())
             yield transport
             self.journal.flush(time.monotonic())
         finally:

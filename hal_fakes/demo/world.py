@@ -46,6 +46,7 @@ class World:
     """One inbox for messages and edges; the day waits in `until`, and meanwhile RMF works.
 
     `places`: where each robot is sent to charge or to wait. `alerts`: what a person was told.
+    `page`: what the page says of its address, if there is one.
     """
 
     def __init__(
@@ -65,6 +66,7 @@ class World:
         self.journal = journal
         self.places: dict[str, str] = {}
         self.alerts: list[d.Alert] = []
+        self.page = ""
         self._parties: list[Party] = []
         self._check = check
         self._patience = patience

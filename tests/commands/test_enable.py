@@ -101,6 +101,18 @@ def test_the_installed_file_itself_is_enabled_again_without_a_copy(
     ) == 1
 
 
+@pytest.mark.parametrize("command", ["enable", "disable"])
+def test_a_card_that_is_not_mounted_is_told_before_a_step(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    root = tmp_path / "card"
+    assert main([command, str(LIFT), "--root", str(root), "--dry-run"]) == os.EX_NOINPUT
+    told = capsys.readouterr()
+    assert (told.out, told.err) == ("", f"{root} is no folder: is the card mounted?\n")
+    assert main([command, str(LIFT), "--root", str(root)]) == os.EX_NOINPUT
+    assert (root.exists(), calls) == (False, [])
+
+
 def test_a_dry_run_prints_every_step_and_takes_none(
     tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -320,7 +320,15 @@ def test_end_of_a_free_lift_is_done_before_it_begins() -> None:
 def test_end_of_a_given_session_is_sent_once_even_to_a_lift_that_does_not_show_it() -> None:
     ran = tell(LiftEnd("Lift1", ME, direct=True), every_second(LIFT))
     assert [at for at, _ in ran.sent] == [0.5]
-    assert ran.outcome == Done("Lift1 is no longer held by fleet/robot")
+    assert ran.outcome == Done("Lift1 is not held by fleet/robot: nothing to end")
+
+
+def test_the_end_of_a_session_that_has_not_the_lift_says_who_has_it() -> None:
+    ran = tell(LiftEnd("Lift1", OTHER, direct=True), every_second(GRANTED))
+    assert [at for at, _ in ran.sent] == [0.5]
+    assert ran.outcome == Done(
+        "Lift1 is not held by fleet/other: nothing to end; fleet/robot has it"
+    )
 
 
 # --- doors -------------------------------------------------------------------------------------

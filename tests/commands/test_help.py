@@ -33,6 +33,25 @@ def test_each_example_is_a_right_command_line(command: str) -> None:
     parser.parse_args(arguments)
 
 
+@pytest.mark.parametrize(
+    ("line", "usage", "unknown"),
+    [
+        ("send door ward open --session me", "send door", "--session me"),
+        ("press lift.yaml --device Lift1 hall_L2 on", "press", "hall_L2 on"),
+        ("status --frequency 2 lift", "status", "--frequency lift"),
+    ],
+)
+def test_what_a_command_does_not_know_is_answered_with_its_own_usage(
+    line: str, usage: str, unknown: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        cli.main(shlex.split(line))
+    told = capsys.readouterr().err
+    assert left.value.code == 2
+    assert told.startswith(f"usage: rmf-bridge {usage} [-h] ")
+    assert told.endswith(f"rmf-bridge {usage}: error: unrecognized arguments: {unknown}\n")
+
+
 @pytest.mark.parametrize("kind", ["lift", "door", "charger"])
 def test_the_help_of_each_request_ends_with_an_example(
     kind: str, capsys: pytest.CaptureFixture[str]

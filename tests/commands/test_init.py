@@ -100,6 +100,14 @@ def test_a_file_that_is_there_is_never_overwritten(tmp_path: Path) -> None:
     assert file.read_text() == "mine"
 
 
+def test_a_folder_that_is_missing_is_told_before_a_question_is_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "none" / "device.yaml"
+    assert cli.main(["init", str(file)]) == 73
+    assert capsys.readouterr().err == f"{file} is not written: {file.parent} is no folder\n"
+
+
 @pytest.mark.parametrize(
     ("words", "answer"),
     [

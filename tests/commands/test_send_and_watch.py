@@ -188,6 +188,33 @@ def test_what_comes_from_the_network_cannot_move_the_cursor(
     assert "\x1b" not in capsys.readouterr().err
 
 
+class Interrupted(io.StringIO):
+    """Ctrl-C comes while this text is printed."""
+
+    def __init__(self, at: str) -> None:
+        super().__init__()
+        self._at = at
+
+    def write(self, text: str) -> int:
+        if self._at in text:
+            raise KeyboardInterrupt
+        return super().write(text)
+
+
+@pytest.mark.parametrize(
+    ("directly", "rest"),
+    [(True, "the last request remains in effect"), (False, "no request was sent")],
+)
+def test_an_interrupted_send_says_whether_it_has_asked(
+    capsys: pytest.CaptureFixture[str], directly: bool, rest: str
+) -> None:
+    device = Device(topics.LIFT_STATES, topics.LIFT_REQUESTS, LIFT)
+    ride = LiftRide("Lift1", "L3", ME, direct=directly)
+    assert send.send(Command(device), ride, 10.0, Interrupted("held by" if directly else "")) == 130
+    assert capsys.readouterr().err == f"rmf-bridge send: interrupted; {rest}\n"
+    assert len(device.requests) == directly
+
+
 def test_the_reason_goes_to_standard_error_and_the_exit_code_is_1(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

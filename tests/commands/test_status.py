@@ -125,8 +125,15 @@ def test_outputs_that_nobody_has_verified_off_are_told_when_the_status_is_gone(
     with served(tmp_path / "lift_a", lift()) as folder:
         (folder / "status.json").unlink()
     config = load(ROOT / "config" / "door_modbus.yaml")
-    Records(Places(folder, folder), config.path).write(of(config))
-    assert [(one.state, one.level) for one in seen(folder)] == [("left on", DOWN)]
+    record = Records(Places(folder, folder), config.path).write(of(config))
+    found = seen(folder)
+    assert [(one.state, one.level) for one in found] == [("left on", DOWN)]
+    head, remedy = shown(found)
+    assert head.startswith("lift_a: has died, and its outputs were not verified off (")
+    assert remedy == (
+        f"  do: rmf-bridge outputs-off {config.path}; if that hardware is gone, cut its supply and"
+        f" remove {record}"
+    )
 
 
 def test_of_a_dead_simulation_nothing_is_to_be_switched_off(tmp_path: Path) -> None:
@@ -196,4 +203,6 @@ def test_a_name_that_nobody_has_is_answered_with_the_names_there_are(
     (tmp_path / "rmf-bridge").mkdir()
     with served(tmp_path / "rmf-bridge" / "lift_named", lift()):
         assert cli.main(["status", "no_such_lift"]) == NONE
-    assert re.search(r"^no daemon no_such_lift; there is .*\blift_named\b", capsys.readouterr().err)
+    told = capsys.readouterr()
+    assert re.search(r"^no daemon no_such_lift; there is .*\blift_named\b", told.err)
+    assert told.out == ""

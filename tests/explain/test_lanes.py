@@ -243,6 +243,21 @@ def test_a_flood_of_names_and_changes_is_bounded_and_counted() -> None:
     assert drawn.left_out == 3 * MOST_SPANS - MOST_ROWS
 
 
+def test_what_is_older_than_a_live_page_shows_is_forgotten() -> None:
+    drawing = Drawing("lift", "Lift1", past_s=20.0)
+    for n in range(100):
+        floor = f"L{n // 10}"
+        drawing.take(heard(n, replace(STATE, current_floor=floor, destination_floor=floor)))
+    floors = lane(drawing.timeline(), "floors")
+    assert told(floors.spans) == [(60, 70, "L6"), (70, 80, "L7"), (80, 90, "L8"), (90, 99, "L9")]
+    assert [(mark.at_s, mark.label) for mark in floors.marks] == [
+        (70, "to L7"),
+        (80, "to L8"),
+        (90, "to L9"),
+    ]
+    assert floors.left_out == 0
+
+
 def test_a_timeline_is_json() -> None:
     drawn = lanes([heard(0, STATE), heard(1, STATE)], "lift", "Lift1")
     floors = json.loads(json.dumps(asdict(drawn)))["lanes"][0]

@@ -1,5 +1,6 @@
 """What a daemon noted of its device, in our own incident files."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,9 @@ from bridges.explain.lanes import Drawing
 from bridges.explain.noted import MOST, Noted, levels, noted
 from bridges.explain.site import Site
 from bridges.explain.timeline import Level
+from bridges.recording.heard import Heard, Own
+from bridges.rmf import definitions as d
+from bridges.serve.diagnostics import diagnosis
 
 CORPUS = Path(__file__).parents[1] / "recording" / "corpus"
 
@@ -38,6 +42,47 @@ def test_an_incident_says_what_its_daemon_refused_and_which_fault_it_has() -> No
     told = site.explain("lift", "Lift1", None)
     assert [fault.code for fault in told.faults] == ["RMF_SILENT"]
     assert not told.notes
+
+
+def test_a_fault_that_is_noted_and_then_said_on_the_graph_is_told_once() -> None:
+    site = Site("Lift1")
+
+    def state(at: float) -> Heard:
+        return Heard(
+            at, at, "lift_states", d.LiftState(lift_time=d.Time(int(at)), lift_name="Lift1")
+        )
+
+    def noted_at(at: float, *codes: str) -> Own:
+        found = [{"code": code, "detail": ""} for code in codes]
+        text = json.dumps({"subject": "Lift1", "faults": found})
+        return Own(at, at, "rmf_bridge/faults", text)
+
+    def said_at(at: float, *codes: str) -> Heard:
+        found = [{"code": code, "detail": ""} for code in codes]
+        told = diagnosis("node", "lift", {}, {"Lift1": {"faults": found}}, d.Time(int(at)))
+        return Heard(at, at, "diagnostics", told)
+
+    story: list[Heard | Own] = [
+        said_at(11, "FIRE"),
+        noted_at(12, "FIRE"),
+        said_at(13, "FIRE"),
+        noted_at(14),
+        said_at(15),
+        noted_at(16, "MANUAL"),
+        said_at(17, "MANUAL"),
+        noted_at(18),
+    ]
+    site.take(state(10))
+    for each in story:
+        site.take(each)
+    site.take(state(19))
+    told = site.explain("lift", "Lift1", None)
+    assert [line.text for line in told.story if "fault" in line.text] == [
+        "fault FIRE",
+        "fault FIRE is over",
+        "fault MANUAL",
+        "fault MANUAL is over",
+    ]
 
 
 def test_notes_become_levels_when_they_change() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers import DriverError
+from drivers.hal import HalError
 from hal_fakes.caller import Caller
 from hal_fakes.control import Control
 from hal_fakes.plants.lift import LiftPlant, Pace
@@ -123,7 +123,7 @@ def test_closing_hangs_up_and_removes_the_socket(world: World) -> None:
 
 def test_a_socket_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     path = tmp_path / "no such directory" / "plant.sock"
-    with pytest.raises(DriverError, match=f"^cannot make the plant's control socket {path}: "):
+    with pytest.raises(HalError, match=f"^cannot make the plant's control socket {path}: "):
         Control(path, {})
 
 

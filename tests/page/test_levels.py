@@ -18,8 +18,14 @@ def test_the_last_sample_and_the_last_outputs_are_shown_in_words() -> None:
     outputs = DoorOutputs(hold_open=True)
     levels.take([step(Sampled(DoorSample(opened=False, closed=True)), outputs)])
     levels.take([step(Sampled(DoorSample(opened=True, closed=False)))])
-    sensed = levels.sensed["ward_door"]
-    assert (sensed["opened"], sensed["closed"], sensed["errors"]) == ("on", "off", "none")
+    assert levels.sensed["ward_door"] == {
+        "opened": "on",
+        "closed": "off",
+        "obstruction": "-",
+        "fire": "-",
+        "lost": "-",
+        "errors": "none",
+    }
     assert levels.driven["ward_door"]["hold open"] == "on"
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from bridges.page.site import GONE_AFTER_S, MOST_DEVICES, MOST_ROBOTS, Site, Stands
+from bridges.page.site import GONE_AFTER_S, KEPT_S, MOST_DEVICES, MOST_ROBOTS, Site, Stands
 from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -123,6 +123,17 @@ def test_the_timeline_has_the_sessions_and_requests_of_its_device_alone() -> Non
         (lane.name, lane.row) for lane in timeline.lanes if lane.name in ("sessions", "requests")
     }
     assert found == {("sessions", ""), ("requests", "fleet/b")}
+
+
+def test_a_day_of_rides_takes_no_more_room_than_ten_minutes() -> None:
+    site = Site()
+    for at in range(0, 3600, 2):
+        state = replace(LIFT, lift_time=stamp(WALL + at), session_id=f"fleet/robot{at}")
+        site.take(heard(float(at), topics.LIFT_STATES, state))
+    kept = site.timeline("lift", "Lift1", now=0.0)
+    assert kept is not None
+    sessions = kept.lanes[0].spans
+    assert (sessions[0].from_s, sessions[-1].to_s) == (3596.0 - KEPT_S, 3598.0)
 
 
 def test_faults_and_simulations_come_from_the_daemons_diagnostics() -> None:

@@ -56,12 +56,15 @@ def test_a_person_records_an_incident_and_replays_it(
         )
         ring = bridge("replay", place / "ring")
         running.end(signal.SIGTERM)
+    late = bridge("incident", lift, "-o", "late.mcap", *where)
     file = tmp_path / "a.mcap"
     told = bridge("replay", file, "--json")
     other = tmp_path / "other.yaml"
     other.write_text(lift.read_text())
 
     assert made.returncode == 0, made.stderr
+    assert late.stdout.splitlines()[0] == f"no daemon serves {lift} now: nothing follows"
+    assert (late.returncode, (tmp_path / "late.mcap").exists()) == (0, True)
     assert [(note.code, note.text) for note in notes_in(file)] == [("OPERATOR", "it stood")]
     assert {one.topic for one in heard_in(file)} == {"lift_states", "diagnostics"}
     assert (told.returncode, json.loads(told.stdout)["differences"]) == (0, [])
@@ -101,11 +104,26 @@ def test_the_recorder_makes_a_file_of_a_daemon_that_is_killed(
 def test_a_command_without_a_ring_or_a_recording_says_what_to_do(
     lift: Path, tmp_path: Path
 ) -> None:
-    nothing = bridge("incident", lift, "--runtime-dir", str(tmp_path / "none"))
+    none = tmp_path / "none"
+    nothing = bridge("incident", lift, "--runtime-dir", str(none))
+    died = bridge("incident", lift, "--died", "--runtime-dir", str(none))
+    nowhere = bridge("incident", lift, "-o", none / "a.mcap", "--runtime-dir", str(none))
     (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n")
     no_entries = bridge("replay", tmp_path / "a.mcap")
 
     assert (nothing.returncode, nothing.stdout) == (69, "")
-    assert "Does its daemon run" in nothing.stderr
+    assert nothing.stderr == (
+        f"{none}/ring cannot be read: No such file or directory."
+        " Does its daemon run, and does its YAML keep a ring?\n"
+    )
+    assert died.stderr == (
+        f"{none}/ring.died cannot be read: No such file or directory."
+        " --died is the run before the last one: of the last one, leave it out\n"
+    )
+    assert (nowhere.returncode, nowhere.stdout, nowhere.stderr) == (
+        73,
+        "",
+        f"{none}/a.mcap cannot be written: No such file or directory\n",
+    )
     assert no_entries.returncode == 65
     assert "Traceback" not in nothing.stderr + no_entries.stderr

@@ -28,6 +28,7 @@ from tests.serve.site import (
     daemon,
     environment,
     hold_open,
+    shipped,
 )
 from tests.waiting import PATIENCE_S, wait_until
 
@@ -473,6 +474,30 @@ def test_missing_lgpio_or_permission_is_told_in_one_line(tmp_path: Path) -> None
     assert done.returncode == 1
     assert "outputs_not_off" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_bus_that_cannot_be_opened_leaves_nothing_to_switch_off(
+    domain: int, tmp_path: Path
+) -> None:
+    """Nothing was claimed, so no record stays that only this hardware could answer."""
+    file = shipped("lift_dry_contact.yaml", tmp_path, wire())
+    text = file.read_text()
+    text = text.replace("domain_id: 0", f"domain_id: {domain}\n  network: localhost")
+    file.write_text(text.replace("type: gpio", "type: gpio, chip: 99"))
+    done = _told("run", file, "--runtime-dir", tmp_path / "run")
+    assert (done.returncode, "outputs_not_off" in done.stderr) == (69, False), done.stderr
+    assert "ERROR" in done.stderr.splitlines()[-1]
+    assert list(tmp_path.rglob("claimed-*")) == []
+
+
+def test_a_simulation_without_a_place_for_its_socket_says_so_in_one_line(
+    domain: int, tmp_path: Path
+) -> None:
+    file = shipped("lift_dry_contact.yaml", tmp_path, wire())
+    options = ("--simulate", "--domain-id", str(domain), "--runtime-dir", "/proc/none")
+    done = _told("run", file, *options)
+    assert (done.returncode, "Traceback" in done.stderr) == (69, False), done.stderr
+    assert "cannot make the plant's control socket /proc/none/" in done.stderr.splitlines()[-1]
 
 
 def test_a_simulation_needs_no_token(domain: int, tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 `mmdebstrap` makes an archive of it, and `mke2fs -d` a file system of that, under fakeroot, so that
 nothing is mounted. The first RAM disk is ours (`ram_disk.py`): a program of the target makes Debian's.
+
+For another architecture than this machine's no installer is emulated: what installers leave in /etc and
+/var is the same text for each, so this machine's tree gets the other one's packages unpacked over it.
 """
 
 import hashlib
@@ -49,6 +52,9 @@ MODULES: Final = (
     "net/can",
 )
 """What is kept of the kernel's modules, of which there are 400 MB."""
+DPKG: Final = "var/lib/dpkg"
+KEPT: Final = ("--exclude=./dev", "--exclude=./etc", "--exclude=./var")
+"""What this machine's installers have made stays when the other architecture's files are unpacked."""
 LEFT_OUT: Final = ("usr/share/doc", "usr/share/locale", "usr/share/man")
 TOOLS: Final = {
     "depmod": "kmod",
@@ -105,14 +111,14 @@ def _key() -> str:
 
 
 def _build(arch: str, folder: Path) -> None:
-    archive, tree = folder / "root.tar", folder / "tree"
+    tree = folder / "tree"
     with (folder / "build.log").open("w") as log:
-        _run([*_mmdebstrap(arch), SUITES[0], str(archive), *_sources()], log.fileno())
         steps = [
             f"mkdir {tree}",
-            f"tar -C {tree} -xpf {archive} --exclude=./dev",
+            *_filled(arch, folder, log.fileno()),
             f"mkdir {tree}/dev",
             f"cp -R {FILES}/. {tree}/",
+            f"chmod -R u+rX {tree}",  # /etc/gshadow may be read by nobody: mke2fs is not root
             f"chown -R 0:0 {tree}/etc",
             f"depmod -b {tree} {KERNEL}-{arch}",
             f"mke2fs -q -t ext4 -L root -d {tree} {folder}/root.ext4 {SIZE}",
@@ -121,7 +127,31 @@ def _build(arch: str, folder: Path) -> None:
     shutil.copy(tree / f"usr/lib/modules/{KERNEL}-{arch}/vmlinuz", folder / "vmlinuz")
     (folder / "initrd").write_bytes(ram_disk(tree, f"{KERNEL}-{arch}"))
     shutil.rmtree(tree)
-    archive.unlink()
+    for archive in folder.glob("*.tar"):
+        archive.unlink()
+
+
+def _filled(arch: str, folder: Path, log: int) -> list[str]:
+    """Make archives; the shell's lines that make the tree of them."""
+    here = subprocess.check_output(["dpkg", "--print-architecture"], text=True).strip()
+    kernel = [f"linux-{part}-{KERNEL}-{arch}" for part in ("binary", "modules")]
+    tree, ours, other = folder / "tree", folder / "ours.tar", folder / "other.tar"
+    if arch == here:
+        _run(_mmdebstrap(arch, "apt", [*PACKAGES, *kernel], ours), log)
+        return [f"tar -C {tree} -xpf {ours} --exclude=./dev"]
+    _run(_mmdebstrap(here, "apt", PACKAGES, ours), log)
+    status = subprocess.check_output(["tar", "-xOf", ours, f"./{DPKG}/status"], text=True)
+    names = [line.split()[1] for line in status.splitlines() if line.startswith("Package: ")]
+    _run(_mmdebstrap(arch, "extract", [*names, *kernel], other), log)
+    return [
+        f"tar -C {tree} -xpf {ours} --exclude=./dev",
+        f"tar -C {tree} -xpf {other} --keep-directory-symlink {' '.join(KEPT)}",
+        f"rm {tree}/etc/ld.so.cache",
+        f"cd {tree}/{DPKG}",
+        f"echo {arch} > arch",
+        f"sed -i 's/^Architecture: {here}$/Architecture: {arch}/' status",
+        f"for file in info/*:{here}.*; do mv $file ${{file%:*}}:{arch}.${{file##*.}}; done",
+    ]
 
 
 def _run(words: Iterable[str], log: int) -> None:
@@ -132,21 +162,23 @@ def _run(words: Iterable[str], log: int) -> None:
         raise Unusable(f"the image could not be built; the end of {name} says why")
 
 
-def _mmdebstrap(arch: str) -> list[str]:
+def _mmdebstrap(arch: str, variant: str, packages: Iterable[str], archive: Path) -> list[str]:
     """An ordinary user needs a user namespace, and uidmap's programs for it."""
     if os.geteuid() != 0:
         needed({"newuidmap": "uidmap"})
-    packages = [*PACKAGES, *(f"linux-{part}-{KERNEL}-{arch}" for part in ("binary", "modules"))]
     return [
         "mmdebstrap",
         f"--mode={'unshare' if os.geteuid() else 'root'}",
         f"--architectures={arch}",
-        "--variant=apt",
+        f"--variant={variant}",
         f"--include={','.join(packages)}",
         '--aptopt=Apt::Install-Recommends "false"',
         *(f"--dpkgopt=path-exclude=/{folder}/*" for folder in LEFT_OUT),
         "--dpkgopt=path-exclude=/usr/lib/modules/*/kernel/*",
         *(f"--dpkgopt=path-include=/usr/lib/modules/*/kernel/{name}*" for name in MODULES),
+        SUITES[0],
+        str(archive),
+        *_sources(),
     ]
 
 

@@ -1,31 +1,45 @@
-"""The checks in turn: functions in `guest/`."""
+"""The checks in turn: functions in `guest/`, and what the host does to the machine between them."""
 
 from typing import Final
 
+CUT: Final = "power cut"
+REBOOT: Final = "reboot"
 LIFT: Final = ("install.package", "install.lift")
-DEATHS: Final = (
-    "deaths.kill_9",
-    "deaths.hang",
-    "deaths.crash",
-    "deaths.out_of_memory",
-    "deaths.clean_stop",
-    "deaths.two_on_one_pin",
-)
-SERVICES: Final = ("wires.door_service", "wires.charger_service")
-WIRES: Final = (
-    "wires.door",
-    "wires.door_killed",
-    "wires.adapter_pulled",
-    "wires.charge",
-    "wires.charger_killed",
-    "wires.interface_down",
-    "wires.bus_off",
-)
-WORLD: Final = ("install.wrong_yaml", "install.recorder")
 PARTS: Final = {
-    "": (*LIFT, *DEATHS, *SERVICES, *WIRES, *WORLD),
-    "deaths": (*LIFT, *DEATHS),
-    "wires": ("install.package", *SERVICES, *WIRES),
-    "world": ("install.package", *WORLD),
+    "lift": (
+        *LIFT,
+        "rides.ride",
+        "deaths.hang",
+        "deaths.crash",
+        "deaths.out_of_memory",
+        "deaths.clean_stop",
+        "deaths.two_on_one_pin",
+        "world.edited_yaml",
+        "world.full_run",
+        "boots.energised",
+        CUT,
+        "boots.off",
+        "boots.energised",
+        REBOOT,
+        "boots.off",
+    ),
+    "site": (
+        *LIFT,
+        "deaths.kill_9",
+        "wires.door_service",
+        "wires.charger_service",
+        "wires.door",
+        "wires.door_killed",
+        "wires.adapter_pulled",
+        "wires.charge",
+        "wires.charger_killed",
+        "wires.interface_down",
+        "wires.bus_off",
+        "install.wrong_yaml",
+        "install.recorder",
+        "install.supervisors",
+    ),
 }
-"""The whole, and its parts, each with what it needs."""
+"""Each is one machine from its first boot on: a check may need those before it."""
+WHOLE: Final = ("lift", "site")
+"""The parts that have every check: they run side by side."""

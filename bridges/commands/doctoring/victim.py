@@ -42,9 +42,11 @@ def _held(
     held: directory.RuntimeDirectory,
     switches_off: list[str],
 ) -> int:
-    all_off = guarded(config, held, switches_off)
     try:
-        bus = config.open_bus(config.bus_of(device))
+        bus, all_off = guarded(config, device, held, switches_off)
+    except DriverError as error:
+        return _say(f"{error}")
+    try:
         driver = config.driver_type(device).create(device, config.devices[device], bus)
         off = _on_for_a_while(driver, bus, step_called(config, device, step))
     except DriverError as error:

@@ -133,7 +133,11 @@ class LiftEnd(_Lift):
         answer = seen.answer(d.LiftState)
         if answer is None or answer.session_id == session:
             return None
-        return Done(f"{self.name} is no longer held by {session}")
+        if any(state.session_id == session for state in seen.states_of(d.LiftState)):
+            return Done(f"{self.name} is no longer held by {session}")
+        holder = answer.session_id
+        instead = f"; {holder} has it" if holder else ""
+        return Done(f"{self.name} is not held by {session}: nothing to end{instead}")
 
     def goes_direct(self, seen: Seen, now: float) -> bool:
         """The supervisor, if there is one, has had its time, and nobody is in the car."""

@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 
 from bridges import cli
+from bridges.serve.places import Places
+from bridges.serve.record import Records, of
+from bridges.settings.load import load
 from tests.commands.terminal import Terminal
 from tests.serve.site import Module, daemon, environment
 from tests.waiting import wait_until
@@ -72,6 +75,18 @@ def test_it_refuses_a_device_that_is_served(module: Module, tmp_path: Path) -> N
         terminal = walk(module, tmp_path)
         terminal.wait_for("To stop it: ")
         assert terminal.end() == os.EX_UNAVAILABLE
+
+
+def test_practice_begins_whatever_a_dead_daemon_has_left_on(module: Module, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    run.mkdir(mode=0o700)
+    left = Records(Places(run, run), module.file).write(of(load(module.file)))
+    words = ("--simulate", "--runtime-dir", run, "--record", tmp_path / "record")
+    terminal = Terminal("walk", module.file, *words, environ=environment())
+    terminal.wait_for("closed yes")
+    terminal.type("q")
+    terminal.wait_for("every output verified off")
+    assert (terminal.end(), left.exists(), module.relay()) == (0, True, [])
 
 
 def test_a_record_that_cannot_be_written_ends_the_walk_before_anything_is_switched(

@@ -22,6 +22,8 @@ from tests.waiting import wait_until
 
 pytestmark = pytest.mark.browser
 MOST_GROWTH_MB = 60
+LONG = 4000 * "x"
+"""Of a session's name, so that a socket's buffers are soon full."""
 RELOADED = "window.loadedOnce === undefined"
 
 
@@ -86,10 +88,10 @@ def test_when_the_network_goes_all_turns_old_and_comes_back_without_a_reload(
 def test_a_browser_that_never_reads_is_ended_and_others_see_all(
     tab: Page, address: str, graph: Graph, until: Until, said: Path
 ) -> None:
-    for number in range(60):
+    for number in range(20):
         graph.lift(f"Tower{number:02}", "L1", 0, "fleet/robot")
     tab.goto(address)
-    until(lambda: "L1" in card(tab, "Tower59"), "the lifts")
+    until(lambda: "L1" in card(tab, "Tower19"), "the lifts")
     pid = page_pid(address)
     before = rss_mb(pid)
     ended_before = said.read_text().count("browser_does_not_read")
@@ -99,16 +101,16 @@ def test_a_browser_that_never_reads_is_ended_and_others_see_all(
         """The site moves in each look, so that there is much to send."""
         nonlocal turn
         turn += 1
-        for number in range(60):
-            graph.lift(f"Tower{number:02}", f"L{1 + turn % 3}", 0, f"fleet/robot_{turn}")
+        for number in range(20):
+            graph.lift(f"Tower{number:02}", f"L{1 + turn % 3}", 0, f"fleet/robot_{turn}" + LONG)
         return said.read_text().count("browser_does_not_read") > ended_before
 
     with deaf(address):
         until(ended, "the page to end it")
         seen = f"fleet/robot_{turn}"
-        until(lambda: seen in card(tab, "Tower59"), "what is new, in the browser that reads")
+        until(lambda: seen in card(tab, "Tower19"), "what is new, in the browser that reads")
         assert rss_mb(pid) - before < MOST_GROWTH_MB
-    for number in range(60):
+    for number in range(20):
         del graph.lifts[f"Tower{number:02}"]
 
 

@@ -17,12 +17,15 @@ from tests.vm.guest.system import (
     until,
 )
 
+PAGE = "rmf-bridge-page.service"
+EXPOSED = 2.0
+"""The score of `systemd-analyze security` that no unit may exceed."""
+
 
 def package() -> str:
     """`apt install ./rmf-bridges_….deb` on a fresh Debian."""
-    deb = _deb()
-    apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
-    sh(*apt, "--no-install-recommends", str(deb))
+    deb = _deb("rmf-bridges")
+    install(deb)
     chip = (header.CONFIGFS / "bank0/chip_name").read_text().strip()
     group = grp.getgrgid(Path(f"/dev/{chip}").stat().st_gid).gr_name
     if group != "gpio":
@@ -30,11 +33,17 @@ def package() -> str:
     return f"{deb.name}: {sh('rmf-bridge', '--version').strip()}; /dev/{chip} is the group gpio's"
 
 
-def _deb() -> Path:
-    """The daemons' package, which the host shares."""
+def install(deb: Path, *options: str) -> None:
+    """As people do it, but that nothing is asked."""
+    apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
+    sh(*apt, "--no-install-recommends", *options, str(deb))
+
+
+def _deb(name: str) -> Path:
+    """The package of this name, which the host shares."""
     if not Path("/srv").is_mount():
         sh("mount", "-t", "9p", "-o", "ro,trans=virtio,version=9p2000.L", "packages", "/srv")
-    (deb,) = Path("/srv").glob("rmf-bridges_*.deb")
+    (deb,) = Path("/srv").glob(f"{name}_*.deb")
     return deb
 
 
@@ -43,6 +52,12 @@ def lift() -> str:
     far_side("lift")
     name = enable("lift")
     return f"ready after {ready_s(name):.2f} s"
+
+
+def supervisors() -> str:
+    """`rmf-bridge enable` for RMF's two supervisors."""
+    took = [ready_s(enable(name)) for name in ("lift_supervisor", "door_supervisor")]
+    return f"ready after {took[0]:.2f} and {took[1]:.2f} s"
 
 
 def recorder() -> str:

@@ -1,11 +1,13 @@
 """Requests of RMF's from outside of the services."""
 
 from tests.vm.guest import header
-from tests.vm.guest.system import sh, until
+from tests.vm.guest.system import Wrong, sh, until
 
 ROOM = ("--domain-id", "7", "--localhost")
 LIFT = dict.fromkeys((18, 16, 22, 23, 24), True)
 """The outputs of lift.yaml: each is on at high."""
+HELD = [16, 18]
+"""Of these outputs: the door and the mode, which a session holds."""
 
 
 def send(*words: str) -> str:
@@ -17,5 +19,19 @@ def energise() -> dict[int, bool]:
     """A session of the lift holds two relays; returns their lines, each with its level for on."""
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
-    until(lambda: len(header.on(LIFT, began)) == 2, "two relays are on")
-    return {line: LIFT[line] for line in header.on(LIFT, began)}
+    until(lambda: sorted(header.on(LIFT, began)) == HELD, "two relays are on")
+    return {line: LIFT[line] for line in HELD}
+
+
+def ride() -> str:
+    """A robot rides from L1 to L3: requests from outside of the service, lines of the header."""
+    began = header.now()
+    send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
+    send("lift", "Lift1", "L3", "--session", "vm/robot", "--direct")
+    held = sorted(header.on(LIFT))
+    send("lift", "Lift1", "--end", "--session", "vm/robot", "--direct")
+    until(lambda: not header.on(LIFT, began), "every output is off after the session")
+    called = [each.line for each in header.writes(began) if each.level and each.line in (22, 24)]
+    if held != HELD or called[-1:] != [24]:
+        raise Wrong(f"held at L3: {held}, calls: {called}")
+    return f"at L3 after {header.now() - began:.1f} s, doors held there, all off after the end"
