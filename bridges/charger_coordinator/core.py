@@ -114,6 +114,6 @@ def _wake_at(memory: Memory, now: float, site: Site) -> float:
         else:
             due.append(grant.made_at + stations.TAKEN_S)
     due += [stations.proven_at(memory, who) for who in memory.strikes]
-    due += report.due(memory)
+    due += report.due(memory, site)
     due += astray.due(memory, now, site)
     return min((at for at in due if at > now), default=NEVER)

@@ -189,8 +189,8 @@ class Memory(msgspec.Struct, frozen=True):
     made so far. `robots`, `stations`: as last heard, and when. `shunned`: station -> until when it is
     passed over, because it took no request. `preferred`: robot -> the station that another node has
     dedicated to it. `nudges`: robots told to leave a pad. `receivers`: robot -> the error of its own
-    receiver. `when`: the local time. `assigned`: the assignments last published. `alerts`: the faults
-    that a person has been told of.
+    receiver. `when`: the local time. `assigned`: the assignments last published, and when:
+    `assigned_at`. `alerts`: the faults that a person has been told of.
     """
 
     began_at: float = 0.0
@@ -212,6 +212,7 @@ class Memory(msgspec.Struct, frozen=True):
     receivers: Mapping[Robot, str] = msgspec.field(default_factory=dict)
     when: LocalTime | None = None
     assigned: tuple[ChargingAssignments, ...] = ()
+    assigned_at: float = AGES_AGO
     alerts: frozenset[str] = frozenset()
 
     def wish(self, robot: Robot) -> Wish | None:

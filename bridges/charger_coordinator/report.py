@@ -54,6 +54,7 @@ TITLES: Final = {
     "REQUEST_NOT_TAKEN": "A charger takes no request",
 }
 ASKS_S: Final = 5.0
+AGAIN_S: Final = 15.0
 """A robot that comes to a pad unannounced asks for it by its fleet's state, a few seconds later."""
 ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
 
@@ -174,7 +175,9 @@ def messages(
             found.append(_to_station(name, grant))
             memory = memory.with_grant(name, replace(grant, sent_at=now))
     assignments = tuple(_assignments(memory, now, site)) if memory.alone else ()
-    if assignments != memory.assigned:
+    forgotten = any(memory.assigned_at < at <= now for at in _again_at(memory, site))
+    if assignments != memory.assigned or forgotten:
+        memory = replace(memory, assigned_at=now)
         found += [(CHARGING_ASSIGNMENTS, message) for message in assignments]
     new = {str(fault): fault for fault in faults}
     found += [(ALERT, _alert(f)) for text, f in new.items() if text not in memory.alerts]
@@ -182,11 +185,27 @@ def messages(
     return memory, tuple(found)
 
 
-def due(memory: Memory) -> list[float]:
-    """When requests, cancels and faults are due."""
+def _again_at(memory: Memory, site: Site) -> Iterator[float]:
+    """When the assignment of a robot that stands elsewhere without a task is published again.
+
+    An EasyFullControl adapter that starts takes the retained assignment, and a moment later the charger
+    of its own file in its place (seen with Jazzy's).
+    """
+    for name, grant in memory.grants.items():
+        standing = memory.robots.get(grant.robot)
+        place = memory.place_of(grant.robot)
+        if grant.over or grant.started or standing is None or standing.sighting.task_id:
+            continue
+        if place is not None and memory.stands_at(grant.robot, site) != name:
+            yield max(standing.since, grant.made_at) + AGAIN_S
+
+
+def due(memory: Memory, site: Site) -> list[float]:
+    """When requests, cancels, assignments and faults are due."""
     if not memory.may_speak:
         return []
     asks = [seen.since + ASKS_S for seen in memory.stations.values()]
+    asks += _again_at(memory, site)
     return asks + [_due_at(memory, name, grant) for name, grant in memory.grants.items()]
 
 

@@ -12,9 +12,9 @@ and DockRobot alone set). So, of a robot that has stood at one of our waypoints 
 4. A wish lasts while the robot stands at one of our waypoints so, and while it drives there: in the
    same task, or without one while a station is kept for it. A task that begins within COMES_S of
    the call is that drive: RMF's automatic retreat, or its ChargeBattery started again.
-5. RMF moves no robot without a task under `finishing_request: nothing` or `park`, until its battery is
-   very low. Such a robot keeps its place when it is called. After COMES_S it loses the station, and
-   ABSENT_S later it is called again.
+5. RMF moves no robot without a task under `finishing_request: nothing`, until its battery is very low;
+   nor under `park`, except Jazzy's, which drives to the assigned place. Such a robot keeps its place
+   when it is called. After COMES_S it loses the station, and ABSENT_S later it is called again.
 """
 
 from typing import Final

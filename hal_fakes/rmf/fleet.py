@@ -6,11 +6,15 @@ FleetUpdateHandle.cpp) and seen with Jazzy's:
    whose waypoint or mode differs from the last one starts it again, and moves no robot without it. A
    waypoint that the graph does not have is the end of the adapter.
 2. It is a task when RMF finds the battery too low for the way to the dedicated waypoint (the automatic
-   retreat; never while the robot stands there already), or when its planner wants it. That task ends at
+   retreat; never while the robot stands there already, and Jazzy's never below the recharge threshold),
+   or when its planner wants it. That task ends at
    recharge_soc. It is no task when it is the fleet's `finishing_request: charge`. That one lasts until
-   the next task, however full the battery is. `park` drives to a parking spot, `nothing` stays.
+   the next task, however full the battery is. `nothing` stays. `park` drives to a parking spot; Jazzy's
+   (branch jazzy, 7eef65a) knows no spots, and goes where ChargeBattery would, at each assignment too.
 3. A robot without a task shows the mode IDLE and no task id, also while it charges. WaitForCharge
    alone sets CHARGING, and nothing sets it back: every later task shows it too.
+4. An EasyFullControl adapter that starts forgets the assignments: it takes the retained one, and a
+   moment later the charger of its file in its place.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,6 +28,8 @@ from bridges.rmf_rules import Party, Said
 EVERY_S: Final = 1.0
 RECHARGE_PERCENT: Final = 100.0
 RETREAT_PERCENT: Final = 12.0
+TOO_LATE_PERCENT: Final = 10.0
+IDLE: Final = d.RobotModeValue.MODE_IDLE
 Graph = Mapping[str, tuple[str, float, float]]
 """Waypoint -> level, x, y (m)."""
 Finishing = Literal["charge", "park", "nothing"]
@@ -72,13 +78,15 @@ class Fleet(Party):
         robots: Mapping[str, str],
         drive_s: float,
         finishing: Finishing = "nothing",
+        jazzy: bool = False,
     ) -> None:
         """`robots`: each where it stands, which is a parking spot. `drive_s`: how long every way takes.
-        `finishing`: the fleet's `finishing_request`."""
+        `finishing`: the fleet's `finishing_request`. `jazzy`: by Jazzy's rules where they differ."""
         self.name = name
         self.graph = graph
         self.drive_s = drive_s
         self.finishing = finishing
+        self.jazzy = jazzy
         self.robots = {who: FleetRobot(who, place, place) for who, place in robots.items()}
         self._spots = dict(robots)
         self._tasks = 0
@@ -98,6 +106,12 @@ class Fleet(Party):
     def rests(self, who: str, now: float) -> None:
         """Its task is over, and the fleet's finishing request begins."""
         self._rest(self.robots[who], now)
+
+    def starts_again(self, now: float) -> None:
+        """The adapter was killed and is up again: each robot has the charger of its file."""
+        for robot in self.robots.values():
+            robot.dedicated, robot.waits, robot.mode = self._spots[robot.name], False, IDLE
+            self._rest(robot, now)
 
     def strays(self, who: str, place: str, now: float) -> None:
         """It drives there in the task that it has, whatever that wants."""
@@ -145,18 +159,20 @@ class Fleet(Party):
             self._go(robot, robot.dedicated, now)
         elif self.finishing == "park":
             robot.doing = "idle park"
-            self._go(robot, self._spots[robot.name], now)
+            self._go(robot, robot.dedicated if self.jazzy else self._spots[robot.name], now)
 
     def _retreat(self, robot: FleetRobot, now: float) -> None:
         """consider_retreating_to_charger: not with a task, and not where it is dedicated to."""
         low = robot.battery_percent < RETREAT_PERCENT
+        if self.jazzy and robot.battery_percent <= TOO_LATE_PERCENT:
+            return
         if low and not robot.task_id and robot.dedicated not in (robot.place, robot.goes_to):
             self._begin(robot, "charge", now)
 
     def _dedicate(self, robot: FleetRobot, waypoint: str, waits: bool, now: float) -> None:
         changed = (waypoint, waits) != (robot.dedicated, robot.waits)
         robot.dedicated, robot.waits = waypoint, waits
-        if changed and robot.charges:
+        if changed and (robot.charges or (self.jazzy and robot.doing == "idle park")):
             self._go(robot, waypoint, now)
 
     # ---- on the road

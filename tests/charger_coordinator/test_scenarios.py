@@ -25,9 +25,9 @@ def yard(finishing: Finishing, **changes: object) -> Yard:
     return site
 
 
-def home_from_work(finishing: Finishing, percent: float) -> Yard:
+def home_from_work(finishing: Finishing, percent: float, jazzy: bool = False) -> Yard:
     """AMR01 has ended its task in the ward, with so much left."""
-    site = yard(finishing)
+    site = yard(finishing, jazzy=jazzy)
     site.fleet.works("AMR01", "ward", site.now)
     site.run(10.0)
     site.fleet.robots["AMR01"].battery_percent = percent
@@ -77,6 +77,26 @@ def test_0_a_robot_without_a_task_is_served_if_its_finishing_request_brings_it(
     assert (robot.place, robot.battery_percent, site.faults) == (place, percent, [])
 
 
+def test_0_a_robot_whose_adapter_starts_again_on_its_way_is_told_again() -> None:
+    site = home_from_work("charge", 60.0)
+    site.run(17.0)
+    site.fleet.starts_again(site.now)
+    assert site.run(60.0) == [
+        (37.25, "charger_a: CHARGING AMR01"),
+        (45.5, "charger_a: RELEASED AMR01"),
+        (45.5, "AMR01 -> WAIT wait_1"),
+        (46.5, "charger_a: IDLE"),
+    ]
+    assert site.faults == []
+
+
+def test_0_jazzys_park_goes_to_the_charger_that_it_is_assigned_as_charge_does() -> None:
+    site = home_from_work("park", 60.0, jazzy=True)
+    assert site.run(300.0) == [*charged_at_a(16.25, 30.5), (31.5, "charger_a: IDLE")]
+    robot = site.fleet.robots["AMR01"]
+    assert (robot.place, robot.battery_percent, site.faults) == ("wait_1", 100.0, [])
+
+
 @pytest.mark.parametrize(
     ("finishing", "history"),
     [
@@ -93,6 +113,13 @@ def test_0_every_robot_that_rmf_lets_retreat_is_served(
     site.fleet.robots["AMR01"].battery_percent = 10.0
     assert told + site.run(300.0) == history
     assert site.faults == []
+
+
+def test_0_jazzy_lets_no_robot_retreat_that_is_below_the_recharge_threshold() -> None:
+    site = home_from_work("nothing", 11.0, jazzy=True)
+    assert site.run(60.0)[0] == (16.25, "charger_a <- charge AMR01")
+    late = home_from_work("nothing", 9.0, jazzy=True)
+    assert (late.run(60.0), late.fleet.robots["AMR01"].place) == ([], "ward")
 
 
 @EACH

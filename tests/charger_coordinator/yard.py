@@ -171,6 +171,7 @@ class Yard:
         fills: float = 5.0,
         drive_s: float = 4.0,
         finishing: Finishing = "nothing",
+        jazzy: bool = False,
     ) -> None:
         self.world = World(in_order)
         self.settings = site or settings()
@@ -178,8 +179,8 @@ class Yard:
         self.story: list[tuple[float, str]] = []
         self.chargers = {name: Charger(name, knows) for name in PLACES}
         homes = {f"AMR0{i}": f"wait_{i}" for i in (1, 2, 3)}
-        self.fleet = Fleet("tiny", GRAPH, homes, drive_s, finishing)
-        self.big = Fleet("big", BIG_GRAPH, {"B01": "bay_1"}, drive_s, finishing)
+        self.fleet = Fleet("tiny", GRAPH, homes, drive_s, finishing, jazzy)
+        self.big = Fleet("big", BIG_GRAPH, {"B01": "bay_1"}, drive_s, finishing, jazzy)
         self.adapters = [self.fleet, self.big][: len(self.settings.fleets)]
         self.rmf = Ticking(self.world, "rmf", STEP_S, self._step).transport
         self.states = self.rmf.publisher(topics.CHARGER_STATES)
