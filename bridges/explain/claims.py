@@ -10,7 +10,7 @@ from bridges.explain.phrases import Moment
 MOST_CLAIMS: Final = 64
 ASKS_WITHIN_S: Final = 3.5
 """Who waits asks at each state or each second; after three that were missed it has stopped."""
-REPEATS_S: Final = 1.9
+REPEATS_S: Final = 1.5
 """Before we have listened so long, the first request heard of somebody may be one that it repeats."""
 
 
