@@ -60,6 +60,8 @@ def serve(
     netloc = f"{shown}:{opened.getsockname()[1]}"
     login = Login(Door(known) if known else None, proxy=args.proxy or "", header=args.proxy_header)
     ui.add_css(STYLE, shared=True)
+    # Quasar draws a progress bar that has no name over the page during each request of a script.
+    app.config.quasar_config["loadingBar"]["skipHijack"] = True
     app.get("/login")(login.show)
     app.post("/login")(login.log_in)
     app.post("/logout")(login.log_out)
