@@ -9,9 +9,10 @@ import pytest
 
 from drivers.hal.can import EXTENDED, CanBus, Frame, Settings, Slcan, Wanted, named, warnings
 from tests.drivers.hal.can.far_end import Clock, FarEnd, bus_on, channel, failure, two_ends
+from tests.drivers.hal.modbus.module import Time
 from tests.waiting import PATIENCE_S
 
-Ends = tuple[CanBus, FarEnd, Clock]
+Ends = tuple[CanBus, FarEnd, Time]
 SILENT = "nothing else is heard on the bus either: power, cable, termination, bitrate?"
 
 
@@ -98,12 +99,12 @@ def test_what_has_come_while_we_hung_is_of_unknown_age_and_thrown_away(ends: End
     assert heard == [Frame(1, b"\2")]
 
 
-def test_waiting_ends_when_it_is_heard_or_when_the_time_is_up(ends: Ends) -> None:
-    bus, far, _ = ends
-    heard = heard_by(bus, Wanted(1))
-    assert bus.wait(lambda: bool(heard), 0.02) is False
-    far.send(1)
-    assert bus.wait(lambda: bool(heard), PATIENCE_S) is True
+def test_waiting_ends_when_it_is_heard_or_when_the_time_is_up() -> None:
+    with two_ends(Clock()) as (bus, far, _):
+        heard = heard_by(bus, Wanted(1))
+        assert bus.wait(lambda: bool(heard), 0.02) is False
+        far.send(1)
+        assert bus.wait(lambda: bool(heard), PATIENCE_S) is True
 
 
 # ---- trouble

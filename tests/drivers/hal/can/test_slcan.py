@@ -56,7 +56,7 @@ class Desk:
         self.heard.clear()
         if failure(self.bus.take) or failure(lambda: self.bus.send(Frame(0x123, b"\1"))):
             return False
-        return failure(lambda: self.bus.wait(lambda: bool(self.heard), 0.1)) == "" and bool(
+        return failure(lambda: self.bus.wait(lambda: bool(self.heard), 1.0)) == "" and bool(
             self.heard
         )
 
