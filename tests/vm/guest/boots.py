@@ -13,9 +13,6 @@ from tests.vm.guest.system import (
 )
 
 SERVICE = unit("lift")
-LOW = 7
-"""The output of low.yaml: it is on at low."""
-STARTS = 10
 
 
 def energised() -> str:

@@ -57,12 +57,12 @@ def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> str:
     relays, old = energise(), pid(SERVICE)
     when = header.now()
     act()
-    took = _off_after(relays, when, within_s)
+    took = off_after(relays, when, within_s)
     back(SERVICE, old)
     return f"off after {took:.2f} s"
 
 
-def _off_after(relays: Mapping[int, bool], when: float, within_s: float) -> float:
+def off_after(relays: Mapping[int, bool], when: float, within_s: float = KILLED_S) -> float:
     """How long after `when` (s) the last of these relays was written off."""
     found = until(lambda: _all_off(relays, when), "each relay is written off", 30.0)
     took = max(found.values()) - when
@@ -82,7 +82,7 @@ def clean_stop() -> str:
     when = header.now()
     sh("systemctl", "stop", SERVICE)
     stopped = header.now() - when
-    took = _off_after(relays, when, KILLED_S)
+    took = off_after(relays, when)
     text = journal(mark, SERVICE)
     if "nothing_to_switch_off" not in text:
         raise Wrong("outputs-off ran once more")

@@ -17,15 +17,12 @@ from tests.vm.guest.system import (
     until,
 )
 
-PAGE = "rmf-bridge-page.service"
-EXPOSED = 2.0
-"""The score of `systemd-analyze security` that no unit may exceed."""
-
 
 def package() -> str:
     """`apt install ./rmf-bridges_….deb` on a fresh Debian."""
-    deb = _deb("rmf-bridges")
-    install(deb)
+    deb = _deb()
+    apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
+    sh(*apt, "--no-install-recommends", str(deb))
     chip = (header.CONFIGFS / "bank0/chip_name").read_text().strip()
     group = grp.getgrgid(Path(f"/dev/{chip}").stat().st_gid).gr_name
     if group != "gpio":
@@ -33,17 +30,11 @@ def package() -> str:
     return f"{deb.name}: {sh('rmf-bridge', '--version').strip()}; /dev/{chip} is the group gpio's"
 
 
-def install(deb: Path, *options: str) -> None:
-    """As people do it, but that nothing is asked."""
-    apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
-    sh(*apt, "--no-install-recommends", *options, str(deb))
-
-
-def _deb(name: str) -> Path:
-    """The package of this name, which the host shares."""
+def _deb() -> Path:
+    """The daemons' package, which the host shares."""
     if not Path("/srv").is_mount():
         sh("mount", "-t", "9p", "-o", "ro,trans=virtio,version=9p2000.L", "packages", "/srv")
-    (deb,) = Path("/srv").glob(f"{name}_*.deb")
+    (deb,) = Path("/srv").glob("rmf-bridges_*.deb")
     return deb
 
 

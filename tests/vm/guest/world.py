@@ -6,8 +6,9 @@ import time
 from pathlib import Path
 
 from tests.vm.guest import header
+from tests.vm.guest.deaths import off_after
 from tests.vm.guest.rides import energise
-from tests.vm.guest.system import Wrong, back, is_active, kill, pid, sh, unit, until
+from tests.vm.guest.system import Wrong, back, is_active, kill, pid, sh, unit
 
 SERVICE = unit("lift")
 YAML = Path("/etc/rmf-bridges/lift.yaml")
@@ -22,7 +23,7 @@ def edited_yaml() -> str:
     when = header.now()
     try:
         kill(SERVICE, "KILL")
-        took = _off(relays, when) - when
+        took = off_after(relays, when)
         back(SERVICE, old)
         new = {each.line for each in header.writes(when)} & {25, 26}
     finally:
@@ -31,12 +32,6 @@ def edited_yaml() -> str:
     if new != {25, 26}:
         raise Wrong(f"of the new pins {new} are written")
     return f"old pins off after {took:.2f} s, back with the new ones"
-
-
-def _off(relays: dict[int, bool], when: float) -> float:
-    """Wait until each of these lines has been written off since `when`; the last one's time."""
-    until(lambda: header.off_at(relays, when).keys() == relays.keys(), "each relay is off")
-    return max(header.off_at(relays, when).values())
 
 
 def full_run() -> str:
@@ -49,7 +44,7 @@ def full_run() -> str:
     when = header.now()
     try:
         kill(SERVICE, "KILL")
-        took = _off(relays, when) - when
+        took = off_after(relays, when)
         time.sleep(10)
         text = "back" if is_active(SERVICE) else "not back until there is room"
     finally:
