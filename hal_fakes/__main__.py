@@ -8,6 +8,8 @@ died. It ignores SIGINT: Ctrl-C in a terminal reaches both, and the daemon has t
 """
 
 import argparse
+import atexit
+import gc
 import json
 import logging
 import signal
@@ -25,6 +27,7 @@ from hal_fakes.realtime import RealTime
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Serve until standard input ends."""
+    atexit.register(gc.freeze)  # as in bridges/cli.py
     parser = argparse.ArgumentParser(prog="python -m hal_fakes")
     parser.add_argument("file", type=Path)
     parser.add_argument("bus")

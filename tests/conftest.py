@@ -1,3 +1,5 @@
+import atexit
+import gc
 import logging
 import os
 import signal
@@ -36,6 +38,10 @@ signal.signal(
     signal.SIGHUP, signal.SIG_DFL
 )  # nohup, or a CI's shell, has daemons inherit another one
 
+gc.disable()
+atexit.register(gc.freeze)
+"""No look for garbage while the tests are collected, which leaves none, nor when a worker ends."""
+
 _deselected: list[str] = []
 
 
@@ -72,6 +78,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items[:] = _mixed(items)
     for item in filter(_is_on_wires, items):
         item.add_marker(pytest.mark.timeout(WIRES_HANG_AFTER_S))
+
+
+def pytest_collection_finish() -> None:
+    """What was collected stays to the end: what looks for garbage leaves it out."""
+    gc.freeze()
+    gc.enable()
 
 
 def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
