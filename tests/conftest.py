@@ -86,6 +86,19 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
+@pytest.hookimpl(optionalhook=True)  # in a run without xdist
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """With `--dist loadscope` a test with all its parameters has one worker, and so one fixture of a
+    module: an echo process, a schema. Any other test goes to the next free worker."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByTest(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return nodeid.partition("[")[0]
+
+    return ByTest(config, log) if config.getvalue("dist") == "loadscope" else None
+
+
 def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
     """In an order in which tests that wait and tests that compute are mixed, so that the workers keep
     all cores busy: file by file, always the same. What takes long is begun early."""
