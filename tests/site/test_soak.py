@@ -35,7 +35,7 @@ def test_rmfs_supervisor_that_forgets_a_robot_stops_a_lift_for_good_without_what
 ) -> None:
     """The day finds the deadlock that `bridges/lift/forgotten.py` ends."""
     monkeypatch.setattr(forgotten, "heard", lambda session, event: (session, False))
-    site = Site(10, "kilted")  # a day on which it comes early
+    site = Site(23, "kilted")  # a day on which it comes early
     site.trouble._draw = site._restart_rmfs
     with pytest.raises(Broken, match=r"waits for Lift\d"):
         site.run(0.5)
