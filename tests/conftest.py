@@ -90,9 +90,9 @@ def pytest_collection_finish() -> None:
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
     """With `--dist loadscope` a test with all its parameters has one worker, and so one fixture of a
     module: an echo process, a schema. Any other test goes to the next free worker."""
-    from xdist.scheduler import LoadScopeScheduling
+    from xdist.scheduler import LoadScopeScheduling  # type: ignore[import-untyped]
 
-    class ByTest(LoadScopeScheduling):
+    class ByTest(LoadScopeScheduling):  # type: ignore[misc]  # which xdist does not type
         def _split_scope(self, nodeid: str) -> str:
             return nodeid.partition("[")[0]
 
