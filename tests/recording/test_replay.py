@@ -23,7 +23,7 @@ HERE = Path(__file__).parent / "corpus"
 CORPUS = sorted(HERE.glob("*.mcap"))
 
 
-@pytest.mark.long
+@pytest.mark.long(5)
 @pytest.mark.parametrize("seed", depth([1], [1, 3]))
 def test_whatever_happens_at_a_site_is_decided_again_in_the_same_way(
     seed: int, tmp_path: Path
@@ -41,7 +41,7 @@ def test_whatever_happens_at_a_site_is_decided_again_in_the_same_way(
     assert found == dict.fromkeys(rings, (True, 0))
 
 
-@pytest.mark.long
+@pytest.mark.long(3)
 def test_a_ring_that_has_turned_many_times_begins_where_all_is_known(tmp_path: Path) -> None:
     site = Site(3)
     rings = keep(site, tmp_path, MB // 24)

@@ -14,7 +14,7 @@ MINUTES = depth(8, 20)
 """Robots go home in the last minutes of a day (`WIND_DOWN_S`): a shorter one has nothing else."""
 
 
-@pytest.mark.long
+@pytest.mark.long(5)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_site_lives_through_its_troubles(seed: int) -> None:
     """If this fails: `make soak SEED=… HOURS=0.3333` plays it again, and prints what went before.
@@ -29,7 +29,7 @@ def test_a_site_lives_through_its_troubles(seed: int) -> None:
     assert sum(site.trouble.counts.values()) > depth(1, 5)
 
 
-@pytest.mark.long
+@pytest.mark.long(3)
 def test_rmfs_supervisor_that_forgets_a_robot_stops_a_lift_for_good_without_what_saves_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -41,7 +41,7 @@ def test_rmfs_supervisor_that_forgets_a_robot_stops_a_lift_for_good_without_what
         site.run(0.5)
 
 
-@pytest.mark.long
+@pytest.mark.long(2)
 def test_the_same_seed_is_the_same_day() -> None:
     days = [Site(5), Site(5)]
     for day in days:

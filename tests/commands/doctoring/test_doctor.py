@@ -329,6 +329,7 @@ def test_a_canopen_receiver_answers_and_is_found_by_its_node(tmp_path: Path) -> 
         assert "no heartbeat within 2 s, but of node 10" in scanned[1]
 
 
+@pytest.mark.long(15)
 def test_who_sends_on_the_graph_is_seen_and_a_second_door_of_the_name_is_wrong(
     module: Module, tmp_path: Path
 ) -> None:
@@ -356,6 +357,7 @@ def test_who_sends_on_the_graph_is_seen_and_a_second_door_of_the_name_is_wrong(
     assert [level for level, _ in found["messages"]] == ["ok"]
 
 
+@pytest.mark.long(15)
 def test_our_daemon_is_heard_and_a_graph_without_rmf_is_warned_of(
     module: Module, tmp_path: Path
 ) -> None:
@@ -367,6 +369,7 @@ def test_our_daemon_is_heard_and_a_graph_without_rmf_is_warned_of(
     assert ("warning", "door_requests: nobody sends") in found["RMF"]
 
 
+@pytest.mark.long(15)
 def test_a_supervisor_beside_another_one_would_be_passive(domain: int, tmp_path: Path) -> None:
     file = tmp_path / "supervisor.yaml"
     file.write_text(
