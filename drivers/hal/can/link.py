@@ -169,7 +169,7 @@ _HINTS: Final = {
 
 
 def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
-    """How to wait for the next byte or frame; None for a bus without a file, which is of this process."""
+    """How to wait for the next byte or frame; None for a bus of one process, which has no file."""
     try:
         descriptor = bus.fileno()
     except NotImplementedError:

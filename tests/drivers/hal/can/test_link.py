@@ -14,7 +14,7 @@ HOUR_S = 3600.0
 
 
 class Interface(can.BusABC):
-    """A bus with a file, in which a byte is a frame's id. `waits`: how long `recv` waited for it (s)."""
+    """A bus with a file, in which a byte is a frame's id. `waits`: how long `recv` waited (s)."""
 
     def __init__(self) -> None:
         self._near, self.far = socket.socketpair()
