@@ -2,7 +2,8 @@
 
 A station is free if its last state is IDLE and no older than STATION_SILENT_S, no robot has it, it has
 not just failed to take a request, and no other robot stands there. A robot that stands on a station's
-pad without a request, so that the station shows an error, may have that very station.
+pad without a request, so that the station shows an error or a charge that nobody requested, may have
+that very station.
 
 A station where a robot has failed is tried again only if no other one suits the robot: a second
 station shows which side was at fault.
@@ -19,7 +20,7 @@ from msgspec.structs import replace
 from bridges.charger.pad import misplaced_in
 from bridges.charger.report import UNREQUESTED
 from bridges.charger.settings import Robot
-from bridges.charger_coordinator.memory import ERROR, IDLE, NODE, Grant, Memory, Site, Wish
+from bridges.charger_coordinator.memory import CHARGING, IDLE, NODE, Grant, Memory, Site, Wish
 
 REMEMBERED_S: Final = 30.0
 """How long a robot's last place counts, after its fleet has shown it."""
@@ -67,11 +68,11 @@ def _free(memory: Memory, station: str, robot: Robot, now: float, here: Here) ->
     if station in memory.grants or in_the_way(here, station, robot):
         return False
     seen = memory.stations[station]
-    if seen.state is not ERROR:
+    if seen.robot != robot or not seen.request_id.startswith(UNREQUESTED):
         return seen.state is IDLE
     stands_there = misplaced_in(seen.error)
-    is_refused = stands_there is not None and seen.robot == stands_there.robot == robot
-    return is_refused and seen.request_id.startswith(UNREQUESTED)
+    is_refused = stands_there is not None and stands_there.robot == robot
+    return is_refused or seen.state in (IDLE, CHARGING)
 
 
 def standing(memory: Memory, now: float, site: Site) -> Here:
