@@ -4,7 +4,8 @@
    charging: the robot did not come. Then a fleet's wish goes to the end of the queue if its robot
    stands at one of our waypoints; any other wish is over. If the robot stands at that very station, it
    has failed there. A station that no longer shows a request, and has not released it, has forgotten
-   it: its daemon was restarted. The wish stays, and the station is asked again (`_forgot`).
+   it: its daemon was restarted. The wish stays, and the station is asked again (`_forgot`). The power
+   may have been switched off meanwhile: a charge that ends within PROVEN_S of that was not to its end.
 2. After an error of the station, the robot gets another station and keeps its place in the queue. An
    error of the robot, or one of an unclear side, also counts as a failure of the robot. After its
    second failure (at a second station if it has one) it is not tried again, and a technician is told.
@@ -60,13 +61,13 @@ def heard(memory: Memory, state: StateHeard, now: float, site: Site) -> Memory:
     if grant is None:
         return memory
     if state.state is not IDLE and state.request_id == grant.request_id:
-        return _followed(memory, name, grant, seen, site)
+        return _followed(memory, name, grant, seen, now, site)
     if grant.over:
         return memory.with_grant(name, None)
     if grant.shown and seen.diagnosis is Diagnosis.LOST:
         return memory
     if grant.shown and not _forgot(memory, name, grant, now, site):
-        return _ended(memory.with_grant(name, None), name, grant, site)
+        return _ended(memory.with_grant(name, None), name, grant, now, site)
     return memory.with_grant(name, _asked_again(grant, seen, now))
 
 
@@ -83,8 +84,8 @@ def _forgot(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> 
 
 def _asked_again(grant: Grant, seen: Seen, now: float) -> Grant | None:
     """The grant whose request the station does not show (yet). None: it will not take this one."""
-    refused_here = seen.robot == grant.robot and seen.request_id.startswith(UNREQUESTED)
-    may_come = seen.state is IDLE or refused_here
+    before = seen.state is RELEASED or seen.request_id.startswith(UNREQUESTED)
+    may_come = seen.state is IDLE or (before and seen.robot == grant.robot)
     if not may_come or not grant.request_id.startswith(f"{NODE}/"):
         return None
     if not grant.shown and not grant.started:
@@ -92,14 +93,16 @@ def _asked_again(grant: Grant, seen: Seen, now: float) -> Grant | None:
     return replace(grant, forgotten_at=now, shown=False, started=False, sent_at=AGES_AGO)
 
 
-def _followed(memory: Memory, name: str, grant: Grant, seen: Seen, site: Site) -> Memory:
+def _followed(
+    memory: Memory, name: str, grant: Grant, seen: Seen, now: float, site: Site
+) -> Memory:
     """The station shows our request."""
     grant = replace(grant, shown=True, started=grant.started or seen.state is CHARGING)
     memory = memory.with_grant(name, grant)
     if grant.over:
         return memory
     if seen.state is RELEASED:
-        memory = _ended(memory, name, grant, site)
+        memory = _ended(memory, name, grant, now, site)
         return memory.with_grant(name, replace(grant, over=True))
     if seen.diagnosis in (Diagnosis.ROBOT, Diagnosis.STATION, Diagnosis.UNCLEAR):
         memory = memory.with_grant(name, replace(grant, over=True, sent_at=AGES_AGO))
@@ -107,9 +110,11 @@ def _followed(memory: Memory, name: str, grant: Grant, seen: Seen, site: Site) -
     return memory
 
 
-def _ended(memory: Memory, name: str, grant: Grant, site: Site) -> Memory:
+def _ended(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> Memory:
     """A request has ended without our cancel."""
     who, wish = grant.robot, memory.wish(grant.robot)
+    if grant.started and now < grant.forgotten_at + PROVEN_S:
+        return memory
     if grant.started:
         return fulfilled(memory, who, site)
     if memory.stands_at(who, site) == name:

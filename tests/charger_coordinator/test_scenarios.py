@@ -157,7 +157,24 @@ def test_0_a_full_robot_that_waits_for_traffic_on_its_pad_is_not_served_again(
     robot.battery_percent = 89.0
     assert site.run(125.0) == [], "the dispatcher gave it a patrol: that is no charge"
     robot.task_id = "somebody's task"
-    assert site.run(130.0)[0] == (127.25, "charger_b <- charge AMR01")
+    assert site.run(130.0)[0] == (127.25, "charger_a <- charge AMR01")
+
+
+@pytest.mark.parametrize("knows", [True, False])
+def test_0_a_robot_that_nobody_moves_from_its_pad_is_charged_again_where_it_stands(
+    knows: bool,
+) -> None:
+    site = yard("nothing", knows=knows)
+    site.fleet.charge("AMR03", site.now, 60.0)
+    site.run(60.0)
+    site.fleet.robots["AMR03"].battery_percent = 50.0
+    assert site.run(73.0)[:5] == [
+        (60.25, "charger_b <- charge AMR03"),
+        (60.25, "charger_b: ASSIGNED AMR03"),
+        (60.25, "AMR03 -> CHARGE dock_b"),
+        (62.25, "charger_b: CHARGING AMR03"),
+        (72.5, "charger_b: RELEASED AMR03"),
+    ]
 
 
 @EACH

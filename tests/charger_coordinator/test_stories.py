@@ -274,6 +274,23 @@ def test_a_robot_whose_chargers_daemon_restarts_during_the_charge_is_charged_to_
 
 
 @pytest.mark.parametrize("by_operator", [False, True])
+def test_a_charge_that_is_asked_for_while_its_power_goes_off_is_begun_again(
+    by_operator: bool,
+) -> None:
+    site = charges_at_a(by_operator=by_operator, knows=True)
+    site.chargers["charger_a"].restarts(site.now, switched_off=False)
+    site.run(14.5)
+    site.chargers["charger_a"].stops()
+    assert site.run(30.0) == [
+        (14.75, "charger_a: RELEASED AMR01"),
+        (14.75, "charger_a <- charge AMR01"),
+        (15.75, "charger_a: ASSIGNED AMR01"),
+        (17.75, "charger_a: CHARGING AMR01"),
+    ]
+    assert site.faults == []
+
+
+@pytest.mark.parametrize("by_operator", [False, True])
 def test_a_robot_on_its_way_keeps_the_charger_whose_daemon_restarts(by_operator: bool) -> None:
     site = yard()
     if by_operator:
