@@ -22,6 +22,7 @@ PARTS: Final = {
         "boots.energised",
         REBOOT,
         "boots.off",
+        "boots.active_low",
     ),
     "site": (
         *LIFT,

@@ -10,9 +10,9 @@ HELD = [16, 18]
 """Of these outputs: the door and the mode, which a session holds."""
 
 
-def send(*words: str) -> str:
-    """A request of RMF's, and its effect."""
-    return sh("rmf-bridge", "send", *words, *ROOM)
+def send(*words: str, fails: bool = False) -> str:
+    """A request of RMF's, and its effect; with `fails`, it has none in time."""
+    return sh("rmf-bridge", "send", *words, *ROOM, fails=fails)
 
 
 def energise() -> dict[int, bool]:

@@ -10,6 +10,8 @@ CONFIG: Final = Path("/mnt/tests/vm/guest/config")
 PYTHON: Final = "/usr/lib/rmf-bridges/bin/python3"
 LATE_S: Final = 60.0
 """For what has no time of its own."""
+KEPT: Final = Path("/var/lib/checks-kept")
+"""A line for each service: how long after kill -9 its relays were off (s)."""
 
 Found = TypeVar("Found")
 
@@ -80,6 +82,12 @@ def back(service: str, old: int) -> None:
     until(lambda: pid(service) not in (0, old) and is_active(service), f"{service} is back")
 
 
+def keep(name: str, took_s: float) -> None:
+    """Write down how long this service's relays took to go off."""
+    with KEPT.open("a") as out:
+        print(name, took_s, file=out)
+
+
 def cursor() -> str:
     """The journal's end."""
     text = sh("journalctl", "-n", "0", "--show-cursor")
@@ -98,6 +106,11 @@ def enable(name: str) -> str:
     sh("rmf-bridge", "enable", str(CONFIG / f"{name}.yaml"))
     until(lambda: is_active(unit(name)), f"{name} is ready")
     return unit(name)
+
+
+def disable(name: str) -> None:
+    """Stop it, and keep it from starting at boot."""
+    sh("rmf-bridge", "disable", name)
 
 
 def far_side(name: str) -> None:
