@@ -39,6 +39,8 @@ PARTS: Final = {
         "install.wrong_yaml",
         "install.recorder",
         "install.supervisors",
+        "figures.memory",
+        "install.security",
     ),
 }
 """Each is one machine from its first boot on: a check may need those before it."""

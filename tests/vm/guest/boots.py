@@ -45,7 +45,7 @@ def off() -> str:
 
 
 def active_low() -> str:
-    """Ten starts with a relay that is on at low: never on, not for a moment. A request switches it on."""
+    """Ten starts with a relay that is on at low: never on, not for a moment, until a request."""
     header.pull(LOW, high=True)  # the relay board's resistor
     began = header.now()
     service = enable("low")
