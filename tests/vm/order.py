@@ -16,6 +16,7 @@ PARTS: Final = {
         "deaths.two_on_one_pin",
         "world.edited_yaml",
         "world.full_run",
+        "world.read_only_root",
         "boots.energised",
         CUT,
         "boots.off",
@@ -40,6 +41,7 @@ PARTS: Final = {
         "install.recorder",
         "install.supervisors",
         "figures.memory",
+        "figures.ratios",
         "install.security",
     ),
 }

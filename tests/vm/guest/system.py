@@ -29,13 +29,15 @@ def sh(*words: str, fails: bool = False) -> str:
     return done.stdout
 
 
-def until(look: Callable[[], Found], what: str, within_s: float = LATE_S) -> Found:
+def until(
+    look: Callable[[], Found], what: str, within_s: float = LATE_S, pause_s: float = 0.2
+) -> Found:
     """What `look` sees, as soon as that is true. Raises Wrong when it is not in time."""
     deadline = time.monotonic() + within_s
     while not (seen := look()):
         if time.monotonic() > deadline:
             raise Wrong(f"not within {within_s:g} s: {what}")
-        time.sleep(0.2)
+        time.sleep(pause_s)
     return seen
 
 
@@ -79,13 +81,12 @@ def kill(service: str, name: str) -> None:
 
 def back(service: str, old: int) -> None:
     """Wait until another process of this service is ready."""
-    until(lambda: pid(service) not in (0, old) and is_active(service), f"{service} is back")
 
+    def look() -> bool:
+        seen = shown(service, "MainPID", "ActiveState")
+        return seen["ActiveState"] == "active" and seen["MainPID"] != str(old)
 
-def keep(name: str, took_s: float) -> None:
-    """Write down how long this service's relays took to go off."""
-    with KEPT.open("a") as out:
-        print(name, took_s, file=out)
+    until(look, f"{service} is back", pause_s=0.5)
 
 
 def cursor() -> str:
