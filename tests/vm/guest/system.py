@@ -89,6 +89,12 @@ def back(service: str, old: int) -> None:
     until(look, f"{service} is back", pause_s=0.5)
 
 
+def keep(name: str, took_s: float) -> None:
+    """Write down how long this service's relays took to go off."""
+    with KEPT.open("a") as out:
+        print(name, took_s, file=out)
+
+
 def cursor() -> str:
     """The journal's end."""
     text = sh("journalctl", "-n", "0", "--show-cursor")
