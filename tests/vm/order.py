@@ -17,6 +17,7 @@ PARTS: Final = {
         "world.edited_yaml",
         "world.full_run",
         "world.read_only_root",
+        "world.labels",
         "boots.energised",
         CUT,
         "boots.off",

@@ -15,8 +15,8 @@ from typing import Final
 
 CONFIGFS: Final = Path("/sys/kernel/config/gpio-sim/header")
 TRACING: Final = Path("/sys/kernel/tracing")
-LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-bcm2711": 58, "pinctrl-rp1": 54}
-"""Chips of the header, and their lines: Raspberry Pi 3 and older, 4, 5."""
+LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-rp1": 54, "pinctrl-bcm2711": 58}
+"""Chips of the header, and their lines: Raspberry Pi 3 and older, 5, 4."""
 PI_4: Final = "pinctrl-bcm2711"
 OTHER: Final = "raspberrypi-exp-gpio"
 """A chip that is not the header's, and gets the lower number here."""

@@ -111,9 +111,9 @@ def _options(mount: str) -> set[str]:
 
 
 def labels() -> str:
-    """The header's chip is found by its label: Raspberry Pi 3, 4 and 5."""
+    """The header's chip is found by its label: Raspberry Pi 3, 5 and 4."""
     sh("systemctl", "stop", SERVICE, "far-lift.service")
-    for label in (*header.LABELS, header.PI_4):
+    for label in header.LABELS:  # that of the other checks is the last one
         header.unplug()
         header.plug(label)
         sh("udevadm", "settle")
