@@ -76,10 +76,10 @@ def _as_next(package: Path, folder: Path) -> None:
     """The same package with the next version, to upgrade to. Raises Unusable."""
     needed({"dpkg-deb": "dpkg"})
     tree = folder / "tree"
-    subprocess.run(["dpkg-deb", "--raw-extract", package, tree], check=True)
+    subprocess.run(["dpkg-deb", "--raw-extract", str(package), str(tree)], check=True)
     control = tree / "DEBIAN/control"
     control.write_text(re.sub(r"^Version: .*", r"\g<0>.1", control.read_text(), flags=re.M))
-    words = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", tree, folder]
+    words = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", str(tree), str(folder)]
     subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
     shutil.rmtree(tree)
 
