@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tests.vm.guest import header
 from tests.vm.guest.deaths import off_after
-from tests.vm.guest.rides import HELD, LIFT, energise, ride, send
+from tests.vm.guest.rides import HELD, LIFT, end, energise, ride, send
 from tests.vm.guest.system import Wrong, back, far_side, is_active, kill, pid, sh, unit, until
 
 SERVICE = unit("lift")
@@ -71,6 +71,7 @@ def clock() -> str:
         if header.off_at(relays, when) or pid(SERVICE) != old:
             raise Wrong(f"{years:+d} years: off went {header.off_at(relays, when)}, {pid(SERVICE)}")
         waits.append(_goes_to(floor))
+    end()
     return f"no restart; at the next floor after {', '.join(f'{s:.1f}' for s in waits)} s"
 
 
