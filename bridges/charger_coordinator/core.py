@@ -112,7 +112,7 @@ def _wake_at(memory: Memory, now: float, site: Site) -> float:
             due.append(stations.hopeless_at(memory, name, grant))
             due.append(stations.absent_at(memory, name, grant, site))
         else:
-            due.append(grant.made_at + stations.TAKEN_S)
+            due.append(stations.not_taken_at(grant))
     due += [stations.proven_at(memory, who) for who in memory.strikes]
     due += report.due(memory, site)
     due += astray.due(memory, now, site)

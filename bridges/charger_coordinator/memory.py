@@ -121,7 +121,8 @@ class Grant(msgspec.Struct, frozen=True):
 
     `shown`: the station's state has shown the request. `started`: current has flowed. `over`: the
     robot no longer has the station, but no other robot gets it until the station has let go.
-    `sent_at`: when the last request or cancel was sent.
+    `sent_at`: when the last request or cancel was sent. `forgotten_at`: when the station's daemon last
+    forgot it, so that it is made again.
     """
 
     robot: Robot
@@ -132,6 +133,7 @@ class Grant(msgspec.Struct, frozen=True):
     started: bool = False
     over: bool = False
     sent_at: float = AGES_AGO
+    forgotten_at: float = AGES_AGO
 
 
 class Standing(msgspec.Struct, frozen=True):

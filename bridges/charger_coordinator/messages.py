@@ -21,6 +21,7 @@ from bridges.charger_coordinator.signals import (
     StateHeard,
     Unwanted,
     Wanted,
+    is_dispatched,
 )
 from bridges.core.decision import RequestRefused
 from bridges.core.kind import Answer
@@ -64,7 +65,7 @@ def _sighting(
     check_length(task_id=robot.task_id)
     return Sighting(
         Robot(fleet_name, robot.name),
-        charges=robot.mode.mode in CHARGES,
+        charges=robot.mode.mode in CHARGES and not is_dispatched(robot.task_id),
         place=_nearest(robot.location, fleet, places, near_m),
         battery_percent=robot.battery_percent,
         task_id=robot.task_id,

@@ -2,7 +2,8 @@
 
 A station is free if its last state is IDLE and no older than STATION_SILENT_S, no robot has it, it has
 not just failed to take a request, and no other robot stands there. A robot that stands on a station's
-pad without a request, so that the station shows an error, may have that very station.
+pad without a request, so that the station shows an error or a charge that nobody requested, may have
+that very station. So may one that a station has released, and that still stands there.
 
 A station where a robot has failed is tried again only if no other one suits the robot: a second
 station shows which side was at fault.
@@ -19,7 +20,16 @@ from msgspec.structs import replace
 from bridges.charger.pad import misplaced_in
 from bridges.charger.report import UNREQUESTED
 from bridges.charger.settings import Robot
-from bridges.charger_coordinator.memory import ERROR, IDLE, NODE, Grant, Memory, Site, Wish
+from bridges.charger_coordinator.memory import (
+    CHARGING,
+    IDLE,
+    NODE,
+    RELEASED,
+    Grant,
+    Memory,
+    Site,
+    Wish,
+)
 
 REMEMBERED_S: Final = 30.0
 """How long a robot's last place counts, after its fleet has shown it."""
@@ -64,14 +74,17 @@ def suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
 def _free(memory: Memory, station: str, robot: Robot, now: float, here: Here) -> bool:
     if not memory.speaks(station, now) or now < memory.shunned.get(station, now):
         return False
-    if station in memory.grants or in_the_way(here, station, robot):
+    if in_the_way(here, station, robot):
         return False
-    seen = memory.stations[station]
-    if seen.state is not ERROR:
+    seen, grant = memory.stations[station], memory.grants.get(station)
+    if grant is not None:
+        released = grant.over and grant.robot == seen.robot == robot and seen.state is RELEASED
+        return released and robot in here.get(station, ())
+    if seen.robot != robot or not seen.request_id.startswith(UNREQUESTED):
         return seen.state is IDLE
     stands_there = misplaced_in(seen.error)
-    is_refused = stands_there is not None and seen.robot == stands_there.robot == robot
-    return is_refused and seen.request_id.startswith(UNREQUESTED)
+    is_refused = stands_there is not None and stands_there.robot == robot
+    return is_refused or seen.state in (IDLE, CHARGING)
 
 
 def standing(memory: Memory, now: float, site: Site) -> Here:

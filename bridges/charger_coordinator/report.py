@@ -175,7 +175,7 @@ def messages(
             found.append(_to_station(name, grant))
             memory = memory.with_grant(name, replace(grant, sent_at=now))
     assignments = tuple(_assignments(memory, now, site)) if memory.alone else ()
-    forgotten = any(memory.assigned_at < at <= now for at in _again_at(memory, site))
+    forgotten = any(at <= now for at in _again_at(memory, site))
     if assignments != memory.assigned or forgotten:
         memory = replace(memory, assigned_at=now)
         found += [(CHARGING_ASSIGNMENTS, message) for message in assignments]
@@ -189,7 +189,8 @@ def _again_at(memory: Memory, site: Site) -> Iterator[float]:
     """When the assignment of a robot that stands elsewhere without a task is published again.
 
     An EasyFullControl adapter that starts takes the retained assignment, and a moment later the charger
-    of its own file in its place (seen with Jazzy's).
+    of its own file in its place (seen with Jazzy's). Nothing shows when it does, so the assignment is
+    published every AGAIN_S until the robot moves, or has lost the station.
     """
     for name, grant in memory.grants.items():
         standing = memory.robots.get(grant.robot)
@@ -197,7 +198,7 @@ def _again_at(memory: Memory, site: Site) -> Iterator[float]:
         if grant.over or grant.started or standing is None or standing.sighting.task_id:
             continue
         if place is not None and memory.stands_at(grant.robot, site) != name:
-            yield max(standing.since, grant.made_at) + AGAIN_S
+            yield max(memory.assigned_at, grant.made_at) + AGAIN_S
 
 
 def due(memory: Memory, site: Site) -> list[float]:

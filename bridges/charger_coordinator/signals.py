@@ -1,5 +1,8 @@
 """What the coordinator's core hears from the graph: fleets, stations, schedules and operators."""
 
+import re
+from typing import Final
+
 import msgspec
 
 from bridges.charger.settings import Robot
@@ -8,10 +11,19 @@ from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.rmf.definitions import ChargerStateValue
 
+_DISPATCHED: Final = re.compile(r"(?!charge)[^.]+\.dispatch-")
+"""RMF's dispatcher names a task CATEGORY.dispatch-NUMBER, and its adapters call their own charging task
+Charge and a UUID (rmf_ros2 jazzy 7eef65a, Dispatcher.cpp; rmf_task jazzy, ChargeBatteryFactory.cpp)."""
+
+
+def is_dispatched(task_id: str) -> bool:
+    """Did RMF's dispatcher give this task: a patrol, a delivery, but no charge?"""
+    return _DISPATCHED.match(task_id) is not None
+
 
 class Sighting(msgspec.Struct, frozen=True):
-    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING. `place`: which of our
-    waypoints it stands at; None for none."""
+    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING, and its task is none that
+    RMF's dispatcher gave it. `place`: which of our waypoints it stands at; None for none."""
 
     who: Robot
     charges: bool

@@ -3,7 +3,9 @@
 1. A station shows how a request ends. Released after charging: the wish is fulfilled. Released without
    charging: the robot did not come. Then a fleet's wish goes to the end of the queue if its robot
    stands at one of our waypoints; any other wish is over. If the robot stands at that very station, it
-   has failed there.
+   has failed there. A station that no longer shows a request, and has not released it, has forgotten
+   it: its daemon was restarted. The wish stays, and the station is asked again (`_forgot`). The power
+   may have been switched off meanwhile: a charge that ends within PROVEN_S of that was not to its end.
 2. After an error of the station, the robot gets another station and keeps its place in the queue. An
    error of the robot, or one of an unclear side, also counts as a failure of the robot. After its
    second failure (at a second station if it has one) it is not tried again, and a technician is told.
@@ -56,29 +58,51 @@ def heard(memory: Memory, state: StateHeard, now: float, site: Site) -> Memory:
     memory = replace(memory, stations={**memory.stations, name: seen})
     memory = _acquitted(memory, name, before, now, site)
     grant = memory.grants.get(name)
-    if grant is not None:
-        if state.state is not IDLE and state.request_id == grant.request_id:
-            return _followed(memory, name, grant, seen, site)
-        if not grant.shown and not grant.over and _may_still_come(state, grant):
-            return memory
-        memory = _gone(memory, name, grant, site)
-    return memory
+    if grant is None:
+        return memory
+    if state.state is not IDLE and state.request_id == grant.request_id:
+        return _followed(memory, name, grant, seen, now, site)
+    if grant.over:
+        return memory.with_grant(name, None)
+    if grant.shown and seen.diagnosis is Diagnosis.LOST:
+        return memory
+    if grant.shown and not _forgot(memory, name, grant, now, site):
+        return _ended(memory.with_grant(name, None), name, grant, now, site)
+    return memory.with_grant(name, _asked_again(grant, seen, now))
 
 
-def _may_still_come(state: StateHeard, grant: Grant) -> bool:
-    """The station may be about to take the request."""
-    refused_here = state.state is ERROR and state.robot == grant.robot
-    return state.state is IDLE or (refused_here and state.request_id.startswith(UNREQUESTED))
+def _forgot(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> bool:
+    """Has the station forgotten the request that it has shown? An IDLE one may also have released it
+    without our notice. Then the robot has left, or did not come in time."""
+    seen = memory.stations[name]
+    if seen.state is not IDLE:
+        return seen.request_id.startswith(UNREQUESTED)
+    if grant.started:
+        return memory.stands_at(grant.robot, site) == name
+    return now < grant.made_at + grant.start_timeout_s
 
 
-def _followed(memory: Memory, name: str, grant: Grant, seen: Seen, site: Site) -> Memory:
+def _asked_again(grant: Grant, seen: Seen, now: float) -> Grant | None:
+    """The grant whose request the station does not show (yet). None: it will not take this one."""
+    before = seen.state is RELEASED or seen.request_id.startswith(UNREQUESTED)
+    may_come = seen.state is IDLE or (before and seen.robot == grant.robot)
+    if not may_come or not grant.request_id.startswith(f"{NODE}/"):
+        return None
+    if not grant.shown and not grant.started:
+        return grant
+    return replace(grant, forgotten_at=now, shown=False, started=False, sent_at=AGES_AGO)
+
+
+def _followed(
+    memory: Memory, name: str, grant: Grant, seen: Seen, now: float, site: Site
+) -> Memory:
     """The station shows our request."""
     grant = replace(grant, shown=True, started=grant.started or seen.state is CHARGING)
     memory = memory.with_grant(name, grant)
     if grant.over:
         return memory
     if seen.state is RELEASED:
-        memory = _ended(memory, name, grant, site)
+        memory = _ended(memory, name, grant, now, site)
         return memory.with_grant(name, replace(grant, over=True))
     if seen.diagnosis in (Diagnosis.ROBOT, Diagnosis.STATION, Diagnosis.UNCLEAR):
         memory = memory.with_grant(name, replace(grant, over=True, sent_at=AGES_AGO))
@@ -86,15 +110,11 @@ def _followed(memory: Memory, name: str, grant: Grant, seen: Seen, site: Site) -
     return memory
 
 
-def _gone(memory: Memory, name: str, grant: Grant, site: Site) -> Memory:
-    """The station no longer shows the request."""
-    memory = memory.with_grant(name, None)
-    return _ended(memory, name, grant, site) if grant.shown and not grant.over else memory
-
-
-def _ended(memory: Memory, name: str, grant: Grant, site: Site) -> Memory:
+def _ended(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> Memory:
     """A request has ended without our cancel."""
     who, wish = grant.robot, memory.wish(grant.robot)
+    if grant.started and now < grant.forgotten_at + PROVEN_S:
+        return memory
     if grant.started:
         return fulfilled(memory, who, site)
     if memory.stands_at(who, site) == name:
@@ -111,7 +131,7 @@ def _struck(memory: Memory, name: str, who: Robot) -> Memory:
 
 
 def adopted(memory: Memory, now: float, site: Site) -> Memory:
-    """Adopt requests that another node has made for our robots."""
+    """Adopt requests that another node has made for our robots, and charges that nobody requested."""
     for name, seen in memory.stations.items():
         if name not in memory.grants and seen.state in (ASSIGNED, CHARGING):
             memory = _adopt(memory, name, seen, now, site)
@@ -125,9 +145,11 @@ def _adopt(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Mem
     elsewhere = memory.station_of(who) is not None
     if elsewhere and not seen.request_id.startswith(f"{NODE}/"):
         return memory
-    started = seen.state is CHARGING
-    grant = Grant(who, seen.request_id, now, shown=True, started=started, over=elsewhere)
-    memory = memory.with_grant(name, grant)
+    to_request = seen.robot is not None and seen.request_id.startswith(UNREQUESTED)
+    if not to_request:
+        started = seen.state is CHARGING
+        grant = Grant(who, seen.request_id, now, shown=True, started=started, over=elsewhere)
+        memory = memory.with_grant(name, grant)
     if elsewhere or memory.wish(who) is not None:
         return memory
     return replace(memory, wishes=(*memory.wishes, Wish(who, "operator")))
@@ -147,7 +169,7 @@ def in_time(memory: Memory, now: float, site: Site) -> Memory:
     for name, grant in list(memory.grants.items()):
         if grant.over or grant.started:
             continue
-        if memory.may_speak and not grant.shown and now >= grant.made_at + TAKEN_S:
+        if memory.may_speak and not grant.shown and now >= not_taken_at(grant):
             shunned = {**memory.shunned, name: now + SHUNNED_S}
             memory = replace(memory, shunned=shunned).with_grant(name, None)
             memory = memory.last_in_queue(grant.robot)
@@ -156,6 +178,11 @@ def in_time(memory: Memory, now: float, site: Site) -> Memory:
         elif now >= absent_at(memory, name, grant, site):
             memory = gives_up(memory, grant.robot, now)
     return _proven(memory, now)
+
+
+def not_taken_at(grant: Grant) -> float:
+    """When a station that does not show this request is passed over."""
+    return max(grant.made_at, grant.forgotten_at) + TAKEN_S
 
 
 def hopeless_at(memory: Memory, name: str, grant: Grant) -> float:

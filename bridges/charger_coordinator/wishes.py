@@ -2,7 +2,8 @@
 
 RMF's fleet adapter shows the mode CHARGING from the first charge on, in every later task too, and
 IDLE in none (rmf_ros2 9dedd0f: TaskManager::robot_mode; RobotContext::current_mode, which WaitForCharge
-and DockRobot alone set). So, of a robot that has stood at one of our waypoints for SETTLES_S:
+and DockRobot alone set). The id of a task that RMF's dispatcher gave says that it is no charge. So, of
+a robot that has stood at one of our waypoints for SETTLES_S:
 1. Below `again_percent` it wants to be charged, if it has no task, or shows CHARGING or DOCKING.
 2. Above that, and below `full_percent`, only a task that shows CHARGING or DOCKING is believed. A robot
    that was charged in that task is not served again. One that was charged, and has not left our
@@ -11,7 +12,8 @@ and DockRobot alone set). So, of a robot that has stood at one of our waypoints 
    time before it has worked.
 4. A wish lasts while the robot stands at one of our waypoints so, and while it drives there: in the
    same task, or without one while a station is kept for it. A task that begins within COMES_S of
-   the call is that drive: RMF's automatic retreat, or its ChargeBattery started again.
+   the call is that drive: RMF's automatic retreat, or its ChargeBattery started again. A dispatched
+   task is not.
 5. RMF moves no robot without a task under `finishing_request: nothing`, until its battery is very low;
    nor under `park`, except Jazzy's, which drives to the assigned place. Such a robot keeps its place
    when it is called. After COMES_S it loses the station, and ABSENT_S later it is called again.
@@ -24,7 +26,7 @@ from msgspec.structs import replace
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator import schedule
 from bridges.charger_coordinator.memory import By, Grant, Memory, Site, Standing, Wish, without
-from bridges.charger_coordinator.signals import Sighting, Wanted
+from bridges.charger_coordinator.signals import Sighting, Wanted, is_dispatched
 
 SETTLES_S: Final = 2.0
 """A robot that passes by on another task may still show the mode CHARGING."""
@@ -143,13 +145,14 @@ def _rested(memory: Memory, sighting: Sighting, site: Site) -> Memory:
 
 
 def _called(memory: Memory, sighting: Sighting, now: float) -> Memory:
-    """A task that begins when the robot is called is its drive to the station."""
+    """A task that begins when the robot is called is its drive to the station, unless the dispatcher
+    gave it."""
     who, task = sighting.who, sighting.task_id
     wish, station = memory.wish(who), memory.station_of(who)
     if wish is None or wish.by == "operator" or wish.task_id or not task or station is None:
         return memory
     grant = memory.grants[station]
-    if grant.started or now >= grant.made_at + COMES_S:
+    if grant.started or now >= grant.made_at + COMES_S or is_dispatched(task):
         return memory
     called = replace(wish, task_id=task, called=True)
     return replace(memory, wishes=tuple(called if w is wish else w for w in memory.wishes))

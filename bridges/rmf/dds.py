@@ -58,10 +58,10 @@ _domains_lock = threading.Lock()
 class DdsTransport(Threaded):
     """One node: a participant, its reader thread, its publishers and subscriptions.
 
-    `loopback`: stay on this machine, whatever CYCLONEDDS_URI says. Otherwise, when the machine's
-    addresses change, the node leaves the graph and joins again with the same ends, and publishers send
-    again what they retain. `release`: None to follow RMF's. Raises TransportError when the domain
-    cannot be joined.
+    `loopback`: stay on this machine, whatever CYCLONEDDS_URI says. When the wall clock is set back or,
+    off loopback, the machine's addresses change, the node leaves the graph and joins again with the
+    same ends, and publishers send again what they retain. `release`: None to follow RMF's. Raises
+    TransportError when the domain cannot be joined.
     """
 
     speaks = "dds"
@@ -78,7 +78,6 @@ class DdsTransport(Threaded):
         self._ends: tuple[DdsPublisher | DdsSubscription, ...] = ()
         self._subscriptions: tuple[DdsSubscription, ...] = ()
         self._loopback = loopback
-        self._stop = threading.Event()
         self._joined = False
         self._dds_peers = DdsPeers(self._peers)
         try:
@@ -88,6 +87,7 @@ class DdsTransport(Threaded):
             self._delete_entities()
             raise
         self._start(self._read, "dds")
+        self._watch_clock()
 
     def publisher(self, topic: AnyTopic) -> DdsPublisher:
         """Declare a publisher with `topic.publish` QoS."""
@@ -119,10 +119,13 @@ class DdsTransport(Threaded):
                 return
             self._closed = True
             self._stop.set()
-            if self._joined:
-                self._leaving.set(True)
+            self._wake()
         self._join_thread()
         self._delete_entities()
+
+    def _wake(self) -> None:
+        if self._joined:
+            self._leaving.set(True)
 
     def _join(self) -> None:
         self._addresses = addresses.addresses()
@@ -150,7 +153,7 @@ class DdsTransport(Threaded):
         with self._lock:
             if self._closed:
                 return
-            was_joined, self._joined = self._joined, False
+            was_joined, self._joined, self._set_back = self._joined, False, False
             self._delete_entities()
             self._topics.clear()
             try:
@@ -197,6 +200,8 @@ class DdsTransport(Threaded):
                 self._recover(error)
 
     def _read_once(self) -> None:
+        if self._set_back:
+            self._join_anew()
         self._follow_network()
         if not self._joined:
             self._stop.wait(LOOK_EVERY_S)

@@ -2,7 +2,8 @@
 
 Samples pass through rclpy as bytes, and `cdr.py` encodes and decodes them, as on `dds`. An invalid
 sample is dropped and counted, as there. rclpy's executor runs in a thread of this transport. When the
-machine's addresses change, that thread leaves the graph and joins again, with the same ends.
+machine's addresses change or its wall clock is set back, that thread leaves the graph and joins again,
+with the same ends. (Of the RMWs only Cyclone needs it for the clock; the others lose a moment.)
 
 Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, ros_stay.py and ros_ends.py import
 rclpy, only ros_types.py the message packages, and only choose.py imports this one.
@@ -10,7 +11,6 @@ rclpy, only ros_types.py the message packages, and only choose.py imports this o
 
 import atexit
 import logging
-import threading
 from collections.abc import Callable, Sequence
 from typing import Final
 
@@ -36,8 +36,9 @@ class Ros2Transport(Threaded):
 
     `ros_args`: the arguments after `--ros-args` on the command line: name, namespace, remappings and
     parameters (`use_sim_time`). `loopback`: stay on this machine, whatever the environment says.
-    Otherwise, when the machine's addresses change, the node leaves the graph and joins again, and
-    publishers send again what they retain. Raises TransportError when the graph cannot be joined.
+    When the wall clock is set back or, off loopback, the machine's addresses change, the node leaves
+    the graph and joins again, and publishers send again what they retain. Raises TransportError when
+    the graph cannot be joined.
     """
 
     speaks = "ros2"
@@ -56,13 +57,13 @@ class Ros2Transport(Threaded):
         self._asked_name = node_name
         self._loopback = loopback
         self._ros_args = ros_args
-        self._pause = threading.Event()
         self._ends = Ends(self.release)
         self._stay: Stay | None = None
         with self._reporting(f"cannot join ROS domain {domain_id}"):
             self._join()
         self.name = self.node.get_name()
         self._start(self._spin, "ros2")
+        self._watch_clock()
         # An executor's thread that outlives the interpreter aborts it, as where a start is refused.
         atexit.register(self.close)
 
@@ -117,12 +118,15 @@ class Ros2Transport(Threaded):
             if self._closed:
                 return
             self._closed = True
-            self._pause.set()
-            if self._stay is not None:
-                self._stay.leave_soon()
+            self._stop.set()
+            self._wake()
         atexit.unregister(self.close)
         self._join_thread()
         self._leave()
+
+    def _wake(self) -> None:
+        if self._stay is not None:
+            self._stay.leave_soon()
 
     def _join(self) -> None:
         """Raises one of REFUSALS."""
@@ -143,7 +147,7 @@ class Ros2Transport(Threaded):
         with self._lock:
             if self._closed:
                 return
-            was_joined = self._stay is not None
+            was_joined, self._set_back = self._stay is not None, False
             self._leave()
             try:
                 self._join()
@@ -166,16 +170,18 @@ class Ros2Transport(Threaded):
                 failures += 1
                 if failures == 1:
                     log.exception(pairs("reader_failed", node=self.name, reason=error))
-                self._pause.wait(AGAIN_S)
+                self._stop.wait(AGAIN_S)
 
     def _lasts(self) -> bool:
         return self._stay is None or self._stay.lasts
 
     def _spin_once(self) -> None:
+        if self._set_back:
+            self._join_anew()
         if not self._loopback and self._look_is_due():
             self._follow_network()
         if self._stay is None:
-            self._pause.wait(LOOK_EVERY_S)
+            self._stop.wait(LOOK_EVERY_S)
         else:
             self._stay.spin(None if self._loopback else LOOK_EVERY_S)
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import ClassVar, Final
 
 from bridges.log import pairs
-from bridges.rmf import addresses
+from bridges.rmf import addresses, wall_clock
 from bridges.rmf.peers import Peers
 from bridges.rmf.releases import Release
 from bridges.rmf.transport import TransportError
@@ -22,7 +22,8 @@ starts with only `lo` up stays there forever, and none notices a changed address
 
 
 class Threaded:
-    """A node on the graph, with one thread. `refusals`: the exceptions by which its library refuses.
+    """A node on the graph, with one thread; on DDS another one looks at the clock. `refusals`: the
+    exceptions by which its library refuses.
 
     `release`: None to follow RMF's.
     """
@@ -36,6 +37,10 @@ class Threaded:
         self.dropped: dict[str, int] = {}
         self._lock = threading.Lock()
         self._closed = False
+        self._stop = threading.Event()
+        self._clock_thread: threading.Thread | None = None
+        self._wall_clock = wall_clock.WallClock(wall_clock.ahead_s())
+        self._set_back = False
         self._look_at = -math.inf
         self._addresses: addresses.Addresses = frozenset()
 
@@ -61,6 +66,26 @@ class Threaded:
         self._thread = threading.Thread(target=run, name=f"{self.name}-{wire}", daemon=True)
         self._thread.start()
 
+    def _watch_clock(self) -> None:
+        """From now on set `_set_back` and wake our thread when the wall clock is set back.
+
+        It takes another thread, because ours may itself wait by the wall clock.
+        """
+        run, name = self._look_at_clock, f"{self.name}-clock"
+        self._clock_thread = threading.Thread(target=run, name=name, daemon=True)
+        self._clock_thread.start()
+
+    def _look_at_clock(self) -> None:
+        while not self._stop.wait(LOOK_EVERY_S):
+            if back_s := self._wall_clock.set_back_s(wall_clock.ahead_s()):
+                log.info(pairs("clock_set_back", node=self.name, by_s=round(back_s, 1)))
+                with self._lock:
+                    self._set_back = True
+                    self._wake()
+
+    def _wake(self) -> None:
+        """End the wait of our thread, if it has joined; called with the lock."""
+
     def _look_is_due(self) -> bool:
         """Whether it is time to look at the network again."""
         now = time.monotonic()
@@ -79,7 +104,9 @@ class Threaded:
         return True
 
     def _join_thread(self) -> None:
-        """Wait until the thread has ended, unless it is the one that asks."""
+        """Wait until the threads have ended, unless ours is the one that asks."""
+        if self._clock_thread is not None:
+            self._clock_thread.join()
         if threading.current_thread() is not self._thread:
             self._thread.join()
 

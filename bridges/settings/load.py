@@ -14,6 +14,7 @@ several sections. The daemon takes nothing else from the file, and checks nothin
 """
 
 from pathlib import Path
+from typing import Final
 
 import msgspec
 from yaml import MappingNode, Node, ScalarNode
@@ -39,6 +40,11 @@ from drivers.hal.points import Wire
 __all__ = ["Config", "Problem", "SettingsError", "load"]
 
 TOPICS = [topic.name for topic in topics.every()]
+OF_RMF: Final = {
+    "rmf_fleet": ("a fleet adapter's configuration", "--fleet-config"),
+    "levels": ("RMF's building map or navigation graph", "--building-map"),
+}
+"""Top key of a file of RMF's -> what the file is, and the option of `check` that takes it."""
 
 
 def load(path: Path | str) -> Config:
@@ -50,10 +56,21 @@ def understood(path: Path | str, text: bytes) -> Config:
     """The Config of a device YAML's text, which is or was at this path. Raises SettingsError."""
     page = Page(str(path))
     root = compose(page, text)
+    _note_rmfs(page, root)
     reading = _Reading(page, root)
     reading.all()
     page.check()
     return reading.config(Path(path), text)
+
+
+def _note_rmfs(page: Page, root: MappingNode) -> None:
+    """Refuse a file of RMF's as a whole, before each of its keys is found unknown."""
+    for key, (what, option) in OF_RMF.items():
+        entry = below(root, key)
+        if entry and not below(root, "kind"):
+            says = f"this is {what}, and no device YAML: rmf-bridge check DEVICE.yaml {option} FILE"
+            page.note(entry.key, says)
+            page.check()
 
 
 class _Reading:

@@ -148,8 +148,9 @@ class Fleet(Party):
     # ---- tasks
 
     def _begin(self, robot: FleetRobot, doing: Doing, now: float, place: str = "") -> None:
+        named = "patrol.dispatch-" if doing == "work" else "Charge"
+        robot.doing, robot.task_id = doing, f"{named}{self._tasks}"
         self._tasks += 1
-        robot.doing, robot.task_id = doing, f"{doing}-{self._tasks}"
         self._go(robot, place or robot.dedicated, now)
 
     def _rest(self, robot: FleetRobot, now: float) -> None:

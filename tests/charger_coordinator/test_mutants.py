@@ -154,15 +154,26 @@ def test_a_dedicated_station_comes_before_the_yamls_first_and_after_where_the_ro
         assert site_.run(1) == [(1.0, f"{station}: AMR01")]
 
 
-def test_a_charge_that_ended_before_its_station_was_heard_again_is_over() -> None:
+@pytest.mark.parametrize(
+    ("place", "said", "served"),
+    [
+        ("charger_a", [(3.0, "charger_a: AMR01"), (4.0, "charger_a: AMR01")], {}),
+        ("wait_1", [], {ONE: "task of AMR01"}),
+    ],
+)
+def test_a_charge_that_an_idle_station_has_not_released_is_over_if_its_robot_has_left(
+    place: str, said: list[tuple[float, str]], served: dict[Robot, str]
+) -> None:
     site_ = Alone()
     site_.wants(ONE, "charger_a", 95.0)
     site_.run(1)
     site_.does(A, CHARGING)
     site_.run(1)
     site_.shows[A] = StateHeard(A, IDLE)
-    assert site_.run(30) == []
-    assert (site_.memory.wishes, site_.memory.served) == ((), {ONE: "task of AMR01"})
+    site_.wants(ONE, place, 95.0)
+    site_.hears(FleetSeen((site_.seen[ONE],)))
+    assert site_.run(2) == said
+    assert site_.memory.served == served
 
 
 def test_a_robot_charged_in_one_task_may_be_charged_again_in_the_next() -> None:
@@ -271,19 +282,29 @@ def test_a_station_that_serves_somebody_else_has_let_our_robot_go() -> None:
     assert site_.run(1) == [(3.0, "charger_b: AMR01")]
 
 
-def test_a_request_that_a_station_drops_for_a_robot_that_stands_there_is_its_failure() -> None:
+@pytest.mark.parametrize(
+    ("after_s", "failed", "said"),
+    [
+        (58, {}, [(60.0, "charger_a: AMR01")]),
+        (59, {ONE: (A,)}, [(61.0, "charger_b: AMR01")]),
+    ],
+)
+def test_a_request_that_a_station_drops_is_made_again_until_its_robot_should_have_started(
+    after_s: int, failed: dict[Robot, tuple[str, ...]], said: list[tuple[float, str]]
+) -> None:
     site_ = Alone()
     site_.wants(ONE, "charger_a")
     site_.run(1)
     site_.does(A, ASSIGNED)
-    site_.run(1)
+    site_.run(after_s)
     site_.shows[A] = StateHeard(A, IDLE)
-    site_.run(1)
-    assert site_.memory.strikes == {ONE: (A,)}
+    assert site_.run(1) == said
+    assert site_.memory.strikes == failed
 
 
 @pytest.mark.parametrize(
-    ("state", "robot", "gone"), [(ERROR, TWO, True), (CHARGING, ONE, True), (ERROR, ONE, False)]
+    ("state", "robot", "gone"),
+    [(ERROR, TWO, True), (CHARGING, TWO, True), (CHARGING, ONE, False), (ERROR, ONE, False)],
 )
 def test_a_request_is_given_up_when_the_station_will_not_take_it(
     state: d.ChargerStateValue, robot: Robot, gone: bool

@@ -10,6 +10,7 @@ import pytest
 
 from bridges.charger_coordinator.schedule import Charging
 from bridges.core.decision import OperatorReset
+from bridges.rmf import definitions as d
 from hal_fakes.rmf.fleet import Finishing
 from tests.charger_coordinator.yard import Yard, settings
 
@@ -90,6 +91,25 @@ def test_0_a_robot_whose_adapter_starts_again_on_its_way_is_told_again() -> None
     assert site.faults == []
 
 
+@pytest.mark.parametrize("starts_at", [12.0, 20.0, 40.0])
+@pytest.mark.parametrize("known", [False, True])
+def test_0_a_robot_that_was_called_before_its_adapter_started_is_told_again(
+    known: bool, starts_at: float
+) -> None:
+    site = Yard(finishing="charge")
+    site.adapters = [site.fleet] if known else []
+    site.run(5.0)
+    site.adapters = []
+    site.wants("AMR01")
+    site.run(starts_at)
+    site.adapters = [site.fleet]
+    site.fleet.robots["AMR01"].battery_percent = 60.0
+    site.run(starts_at + 0.5)
+    site.fleet.starts_again(site.now)
+    site.run(starts_at + 22.0)
+    assert site.mode("charger_a") == "CHARGING"
+
+
 def test_0_jazzys_park_goes_to_the_charger_that_it_is_assigned_as_charge_does() -> None:
     site = home_from_work("park", 60.0, jazzy=True)
     assert site.run(300.0) == [*charged_at_a(16.25, 30.5), (31.5, "charger_a: IDLE")]
@@ -134,9 +154,50 @@ def test_0_a_full_robot_that_waits_for_traffic_on_its_pad_is_not_served_again(
     site.fleet.works("AMR01", "ward", site.now)
     robot.battery_percent = 99.0
     assert site.run(120.0) == []
-    assert robot.task_id.startswith("work")
     robot.battery_percent = 89.0
-    assert site.run(125.0)[0] == (120.25, "charger_b <- charge AMR01")
+    assert site.run(125.0) == [], "the dispatcher gave it a patrol: that is no charge"
+    robot.task_id = "somebody's task"
+    assert site.run(130.0)[0] == (127.25, "charger_a <- charge AMR01")
+
+
+@pytest.mark.parametrize("knows", [True, False])
+def test_0_a_robot_that_nobody_moves_from_its_pad_is_charged_again_where_it_stands(
+    knows: bool,
+) -> None:
+    site = yard("nothing", knows=knows)
+    site.fleet.charge("AMR03", site.now, 60.0)
+    site.run(60.0)
+    site.fleet.robots["AMR03"].battery_percent = 50.0
+    assert site.run(73.0)[:5] == [
+        (60.25, "charger_b <- charge AMR03"),
+        (60.25, "charger_b: ASSIGNED AMR03"),
+        (60.25, "AMR03 -> CHARGE dock_b"),
+        (62.25, "charger_b: CHARGING AMR03"),
+        (72.5, "charger_b: RELEASED AMR03"),
+    ]
+
+
+@EACH
+def test_0_a_robot_that_stops_at_its_place_on_a_patrol_does_not_ask(finishing: Finishing) -> None:
+    site = yard(finishing)
+    robot = site.fleet.robots["AMR01"]
+    robot.mode, robot.battery_percent = d.RobotModeValue.MODE_CHARGING, 50.0
+    site.fleet.works("AMR01", "wait_1", site.now)
+    assert site.run(60.0) == []
+    site.fleet.charge("AMR01", site.now, 50.0)
+    assert site.run(63.0)[0] == (62.25, "charger_a <- charge AMR01")
+
+
+def test_0_a_patrol_that_begins_when_a_robot_is_called_is_not_its_drive() -> None:
+    site = home_from_work("charge", 60.0)
+    site.run(17.0)
+    site.fleet.works("AMR01", "ward", site.now)
+    assert site.run(30.0) == [
+        (17.25, "charger_a <- cancel"),
+        (17.25, "charger_a: RELEASED AMR01"),
+        (17.25, "AMR01 -> WAIT wait_1"),
+        (18.25, "charger_a: IDLE"),
+    ]
 
 
 @EACH

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import pytest
 from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
@@ -112,7 +113,7 @@ def test_a_robot_that_does_not_leave_the_wrong_station_is_told_twice_and_then_a_
     assert site.mode("charger_a") == "ASSIGNED"
     robot.stuck = False
     site.fleet.works("AMR01", "charger_a", site.now)
-    robot.task_id = "charge-1"
+    robot.task_id = "Charge0"
     assert site.run(60.0) == [(50.25, "charger_b: IDLE"), (56.0, "charger_a: CHARGING AMR01")]
     assert site.faults == []
 
@@ -228,6 +229,94 @@ def test_a_restart_keeps_the_queue_and_touches_no_charge_under_way() -> None:
         (71.25, "charger_b: ASSIGNED AMR03"),
         (71.25, "AMR03 -> CHARGE dock_b"),
     ]
+
+
+def charges_at_a(*, by_operator: bool, knows: bool) -> Yard:
+    """AMR01 charges at charger_a; at 14 s it has 60 %, or by an operator 65 %."""
+    site = yard(fills=1.0, knows=knows)
+    if by_operator:
+        site.wants("AMR01")
+        site.fleet.strays("AMR01", "charger_a", site.now)
+        site.fleet.robots["AMR01"].battery_percent = 60.0
+    else:
+        site.fleet.charge("AMR01", site.now, 60.0)
+    site.run(14.0)
+    assert site.mode("charger_a") == "CHARGING"
+    return site
+
+
+AGAIN: Any = [(16.25, "charger_a: ASSIGNED AMR01"), (18.25, "charger_a: CHARGING AMR01")]
+"""What follows when the station is read again, and is asked."""
+REFUSED = (16.25, "charger_a: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)")
+
+
+@pytest.mark.parametrize("by_operator", [False, True])
+@pytest.mark.parametrize(
+    ("knows", "switched_off", "history"),
+    [
+        (True, True, [REFUSED, *AGAIN]),
+        (True, False, []),
+        (False, True, [(16.25, "charger_a: IDLE"), *AGAIN]),
+        (False, False, [(16.25, "charger_a: CHARGING")]),
+    ],
+)
+def test_a_robot_whose_chargers_daemon_restarts_during_the_charge_is_charged_to_its_end(
+    knows: bool, switched_off: bool, history: list[tuple[float, str]], by_operator: bool
+) -> None:
+    site = charges_at_a(by_operator=by_operator, knows=knows)
+    site.chargers["charger_a"].dead = True
+    site.run(16.0)
+    site.chargers["charger_a"].restarts(site.now, switched_off)
+    assert site.run(30.0) == history
+    assert site.faults == []
+    site.run(70.0)
+    assert site.fleet.robots["AMR01"].battery_percent == 100.0
+
+
+@pytest.mark.parametrize("by_operator", [False, True])
+def test_a_charge_that_is_asked_for_while_its_power_goes_off_is_begun_again(
+    by_operator: bool,
+) -> None:
+    site = charges_at_a(by_operator=by_operator, knows=True)
+    site.chargers["charger_a"].restarts(site.now, switched_off=False)
+    site.run(14.5)
+    site.chargers["charger_a"].stops()
+    assert site.run(30.0) == [
+        (14.75, "charger_a: RELEASED AMR01"),
+        (14.75, "charger_a <- charge AMR01"),
+        (15.75, "charger_a: ASSIGNED AMR01"),
+        (17.75, "charger_a: CHARGING AMR01"),
+    ]
+    assert site.faults == []
+
+
+@pytest.mark.parametrize("by_operator", [False, True])
+def test_a_robot_on_its_way_keeps_the_charger_whose_daemon_restarts(by_operator: bool) -> None:
+    site = yard()
+    if by_operator:
+        site.wants("AMR01")
+    else:
+        site.fleet.charge("AMR01", site.now)
+    site.run(8.0)
+    assert site.mode("charger_a") == "ASSIGNED"
+    site.chargers["charger_a"].restarts(site.now)
+    assert site.run(9.0) == [(8.25, "charger_a: IDLE"), (8.25, "charger_a: ASSIGNED AMR01")]
+    assert site.faults == []
+
+
+def test_a_charge_whose_daemon_and_coordinator_forgot_it_is_requested_and_goes_on() -> None:
+    for stops_at in (16.5, None):
+        site = charges_at_a(by_operator=False, knows=True)
+        site.chargers["charger_a"].restarts(site.now, switched_off=False)
+        site.coordinator.leave()
+        site.disk.kept = None
+        site.coordinator.restart()
+        if stops_at:
+            site.run(stops_at)
+            site.chargers["charger_a"].stops()
+        site.run(70.0)
+        assert site.fleet.robots["AMR01"].battery_percent == 100.0
+        assert site.faults == []
 
 
 def test_a_coordinator_that_has_lost_its_memory_takes_over_what_the_stations_show() -> None:

@@ -1,6 +1,6 @@
 """Every history to a depth, and drawn ones: what must hold whatever fleets, stations and time do.
 
-The walk: all histories of three moves (in `make deep` of four: 9^4 = 6561), a second and more
+The walk: all histories of three moves (in `make deep` of four: 10^4), a second and more
 apart, of two robots and two stations that do as RMF's charger messages say. Whoever speaks then is
 heard to the end.
 """
@@ -48,21 +48,34 @@ STEP_S = 1.25
 
 
 class Node:
-    """A charger's daemon by the book. `holder`: the request id and robot; `ends`: it was cancelled."""
+    """A charger's daemon by the book. `holder`: the request id and robot; `ends`: it was cancelled.
+    `on_pad`: whom it was charging when it was restarted."""
 
     def __init__(self) -> None:
         self.state = IDLE
         self.holder: tuple[str, Robot] | None = None
         self.error = ""
         self.ends = False
+        self.on_pad: Robot | None = None
         self.known: set[str] = set()
+
+    def takes(self, who: Robot) -> bool:
+        """May this robot have it?"""
+        return self.state is IDLE or (self.holder is None and self.on_pad == who)
+
+    def restarts(self) -> None:
+        """It was killed, and has forgotten its request; current flows for one more state."""
+        self.on_pad = self.holder[1] if self.holder and self.state is CHARGING else None
+        self.state = CHARGING if self.on_pad else IDLE
+        self.holder, self.error, self.known = None, "", set()
 
     def hears(self, message: Any) -> None:
         if isinstance(message, d.ChargerRequest):
-            if self.state is IDLE and message.request_id not in self.known:
+            who = Robot(message.fleet_name, message.robot_name)
+            if self.takes(who) and message.request_id not in self.known:
                 self.known.add(message.request_id)
-                who = Robot(message.fleet_name, message.robot_name)
                 self.state, self.holder, self.ends = ASSIGNED, (message.request_id, who), False
+                self.error, self.on_pad = "", None
         elif self.holder and self.holder[0] == message.request_id:
             self.ends = True
             if self.state is not ERROR:
@@ -70,8 +83,11 @@ class Node:
 
     def goes_on(self) -> None:
         """The next thing that happens when all is well."""
+        if self.on_pad and self.state is CHARGING:
+            self.fails(f"wrong docking: {self.on_pad} is not assigned here")
+            return
         if self.state is ERROR:
-            self.error = ""
+            self.error, self.on_pad = "", None
             self.state = RELEASED if self.holder else IDLE
             return
         after = {ASSIGNED: CHARGING, CHARGING: RELEASED, RELEASED: IDLE, IDLE: IDLE}
@@ -83,7 +99,7 @@ class Node:
         self.state, self.error = ERROR, error
 
     def shown(self, name: str) -> StateHeard:
-        request_id, who = self.holder or ("", None)
+        request_id, who = self.holder or ("", self.on_pad)
         if not request_id and self.state is not IDLE:
             request_id = f"unrequested/{name}"
         return StateHeard(name, self.state, request_id, who, self.error)
@@ -155,7 +171,7 @@ class Ledger:
                 node, who = self.nodes[name], Robot(message.fleet_name, message.robot_name)
                 if message.request_id in node.known:
                     return  # a repeat
-                assert node.state is IDLE, "asked for a station that is not free"
+                assert node.takes(who), "asked for a station that is not free"
                 assert who not in self._live(), "a robot that has a station asks for another"
                 assert not self.memory.faulty(who)
                 node.hears(message)
@@ -210,6 +226,7 @@ MOVES: list[Any] = [
     lambda ledger: ledger.nodes[A].fails("robot: authentication timeout"),
     lambda ledger: ledger.hears(MaySpeak(not ledger.speaks)),
     lambda ledger: ledger.restarts(),
+    lambda ledger: ledger.nodes[A].restarts(),
     lambda ledger: ledger.hears(Wanted(TWO, A, "op-1", 0.0)),
 ]
 

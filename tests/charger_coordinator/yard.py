@@ -112,6 +112,16 @@ class Charger:
         self._told: Any = None
         self._told_at = -1.0
 
+    def restarts(self, now: float, switched_off: bool = True) -> None:
+        """Its daemon was killed and is up again. `switched_off`: `outputs-off` reached the station."""
+        self.memory = charger.initial(self.limits, now)
+        self._power = self._power and not switched_off
+        self._clears, self._told, self.dead = 0, None, False
+
+    def stops(self) -> None:
+        """Its power ends, whatever its daemon says."""
+        self._power = False
+
     def scan(self, now: float) -> d.ChargerState | None:
         """Read, decide, drive; the state when it is due."""
         self._run(now)
@@ -129,7 +139,7 @@ class Charger:
         decision = charger.decide(self.memory, event, now, self.limits)
         self.memory, outputs = decision.memory, decision.outputs
         if not self.unplugged:
-            self._power = bool(outputs.power)
+            self._power = self._power if outputs.power is None else outputs.power
             if outputs.clear_errors > self._clears and not self.broken:
                 self.error = None
             self._clears = outputs.clear_errors

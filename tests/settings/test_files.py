@@ -149,3 +149,17 @@ def test_a_deeply_nested_file_is_one_problem(file: Path, opening: str) -> None:
     (problem,) = problems_of(file, opening * 5_000)
     assert problem.startswith("1:")
     assert problem.endswith(": nested more than 32 deep")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("rmf_fleet: {name: tiny}\nother: 1\n", "a fleet adapter's configuration"),
+        ("other: 1\nlevels: {L1: {}}\n", "RMF's building map or navigation graph"),
+    ],
+)
+def test_a_file_of_rmfs_is_named_as_such_with_the_option_that_takes_it(
+    file: Path, text: str, says: str
+) -> None:
+    (found,) = problems_of(file, text)
+    assert f"this is {says}, and no device YAML: rmf-bridge check DEVICE.yaml --" in found

@@ -2,6 +2,8 @@
 
 python-can opens, reads and sends. This file makes good what it leaves open:
 
+- python-can's `recv` waits by the wall clock: on a silent bus it would wait for an hour more when the
+  clock is set back by one. So this file waits, and `recv` only reads what is there.
 - If an slcan adapter returns no frame, more may follow: it may have sent an acknowledgement.
 - Bytes that are not slcan break python-can's parser for good, so the adapter is opened again.
 - python-can's slcan write waits for the adapter without limit; here it has `timeout_s`.
@@ -167,11 +169,11 @@ _HINTS: Final = {
 
 
 def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
-    """How to wait for an slcan adapter's next byte; None if python-can's `recv` waits as it should."""
-    port = getattr(bus, "serialPortOrig", None)
-    if port is None:
+    """How to wait for the next byte or frame; None for a bus of one process, which has no file."""
+    try:
+        descriptor = bus.fileno()
+    except NotImplementedError:
         return None
-    descriptor = port.fileno()
     return lambda wait_s: bool(select.select([descriptor], [], [], wait_s)[0])
 
 

@@ -172,11 +172,24 @@ class Line:
                 self._drop(heard)
                 heard = b""
             elif size := _complete(heard):
-                return _checked(heard[:size], request, heard)
+                return self._checked(heard[:size], request)
             more = self._heard(max(PAUSE_S, self._settings.gap_s) if heard else self._timeout_s)
             if heard and not more:
                 raise Noise(f"{_start(heard)} is half a frame")
             heard += more
+
+    def _checked(self, frame: bytes, request: bytes) -> bytes:
+        """This frame, if its CRC fits. Raises Noise where the echo of an earlier try came late, else
+        BadReply."""
+        if frames.crc_fits(frame):
+            return frame
+        is_echo = request[1] not in WRITES and frame == request[: len(frame)]
+        if is_echo and self._settings.ignore_echo:
+            raise Noise("the adapter's echo came late")
+        if is_echo:
+            text = "our own request comes back; does the adapter echo? say ignore_echo: true"
+            raise BadReply(text)
+        raise BadReply(f"CRC of {frame.hex(' ')} is wrong")
 
     def _drop(self, heard: bytes) -> None:
         """Drop another unit's frame: all bytes until the line is silent. Raises Noise if it is none."""
@@ -217,14 +230,6 @@ def _complete(heard: bytes) -> int:
 
 def _start(heard: bytes) -> str:
     return heard[:16].hex(" ") + (" …" if len(heard) > 16 else "")
-
-
-def _checked(frame: bytes, request: bytes, heard: bytes) -> bytes:
-    if frames.crc_fits(frame):
-        return frame
-    if request[1] not in WRITES and heard[: len(frame)] == request[: len(frame)]:
-        raise BadReply("our own request comes back; does the adapter echo? say ignore_echo: true")
-    raise BadReply(f"CRC of {frame.hex(' ')} is wrong")
 
 
 def _why(error: Exception) -> str:

@@ -194,6 +194,16 @@ def test_an_adapter_that_echoes_unannounced_is_named(line: SerialModule) -> None
     assert "our own request comes back; does the adapter echo? say ignore_echo: true" in text
 
 
+def test_a_second_echo_is_that_of_an_earlier_try_and_the_file_is_not_blamed(
+    line: SerialModule,
+) -> None:
+    door(line)
+    line.on_wire = lambda frame: frame + frame + _answer(line, frame)
+    text = fails(bus_to(line.port, timeout_s=1.0, ignore_echo=True), IN0)
+    assert "the adapter's echo came late" in text
+    assert "ignore_echo" not in text
+
+
 def test_an_adapter_that_does_not_echo_although_the_file_says_so_is_named(
     line: SerialModule,
 ) -> None:

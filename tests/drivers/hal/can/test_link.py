@@ -1,0 +1,56 @@
+"""How one bus is waited for. The vendor's bus here has a file, as an interface of the kernel has."""
+
+import socket
+from typing import Any
+
+import can
+import can.bus
+import pytest
+
+from drivers.hal.can.frames import Frame
+from drivers.hal.can.link import Link
+
+HOUR_S = 3600.0
+
+
+class Interface(can.BusABC):
+    """A bus with a file, in which a byte is a frame's id. `waits`: how long `recv` waited (s)."""
+
+    def __init__(self) -> None:
+        self._near, self.far = socket.socketpair()
+        self.waits: list[float | None] = []
+        super().__init__("can0")
+
+    def fileno(self) -> int:
+        """The file that is waited for."""
+        return self._near.fileno()
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        self.waits.append(timeout)
+        if timeout:
+            return None, False  # the clock shows how long that was
+        return can.Message(arbitration_id=self._near.recv(1)[0], is_extended_id=False), False
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """Nobody sends here."""
+
+    def shutdown(self) -> None:
+        """Close both ends."""
+        super().shutdown()
+        self._near.close()
+        self.far.close()
+
+
+def test_a_clock_that_is_set_back_during_a_wait_makes_it_no_longer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shown = iter([0.0, -HOUR_S, HOUR_S, HOUR_S, HOUR_S, HOUR_S])
+    monkeypatch.setattr(can.bus, "time", lambda: next(shown))
+    bus = Interface()
+    link = Link(lambda: bus, "can0", timeout_s=0.05)
+    link.open()
+    heard: list[Any] = [link.receive(0.001)]
+    bus.far.send(b"\x07")
+    heard.append(link.receive(0.001))
+    link.close()
+    assert (heard, bus.waits) == ([None, Frame(7, b"")], [0])
