@@ -69,9 +69,13 @@ def restarts(service: str) -> int:
 
 def ready_s(service: str) -> float:
     """How long it took from the start of its process to its "ready"."""
-    names = ("ExecMainStartTimestampMonotonic", "ActiveEnterTimestampMonotonic")
-    began, ready = (int(shown(service, name)[name]) for name in names)
-    return (ready - began) / 1e6
+    began = since_boot_s(service, "ExecMainStartTimestampMonotonic")
+    return since_boot_s(service, "ActiveEnterTimestampMonotonic") - began
+
+
+def since_boot_s(service: str, name: str) -> float:
+    """This property of a unit, a time (monotonic s)."""
+    return int(shown(service, name)[name]) / 1e6
 
 
 def kill(service: str, name: str) -> None:
