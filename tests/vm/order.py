@@ -27,6 +27,7 @@ PARTS: Final = {
         REBOOT,
         "boots.off",
         "boots.active_low",
+        "install.upgrade",
     ),
     "site": (
         *LIFT,

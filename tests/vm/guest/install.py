@@ -130,16 +130,15 @@ def security() -> str:
 
 
 def upgrade() -> str:
-    """The next version is installed, two relays on: they go off and stay so, each service is back."""
-    names = [unit(n) for n in ("lift", "door", "charger")]
-    before = {name: pid(name) for name in names}
-    relays, when = energise(), header.now()
+    """The next version is installed, two relays on: they go off and stay so, the service is back."""
+    service = unit("lift")
+    relays, old = energise(), pid(service)
+    when = header.now()
     install(_deb("next/rmf-bridges"))
-    for name in names:
-        back(name, before[name])
+    back(service, old)
     version = sh("dpkg-query", "-W", "-f", "${Version}", "rmf-bridges")
     off = header.off_at(relays, when)
     if off.keys() != relays.keys() or header.on(relays, when) or not version.endswith(".1"):
         raise Wrong(f"{version}: of {sorted(relays)} off {off}, on {header.on(relays, when)}")
-    down_s = since_boot_s(names[0], "ActiveEnterTimestampMonotonic") - max(off.values())
-    return f"{version}: relays off, the lift is back after {down_s:.1f} s, so are door and charger"
+    down_s = since_boot_s(service, "ActiveEnterTimestampMonotonic") - max(off.values())
+    return f"{version}: relays off, the service is back after {down_s:.1f} s"
