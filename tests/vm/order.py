@@ -47,6 +47,7 @@ PARTS: Final = {
         "install.supervisors",
         "figures.memory",
         "figures.ratios",
+        "install.page",
         "install.security",
     ),
 }
