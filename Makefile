@@ -47,9 +47,8 @@ demo-page: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo page
 
 # Many tests wait for a process or a wire: more of them than there are cores run side by side.
-# Each test goes to the next free worker, in the mixed order of conftest.py. Tests that share a
-# process stay together (mark xdist_group).
-SIDE_BY_SIDE := -n 8 --dist loadgroup --no-loadscope-reorder
+# Each test goes with all its parameters to the next free worker, in the mixed order of conftest.py.
+SIDE_BY_SIDE := -n 8 --dist loadscope --no-loadscope-reorder
 # mypy uses one core only, so it runs beside the tests.
 test: .venv/ready style
 	@$(MAKE) --no-print-directory -j 2 types suite

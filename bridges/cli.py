@@ -1,6 +1,8 @@
 """The command `rmf-bridge`. Each subcommand is a file in `bridges/commands/`."""
 
 import argparse
+import atexit
+import gc
 import importlib
 import os
 import re
@@ -102,6 +104,8 @@ COMMANDS = {
 
 def main(argv: list[str] | None = None) -> int:
     """Run one subcommand and return its exit code."""
+    # Python looks through all objects when a process ends: a fifth of the CPU of a short one.
+    atexit.register(gc.freeze)
     if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion; ends the process
         import argcomplete
 

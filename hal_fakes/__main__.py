@@ -8,11 +8,14 @@ died. It ignores SIGINT: Ctrl-C in a terminal reaches both, and the daemon has t
 """
 
 import argparse
+import atexit
+import gc
 import json
 import logging
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from bridges import log
@@ -25,6 +28,7 @@ from hal_fakes.realtime import RealTime
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Serve until standard input ends."""
+    atexit.register(gc.freeze)  # as in bridges/cli.py
     parser = argparse.ArgumentParser(prog="python -m hal_fakes")
     parser.add_argument("file", type=Path)
     parser.add_argument("bus")
@@ -38,26 +42,32 @@ def main(argv: Sequence[str] | None = None) -> int:
         log.start("WARNING", json=arguments.log_format == "json")
         logging.getLogger("hal_fakes").setLevel(logging.INFO)
     try:
-        _serve(arguments.file, arguments.bus, arguments.socket)
+        with served(arguments.file, arguments.bus, arguments.socket) as replace:
+            sys.stdout.write(json.dumps(replace) + "\n")
+            sys.stdout.flush()
+            sys.stdin.buffer.read()
     except (SettingsError, DriverError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     return 0
 
 
-def _serve(path: Path, bus_name: str, socket: Path) -> None:
+@contextmanager
+def served(path: Path, bus_name: str, socket: Path) -> Iterator[dict[str, object]]:
+    """The far side of this bus until the end of the block; gives what must stand in its settings.
+
+    Raises SettingsError, DriverError.
+    """
     config = load(path)
     far = far_side(config, bus_name)
     assert isinstance(far, Outside)
-    world = RealTime(plants_on(config, bus_name))
-    control = Control(socket, world.plants)
-    server = far.serve(config.buses[bus_name], stations_on(config, bus_name, world.plants))
-    sys.stdout.write(json.dumps(server.replace) + "\n")
-    sys.stdout.flush()
-    sys.stdin.buffer.read()
-    server.close()
-    control.close()
-    world.close()
+    with (
+        closing(RealTime(plants_on(config, bus_name))) as world,
+        closing(Control(socket, world.plants)),
+    ):
+        stations = stations_on(config, bus_name, world.plants)
+        with closing(far.serve(config.buses[bus_name], stations)) as server:
+            yield server.replace
 
 
 if __name__ == "__main__":

@@ -1,3 +1,5 @@
+import atexit
+import gc
 import logging
 import os
 import signal
@@ -35,6 +37,10 @@ settings.load_profile("here")
 signal.signal(
     signal.SIGHUP, signal.SIG_DFL
 )  # nohup, or a CI's shell, has daemons inherit another one
+
+gc.disable()
+atexit.register(gc.freeze)
+"""No look for garbage while the tests are collected, which leaves none, nor when a worker ends."""
 
 _deselected: list[str] = []
 
@@ -74,14 +80,40 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         item.add_marker(pytest.mark.timeout(WIRES_HANG_AFTER_S))
 
 
+def pytest_collection_finish() -> None:
+    """What was collected stays to the end: what looks for garbage leaves it out."""
+    gc.freeze()
+    gc.enable()
+
+
+@pytest.hookimpl(optionalhook=True)  # in a run without xdist
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """With `--dist loadscope` a test with all its parameters has one worker, and so one fixture of a
+    module: an echo process, a schema. Any other test goes to the next free worker."""
+    from xdist.scheduler import LoadScopeScheduling  # type: ignore[import-untyped]
+
+    class ByTest(LoadScopeScheduling):  # type: ignore[misc]  # which xdist does not type
+        def _split_scope(self, nodeid: str) -> str:
+            return nodeid.partition("[")[0]
+
+    return ByTest(config, log) if config.getvalue("dist") == "loadscope" else None
+
+
 def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
     """In an order in which tests that wait and tests that compute are mixed, so that the workers keep
-    all cores busy: file by file, always the same. What takes long is begun early."""
+    all cores busy: file by file, always the same. Among those of the first quarter is what takes long,
+    the longest first."""
     random = Random(1)
     place = {path: random.random() for path in sorted({item.path for item in items})}
-    early = [item for item in items if item.get_closest_marker("long")]
-    place_of_early = {item: random.random() / 4 for item in early}
+    early = sorted(filter(_seconds, items), key=_seconds, reverse=True)
+    place_of_early = {item: n / len(early) / 4 for n, item in enumerate(early)}
     return sorted(items, key=lambda item: place_of_early.get(item, place[item.path]))
+
+
+def _seconds(item: pytest.Item) -> float:
+    """How long it takes alone, as its mark says; 0 without one."""
+    mark = item.get_closest_marker("long")
+    return float(mark.args[0]) if mark else 0.0
 
 
 def _is_on_wires(item: pytest.Item) -> bool:

@@ -14,53 +14,60 @@ from hal_fakes.plants.lift import LiftPlant
 from hal_fakes.realtime import RealTime
 from tests.hal_fakes.virtual_lift import shipped
 
+FORKED = """
+import os, sys
+from bridges import cli
+cli.whole_parser()
+for told, line in zip(sys.argv[1::2], sys.argv[2::2]):
+    if not (child := os.fork()):
+        asked = {"_ARGCOMPLETE_STDOUT_FILENAME": told, "COMP_LINE": line, "COMP_POINT": str(len(line))}
+        os.environ.update(asked)
+        os.environ["_ARGCOMPLETE"] = "1"
+        cli.main([])
+    assert os.waitpid(child, 0)[1] == 0
+"""
+"""A process for each line, as a shell starts them, but forked from one that has imported it all."""
 
-def completed(line: str, tmp_path: Path) -> list[str]:
-    """What the shell is offered at the end of this line, by argcomplete's own protocol."""
-    told = tmp_path / "told"
-    environ = os.environ | {
-        "_ARGCOMPLETE": "1",
-        "_ARGCOMPLETE_STDOUT_FILENAME": str(told),
-        "_ARGCOMPLETE_IFS": "\n",
-        "_ARGCOMPLETE_SHELL": "bash",
-        "COMP_LINE": line,
-        "COMP_POINT": str(len(line)),
-    }
-    command = [sys.executable, "-m", "bridges.cli"]
+
+def completed(folder: Path, *lines: str) -> list[list[str]]:
+    """What the shell is offered at the end of each line, by argcomplete's own protocol."""
+    told = [folder / str(n) for n in range(len(lines))]
+    words = [str(word) for each in zip(told, lines, strict=True) for word in each]
+    environ = os.environ | {"_ARGCOMPLETE_IFS": "\n", "_ARGCOMPLETE_SHELL": "bash"}
+    command = [sys.executable, "-c", FORKED, *words]
     subprocess.run(command, env=environ, check=True, capture_output=True)
-    return told.read_text().split()
+    return [file.read_text().split() for file in told]
 
 
-@pytest.mark.parametrize(
-    ("line", "offered"),
-    [
-        ("rmf-bridge ch", ["check"]),
-        ("rmf-bridge run --log", ["--log-level", "--log-format"]),
-        ("rmf-bridge fail lift.yaml car st", ["stuck"]),
-        ("rmf-bridge send li", ["lift"]),
-    ],
-)
-def test_commands_options_and_choices_are_completed(
-    line: str, offered: list[str], tmp_path: Path
-) -> None:
-    assert completed(line, tmp_path) == offered
+OFFERED = {
+    "rmf-bridge ch": ["check"],
+    "rmf-bridge run --log": ["--log-level", "--log-format"],
+    "rmf-bridge fail lift.yaml car st": ["stuck"],
+    "rmf-bridge send li": ["lift"],
+}
+
+
+def test_commands_options_and_choices_are_completed(tmp_path: Path) -> None:
+    assert completed(tmp_path, *OFFERED) == list(OFFERED.values())
 
 
 def test_the_devices_of_the_file_are_completed(tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
-    for command in ("press", "fail", "walk", "doctor", "log"):
-        assert completed(f"rmf-bridge {command} {file} --device ", tmp_path) == ["Lift1"]
-        assert completed(f"rmf-bridge {command} no_such.yaml --device ", tmp_path) == []
+    commands = ("press", "fail", "walk", "doctor", "log")
+    lines = [f"rmf-bridge {command} {file} --device " for command in commands]
+    assert completed(tmp_path, *lines) == [["Lift1"]] * len(commands)
+    lines = [f"rmf-bridge {command} no_such.yaml --device " for command in commands]
+    assert completed(tmp_path, *lines) == [[]] * len(commands)
 
 
 def test_the_buttons_of_a_running_simulation_are_completed(tmp_path: Path) -> None:
     running = RealTime({"Lift1": LiftPlant("Lift1", shipped())})
     control = Control(tmp_path / "plant.sock", running.plants)
     try:
-        line = f"rmf-bridge press --runtime-dir {tmp_path} lift.yaml fi"
-        assert completed(line, tmp_path) == ["fire_alarm"]
-        line = f"rmf-bridge fail --runtime-dir {tmp_path} lift.yaml door_o"
-        assert completed(line, tmp_path) == ["door_open", "door_operator"]
+        press = f"rmf-bridge press --runtime-dir {tmp_path} lift.yaml fi"
+        fail = f"rmf-bridge fail --runtime-dir {tmp_path} lift.yaml door_o"
+        offered = [["fire_alarm"], ["door_open", "door_operator"]]
+        assert completed(tmp_path, press, fail) == offered
     finally:
         control.close()
         running.close()

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from bridges.rmf import topics
+from tests.depth import depth
 from tests.door_supervisor.world import (
     DoorDaemon,
     OurSupervisor,
@@ -111,7 +112,7 @@ def rates(storm: Storm, topic: Any) -> list[float]:
 
 
 @pytest.mark.parametrize("fate", [lossy, late])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(depth(6, 12)))
 def test_no_door_closes_on_a_robot_and_no_robot_waits_for_ever(seed: int, fate: Fate) -> None:
     storm = Storm(seed, fate)
     storm.rages()

@@ -5,7 +5,7 @@ bus, that cannot be read: for once, or for ever.
 """
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 
@@ -24,7 +24,10 @@ from drivers.hal import http
 from drivers.hal.gpio import GpioBus
 from drivers.hal.points import Points, Wire
 from tests.drivers.charger.test_canopen import DISABLE, Receiver
+from tests.drivers.hal.modbus.conftest import hang_up, module
 from tests.drivers.hal.modbus.module import Module, Time, bus_to, frame
+
+__all__ = ["hang_up", "module"]
 
 HELD, RELEASED = DoorOutputs(hold_open=True), DoorOutputs(hold_open=False)
 STATUS, COMMAND = (3, 10), (3, 20)
@@ -73,13 +76,6 @@ class Registers:
 @pytest.fixture
 def registers(module: Module) -> Registers:
     return Registers(module)
-
-
-@pytest.fixture
-def module() -> Iterator[Module]:
-    started = Module()
-    yield started
-    started.close()
 
 
 REGISTER_DOOR = msgspec.convert(

@@ -99,7 +99,7 @@ def verdict(process: subprocess.Popen[str]) -> tuple[int, set[str], list[str]]:
     return process.returncode, broken, told["notes"]
 
 
-@pytest.mark.long
+@pytest.mark.long(80)
 @pytest.mark.parametrize(
     ("file", "words", "speaks"),
     [
@@ -129,7 +129,7 @@ def test_our_own_daemons_keep_every_law(
         assert verdict(process) == (0, set(), [])
 
 
-@pytest.mark.long
+@pytest.mark.long(14)
 def test_a_volatile_fire_alarm_is_told_by_who_matches(speaks: Wire, domain: int) -> None:
     watch = ["judge", "lift", "Lift1", "--for", "6", "--json", "--localhost"]
     with (
@@ -139,7 +139,7 @@ def test_a_volatile_fire_alarm_is_told_by_who_matches(speaks: Wire, domain: int)
         assert verdict(process) == (1, {"L12.retained"}, [])
 
 
-@pytest.mark.long
+@pytest.mark.long(14)
 def test_a_judge_that_is_told_to_end_ends_its_session_first(speaks: Wire, domain: int) -> None:
     number = signal.SIGTERM if speaks == "zenoh" else signal.SIGINT
     ride = ["judge", "lift", "Lift1", "--active", "--ride", "L1", "L3", "--json", "--localhost"]
@@ -152,7 +152,7 @@ def test_a_judge_that_is_told_to_end_ends_its_session_first(speaks: Wire, domain
         assert node.session == ""
 
 
-@pytest.mark.long
+@pytest.mark.long(20)
 def test_a_node_that_answers_each_request_floods_nobody(speaks: Wire, domain: int) -> None:
     """A loop at the speed of the wire, which the judge stops by being silent."""
     ride = ["judge", "lift", "Lift1", "--active", "--ride", "L1", "L3", "--json", "--localhost"]

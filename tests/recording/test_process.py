@@ -1,21 +1,25 @@
 """The recorder and the commands beside a real daemon, as a person runs them."""
 
+import io
 import json
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
+from bridges import cli
 from bridges.recording.bags import heard_in
 from bridges.recording.entries import Spoken
 from bridges.recording.incidents import head_of, notes_in
 from bridges.recording.ring import Read
 from hal_fakes.wire import wire
-from tests.serve.site import command, daemon, environment, shipped
+from tests.serve.site import daemon, environment, shipped
 from tests.waiting import PATIENCE_S, wait_until
 
 
@@ -24,16 +28,20 @@ def lift(tmp_path: Path) -> Path:
     return shipped("lift_dry_contact.yaml", tmp_path, wire())
 
 
-def bridge(*words: str | Path, **env: str) -> subprocess.CompletedProcess[str]:
-    """A command, to its end."""
-    return subprocess.run(
-        command(*words),
-        capture_output=True,
-        text=True,
-        env=environment(**env),
-        timeout=PATIENCE_S,
-        cwd=words[1].parent if isinstance(words[1], Path) else None,
-    )
+class Told(NamedTuple):
+    """What a command has said, and its exit code."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def bridge(*words: str | Path) -> Told:
+    """A command, to its end, in the folder of its file."""
+    out, error = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(error), chdir(Path(words[1]).parent):
+        code = cli.main([str(word) for word in words])
+    return Told(code, out.getvalue(), error.getvalue())
 
 
 def states(place: Path) -> int:

@@ -23,8 +23,8 @@ HERE = Path(__file__).parent / "corpus"
 CORPUS = sorted(HERE.glob("*.mcap"))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.long(5)
+@pytest.mark.parametrize("seed", depth([1], [1, 3]))
 def test_whatever_happens_at_a_site_is_decided_again_in_the_same_way(
     seed: int, tmp_path: Path
 ) -> None:
@@ -41,11 +41,11 @@ def test_whatever_happens_at_a_site_is_decided_again_in_the_same_way(
     assert found == dict.fromkeys(rings, (True, 0))
 
 
-@pytest.mark.long
+@pytest.mark.long(3)
 def test_a_ring_that_has_turned_many_times_begins_where_all_is_known(tmp_path: Path) -> None:
     site = Site(3)
-    rings = keep(site, tmp_path, MB // 16)
-    site.run(depth(8, 20) / 60)
+    rings = keep(site, tmp_path, MB // 24)
+    site.run(depth(6, 20) / 60)
 
     for name in ("Lift1", "ward", "bay1"):
         read = Read(rings[name])

@@ -44,7 +44,6 @@ def echo(request: pytest.FixtureRequest) -> Iterator[None]:
 # --- to another process ------------------------------------------------------------------------
 
 
-@pytest.mark.xdist_group("echo on dds")
 @ALL_TOPICS
 def test_every_message_survives_the_wire_to_another_process_and_back(
     echo: None, join_wire: Join, topic: Topic[Any]

@@ -43,7 +43,6 @@ def echoed(request: pytest.FixtureRequest, module_domain: int) -> Iterator[Zenoh
     made.node.close()
 
 
-@pytest.mark.xdist_group("echo on zenoh")
 @ALL_TOPICS
 def test_every_message_survives_the_wire_to_another_process_and_back(
     echoed: ZenohTransport, topic: Topic[Any]

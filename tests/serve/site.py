@@ -3,17 +3,17 @@
 import json
 import os
 import re
-import signal
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
+from hal_fakes.__main__ import served
 from hal_fakes.caller import Caller
 from hal_fakes.wire import join, wire
 from tests.waiting import PATIENCE_S, wait_until
@@ -41,7 +41,7 @@ doors:
 
 
 class Module:
-    """The I/O module and the door behind it; it outlives every daemon."""
+    """The I/O module and the door behind it, in this process; it outlives every daemon."""
 
     def __init__(self, directory: Path, domain: int, transport: str | None = None) -> None:
         transport = transport or wire()
@@ -51,15 +51,11 @@ class Module:
         draft = directory / "draft.yaml"
         draft.write_text(YAML.format(domain=domain, transport=transport, port=502))
         path = directory / "plant.sock"
-        self._far_side = subprocess.Popen(
-            [sys.executable, "-m", "hal_fakes", str(draft), "module", "--socket", str(path)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-        )
-        assert self._far_side.stdout
-        tcp = json.loads(self._far_side.stdout.readline())["tcp"]
+        self._far_side = ExitStack()
+        there: Any = self._far_side.enter_context(served(draft, "module", path))
         self.file = directory / "ward_door.yaml"
-        self.yaml = YAML.format(domain=domain, transport=transport, port=tcp["port"])
+        port = there["tcp"]["port"]
+        self.yaml = YAML.format(domain=domain, transport=transport, port=port)
         self.file.write_text(self.yaml)
         self._follow = socket.socket(socket.AF_UNIX)
         self._follow.connect(str(path))
@@ -85,21 +81,16 @@ class Module:
 
     def hang(self) -> None:
         """The module answers nobody, and its relay stays as it is."""
-        self._far_side.send_signal(signal.SIGSTOP)
+        self.tell("fail", "ward_door", "server", "stuck")
 
     def go_on(self) -> None:
         """It answers again."""
-        self._far_side.send_signal(signal.SIGCONT)
+        self.tell("fail", "ward_door", "server", "ok")
 
     def close(self) -> None:
         """Take the module off the wall."""
-        self.go_on()
         self._follow.close()
-        assert self._far_side.stdin
-        assert self._far_side.stdout
-        self._far_side.stdin.close()
-        self._far_side.wait(PATIENCE_S)
-        self._far_side.stdout.close()
+        self._far_side.close()
 
 
 def shipped(name: str, directory: Path, transport: str) -> Path:

@@ -15,7 +15,7 @@ from bridges.settings.examples import device_yamls
 from bridges.settings.load import load
 from drivers.profiles import texts
 
-DEVICES = [file for file in device_yamls() if load(file).buses]
+DEVICES = [file for file in device_yamls() if "\nbuses:" in file.read_text()]
 
 
 @pytest.fixture(autouse=True)

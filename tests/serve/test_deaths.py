@@ -105,14 +105,8 @@ def test_the_rule_leaves_out_crashes_and_signals_that_end_nothing_by_default() -
     }
 
 
-USUAL = [
-    signal.SIGHUP,
-    signal.SIGINT,
-    signal.SIGQUIT,
-    signal.SIGTERM,
-    signal.SIGTSTP,
-    signal.SIGRTMAX,
-]
+USUAL = [signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGRTMAX]
+"""SIGINT and SIGTERM are in test_process.py."""
 EVERY = [n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX)]
 """Of the realtime signals the first and the last."""
 

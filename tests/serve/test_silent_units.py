@@ -117,7 +117,7 @@ def line(request: pytest.FixtureRequest) -> Iterator[tuple[Module, int]]:
     module.close()
 
 
-@pytest.mark.long
+@pytest.mark.long(20)
 def test_on_a_real_bus_a_live_unit_is_asked_between_any_two_silent_ones(
     line: tuple[Module, int], tmp_path: Path
 ) -> None:

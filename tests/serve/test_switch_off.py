@@ -1,5 +1,6 @@
 """Switching off from a fresh process: silent devices keep no other's relay on."""
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,13 +18,19 @@ SILENT = 30
 
 @pytest.fixture
 def module() -> Iterator[Module]:
-    """The last of many units answers, and its relay is on."""
+    """The last of many units answers, and its relay is on.
+
+    Who still asks silent ones when the time is up ends once the module is closed, and is waited for.
+    """
+    before = set(threading.enumerate())
     standing = Module()
     standing.units.clear()
     door(standing, SILENT + 1)
     standing.coils[SILENT + 1, 0] = True
     yield standing
     standing.close()
+    for thread in set(threading.enumerate()) - before:
+        thread.join()
 
 
 def yaml(module: Module, folder: Path, *units: int) -> Path:

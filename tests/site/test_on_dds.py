@@ -22,7 +22,7 @@ def site(
     site.close()
 
 
-@pytest.mark.long
+@pytest.mark.long(70)
 def test_three_robots_share_a_lift_and_a_door_while_everybody_is_killed_once(
     site: RealSite,
 ) -> None:

@@ -8,12 +8,14 @@ from tests.site.day import Site
 from tests.site.growth import Look, growth
 from tests.site.laws import Broken
 
+SEEDS = depth([2], [1, 2, 3])
+"""tests/recording/test_replay.py has days of 1 and 3: each is that of another supervisor."""
 MINUTES = depth(8, 20)
 """Robots go home in the last minutes of a day (`WIND_DOWN_S`): a shorter one has nothing else."""
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.long(5)
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_site_lives_through_its_troubles(seed: int) -> None:
     """If this fails: `make soak SEED=… HOURS=0.3333` plays it again, and prints what went before.
 
@@ -27,19 +29,19 @@ def test_a_site_lives_through_its_troubles(seed: int) -> None:
     assert sum(site.trouble.counts.values()) > depth(1, 5)
 
 
-@pytest.mark.long
+@pytest.mark.long(3)
 def test_rmfs_supervisor_that_forgets_a_robot_stops_a_lift_for_good_without_what_saves_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The day finds the deadlock that `bridges/lift/forgotten.py` ends."""
     monkeypatch.setattr(forgotten, "heard", lambda session, event: (session, False))
-    site = Site(10, "kilted")  # a day on which it comes early
+    site = Site(23, "kilted")  # a day on which it comes early
     site.trouble._draw = site._restart_rmfs
     with pytest.raises(Broken, match=r"waits for Lift\d"):
         site.run(0.5)
 
 
-@pytest.mark.long
+@pytest.mark.long(2)
 def test_the_same_seed_is_the_same_day() -> None:
     days = [Site(5), Site(5)]
     for day in days:

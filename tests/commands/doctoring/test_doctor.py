@@ -1,15 +1,15 @@
 """`rmf-bridge doctor` on real wires: Modbus, HTTP and CAN, and on RMF's graph."""
 
+import io
 import json
 import os
 import signal
 import socket
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from bridges.serve import record
 from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.settings.load import load
+from hal_fakes.__main__ import served as served_by
 from hal_fakes.caller import Caller
 from hal_fakes.wire import join, wire
 from tests.commands import runtime
@@ -38,14 +39,13 @@ LISTEN_S = "15"
 
 def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, list[Any]]]:
     """The exit code, and the findings of each subject: (level, found)."""
-    words: list[str | Path] = ["doctor", file, "--json", "--runtime-dir", tmp_path / "run"]
-    ended = subprocess.run(
-        command(*words, *options), env=environment(), capture_output=True, check=False
-    )
+    words = ["doctor", str(file), "--json", "--runtime-dir", str(tmp_path / "run")]
+    with redirect_stdout(io.StringIO()) as told:
+        code = cli.main([*words, *options])
     subjects: dict[str, list[Any]] = {}
-    for one in json.loads(ended.stdout):
+    for one in json.loads(told.getvalue()):
         subjects.setdefault(one["subject"], []).append((one["level"], one["found"]))
-    return ended.returncode, subjects
+    return code, subjects
 
 
 class Tapped:
@@ -271,20 +271,11 @@ def test_for_people_each_finding_has_a_line_below_its_subject(
 
 
 @contextmanager
-def far_side(yaml: str, bus: str, folder: Path) -> Iterator[dict[str, Any]]:
+def far_side(yaml: str, bus: str, folder: Path) -> Iterator[Any]:
     """The fake of one bus, and what must stand in its settings."""
     (folder / "far.yaml").write_text(yaml)
-    words = [sys.executable, "-m", "hal_fakes", str(folder / "far.yaml"), bus]
-    with subprocess.Popen(
-        [*words, "--socket", str(folder / "plant.sock")],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    ) as process:
-        assert process.stdout
-        yield json.loads(process.stdout.readline())
-        assert process.stdin
-        process.stdin.close()
-        process.wait(PATIENCE_S)
+    with served_by(folder / "far.yaml", bus, folder / "plant.sock") as there:
+        yield there
 
 
 HTTP = """
@@ -338,6 +329,7 @@ def test_a_canopen_receiver_answers_and_is_found_by_its_node(tmp_path: Path) -> 
         assert "no heartbeat within 2 s, but of node 10" in scanned[1]
 
 
+@pytest.mark.long(15)
 def test_who_sends_on_the_graph_is_seen_and_a_second_door_of_the_name_is_wrong(
     module: Module, tmp_path: Path
 ) -> None:
@@ -365,6 +357,7 @@ def test_who_sends_on_the_graph_is_seen_and_a_second_door_of_the_name_is_wrong(
     assert [level for level, _ in found["messages"]] == ["ok"]
 
 
+@pytest.mark.long(15)
 def test_our_daemon_is_heard_and_a_graph_without_rmf_is_warned_of(
     module: Module, tmp_path: Path
 ) -> None:
@@ -376,6 +369,7 @@ def test_our_daemon_is_heard_and_a_graph_without_rmf_is_warned_of(
     assert ("warning", "door_requests: nobody sends") in found["RMF"]
 
 
+@pytest.mark.long(15)
 def test_a_supervisor_beside_another_one_would_be_passive(domain: int, tmp_path: Path) -> None:
     file = tmp_path / "supervisor.yaml"
     file.write_text(

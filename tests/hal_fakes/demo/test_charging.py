@@ -28,7 +28,7 @@ def demo(directory: Path) -> subprocess.Popen[str]:
     )
 
 
-@pytest.mark.long
+@pytest.mark.long(90)
 def test_the_scenarios_go_as_their_slides_say_with_three_daemons_on_one_graph(
     directory: Path,
 ) -> None:

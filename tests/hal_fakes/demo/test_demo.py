@@ -42,7 +42,7 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("d")
 
 
-@pytest.mark.long
+@pytest.mark.long(25)
 def test_a_robot_goes_through_the_door_rides_the_lift_and_charges(directory: Path) -> None:
     with demo(directory, *PATIENTLY, on=runs_here()) as process:
         out, _ = process.communicate()
@@ -51,6 +51,7 @@ def test_a_robot_goes_through_the_door_rides_the_lift_and_charges(directory: Pat
     assert (running(directory), list(directory.iterdir())) == ([], [])
 
 
+@pytest.mark.long(23)
 def test_a_failure_makes_it_wrong_with_the_reason_the_last_states_and_the_logs(
     directory: Path,
 ) -> None:

@@ -33,7 +33,8 @@ def line() -> Iterator[SerialModule]:
 
 
 @pytest.fixture(autouse=True)
-def _hang_up() -> Iterator[None]:
+def hang_up() -> Iterator[None]:
+    """No bus is left open."""
     yield
     while opened:
         opened.pop().close()
