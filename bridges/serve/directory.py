@@ -85,20 +85,28 @@ def _is_about(places: Places, file: Path) -> bool:
 
 
 def holder(places: Places) -> LockHolder | None:
-    """The process that holds the lock now; None if there is none. Raises Unknown."""
-    for folder in places.folders:
-        try:
-            lock = _open(folder / LOCK, os.O_RDONLY)
-        except (FileNotFoundError, NotADirectoryError):
-            continue
-        except OSError as error:
-            raise Unknown(_what_to_do(folder, error)) from None
-        try:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return _written(folder / LOCK)
-        finally:
-            os.close(lock)
+    """The process that holds the lock now; None if there is none. Raises Unknown.
+
+    The runtime directory's lock names it first: on a read-only root the other one keeps an old name.
+    """
+    found = [_locked(folder) for folder in reversed(places.folders)]
+    return max(filter(None, found), key=lambda each: each.pid != 0, default=None)
+
+
+def _locked(folder: Path) -> LockHolder | None:
+    """Whom the lock of this folder names while it is held. Raises Unknown."""
+    try:
+        lock = _open(folder / LOCK, os.O_RDONLY)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise Unknown(_what_to_do(folder, error)) from None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return _written(folder / LOCK)
+    finally:
+        os.close(lock)
     return None
 
 
@@ -257,7 +265,7 @@ class RuntimeDirectory:
     def _lock_by(self, folder: Path, deadline: float) -> None:
         """Take the lock; wait while `outputs-off` holds it."""
         while not self._lock(folder):
-            found = _written(folder / LOCK)
+            found = holder(self.places) or _written(folder / LOCK)
             if found.serves or time.monotonic() >= deadline:
                 self.close()
                 raise AlreadyRunning(_in_use(folder, found))

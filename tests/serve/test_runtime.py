@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from bridges.serve import directory, places
@@ -64,6 +65,22 @@ def test_either_of_its_locks_shows_that_a_daemon_lives(tmp_path: Path) -> None:
         assert holder(both) == OURS
         path.with_name("away").rename(path)
     serving.close()
+
+
+def test_where_the_state_keeps_an_old_name_the_runtime_directory_says_who_it_is(
+    tmp_path: Path,
+) -> None:
+    both = Places(tmp_path / "run", tmp_path / "state")
+    serving = RuntimeDirectory(both, FILE, serves=False)
+    old = LockHolder(7, str(FILE), True)  # of the daemon before the root became read-only
+    (tmp_path / "state" / "lock").write_bytes(msgspec.json.encode(old))
+    assert holder(both) == LockHolder(os.getpid(), str(FILE), False)
+    with pytest.raises(AlreadyRunning, match=f"in use by process {os.getpid()}"):
+        RuntimeDirectory(both, FILE, serves=True, wait_s=0.0)
+    (tmp_path / "run" / "lock").write_bytes(b"")  # /run is full
+    assert holder(both) == old
+    serving.close()
+    assert holder(both) is None
 
 
 def test_what_is_claimed_is_remembered_whole_until_it_is_released(tmp_path: Path) -> None:

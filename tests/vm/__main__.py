@@ -2,6 +2,9 @@
 
 import argparse
 import os
+import re
+import shutil
+import subprocess
 import sys
 import time
 from collections.abc import Iterable
@@ -10,12 +13,14 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from tests.vm.image import Unusable, image
+from tests.vm.image import Unusable, image, needed
 from tests.vm.machine import ARCHS, Machine, accelerated
 from tests.vm.order import CUT, PARTS, REBOOT, WHOLE
 
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / "build/vm"
+NEXT = "next"
+"""The folder, among the packages, of the one to upgrade to (`guest/install.py`)."""
 
 
 def main() -> int:
@@ -58,12 +63,25 @@ def _packages(arch: str, folder: Path) -> Path:
     if not found:
         raise Unusable(f"no package: make deb ARCHS={arch} PYTHONS=3.13")
     packages = folder / "packages"
-    packages.mkdir(exist_ok=True)
-    for old in packages.iterdir():
-        old.unlink()
+    shutil.rmtree(packages, ignore_errors=True)
+    (packages / NEXT).mkdir(parents=True)
     for each in found:
         os.link(each, packages / each.name)
+        if each.name.startswith("rmf-bridges_"):
+            _as_next(each, packages / NEXT)
     return packages
+
+
+def _as_next(package: Path, folder: Path) -> None:
+    """The same package with the next version, to upgrade to. Raises Unusable."""
+    needed({"dpkg-deb": "dpkg"})
+    tree = folder / "tree"
+    subprocess.run(["dpkg-deb", "--raw-extract", str(package), str(tree)], check=True)
+    control = tree / "DEBIAN/control"
+    control.write_text(re.sub(r"^Version: .*", r"\g<0>.1", control.read_text(), flags=re.M))
+    words = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", str(tree), str(folder)]
+    subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
+    shutil.rmtree(tree)
 
 
 def _run(machine: Machine, steps: Iterable[str], log: Path) -> int:

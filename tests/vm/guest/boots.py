@@ -1,18 +1,23 @@
 """What a boot does to relays. The host cuts the power, or lets the machine restart, in between."""
 
 from tests.vm.guest import header
-from tests.vm.guest.rides import LIFT, energise
+from tests.vm.guest.rides import LIFT, energise, send
 from tests.vm.guest.system import (
     Wrong,
+    disable,
+    enable,
     far_side,
     is_active,
     sh,
-    shown,
+    since_boot_s,
     unit,
     until,
 )
 
 SERVICE = unit("lift")
+LOW = 7
+"""The output of low.yaml: it is on at low."""
+STARTS = 10
 
 
 def energised() -> str:
@@ -33,7 +38,28 @@ def off() -> str:
     on = [each for each in writes if each.level == LIFT[each.line]]
     if on or {each.line for each in writes} != LIFT.keys():
         raise Wrong(f"written on: {on}; written at all: {writes}")
-    ready = int(shown(SERVICE, "ActiveEnterTimestampMonotonic")["ActiveEnterTimestampMonotonic"])
+    ready = since_boot_s(SERVICE, "ActiveEnterTimestampMonotonic")
     far_side("lift")
     first = min(each.at for each in writes)
-    return f"all written off {first:.1f} s after the kernel's start, ready at {ready / 1e6:.1f} s"
+    return f"all written off {first:.1f} s after the kernel's start, ready at {ready:.1f} s"
+
+
+def active_low() -> str:
+    """Ten starts with a relay that is on at low: never on, not for a moment, until a request."""
+    header.pull(LOW, high=True)  # the relay board's resistor
+    began = header.now()
+    service = enable("low")
+    for _ in range(STARTS - 1):
+        sh("systemctl", "restart", service)
+    starts = _written(began)
+    asked = header.now()
+    send("door", "lab_door", "open", "--direct", "--timeout", "5", fails=True)  # it cannot move
+    opened = _written(asked)
+    disable("low")
+    if 0 in starts or len(starts) < STARTS or 0 not in opened:
+        raise Wrong(f"written by {STARTS} starts: {starts}; after a request: {opened}")
+    return f"{len(starts)} writes, all of them high; a request wrote {opened[0]}"
+
+
+def _written(since: float) -> list[int]:
+    return [each.level for each in header.writes(since) if each.line == LOW]

@@ -10,6 +10,7 @@ from tests.vm.guest.system import (
     back,
     cursor,
     journal,
+    keep,
     kill,
     pid,
     sh,
@@ -25,17 +26,19 @@ KILLED_S, STOPPED_S = 1.0, 4.0
 
 def kill_9() -> str:
     """kill -9, two relays on: off, and the service is back."""
-    return _dies(lambda: kill(SERVICE, "KILL"))
+    took = _dies(lambda: kill(SERVICE, "KILL"))
+    keep("lift", took)
+    return f"off after {took:.2f} s"
 
 
 def hang() -> str:
     """SIGSTOP, two relays on: the watchdog ends it; off, and the service is back."""
-    return _dies(lambda: kill(SERVICE, "STOP"), STOPPED_S)
+    return f"off after {_dies(lambda: kill(SERVICE, 'STOP'), STOPPED_S):.2f} s"
 
 
 def crash() -> str:
     """A crash in C code (SIGSEGV by the kernel), two relays on: off, and the service is back."""
-    return _dies(lambda: kill(SERVICE, "SEGV"))
+    return f"off after {_dies(lambda: kill(SERVICE, 'SEGV')):.2f} s"
 
 
 def out_of_memory() -> str:
@@ -47,19 +50,19 @@ def out_of_memory() -> str:
         limit.write_text("4M")  # the kernel returns when it has killed
         limit.write_text(before)
 
-    found = _dies(starve)
+    took = _dies(starve)
     sh("journalctl", "-k", "--no-hostname", "-g", "Memory cgroup out of memory")
-    return found
+    return f"off after {took:.2f} s"
 
 
-def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> str:
-    """`act` ends the daemon while two relays are on."""
+def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> float:
+    """`act` ends the daemon while two relays are on; how long until they were off (s)."""
     relays, old = energise(), pid(SERVICE)
     when = header.now()
     act()
     took = off_after(relays, when, within_s)
     back(SERVICE, old)
-    return f"off after {took:.2f} s"
+    return took
 
 
 def off_after(relays: Mapping[int, bool], when: float, within_s: float = KILLED_S) -> float:

@@ -15,9 +15,11 @@ from typing import Final
 
 CONFIGFS: Final = Path("/sys/kernel/config/gpio-sim/header")
 TRACING: Final = Path("/sys/kernel/tracing")
-LABEL: Final = "pinctrl-bcm2711"
-LINES: Final = 58
-"""Of the chip of a Raspberry Pi 4."""
+LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-rp1": 54, "pinctrl-bcm2711": 58}
+"""Chips of the header, and their lines: Raspberry Pi 3 and older, 5, 4."""
+PI_4: Final = "pinctrl-bcm2711"
+OTHER: Final = "raspberrypi-exp-gpio"
+"""A chip that is not the header's, and gets the lower number here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,17 +34,27 @@ class Write:
 def main() -> int:
     """At boot: watch first, so that no write is missed."""
     watch()
-    plug()
+    plug(PI_4)
     return 0
 
 
-def plug() -> None:
-    """Make the chip."""
-    bank = CONFIGFS / "bank0"
-    bank.mkdir(parents=True)
-    (bank / "num_lines").write_text(str(LINES))
-    (bank / "label").write_text(LABEL)
+def plug(label: str) -> None:
+    """Make the chip, beside another one."""
+    for bank, name, lines in (("other", OTHER, 8), ("bank0", label, LABELS[label])):
+        folder = CONFIGFS / bank
+        folder.mkdir(parents=True)
+        (folder / "num_lines").write_text(str(lines))
+        (folder / "label").write_text(name)
     (CONFIGFS / "live").write_text("1")
+
+
+def unplug() -> None:
+    """Take both away."""
+    (CONFIGFS / "live").write_text("0")
+    for folder in (*CONFIGFS.glob("*/num_lines"),):
+        folder.parent.rmdir()
+    CONFIGFS.rmdir()
+    _lines.cache_clear()
 
 
 @cache
@@ -92,8 +104,9 @@ def _traced() -> Iterator[Write]:
 
 def _base() -> int:
     """The number that the kernel's trace gives to the chip's first line."""
+    label = (CONFIGFS / "bank0/label").read_text().strip()
     chips = Path("/sys/class/gpio").glob("gpiochip*")
-    ours = (c for c in chips if (c / "label").read_text().strip() == LABEL)
+    ours = (c for c in chips if (c / "label").read_text().strip() == label)
     return next(int((c / "base").read_text()) for c in ours)
 
 

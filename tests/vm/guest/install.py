@@ -1,28 +1,37 @@
 """The package, and services made of YAMLs."""
 
 import grp
+import time
 from pathlib import Path
 
 from tests.vm.guest import header
+from tests.vm.guest.figures import pss_mb
+from tests.vm.guest.rides import energise
 from tests.vm.guest.system import (
     Wrong,
+    back,
     enable,
     far_side,
     is_active,
+    pid,
     ready_s,
     restarts,
     sh,
     shown,
+    since_boot_s,
     unit,
     until,
 )
 
+PAGE = "rmf-bridge-page.service"
+EXPOSED = 2.0
+"""The score of `systemd-analyze security` that no unit may exceed."""
+
 
 def package() -> str:
     """`apt install ./rmf-bridges_….deb` on a fresh Debian."""
-    deb = _deb()
-    apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
-    sh(*apt, "--no-install-recommends", str(deb))
+    deb = _deb("rmf-bridges")
+    install(deb)
     chip = (header.CONFIGFS / "bank0/chip_name").read_text().strip()
     group = grp.getgrgid(Path(f"/dev/{chip}").stat().st_gid).gr_name
     if group != "gpio":
@@ -30,11 +39,17 @@ def package() -> str:
     return f"{deb.name}: {sh('rmf-bridge', '--version').strip()}; /dev/{chip} is the group gpio's"
 
 
-def _deb() -> Path:
-    """The daemons' package, which the host shares."""
+def install(deb: Path) -> None:
+    """As people do it, but that nothing is asked."""
+    apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
+    sh(*apt, "--no-install-recommends", str(deb))
+
+
+def _deb(name: str) -> Path:
+    """The package of this name, which the host shares."""
     if not Path("/srv").is_mount():
         sh("mount", "-t", "9p", "-o", "ro,trans=virtio,version=9p2000.L", "packages", "/srv")
-    (deb,) = Path("/srv").glob("rmf-bridges_*.deb")
+    (deb,) = Path("/srv").glob(f"{name}_*.deb")
     return deb
 
 
@@ -70,3 +85,61 @@ def wrong_yaml() -> str:
     if (state, count) != ({"ActiveState": "failed", "ExecMainStatus": "78"}, 0):
         raise Wrong(f"{state}, {count} restarts")
     return "exit code 78, failed, 0 restarts"
+
+
+def page() -> str:
+    """The web page, a package of its own: started by systemd it answers, below its memory limit."""
+    install(_deb("rmf-bridges-page"))
+    began = time.monotonic()
+    sh("systemctl", "start", PAGE)
+    until(_answers, "the page answers")
+    took = time.monotonic() - began
+    memory = shown(PAGE, "MemoryPeak", "MemoryMax", "User", "NRestarts")
+    peak, most = int(memory["MemoryPeak"]) / 1e6, int(memory["MemoryMax"]) / 1e6
+    if peak >= most or (memory["User"], memory["NRestarts"]) != ("rmf-bridge-page", "0"):
+        raise Wrong(str(memory))
+    return (
+        f"answers after {took:.1f} s, {pss_mb(PAGE):.0f} MB (PSS), at most {peak:.0f} of {most:.0f}"
+    )
+
+
+def _answers() -> bool:
+    ask = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:8080', timeout=30).status)"
+    try:
+        return sh("python3", "-c", ask).strip() == "200"
+    except Wrong:
+        state = shown(PAGE, "ActiveState", "ExecMainStatus")
+        if state["ActiveState"] == "active":
+            return False
+        raise Wrong(f"the page has ended: {state}") from None
+
+
+def security() -> str:
+    """`systemd-analyze security` of each live unit of ours: 2.0 or less; these checks' own has more."""
+    scores = _scores()
+    units = sh("systemctl", "list-units", "--plain", "--no-legend", "rmf-bridge*.service")
+    ours = {line.split()[0]: scores[line.split()[0]] for line in units.splitlines()}
+    if max(ours.values()) > EXPOSED or scores["checks.service"] <= EXPOSED:
+        raise Wrong(f"{ours}, and these checks {scores['checks.service']}")
+    return ", ".join(f"{n.split('@')[-1].removesuffix('.service')} {s}" for n, s in ours.items())
+
+
+def _scores() -> dict[str, float]:
+    """Each service, and how exposed it is: 0 to 10."""
+    table = (line.split() for line in sh("systemd-analyze", "security", "--no-pager").splitlines())
+    return {words[0]: float(words[1]) for words in table if words and ".service" in words[0]}
+
+
+def upgrade() -> str:
+    """The next version is installed, two relays on: they go off and stay so, the service is back."""
+    service = unit("lift")
+    relays, old = energise(), pid(service)
+    when = header.now()
+    install(_deb("next/rmf-bridges"))
+    back(service, old)
+    version = sh("dpkg-query", "-W", "-f", "${Version}", "rmf-bridges")
+    off = header.off_at(relays, when)
+    if off.keys() != relays.keys() or header.on(relays, when) or not version.endswith(".1"):
+        raise Wrong(f"{version}: of {sorted(relays)} off {off}, on {header.on(relays, when)}")
+    down_s = since_boot_s(service, "ActiveEnterTimestampMonotonic") - max(off.values())
+    return f"{version}: relays off, the service is back after {down_s:.1f} s"

@@ -10,9 +10,9 @@ HELD = [16, 18]
 """Of these outputs: the door and the mode, which a session holds."""
 
 
-def send(*words: str) -> str:
-    """A request of RMF's, and its effect."""
-    return sh("rmf-bridge", "send", *words, *ROOM)
+def send(*words: str, fails: bool = False) -> str:
+    """A request of RMF's, and its effect; with `fails`, it has none in time."""
+    return sh("rmf-bridge", "send", *words, *ROOM, fails=fails)
 
 
 def energise() -> dict[int, bool]:
@@ -23,14 +23,19 @@ def energise() -> dict[int, bool]:
     return {line: LIFT[line] for line in HELD}
 
 
+def end() -> None:
+    """The session ends, and every output goes off."""
+    send("lift", "Lift1", "--end", "--session", "vm/robot", "--direct")
+    until(lambda: not header.on(LIFT), "every output is off after the session")
+
+
 def ride() -> str:
     """A robot rides from L1 to L3: requests from outside of the service, lines of the header."""
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
     send("lift", "Lift1", "L3", "--session", "vm/robot", "--direct")
     held = sorted(header.on(LIFT))
-    send("lift", "Lift1", "--end", "--session", "vm/robot", "--direct")
-    until(lambda: not header.on(LIFT, began), "every output is off after the session")
+    end()
     called = [each.line for each in header.writes(began) if each.level and each.line in (22, 24)]
     if held != HELD or called[-1:] != [24]:
         raise Wrong(f"held at L3: {held}, calls: {called}")

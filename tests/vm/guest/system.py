@@ -10,6 +10,8 @@ CONFIG: Final = Path("/mnt/tests/vm/guest/config")
 PYTHON: Final = "/usr/lib/rmf-bridges/bin/python3"
 LATE_S: Final = 60.0
 """For what has no time of its own."""
+KEPT: Final = Path("/var/lib/checks-kept")
+"""A line for each service: how long after kill -9 its relays were off (s)."""
 
 Found = TypeVar("Found")
 
@@ -27,13 +29,15 @@ def sh(*words: str, fails: bool = False) -> str:
     return done.stdout
 
 
-def until(look: Callable[[], Found], what: str, within_s: float = LATE_S) -> Found:
+def until(
+    look: Callable[[], Found], what: str, within_s: float = LATE_S, pause_s: float = 0.2
+) -> Found:
     """What `look` sees, as soon as that is true. Raises Wrong when it is not in time."""
     deadline = time.monotonic() + within_s
     while not (seen := look()):
         if time.monotonic() > deadline:
             raise Wrong(f"not within {within_s:g} s: {what}")
-        time.sleep(0.2)
+        time.sleep(pause_s)
     return seen
 
 
@@ -65,9 +69,13 @@ def restarts(service: str) -> int:
 
 def ready_s(service: str) -> float:
     """How long it took from the start of its process to its "ready"."""
-    names = ("ExecMainStartTimestampMonotonic", "ActiveEnterTimestampMonotonic")
-    began, ready = (int(shown(service, name)[name]) for name in names)
-    return (ready - began) / 1e6
+    began = since_boot_s(service, "ExecMainStartTimestampMonotonic")
+    return since_boot_s(service, "ActiveEnterTimestampMonotonic") - began
+
+
+def since_boot_s(service: str, name: str) -> float:
+    """This property of a unit, a time (monotonic s)."""
+    return int(shown(service, name)[name]) / 1e6
 
 
 def kill(service: str, name: str) -> None:
@@ -77,7 +85,18 @@ def kill(service: str, name: str) -> None:
 
 def back(service: str, old: int) -> None:
     """Wait until another process of this service is ready."""
-    until(lambda: pid(service) not in (0, old) and is_active(service), f"{service} is back")
+
+    def look() -> bool:
+        seen = shown(service, "MainPID", "ActiveState")
+        return seen["ActiveState"] == "active" and seen["MainPID"] != str(old)
+
+    until(look, f"{service} is back", pause_s=0.5)
+
+
+def keep(name: str, took_s: float) -> None:
+    """Write down how long this service's relays took to go off."""
+    with KEPT.open("a") as out:
+        print(name, took_s, file=out)
 
 
 def cursor() -> str:
@@ -98,6 +117,11 @@ def enable(name: str) -> str:
     sh("rmf-bridge", "enable", str(CONFIG / f"{name}.yaml"))
     until(lambda: is_active(unit(name)), f"{name} is ready")
     return unit(name)
+
+
+def disable(name: str) -> None:
+    """Stop it, and keep it from starting at boot."""
+    sh("rmf-bridge", "disable", name)
 
 
 def far_side(name: str) -> None:

@@ -16,6 +16,7 @@ from tests.vm.guest.system import (
     enable,
     far_side,
     journal,
+    keep,
     kill,
     pid,
     ready_s,
@@ -126,6 +127,7 @@ def _killed(name: str) -> str:
     back(service, old)
     if took > KILLED_S:
         raise Wrong(f"off after {took:.2f} s, more than {KILLED_S:g}")
+    keep(name, took)
     return f"off after {took:.2f} s"
 
 

@@ -1,19 +1,28 @@
-"""What happens around a service: its file, its disks."""
+"""What happens around a service: its file, its disks, its clock, the kind of Pi."""
 
 import os
 import re
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 from tests.vm.guest import header
 from tests.vm.guest.deaths import off_after
-from tests.vm.guest.rides import energise
-from tests.vm.guest.system import Wrong, back, is_active, kill, pid, sh, unit
+from tests.vm.guest.rides import HELD, LIFT, end, energise, send
+from tests.vm.guest.system import Wrong, back, far_side, is_active, kill, pid, sh, unit, until
 
 SERVICE = unit("lift")
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 MOVED = {"BCM18": "BCM25", "BCM16": "BCM26"}
 """Pins of the outputs that a session holds, and others that are free."""
+EVENT = re.compile(r"[a-z_]+( [a-z_]+=\S|$)")
+SYSRQ = Path("/proc/sysrq-trigger")
+STEPS = (10, -20, 10)
+"""Years by which the clock steps: ten too far, ten too few, and right again."""
+MEANWHILE_S = 12.0
+"""Longer than the watchdog's time and a node's lease: who sleeps by the wall clock shows it."""
+HEARD_S = 20.0
+"""A request has its effect so long after a step, at the latest: a ride takes 5 s of it."""
 
 
 def edited_yaml() -> str:
@@ -51,3 +60,84 @@ def full_run() -> str:
         filler.unlink()
     back(SERVICE, old)
     return f"off after {took:.2f} s, {text}"
+
+
+def clock() -> str:
+    """The clock steps by ten years, forth and back: two relays stay on, a request is heard."""
+    relays, old, waits = energise(), pid(SERVICE), []
+    for years, floor in zip(STEPS, ("L3", "L1", "L3"), strict=True):
+        when = header.now()
+        sh("date", "-s", f"{years:+d} years")
+        time.sleep(MEANWHILE_S)
+        if header.off_at(relays, when) or pid(SERVICE) != old:
+            raise Wrong(f"{years:+d} years: off went {header.off_at(relays, when)}, {pid(SERVICE)}")
+        waits.append(_goes_to(floor))
+    end()
+    return f"no restart; at the next floor after {', '.join(f'{s:.1f}' for s in waits)} s"
+
+
+def _goes_to(floor: str) -> float:
+    """How long a request from a new node takes to have its effect, the session's relays on (s)."""
+    began = header.now()
+    send("lift", "Lift1", floor, "--session", "vm/robot", "--direct")
+    took = header.now() - began
+    if sorted(header.on(LIFT)) != HELD or took > HEARD_S:
+        raise Wrong(f"at {floor} after {took:.1f} s, on are {sorted(header.on(LIFT))}")
+    return took
+
+
+def read_only_root() -> str:
+    """The root file system is read only: the service starts, serves, dies, and is off."""
+    sh("systemctl", "stop", SERVICE)
+    sh("journalctl", "--relinquish-var")
+    SYSRQ.write_text("u")  # whoever writes there, as when the kernel has seen a damaged disk
+    until(lambda: "ro" in _options("/"), "the root is read only")
+    try:
+        sh("systemctl", "start", SERVICE)
+        relays, when, old = energise(), header.now(), pid(SERVICE)
+        kill(SERVICE, "KILL")
+        took = off_after(relays, when)
+        back(SERVICE, old)
+        if "ro" not in _options("/"):
+            raise Wrong("the root was writable again")
+    finally:
+        sh("mount", "-o", "remount,rw", "/")
+        sh("journalctl", "--flush")
+    return f"two relays on; killed, off after {took:.2f} s, and back"
+
+
+def _options(mount: str) -> set[str]:
+    lines = (line.split() for line in Path("/proc/self/mounts").read_text().splitlines())
+    return next(set(words[3].split(",")) for words in lines if words[1] == mount)
+
+
+def labels() -> str:
+    """The header's chip is found by its label: Raspberry Pi 3, 5 and 4."""
+    sh("systemctl", "stop", SERVICE, "far-lift.service")
+    for label in header.LABELS:  # that of the other checks is the last one
+        header.unplug()
+        header.plug(label)
+        sh("udevadm", "settle")
+        _claims(label, LIFT)
+    far_side("lift")
+    sh("systemctl", "start", SERVICE)
+    return ", ".join(header.LABELS)
+
+
+def _claims(label: str, lines: Iterable[int]) -> None:
+    """Start the service until it has written each output, and stop it."""
+    when = header.now()
+    sh("systemctl", "start", SERVICE)
+    written = {each.line for each in header.writes(when)}
+    sh("systemctl", "stop", SERVICE)
+    if not written.issuperset(lines):
+        raise Wrong(f"on {label} the service has written {sorted(written)}")
+
+
+def said() -> str:
+    """The journal is readable: a line for each event, key=value, no traceback."""
+    text = sh("journalctl", "-b", "-u", SERVICE, "-o", "cat", "-t", "rmf-bridge")
+    lines = text.splitlines()
+    if others := [line for line in lines if not EVENT.match(line)]:
+        raise Wrong(f"{len(others)} of {len(lines)} lines: {others[0]}")
+    return f"{len(lines)} lines, the longest has {max(map(len, lines))} characters"

@@ -1,0 +1,15 @@
+"""A service that does nothing, to compare ours with. `empty.py` serves, `empty.py off` ends."""
+
+import os
+import signal
+import socket
+import sys
+import time
+from pathlib import Path
+
+if sys.argv[1:]:
+    Path("/run/empty").write_text(str(time.monotonic()))
+else:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told:
+        told.sendto(b"READY=1", os.environ["NOTIFY_SOCKET"])
+    signal.pause()

@@ -1,0 +1,41 @@
+"""A network that comes late, and changes."""
+
+import time
+from typing import Final
+
+from tests.vm.guest.system import Wrong, disable, enable, far_side, pid, sh
+
+SITE: Final = ("ip", "-n", "site")
+"""The other machine: a network namespace at the other end of a cable."""
+MOVES: Final = (("10.7.0", "open"), ("10.8.0", "close"))
+"""Each network that comes, and what is asked over it."""
+
+
+def late() -> str:
+    """The service starts without a network. One comes, then another address: requests are fulfilled."""
+    sh("ip", "netns", "add", "site")
+    sh("ip", "link", "add", "eth0", "type", "veth", "peer", "name", "eth1", "netns", "site")
+    sh(*SITE, "link", "set", "lo", "up")
+    far_side("far")
+    service = enable("far")
+    old = pid(service)
+    took = [_moved(addresses, word) for addresses, word in MOVES]
+    if pid(service) != old:
+        raise Wrong("it was restarted")
+    disable("far")
+    sh("systemctl", "stop", "far-far.service")
+    sh("ip", "netns", "del", "site")
+    return f"no restart; fulfilled {took[0]:.1f} and {took[1]:.1f} s after each address"
+
+
+def _moved(addresses: str, word: str) -> float:
+    """Give both ends addresses of this network; how long it then takes to move the door from there."""
+    for ip, name, last in ((("ip",), "eth0", 2), (SITE, "eth1", 3)):
+        sh(*ip, "link", "set", name, "down")
+        sh(*ip, "addr", "flush", "dev", name)
+        sh(*ip, "addr", "add", f"{addresses}.{last}/24", "dev", name)
+        sh(*ip, "link", "set", name, "up")
+    began = time.monotonic()
+    words = ("door", "far_door", word, "--direct", "--domain-id", "8")
+    sh("ip", "netns", "exec", "site", "rmf-bridge", "send", *words)
+    return time.monotonic() - began
