@@ -13,10 +13,9 @@ from pathlib import Path
 from bridges.commands import reset
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.loop import SUSPENDED_S
-from tests.serve.site import Graph, Module, command, daemon, environment, hold_open
+from tests.serve.site import SERVICE, Graph, Module, command, daemon, environment, hold_open
 from tests.waiting import wait_until
 
-SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 WATCHDOG = {**SERVICE, "WATCHDOG_USEC": "3000000"}
 HURT = "tests.serve.hurt"
 

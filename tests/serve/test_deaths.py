@@ -21,6 +21,7 @@ from bridges.serve.signals import ENDING, WRITES
 from hal_fakes.wire import wire
 from tests.depth import depth
 from tests.serve.site import (
+    SERVICE,
     YAML,
     Graph,
     Module,
@@ -31,9 +32,6 @@ from tests.serve.site import (
     shipped,
 )
 from tests.waiting import PATIENCE_S, wait_until
-
-SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
-"""A unit stands behind this daemon, so that it has no guard."""
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf.topics import DIAGNOSTICS, DOOR_STATES
 from bridges.serve.diagnostics import MOST, diagnosis, faults
 from hal_fakes.wire import join
-from tests.serve.site import PATIENT, Module, daemon
+from tests.serve.site import PATIENT, SERVICE, Module, daemon
 from tests.waiting import wait_until
 
 AT = d.Time(7, 8)
@@ -90,7 +90,7 @@ def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(
     heard: list[d.DiagnosticArray] = []
     listener.subscribe(DIAGNOSTICS, heard.append)
     try:
-        with daemon(module.file, tmp_path / "run"):
+        with daemon(module.file, tmp_path / "run", **SERVICE):
             wait_until(lambda: heard and heard[-1].status[1].level == 0, "the door is well")
             module.close()
             wait_until(lambda: faults(heard[-1].status[1]), "the door's fault is named")
@@ -112,7 +112,7 @@ def test_diagnostics_can_be_left_off(domain: int, tmp_path: Path) -> None:
     listener.subscribe(DOOR_STATES, states.append)
     diagnostics = listener.subscribe(DIAGNOSTICS, lambda message: None)
     try:
-        with daemon(module.file, tmp_path / "run"):
+        with daemon(module.file, tmp_path / "run", **SERVICE):
             wait_until(lambda: len(states) > 1, "the door's states come")
             assert diagnostics.matched() == 0
     finally:

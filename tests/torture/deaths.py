@@ -14,11 +14,10 @@ from pathlib import Path
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve.signals import ENDING
 from hal_fakes.domain import domain_for_a_while
-from tests.serve.site import Daemon, Graph, Module, command, environment
+from tests.serve.site import SERVICE, Daemon, Graph, Module, command, environment
 from tests.torture.table import Table
 from tests.waiting import wait_until
 
-SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 LONGEST_LIFE_S = 4.0
 PATIENCE_S = 60.0
 

@@ -190,11 +190,14 @@ def test_a_doctor_that_dies_in_its_kill_test_leaves_nothing_on(
 
 
 def test_the_kill_test_switches_nothing_on_a_dead_bus(module: Module, tmp_path: Path) -> None:
-    module.close()
+    module.tell("fail", "ward_door", "server", "off")
     _, found = doctor(module.file, tmp_path, "--listen", "0", "--kill-test", "--yes")
     ((level, text),) = found["kill test"]
     assert level == "wrong"
     assert text.startswith("ward_door hold_open was not switched on: no Modbus TCP connection")
+    module.tell("fail", "ward_door", "server", "ok")
+    places = Places(tmp_path / "run", tmp_path / "run")
+    wait_until(lambda: not Records(places, module.file).unreleased(), "its guard ends")
 
 
 FIRE = """
