@@ -20,8 +20,8 @@ from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
-"""A unit stands behind this daemon, so that it has no guard: that would try for minutes where the module
-is gone."""
+"""A unit stands behind this daemon, so that it has no guard: that would try for minutes where
+the module is gone."""
 PATIENT = "stale_after_s: 30"
 """A busy machine that keeps the daemon from scanning for a while does not take its door away.
 
