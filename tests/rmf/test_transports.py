@@ -122,6 +122,7 @@ def test_others_only_leaves_out_the_nodes_own_messages(join: Join) -> None:
     our_voice, other_voice = ours.publisher(HEARD), other.publisher(HEARD)
     wait_until(lambda: our_voice.matched() == 1, "ours reaches one of the two")
     wait_until(lambda: other_voice.matched() == 2, "the other reaches both")
+    wait_until(lambda: (everything.matched(), others_only.matched()) == (2, 1), "both count")
     our_voice.publish(numbered(1))
     other_voice.publish(numbered(2))
     wait_until(lambda: len(echoed) == 2 and from_others, "all has arrived")

@@ -146,7 +146,7 @@ def heard_from(
     with reading(meeting(DOMAIN), order) as told:
         wait_until(lambda: told.values("said"), "it has spoken")
         wait_until(lambda: received, "it is heard")
-        assert subscription.matched() == 1
+        wait_until(lambda: subscription.matched() == 1, "it is counted")
     wait_until(lambda: subscription.matched() == 0, "it has gone")
     return received
 

@@ -15,7 +15,8 @@ from typing import Any
 
 from tests.vm.image import Unusable, image, needed
 from tests.vm.machine import ARCHS, Machine, accelerated
-from tests.vm.order import CUT, PARTS, REBOOT, WHOLE
+from tests.vm.order import ALSO, CUT, PARTS, REBOOT, WHOLE
+from tests.vm.suite import suite
 
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / "build/vm"
@@ -33,12 +34,17 @@ def main() -> int:
         booted = image(args.arch, CACHE)
         kvm = accelerated(args.arch, booted)
         print(f"{args.arch} on {'KVM' if kvm else 'TCG, a core of 1,000 MIPS'}", flush=True)
-        shared = {"checks": Path(__file__).parent, "packages": _packages(args.arch, folder)}
+        shared = {
+            "checks": Path(__file__).parent,
+            "packages": _packages(args.arch, folder),
+            "suite": suite(args.arch, ROOT, folder),
+        }
 
         def part(name: str) -> int:
             machine = Machine(args.arch, booted, kvm, shared, folder / name)
             with closing(machine):
-                return _run(machine, PARTS[name], folder / f"{name}.log")
+                steps = (*PARTS[name], *ALSO.get((args.arch, name), ()))
+                return _run(machine, steps, folder / f"{name}.log")
 
         names = [args.only] if args.only else WHOLE
         with ThreadPoolExecutor(len(names)) as pool:

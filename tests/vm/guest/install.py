@@ -13,6 +13,7 @@ from tests.vm.guest.system import (
     enable,
     far_side,
     is_active,
+    mounted,
     pid,
     ready_s,
     restarts,
@@ -47,9 +48,7 @@ def install(deb: Path) -> None:
 
 def _deb(name: str) -> Path:
     """The package of this name, which the host shares."""
-    if not Path("/srv").is_mount():
-        sh("mount", "-t", "9p", "-o", "ro,trans=virtio,version=9p2000.L", "packages", "/srv")
-    (deb,) = Path("/srv").glob(f"{name}_*.deb")
+    (deb,) = mounted("packages", "/srv").glob(f"{name}_*.deb")
     return deb
 
 

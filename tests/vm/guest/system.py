@@ -41,6 +41,13 @@ def until(
     return seen
 
 
+def mounted(tag: str, place: str) -> Path:
+    """This folder of the host's, read only."""
+    if not Path(place).is_mount():
+        sh("mount", "-t", "9p", "-o", "ro,trans=virtio,version=9p2000.L", tag, place)
+    return Path(place)
+
+
 def unit(name: str) -> str:
     """The service of a YAML."""
     return f"rmf-bridge@{name}.service"

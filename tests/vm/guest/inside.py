@@ -1,0 +1,27 @@
+"""The demo and the tests of the transport, on what the package has installed."""
+
+from typing import Final
+
+from tests.vm.guest.system import PYTHON, Wrong, mounted, sh
+
+PATIENCE: Final = "6"
+"""How many times longer the demo waits than on a laptop: there are three daemons on one slow core."""
+
+
+def demo() -> str:
+    """The demo on zenoh: a robot goes through the door, rides the lift and charges."""
+    env = ("env", "TRANSPORT=zenoh", "HOME=/root", "TERM=dumb")
+    told = sh(*env, PYTHON, "-m", "hal_fakes.demo", "--patience", PATIENCE)
+    return told.strip().splitlines()[-1].strip()
+
+
+def transport() -> str:
+    """The tests of zenoh, the transport that works here without ROS."""
+    suite = mounted("suite", "/media")
+    tests = sorted(str(path) for path in (suite / "tests/rmf").glob("test_zenoh_*.py"))
+    path = f"PYTHONPATH={suite}:{suite / 'site'}"
+    told = sh("env", "-C", str(suite), path, "HOME=/root", PYTHON, "-m", "pytest", *tests)
+    last = told.strip().splitlines()[-1]
+    if " passed" not in last:
+        raise Wrong(f"nothing has passed: {last}")
+    return last
