@@ -15,7 +15,7 @@ from typing import Any
 
 from tests.vm.image import Unusable, image, needed
 from tests.vm.machine import ARCHS, Machine, accelerated
-from tests.vm.order import ALSO, CUT, PARTS, REBOOT, WHOLE
+from tests.vm.order import ALSO, CUT, NOT_ON, PARTS, REBOOT, WHOLE
 from tests.vm.suite import suite
 
 ROOT = Path(__file__).parents[2]
@@ -43,8 +43,7 @@ def main() -> int:
         def part(name: str) -> int:
             machine = Machine(args.arch, booted, kvm, shared, folder / name)
             with closing(machine):
-                steps = (*PARTS[name], *ALSO.get((args.arch, name), ()))
-                return _run(machine, steps, folder / f"{name}.log")
+                return _run(machine, _steps(args.arch, name), folder / f"{name}.log")
 
         names = [args.only] if args.only else WHOLE
         with ThreadPoolExecutor(len(names)) as pool:
@@ -61,6 +60,11 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--arch", choices=ARCHS, default="amd64")
     parser.add_argument("--only", choices=PARTS, default="", help="a part")
     return parser.parse_args()
+
+
+def _steps(arch: str, part: str) -> list[str]:
+    there = [step for step in PARTS[part] if step not in NOT_ON.get(arch, ())]
+    return [*there, *ALSO.get((arch, part), ())]
 
 
 def _packages(arch: str, folder: Path) -> Path:

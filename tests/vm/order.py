@@ -56,3 +56,5 @@ WHOLE: Final = ("lift", "site")
 """The parts that have every check: they run side by side."""
 ALSO: Final = {("arm64", "lift"): ("inside.demo", "inside.transport")}
 """What CI's own machine, an amd64, does not show."""
+NOT_ON: Final = {"arm64": ("network.late",)}
+"""There zenoh is spoken, which finds another machine by a router alone, and none is in the machine."""
