@@ -11,16 +11,16 @@ from tests.vm.image import Unusable
 PYTHON: Final = "3.13"
 """Debian 13's."""
 MACHINES: Final = {"amd64": "x86_64", "arm64": "aarch64"}
-NEEDED: Final = ("hypothesis", "pytest", "pytest-timeout")
+NEEDED: Final = ("hypothesis", "pytest", "pytest-timeout", "trustme")
 
 
 def suite(arch: str, root: Path, folder: Path) -> Path:
-    """A folder with `tests`, `config`, `pyproject.toml`, and in `site` what runs them.
+    """A folder with `tests`, the fakes, `config`, `pyproject.toml`, and in `site` what runs them.
 
     Raises Unusable.
     """
     made, site = folder / "suite", folder / "suite/site"
-    for name in ("tests", "config"):
+    for name in ("tests", "hal_fakes", "config"):
         shutil.rmtree(made / name, ignore_errors=True)
         shutil.copytree(root / name, made / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(root / "pyproject.toml", made)

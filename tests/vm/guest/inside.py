@@ -10,7 +10,8 @@ PATIENCE: Final = "6"
 
 def demo() -> str:
     """The demo on zenoh: a robot goes through the door, rides the lift and charges."""
-    env = ("env", "TRANSPORT=zenoh", "HOME=/root", "TERM=dumb")
+    suite = mounted("suite", "/media")  # which has the files of config/
+    env = ("env", f"PYTHONPATH={suite}", "TRANSPORT=zenoh", "HOME=/root", "TERM=dumb")
     told = sh(*env, PYTHON, "-m", "hal_fakes.demo", "--patience", PATIENCE)
     return told.strip().splitlines()[-1].strip()
 
