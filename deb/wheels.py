@@ -43,7 +43,9 @@ def main() -> int:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("wheel", type=Path, help="the wheel to begin with")
+    parser.add_argument(
+        "wheel", type=Path, help="the wheel to begin with, or a distribution's name"
+    )
     parser.add_argument("--target", type=Path, required=True, help="the site-packages to fill")
     parser.add_argument("--find-links", type=Path, required=True, help="a directory of more wheels")
     parser.add_argument("--arch", choices=MACHINES, required=True)

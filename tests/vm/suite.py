@@ -10,7 +10,6 @@ from tests.vm.image import Unusable
 
 PYTHON: Final = "3.13"
 """Debian 13's."""
-MACHINES: Final = {"amd64": "x86_64", "arm64": "aarch64"}
 NEEDED: Final = ("hypothesis", "pytest", "pytest-timeout", "trustme")
 
 
@@ -25,18 +24,17 @@ def suite(arch: str, root: Path, folder: Path) -> Path:
         shutil.copytree(root / name, made / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(root / "pyproject.toml", made)
     if not site.exists():
-        _fetch(MACHINES[arch], site)
+        _fetch(arch, root, site)
     return made
 
 
-def _fetch(machine: str, site: Path) -> None:
+def _fetch(arch: str, root: Path, site: Path) -> None:
+    """By deb/wheels.py, as for the package: pip alone judges what is needed by this machine."""
     fresh = site.with_name("site.new")
-    platforms = [f"manylinux{name}_{machine}" for name in ("_2_28", "_2_17", "2014")]
-    words = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    words += ["--no-compile", "--only-binary", ":all:", "--python-version", PYTHON]
-    words += [word for platform in platforms for word in ("--platform", platform)]
     shutil.rmtree(fresh, ignore_errors=True)
-    done = subprocess.run([*words, "--target", str(fresh), *NEEDED], stderr=subprocess.DEVNULL)
-    if done.returncode:
-        raise Unusable(f"pip could not fetch {', '.join(NEEDED)} for {machine}")
+    words = ["--arch", arch, "--python", PYTHON, "--find-links", ".", "--target", str(fresh)]
+    for name in NEEDED:
+        command = [sys.executable, str(root / "deb/wheels.py"), name, *words]
+        if subprocess.run(command, stderr=subprocess.DEVNULL).returncode:
+            raise Unusable(f"{name} could not be fetched for {arch}: {' '.join(command)}")
     fresh.rename(site)
