@@ -7,10 +7,11 @@ it is, the state still comes once a second, and the last right request is the on
 import sys
 import tempfile
 import time
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+
+from msgspec.structs import replace
 
 from bench.daemons import DOMAIN, cpu_s, daemon, memory_mb, ready, shipped
 from bridges.rmf.dds import DdsTransport

@@ -7,7 +7,7 @@ import importlib
 import os
 import re
 import sys
-from collections.abc import Container
+from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
 from bridges import __version__
@@ -109,7 +109,7 @@ def main(argv: list[str] | None = None) -> int:
     if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion; ends the process
         import argcomplete
 
-        argcomplete.autocomplete(parser(COMMANDS))
+        argcomplete.autocomplete(whole_parser())
     arguments, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
     typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
     parsed, unknown = parser(arguments).parse_known_args(arguments, typed)
@@ -138,12 +138,27 @@ def _nearest(typed: str, listed: str) -> str:
     return next(iter(get_close_matches(typed.lower(), known, n=1)), "")
 
 
-def parser(whole: Container[str]) -> argparse.ArgumentParser:
-    """The command line's parser. `whole`: the subcommands with options; only they are imported."""
+def parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
+    """The parser for these arguments: the subcommand that they begin with, else all without options.
+
+    `outputs-off` is short of time, so no other subcommand is imported, or even described.
+    """
+    if arguments and arguments[0] in COMMANDS:
+        return _parser(arguments[:1], whole=True)
+    return _parser(COMMANDS, whole=False)
+
+
+def whole_parser() -> argparse.ArgumentParser:
+    """The parser with every subcommand's options: for the manual page (`make man`) and completion."""
+    return _parser(COMMANDS, whole=True)
+
+
+def _parser(names: Iterable[str], whole: bool) -> argparse.ArgumentParser:
     top = _Parser(prog="rmf-bridge", description="Connect Open-RMF to lifts, doors and chargers.")
     top.add_argument("--version", action="version", version=f"rmf-bridge {__version__}")
     subparsers = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, (text, example) in COMMANDS.items():
+    for name in names:
+        text, example = COMMANDS[name]
         subparser = subparsers.add_parser(
             name,
             help=text,
@@ -151,14 +166,9 @@ def parser(whole: Container[str]) -> argparse.ArgumentParser:
             epilog=f"example: rmf-bridge {example}",
         )
         subparser.set_defaults(usage=subparser.error)
-        if name in whole:
+        if whole:
             _module(name).add_arguments(subparser)
     return top
-
-
-def whole_parser() -> argparse.ArgumentParser:
-    """The parser with every subcommand's options, for the manual page (`make man`)."""
-    return parser(COMMANDS)
 
 
 def split_ros_args(argv: list[str]) -> tuple[list[str], list[str]]:

@@ -1,7 +1,6 @@
 """Logs: one line `event key=value …` for each event, with journald's priority."""
 
 import codecs
-import dataclasses
 import logging
 import os
 import sys
@@ -48,7 +47,7 @@ def plain(value: object) -> str:
             return _listed(f"{key} {plain(part)}" for key, part in value.items())
         case tuple() | list() | Set():
             return _listed(map(plain, value))
-    if isinstance(value, msgspec.Struct) or dataclasses.is_dataclass(value):
+    if isinstance(value, msgspec.Struct):
         return _listed(f"{key} {plain(part)}" for key, part in _set(value))
     return str(value)
 
@@ -57,12 +56,8 @@ def _listed(parts: Iterator[str]) -> str:
     return ", ".join(parts) or "-"
 
 
-def _set(record: object) -> Iterator[tuple[str, object]]:
-    if isinstance(record, msgspec.Struct):
-        names = record.__struct_fields__
-    else:
-        names = tuple(field.name for field in dataclasses.fields(record))  # type: ignore[arg-type]
-    for name in names:
+def _set(record: msgspec.Struct) -> Iterator[tuple[str, object]]:
+    for name in record.__struct_fields__:
         part = getattr(record, name)
         if part is not None and part is not False and part not in ("", ()):
             yield name, part

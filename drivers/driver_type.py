@@ -5,7 +5,6 @@ drivers to edit. Only `bridges/settings/names.py` imports a driver by its name.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeVar
 
 import msgspec
@@ -20,8 +19,7 @@ Sample = TypeVar("Sample")
 Outputs = TypeVar("Outputs")
 
 
-@dataclass(frozen=True)
-class DriverType(Generic[Settings, Sample, Outputs]):
+class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True):
     """One driver.
 
     `settings`: a struct that derives from the kind's (`bridges.lift.settings.LiftSettings`…) and adds

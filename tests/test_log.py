@@ -2,10 +2,10 @@
 
 import json
 import logging
-from dataclasses import dataclass
 from datetime import datetime
 
 import pytest
+from msgspec import Struct
 
 from bridges.core.decision import OperatorReset
 from bridges.door.signals import DoorOutputs
@@ -14,8 +14,7 @@ from bridges.log import _Formatter, _Json, pairs, plain
 from bridges.rmf.definitions import LiftMode
 
 
-@dataclass(frozen=True)
-class Asked:
+class Asked(Struct, frozen=True):
     session_id: str
     agv: bool
     at: float = 0.0

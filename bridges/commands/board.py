@@ -8,8 +8,10 @@ import json
 import re
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
 from typing import Final
+
+from msgspec import Struct
+from msgspec.structs import asdict
 
 from bridges.commands.columns import aligned
 from bridges.commands.graph import SILENT_AFTER_S
@@ -32,8 +34,7 @@ Device = tuple[str, str]
 """Its kind and its name on RMF's graph."""
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
+class Row(Struct, frozen=True):
     """One device, the charger coordinator, or a robot with its assigned place.
 
     `waiting`: the supervisor's or coordinator's queue. `age`: age of the reading. `mark`: why the row
@@ -69,8 +70,7 @@ class Row:
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnosis:
+class Diagnosis(Struct, frozen=True):
     """A daemon's latest diagnostic status of one device, and when it arrived (monotonic s)."""
 
     at: float

@@ -9,11 +9,11 @@ import json
 import os
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TextIO
 
 import msgspec
+from msgspec.structs import replace
 
 from bridges import log
 from bridges.commands.by_hand import NoDevice, device_of

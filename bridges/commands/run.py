@@ -4,8 +4,9 @@ import argparse
 import logging
 import os
 import sys
-from dataclasses import replace
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from bridges import log
 from bridges.commands.graph import TRANSPORTS, overridden

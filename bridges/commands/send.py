@@ -8,9 +8,10 @@ import argparse
 import sys
 import time
 from contextlib import closing
-from dataclasses import replace
 from typing import TextIO
 from uuid import uuid4
+
+from msgspec.structs import replace
 
 from bridges.commands.exchange import step
 from bridges.commands.graph import (

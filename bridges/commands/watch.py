@@ -11,8 +11,9 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import asdict
 from typing import TextIO
+
+from msgspec.structs import asdict
 
 from bridges.commands.board import Board, Row, change_line, changes, json_line, repaint, table
 from bridges.commands.graph import (

@@ -6,8 +6,9 @@ doors) there are, and keeps one core memory for each. `bridges/<kind>/__init__.p
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, Generic, Union
+
+from msgspec import Struct
 
 from bridges.core.decision import Decision, M, OperatorReset, R
 from bridges.core.kind import Answer, AnyDeviceKind, E, L, Place, S
@@ -16,8 +17,7 @@ from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
 
 
-@dataclass(frozen=True, slots=True)
-class MaySpeak:
+class MaySpeak(Struct, frozen=True):
     """Whether the core may publish. It may not during the quiet start or while a rival publishes.
 
     `at_once`: during the quiet start what a restart must not interrupt may be sent: no rival is there.
@@ -29,8 +29,7 @@ class MaySpeak:
     alone: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Woken:
+class Woken(Struct, frozen=True):
     """The core's `wake_at` has come, and nothing was heard."""
 
 
@@ -38,8 +37,7 @@ GraphEvent = Union[MaySpeak, Woken, OperatorReset, E]  # noqa: UP007
 """Every event that such a core takes."""
 
 
-@dataclass(frozen=True, slots=True)
-class GraphKind(Generic[S, L, M, E, R]):
+class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
     """One kind that lives on RMF's graph alone: its settings, limits, memory, events and report.
 
     `devices_key`: the YAML's section of its settings. `settings`: the struct that reads it.

@@ -5,8 +5,9 @@
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, TypeVar, Union
+
+from msgspec import Struct
 
 from bridges.core.decision import (
     Decision,
@@ -47,8 +48,7 @@ class Answer(NamedTuple):
     told: Mapping[str, str]
 
 
-@dataclass(frozen=True, slots=True)
-class Kind(Generic[S, L, M, X, E, O, R]):
+class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     """One kind of device: its settings, limits, memory, sample, requests, outputs and report.
 
     `devices_key`: the YAML's section of the devices. `states`: the topic of their state messages.

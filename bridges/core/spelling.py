@@ -1,6 +1,5 @@
 """How messages speak of names: shortened, listed, and with the known one that was probably meant."""
 
-import difflib
 from collections.abc import Iterable
 
 
@@ -17,7 +16,9 @@ def either(names: Iterable[str]) -> str:
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name that was probably meant; None if none is similar."""
-    return next(iter(difflib.get_close_matches(name, list(known), n=1)), None)
+    from difflib import get_close_matches  # only what is misspelt needs it
+
+    return next(iter(get_close_matches(name, list(known), n=1)), None)
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:

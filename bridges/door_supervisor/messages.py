@@ -1,7 +1,8 @@
 """DoorRequests and DoorStates in. Is a message well formed, and about a door that we serve?"""
 
 from collections.abc import Mapping
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from bridges.core.decision import RequestRefused
 from bridges.core.freshness import in_ns

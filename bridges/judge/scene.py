@@ -6,8 +6,9 @@ the pace of states, their stamps, and what followed a request.
 
 from abc import ABC, abstractmethod
 from collections import deque
-from dataclasses import replace
 from typing import ClassVar, Final, Generic, TypeVar
+
+from msgspec.structs import replace
 
 from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d

@@ -1,8 +1,9 @@
 """LiftRequests and LiftStates in. Is a message well formed, and about a lift that we serve?"""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.core.decision import RequestRefused
 from bridges.core.freshness import SECOND_NS, in_ns

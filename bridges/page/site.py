@@ -4,8 +4,10 @@ Pure: time comes with each message. Names come from the network, where anybody m
 everything has a bound; who is known stays, whoever comes later.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.commands.board import KINDS as KIND_OF
 from bridges.commands.board import Board, Device, Row

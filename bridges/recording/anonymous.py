@@ -7,7 +7,6 @@ or a value of the YAML, a word of a core, a topic) stays: replacing it would mak
 Comments of the YAML go; the addresses of its buses become `192.0.2.1`.
 """
 
-import dataclasses
 import enum
 import importlib
 import inspect
@@ -93,9 +92,9 @@ def _names_in(value: object, field: str = "") -> Iterator[str]:
     elif isinstance(value, tuple):
         for part in value:
             yield from _names_in(part, field)
-    elif dataclasses.is_dataclass(value):
-        for part in dataclasses.fields(value):
-            yield from _names_in(getattr(value, part.name), part.name)
+    elif isinstance(value, msgspec.Struct):
+        for name in value.__struct_fields__:
+            yield from _names_in(getattr(value, name), name)
 
 
 def _remembered(incident: Incident) -> Iterator[str]:
@@ -245,9 +244,9 @@ def _message(value: Any, swap: Swap) -> Any:
         return swap(value)
     if isinstance(value, tuple):
         return tuple(_message(part, swap) for part in value)
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = dataclasses.fields(value)
-        return type(value)(**{f.name: _message(getattr(value, f.name), swap) for f in fields})
+    if isinstance(value, msgspec.Struct):
+        fields = value.__struct_fields__
+        return type(value)(**{name: _message(getattr(value, name), swap) for name in fields})
     return value
 
 

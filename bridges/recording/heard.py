@@ -4,13 +4,12 @@ A live graph and every kind of recording give the same values in the same order,
 explains or draws does not know where they come from.
 """
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from bridges.rmf.definitions import Message
 
 
-@dataclass(frozen=True, slots=True)
-class Heard:
+class Heard(Struct, frozen=True):
     """A message, its topic's ROS name, and when it arrived.
 
     `at`: s on a clock that never steps; its zero means nothing. `wall`: s since the epoch, as the
@@ -23,8 +22,7 @@ class Heard:
     message: Message
 
 
-@dataclass(frozen=True, slots=True)
-class Own:
+class Own(Struct, frozen=True):
     """A text that our recorder wrote beside the messages: JSON of what a daemon noted.
 
     `topic`: such as `rmf_bridge/outputs`. Times as of `Heard`.

@@ -6,7 +6,6 @@ with its fields beside it, or what it holds under `=`. Only types that merely ho
 again: no recording can have anything else called.
 """
 
-import dataclasses
 import importlib
 import math
 from collections.abc import Mapping
@@ -141,9 +140,6 @@ def _struct(kind: type[Any]) -> Struct | None:
 def _found(kind: type[Any]) -> Struct | None:
     if issubclass(kind, msgspec.Struct):
         return Struct(_name(kind), kind.__struct_fields__)
-    if dataclasses.is_dataclass(kind):
-        names = tuple(field.name for field in dataclasses.fields(kind) if field.init)
-        return Struct(_name(kind), names)
     return None
 
 

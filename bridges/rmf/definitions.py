@@ -9,8 +9,9 @@ Jazzy.
 A `T[]` of ROS is a tuple here, so that a message is a value: hashable, comparable, immutable.
 """
 
-from dataclasses import dataclass, fields
-from typing import Annotated, Final, cast
+from typing import Annotated, Final
+
+from msgspec import Struct
 
 from bridges.rmf.constants import AlertTier as AlertTier
 from bridges.rmf.constants import ChargerStateValue as ChargerStateValue
@@ -32,16 +33,14 @@ int32 = Annotated[int, "int32"]
 float32 = Annotated[float, "float32"]
 
 
-@dataclass(frozen=True, slots=True)
-class Time:
+class Time(Struct, frozen=True, gc=False):
     """builtin_interfaces/Time: seconds and nanoseconds since the epoch; 0.0 means never."""
 
     sec: int32 = 0
     nanosec: uint32 = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Duration:
+class Duration(Struct, frozen=True, gc=False):
     """builtin_interfaces/Duration: sec may be negative, nanosec is added to it."""
 
     sec: int32 = 0
@@ -51,8 +50,7 @@ class Duration:
 # --- rmf_lift_msgs -----------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class LiftRequest:
+class LiftRequest(Struct, frozen=True, gc=False):
     lift_name: str = ""
     request_time: Time = Time()
     session_id: str = ""
@@ -61,8 +59,7 @@ class LiftRequest:
     door_state: uint8 = 0
 
 
-@dataclass(frozen=True, slots=True)
-class LiftState:
+class LiftState(Struct, frozen=True, gc=False):
     lift_time: Time = Time()
     lift_name: str = ""
     available_floors: tuple[str, ...] = ()
@@ -78,48 +75,41 @@ class LiftState:
 # --- rmf_door_msgs -----------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class DoorMode:
+class DoorMode(Struct, frozen=True, gc=False):
     value: uint32 = 0
 
 
-@dataclass(frozen=True, slots=True)
-class DoorRequest:
+class DoorRequest(Struct, frozen=True, gc=False):
     request_time: Time = Time()
     requester_id: str = ""
     door_name: str = ""
     requested_mode: DoorMode = DoorMode()
 
 
-@dataclass(frozen=True, slots=True)
-class DoorState:
+class DoorState(Struct, frozen=True, gc=False):
     door_time: Time = Time()
     door_name: str = ""
     current_mode: DoorMode = DoorMode()
 
 
-@dataclass(frozen=True, slots=True)
-class Session:
+class Session(Struct, frozen=True, gc=False):
     request_time: Time = Time()
     requester_id: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class DoorSessions:
+class DoorSessions(Struct, frozen=True, gc=False):
     door_name: str = ""
     sessions: tuple[Session, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class SupervisorHeartbeat:
+class SupervisorHeartbeat(Struct, frozen=True, gc=False):
     all_sessions: tuple[DoorSessions, ...] = ()
 
 
 # --- rmf_charger_msgs --------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class ChargerRequest:
+class ChargerRequest(Struct, frozen=True, gc=False):
     charger_name: str = ""
     fleet_name: str = ""
     robot_name: str = ""
@@ -127,14 +117,12 @@ class ChargerRequest:
     request_id: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class ChargerCancel:
+class ChargerCancel(Struct, frozen=True, gc=False):
     charger_name: str = ""
     request_id: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class ChargerState:
+class ChargerState(Struct, frozen=True, gc=False):
     charger_time: Time = Time()
     state: uint32 = 0
     charger_name: str = ""
@@ -148,15 +136,13 @@ class ChargerState:
 # --- rmf_fleet_msgs ----------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class RobotMode:
+class RobotMode(Struct, frozen=True, gc=False):
     mode: uint32 = 0
     mode_request_id: uint64 = 0
     performing_action: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Location:
+class Location(Struct, frozen=True, gc=False):
     t: Time = Time()
     x: float32 = 0.0
     y: float32 = 0.0
@@ -167,8 +153,7 @@ class Location:
     index: uint64 = 0
 
 
-@dataclass(frozen=True, slots=True)
-class RobotState:
+class RobotState(Struct, frozen=True, gc=False):
     """`battery_percent`: 0-100."""
 
     name: str = ""
@@ -181,27 +166,23 @@ class RobotState:
     path: tuple[Location, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class FleetState:
+class FleetState(Struct, frozen=True, gc=False):
     name: str = ""
     robots: tuple[RobotState, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class ChargingAssignment:
+class ChargingAssignment(Struct, frozen=True, gc=False):
     robot_name: str = ""
     waypoint_name: str = ""
     mode: uint8 = 0
 
 
-@dataclass(frozen=True, slots=True)
-class ChargingAssignments:
+class ChargingAssignments(Struct, frozen=True, gc=False):
     fleet_name: str = ""
     assignments: tuple[ChargingAssignment, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class EmergencySignal:
+class EmergencySignal(Struct, frozen=True, gc=False):
     fleet_names: tuple[str, ...] = ()
     is_emergency: bool = False
 
@@ -209,14 +190,12 @@ class EmergencySignal:
 # --- rmf_task_msgs, std_msgs -------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class AlertParameter:
+class AlertParameter(Struct, frozen=True, gc=False):
     name: str = ""
     value: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Alert:
+class Alert(Struct, frozen=True, gc=False):
     """What RMF's dashboard shows a person; its `id` is used once."""
 
     id: str = ""
@@ -230,13 +209,11 @@ class Alert:
     task_id: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Bool:
+class Bool(Struct, frozen=True, gc=False):
     data: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Header:
+class Header(Struct, frozen=True, gc=False):
     stamp: Time = Time()
     frame_id: str = ""
 
@@ -244,14 +221,12 @@ class Header:
 # --- diagnostic_msgs ---------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class KeyValue:
+class KeyValue(Struct, frozen=True, gc=False):
     key: str = ""
     value: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class DiagnosticStatus:
+class DiagnosticStatus(Struct, frozen=True, gc=False):
     level: byte = 0
     name: str = ""
     message: str = ""
@@ -259,8 +234,7 @@ class DiagnosticStatus:
     values: tuple[KeyValue, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class DiagnosticArray:
+class DiagnosticArray(Struct, frozen=True, gc=False):
     header: Header = Header()
     status: tuple[DiagnosticStatus, ...] = ()
 
@@ -317,4 +291,4 @@ PACKAGES: Final[dict[type, str]] = {
 
 def field_types(message_type: type) -> dict[str, type]:
     """Field -> type, in the message's order: as annotated, so a number is an `Annotated`."""
-    return {field.name: cast(type, field.type) for field in fields(message_type)}
+    return dict(message_type.__annotations__)

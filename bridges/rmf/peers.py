@@ -10,8 +10,9 @@ they see.
 import logging
 from collections import Counter
 from collections.abc import Hashable, Iterator
-from dataclasses import dataclass
 from typing import Final
+
+from msgspec import Struct
 
 from bridges.log import pairs
 from bridges.rmf import notices
@@ -34,8 +35,7 @@ MISFIT: Final = "TYPE_MISFIT"
 MIXED: Final = "TWO_RELEASES"
 
 
-@dataclass(frozen=True, slots=True)
-class Announced:
+class Announced(Struct, frozen=True):
     """An end of any node. `topic`: without slash. `type`: package/msg/Name. `hash`: "" for none."""
 
     topic: str

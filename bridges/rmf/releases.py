@@ -10,8 +10,9 @@ Two nodes of different releases do not hear each other where a message differs. 
 hash of every end, so the hashes on a graph tell which release RMF has there.
 """
 
-from dataclasses import dataclass
 from typing import Final
+
+from msgspec import Struct
 
 from bridges.rmf.definitions import (
     PACKAGES,
@@ -23,8 +24,7 @@ from bridges.rmf.definitions import (
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Release:
+class Release(Struct, frozen=True, eq=False):
     """One release. `lacks`: messages that it does not have; `without`: fields, as (message, field)."""
 
     name: str

@@ -5,16 +5,17 @@ door_supervisor/Node.cpp). All endpoints are RELIABLE with KEEP_LAST history; wh
 durability and the depth.
 """
 
-from dataclasses import dataclass, replace
 from typing import Generic, Literal, TypeVar
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 
 M_co = TypeVar("M_co", bound=d.Message, covariant=True)
 
 
-@dataclass(frozen=True, slots=True)
-class Qos:
+class Qos(Struct, frozen=True):
     """RELIABLE, KEEP_LAST(depth), with this durability."""
 
     durability: Literal["volatile", "transient_local"]
@@ -25,8 +26,7 @@ VOLATILE = Qos("volatile", 100)
 RETAINED = Qos("transient_local", 100)
 
 
-@dataclass(frozen=True, slots=True)
-class Topic(Generic[M_co]):
+class Topic(Struct, Generic[M_co], frozen=True):
     """A topic under its ROS name (without `rt/`), and the QoS of our publisher and subscription."""
 
     name: str

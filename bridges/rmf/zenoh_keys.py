@@ -12,10 +12,10 @@ publisher or a subscription is there. An end is a publisher or a subscription.
 
 import re
 import struct
-from dataclasses import dataclass
 from typing import Final, Literal, Protocol
 
 import xxhash
+from msgspec import Struct
 
 from bridges.rmf.definitions import PACKAGES
 from bridges.rmf.peers import WITNESSES, Announced
@@ -31,8 +31,7 @@ GID_LENGTH: Final = 16
 HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 
 
-@dataclass(frozen=True, slots=True)
-class Peer:
+class Peer(Struct, frozen=True):
     """What a token says of an end.
 
     `type`: the message type, with the hash where the token has one. `transient_local`: a publisher

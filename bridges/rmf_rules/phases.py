@@ -4,8 +4,9 @@ Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/. None 
 Left out: the lift watchdog, localisation, holding points (they send nothing to us).
 """
 
-from dataclasses import replace
 from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf_rules import Said, has_session

@@ -7,7 +7,8 @@ Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/RobotConte
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
@@ -15,8 +16,7 @@ from bridges.rmf.stamps import stamp
 from bridges.rmf_rules import NEVER, Party, Said, door_request, has_session
 
 
-@dataclass(frozen=True, slots=True)
-class LiftDestination:
+class LiftDestination(Struct, frozen=True):
     """Where the robot wants its lift; `inside` once it may be in the car."""
 
     lift: str

@@ -6,8 +6,9 @@ jazzy, 7eef65a), `jazzy` says so.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics

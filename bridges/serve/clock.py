@@ -2,7 +2,8 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from bridges.core.durations import AGES_AGO
 from bridges.rmf import stamps
@@ -13,8 +14,7 @@ TELL_GAP_S = 0.1
 """States go out at 1 Hz, and at once when they change, but never faster than 10 Hz."""
 
 
-@dataclass(frozen=True, slots=True)
-class Clock:
+class Clock(Struct, frozen=True):
     """Monotonic seconds for durations, seconds since the epoch for stamps; tests bring their own."""
 
     monotonic: Callable[[], float]

@@ -13,8 +13,9 @@ import pwd
 import stat
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
+
+from msgspec import Struct
 
 SERVICE_RUN = Path("/run/rmf-bridge")
 SERVICE_STATE = Path("/var/lib/rmf-bridge")
@@ -25,8 +26,7 @@ GROUPS = ("gpio", "dialout")
 """The groups that a drop-in may give this user beside its own (`drop_in.py`)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Places:
+class Places(Struct, frozen=True):
     """The directories of one daemon."""
 
     runtime: Path

@@ -3,8 +3,9 @@ decision: publishes messages, counts refusals, and logs states and faults when t
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
+
+from msgspec import Struct
 
 from bridges.core.decision import Decision, Fault, M, O, R
 from bridges.core.durations import NEVER
@@ -27,8 +28,7 @@ V = TypeVar("V")
 """The events of a core."""
 
 
-@dataclass(frozen=True, slots=True)
-class Core(Generic[M, V, O, R]):
+class Core(Struct, Generic[M, V, O, R], frozen=True):
     """A kind's core with its limits, as subjects need it.
 
     `word`: the key of a subject's name in the log. `decide(memory, event, now)`.

@@ -5,7 +5,8 @@ machine.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from bridges.core.graph_kind import GraphKind
 from bridges.core.spelling import unknown
@@ -18,16 +19,14 @@ from drivers.hal import Where
 Path = tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
+class Found(Struct, frozen=True):
     """Errors and warnings, in the order of the files."""
 
     errors: list[Problem]
     warnings: list[Problem]
 
 
-@dataclass(frozen=True, slots=True)
-class Claim:
+class Claim(Struct, frozen=True):
     """A file uses something that only one file may use. `what`: its name. `path`: where it says so."""
 
     config: Config

@@ -15,8 +15,8 @@ lift.py, building.py), and rmf_ros2's parse_graph.cpp, which reads the graph.
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
 
+from msgspec import Struct, field
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
 from bridges.core.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
@@ -31,8 +31,7 @@ Place = tuple[str, float, float]
 """Level, x, y."""
 
 
-@dataclass(frozen=True, slots=True)
-class BuildingMap:
+class BuildingMap(Struct, frozen=True):
     """The names of one file. `named`: what -> name -> line. `stops`: lift -> the floors it serves.
 
     `places`: waypoint -> level, x, y (m), of a navigation graph; traffic-editor's file has pixels.

@@ -1,8 +1,8 @@
 """Reads one bus of a device YAML: its `type`, and the settings of that type."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from msgspec import Struct
 from yaml import MappingNode, ScalarNode
 
 from bridges.core.spelling import either, nearest, unknown
@@ -14,8 +14,7 @@ from bridges.settings.values import BROKEN, Values
 from drivers.hal import AnyBus, Remark
 
 
-@dataclass(frozen=True, slots=True)
-class BusRead:
+class BusRead(Struct, frozen=True):
     """A bus as far as it could be read.
 
     `type` and `hal`: None where the type is missing or wrong. `settings`: BROKEN where they are wrong.

@@ -1,9 +1,10 @@
 """A valid device YAML, as the daemon and `check` use it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct, field
 
 from bridges.recording.settings import Recording
 from bridges.rmf.settings import Rmf
@@ -14,8 +15,7 @@ from drivers.hal import AnyBus, Bus
 from drivers.hal.points import Wire
 
 
-@dataclass(frozen=True)
-class Config:
+class Config(Struct, frozen=True):
     """A valid file.
 
     `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's

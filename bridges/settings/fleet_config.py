@@ -15,7 +15,6 @@ fleet_adapter.py. Other keys are not ours, and are not looked at.
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Annotated
 
 import msgspec
@@ -86,8 +85,7 @@ class Contents(msgspec.Struct, frozen=True):
     reference_coordinates: dict[str, Pairs] | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class FleetFile:
+class FleetFile(msgspec.Struct, frozen=True):
     """One file and its places."""
 
     file: str

@@ -6,10 +6,10 @@ or stays on a pad. Each mismatch is told with its file, its line and what to wri
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from msgspec import Struct, field
 from yaml import MappingNode
 
 from bridges.charger_coordinator.settings import Fleet, Settings, Waypoint
@@ -26,8 +26,7 @@ Transforms = Mapping[str, Similarity]
 FINISHING = ("charge", "park", "nothing")
 
 
-@dataclass(slots=True)
-class Compared:
+class Compared(Struct):
     """What was found: what cannot be right, what may be a mistake, what else is good to know."""
 
     errors: list[Problem] = field(default_factory=list)

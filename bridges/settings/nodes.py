@@ -7,10 +7,10 @@ a limit, so a deeply nested file would crash the interpreter instead of raising.
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import cast
 
 import yaml
+from msgspec import Struct
 from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNode, SequenceNode
 from yaml.reader import ReaderError
 
@@ -23,8 +23,7 @@ from bridges.settings.problems import SettingsError as SettingsError
 MAX_DEPTH = 32
 
 
-@dataclass(frozen=True, slots=True)
-class Sort:
+class Sort(Struct, frozen=True):
     """One sort of file: its name, how it begins, and its maximum size."""
 
     name: str

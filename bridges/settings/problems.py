@@ -1,11 +1,11 @@
 """What is wrong with a file, and where: without YAML, for those who only report it."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Problem:
+class Problem(Struct, frozen=True, order=True):
     """One problem or warning and its place; line and column count from 1."""
 
     file: str

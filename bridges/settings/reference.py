@@ -7,7 +7,6 @@ struct's docstring that begins with that key.
 import inspect
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import msgspec
 from msgspec import inspect as mi
@@ -28,8 +27,7 @@ KEYS = r"(?:^|(?<=[.;]\s))((?:`\w+`(?:,\s)?)+): "
 MEANING = re.compile(rf"{KEYS}(.*?)(?={KEYS}|\Z)", re.M | re.S)
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
+class Shape(msgspec.Struct, frozen=True):
     """One `kind:` with one `driver:`, and the sections that such a file has."""
 
     kind: str

@@ -7,13 +7,13 @@ same mean squared error. A point is a complex number here: x + y·i.
 
 import cmath
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 Point = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Similarity:
+class Similarity(Struct, frozen=True):
     """`to = turn · from + shift`. `mse`: the mean squared error of its pairs, in units of `to`."""
 
     turn: complex

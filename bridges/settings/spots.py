@@ -1,8 +1,8 @@
 """Places in a YAML file: where a value stands, and what an error about it points to."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from msgspec import Struct
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
 from bridges.core.spelling import short
@@ -10,8 +10,7 @@ from bridges.settings.nodes import is_plain
 from bridges.settings.scalars import is_null_word
 
 
-@dataclass(frozen=True, slots=True)
-class Spot:
+class Spot(Struct, frozen=True):
     """A node that is to become a value.
 
     `at`: the node that an error about the whole value points to (its key). `label`: the value's name
@@ -24,8 +23,7 @@ class Spot:
     path: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(Struct, frozen=True):
     """One `key: value` of a mapping."""
 
     name: str

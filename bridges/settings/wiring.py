@@ -5,8 +5,8 @@ The bus type knows how its points are spelled and which wires are impossible (`c
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from msgspec import Struct
 from yaml import Node
 
 from bridges.core.spelling import unknown
@@ -17,8 +17,7 @@ from drivers.hal import AnyBus
 from drivers.hal.points import Input, Output, Wire
 
 
-@dataclass(frozen=True, slots=True)
-class Use:
+class Use(Struct, frozen=True):
     """A point of a bus that a device uses: `point` in its canonical spelling, and as `written`."""
 
     bus: str

@@ -5,7 +5,6 @@ The maker's defaults are 250 kbit/s and node id 10. The node sends a heartbeat (
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
 import msgspec
@@ -21,8 +20,7 @@ HEARTBEAT_S: Final = 0.1
 BeatTimeout = Annotated[float, msgspec.Meta(ge=0.15, le=10, extra={"unit": "s"})]
 
 
-@dataclass(frozen=True, slots=True)
-class Object:
+class Object(msgspec.Struct, frozen=True):
     """An unsigned little-endian CANopen object, read by SDO; `octets` is its width."""
 
     index: int

@@ -5,7 +5,6 @@ a CAN frame. Rules are tried before `codes`: the first rule whose tests all hold
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Final, NamedTuple, Protocol
 
 import msgspec
@@ -203,8 +202,7 @@ def judge(rules: list[Rule], read: Read) -> Rule | None:
     return next((r for r in rules if all(t.holds(read(at)) for at, t in r.when.items())), None)
 
 
-@dataclass(frozen=True, slots=True)
-class Judged:
+class Judged(msgspec.Struct, frozen=True):
     """What the station does, whose fault an error is, its code for texts, and what is wrong.
 
     `does`: what it does beneath an error.

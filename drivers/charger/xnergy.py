@@ -13,8 +13,10 @@ station's; all others are the robot's: its receiver and its position.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
 from typing import Final, Protocol
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
@@ -160,8 +162,7 @@ RANGE_SETTLE_S: Final = 1.0
 """How long after a range check its result is valid (s); until then the previous result is read."""
 
 
-@dataclass(frozen=True, slots=True)
-class Written:
+class Written(Struct, frozen=True):
     """What was last written to the receiver. `enabled`: the last ENABLE; None while unknown.
 
     `range_checks`: how many checks were requested; `asked_at`: when the last one was (monotonic s), inf
@@ -173,8 +174,7 @@ class Written:
     asked_at: float = float("-inf")
 
 
-@dataclass(frozen=True, slots=True)
-class Orders:
+class Orders(Struct, frozen=True):
     """What to write in this scan: `enable` (None: nothing), and whether to start a range check."""
 
     enable: bool | None = None

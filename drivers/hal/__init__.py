@@ -7,7 +7,6 @@ most one timeout per backoff.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
@@ -77,8 +76,7 @@ class Bus:
         """Release the bus. Does not raise; may be called twice."""
 
 
-@dataclass(frozen=True)
-class BusType(Generic[Settings]):
+class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, which needs no vendor library.
 
     `settings`: the struct below the bus's name in the YAML, with `scan_s` (how often it is read).

@@ -6,7 +6,6 @@ inputs of a Modbus I/O module are treated alike.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Literal, Protocol, runtime_checkable
 
 import msgspec
@@ -61,16 +60,14 @@ def input_wires(inputs: msgspec.Struct, debounce_s: float | None = None) -> list
     return [line.wire(s, ("inputs", s), debounce_s) for s, line in fields if line is not None]
 
 
-@dataclass(frozen=True, slots=True)
-class Flash:
+class Flash(msgspec.Struct, frozen=True):
     """A pulse that the module times: the point where it is requested, and how long it lasts (s)."""
 
     point: str
     on_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Wire:
+class Wire(msgspec.Struct, frozen=True):
     """One row of the wiring table: a signal, where it is, and what its level means."""
 
     signal: str

@@ -1,8 +1,7 @@
 """ChargerRequest and ChargerCancel in, ChargerState out."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.charger import KIND
 from bridges.charger.memory import ChargerLimits
@@ -25,7 +24,7 @@ RIGHT = ChargerRequest("charger_a", "tiny", "AMR01", Duration(30, 500_000_000), 
 
 
 def asked(**changes: object) -> object:
-    request = replace(RIGHT, **changes)  # type: ignore[arg-type]
+    request = replace(RIGHT, **changes)
     return KIND.requests[CHARGER_REQUESTS](request, SETTINGS)
 
 

@@ -1,7 +1,9 @@
 """A ChargerRequest that is refused is answered: on a topic, in the status and in diagnostics."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
+
+from msgspec.structs import replace
 
 from bridges.charger import KIND
 from bridges.charger.memory import ChargerLimits

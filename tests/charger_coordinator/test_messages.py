@@ -1,10 +1,10 @@
 """What comes in and what a file may say: ours or refused, by name."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator import KIND, messages

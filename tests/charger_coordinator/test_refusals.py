@@ -1,7 +1,9 @@
 """A wish that the coordinator refuses is answered, as a charger's refusal is."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from bridges.charger.refusals import Refusal, read
 from bridges.charger_coordinator import KIND

@@ -1,10 +1,11 @@
 """`send`, in virtual time: what it sends when, when it is content, and what it says when not."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from bridges.charger.refusals import Refusal
 from bridges.commands.exchange import step

@@ -1,10 +1,10 @@
 """`rmf-bridge explain` and `plot` as they are typed, on recordings of every kind."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from bridges import cli
 from bridges.commands import live

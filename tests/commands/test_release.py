@@ -1,11 +1,12 @@
 """`release`: first the supervisor, then the lift's own daemon, unless a robot may be inside."""
 
+import dataclasses
 import io
 import time
 from collections.abc import Iterable
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.commands import send
 from bridges.commands.exchange import step
@@ -58,7 +59,7 @@ def test_while_a_robot_may_be_inside_somebody_must_say_that_the_car_is_empty(boa
     assert hints == [LOOK]
     assert isinstance(outcome, Failed)
     assert "look into it" in outcome.text
-    sent, *_ = told(replace(RELEASE, car_empty=True), [GRANTED] * 6 + [LIFT], boarded)
+    sent, *_ = told(dataclasses.replace(RELEASE, car_empty=True), [GRANTED] * 6 + [LIFT], boarded)
     assert sent[-1] == (5, "direct")
 
 

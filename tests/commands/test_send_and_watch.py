@@ -9,12 +9,11 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
-from msgspec.structs import replace as replace_struct
+from msgspec.structs import replace
 
 from bridges.charger.refusals import Refusal
 from bridges.cli import main
@@ -409,7 +408,7 @@ def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
         options = argparse.ArgumentParser()
         add_graph_arguments(options)
         told = options.parse_args(["--config", str(file), "--domain-id", "3"])
-        assert overridden(load(file).rmf, told) == replace_struct(load(file).rmf, domain_id=3)
+        assert overridden(load(file).rmf, told) == replace(load(file).rmf, domain_id=3)
     finally:
         node.close()
         router.leave()

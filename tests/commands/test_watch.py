@@ -2,9 +2,9 @@
 
 import argparse
 import json
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.commands import watch
 from bridges.commands.board import (

@@ -4,8 +4,9 @@ Each gives what was heard, and the device that is asked about.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.charger.pad import Misplaced
 from bridges.charger.settings import Robot
@@ -335,7 +336,7 @@ class _Foreign:
             current_floor="L1",
             current_mode=d.LiftMode.MODE_AGV,
         )
-        self._state = replace(known, **fields)  # type: ignore[arg-type]
+        self._state = replace(known, **fields)
         self._say()
 
     def _say(self) -> None:

@@ -1,8 +1,7 @@
 """What anybody can send: floods of names, strange values, control characters. Bounded, and told."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.explain.claims import MOST_CLAIMS
 from bridges.explain.device import MOST_LINES

@@ -2,8 +2,10 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.explain.lanes import MOST_ROWS, Drawing, lanes
 from bridges.explain.rows import LONGEST_LABEL, MOST_SPANS

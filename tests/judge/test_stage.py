@@ -1,8 +1,7 @@
 """When the judge may play, how it leaves, and what it makes of nonsense."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.judge.judge import Judge
 from bridges.judge.law import Verdict

@@ -1,11 +1,12 @@
 """Whatever happens, in whichever order: the invariants on a debounced lift, and RMF in a storm."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from bridges.core.decision import Sampled
 from bridges.lift import KIND, core

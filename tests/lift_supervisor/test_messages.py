@@ -1,8 +1,7 @@
 """What adapters send, as events, or refused by name; and what the status file says."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.core.decision import Fault, RequestRefused
 from bridges.lift_supervisor import messages
@@ -51,7 +50,7 @@ def test_an_end_is_taken_as_fleet_adapters_send_it_and_whatever_else_it_says() -
     ],
 )
 def test_what_cannot_be_asked_is_refused_by_name(changes: dict[str, object], kind: str) -> None:
-    wrong = replace(AGV, **changes)  # type: ignore[arg-type]
+    wrong = replace(AGV, **changes)
     with pytest.raises(RequestRefused) as refusal:
         messages.accept_request(wrong, Settings(lifts=["Lift1"]), 101.0)
     assert refusal.value.kind == kind
@@ -79,7 +78,7 @@ def test_a_lift_state_is_read_field_by_field() -> None:
 def test_a_state_with_texts_that_are_too_long_is_dropped(
     changes: dict[str, object], kind: str
 ) -> None:
-    state = replace(LiftState(lift_name="Lift1"), **changes)  # type: ignore[arg-type]
+    state = replace(LiftState(lift_name="Lift1"), **changes)
     with pytest.raises(RequestRefused) as refusal:
         messages.accept_state(state, ANY, 0.0)
     assert refusal.value.kind == kind

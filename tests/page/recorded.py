@@ -1,7 +1,8 @@
 """A recording of a ride, as our recorder writes it."""
 
-from dataclasses import replace
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from bridges import __version__
 from bridges.recording import mcap_write

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridges.cli import COMMANDS, parser
+from bridges.cli import whole_parser
 from bridges.commands.board import Row
 from bridges.page.actions import Action, Local, actions, fail, press, queue
 from bridges.page.site import Shown
@@ -14,7 +14,7 @@ LOCAL = Local("/etc/rmf-bridges/a.yaml", ("robot",), ("unit",), "/run/a")
 
 
 def parsed(action: Action) -> dict[str, object]:
-    return vars(parser(COMMANDS).parse_args([*action.words]))
+    return vars(whole_parser().parse_args([*action.words]))
 
 
 @pytest.mark.parametrize("name", ["Lift1", HOSTILE, "-h", "a b"])

@@ -2,7 +2,8 @@
 
 import json
 import re
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from bridges.page.gallery import Gallery, place_of, script
 from bridges.page.listener import Listener

@@ -1,6 +1,6 @@
 """What the page knows of the graph: the latest of each device, in bounds, whatever is made up."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.page.site import GONE_AFTER_S, KEPT_S, MOST_DEVICES, MOST_ROBOTS, Site, Stands
 from bridges.recording.heard import Heard

@@ -4,11 +4,12 @@ Typed from the .msg files of rmf_internal_msgs 3d4df02, std_msgs and builtin_int
 node's view of the wire. No `from __future__ import annotations` here: cyclonedds cannot read them.
 """
 
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from cyclonedds.idl import IdlStruct, annotations
 from cyclonedds.idl.types import byte, float32, int32, sequence, uint8, uint32, uint64
+from msgspec import Struct
 
 # mypy knows nothing of cyclonedds.
 # mypy: disable-error-code="misc, call-arg"
@@ -252,7 +253,7 @@ def to_idl(value: Any) -> Any:
     """One of our messages as the class of the same name here."""
     if isinstance(value, tuple):
         return [to_idl(element) for element in value]
-    if not is_dataclass(value):
+    if not isinstance(value, Struct):
         return value
-    members = [to_idl(getattr(value, field.name)) for field in fields(value)]
+    members = [to_idl(getattr(value, name)) for name in value.__struct_fields__]
     return globals()[type(value).__name__](*members)

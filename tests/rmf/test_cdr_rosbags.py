@@ -1,11 +1,11 @@
 """Our bytes beside those of rosbags: a second implementation of CDR, and of the type hash."""
 
-from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy
 import pytest
 from hypothesis import given
+from msgspec import Struct
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from bridges.rmf import definitions as d
@@ -28,14 +28,14 @@ def name(kind: type) -> str:
 
 def theirs(value: Any) -> Any:
     """A value of ours as rosbags wants it; of numbers in a row it makes arrays."""
-    if is_dataclass(value) and not isinstance(value, type):
+    if isinstance(value, Struct):
         made = STORE.types[name(type(value))]
-        members = {field.name: theirs(getattr(value, field.name)) for field in fields(value)}
+        members = {name: theirs(getattr(value, name)) for name in value.__struct_fields__}
         if isinstance(value, d.DiagnosticStatus):  # a `byte` is signed there; its bits are the same
             members["level"] = (value.level ^ 128) - 128
         return made(**members)
     if isinstance(value, tuple):
-        if (value and isinstance(value[0], str)) or (value and is_dataclass(value[0])):
+        if (value and isinstance(value[0], str)) or (value and isinstance(value[0], Struct)):
             return [theirs(element) for element in value]
         return numpy.array(value, dtype=numpy.uint8)
     return value

@@ -1,4 +1,4 @@
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport

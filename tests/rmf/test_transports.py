@@ -1,10 +1,10 @@
 """What every transport does, whichever wire it speaks."""
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
 from hypothesis import given
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf.topics import RETAINED, VOLATILE, Topic

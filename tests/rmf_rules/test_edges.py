@@ -1,6 +1,6 @@
 """RMF's rules at their edges: Jazzy's older ones, and what a mutation run found untold."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf.stamps import stamp

@@ -1,9 +1,9 @@
 """The stand-in for RMF keeps the rules of its supervisors and fleet adapters, one sentence each."""
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics

@@ -2,11 +2,11 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.rmf import stamps
 from bridges.rmf.definitions import LiftMode, LiftRequest, LiftState

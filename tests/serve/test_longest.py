@@ -1,12 +1,12 @@
 """Every string of every message that a kind hears: ten megabytes of it are not kept."""
 
-import dataclasses
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec import Struct
+from msgspec.structs import replace
 
 from bridges.core.decision import RequestRefused
 from bridges.core.graph_kind import GraphKind
@@ -80,10 +80,10 @@ def with_huge(value: Any) -> Iterator[Any]:
     elif isinstance(value, tuple):
         for i, item in enumerate(value):
             yield from ((*value[:i], huge, *value[i + 1 :]) for huge in with_huge(item))
-    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-        for field in dataclasses.fields(value):
-            for huge in with_huge(getattr(value, field.name)):
-                yield replace(value, **{field.name: huge})
+    elif isinstance(value, Struct):
+        for field in value.__struct_fields__:
+            for huge in with_huge(getattr(value, field)):
+                yield replace(value, **{field: huge})
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,10 @@
 """No single call of a bus may be taken for a hang by systemd's watchdog."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.commands.run import too_slow
 from bridges.settings.load import SettingsError, load

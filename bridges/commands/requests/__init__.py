@@ -7,9 +7,12 @@ table, most specific first; the last one always applies.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import ClassVar, Final, NamedTuple, TypeVar
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from bridges.charger.refusals import Refusal, read
 from bridges.commands.graph import CommandLine
@@ -22,8 +25,7 @@ State = TypeVar("State", bound=words.Stated)
 NEVER_AT: Final = float("-inf")
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
+class Seen(Struct, frozen=True):
     """What has happened since the command began; times are monotonic s.
 
     `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
@@ -103,15 +105,13 @@ WHERE: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Done:
+class Done(Struct, frozen=True):
     """The request took effect."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Failed:
+class Failed(Struct, frozen=True):
     """The request had no effect; `text` says why."""
 
     text: str

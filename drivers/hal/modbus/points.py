@@ -8,8 +8,9 @@ register 0 is 40001. Such a number is refused, and the error says which address 
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Final, Literal
+
+from msgspec import Struct
 
 from drivers.hal.points import Wire
 
@@ -56,8 +57,7 @@ _HOW: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Point:
+class Point(Struct, frozen=True, order=True):
     """One coil, discrete input or register of one unit, or one bit of a register.
 
     `str` gives its canonical spelling.
@@ -84,8 +84,7 @@ class Point:
         return value if self.bit is None else value >> self.bit & 1
 
 
-@dataclass(frozen=True, slots=True)
-class Range:
+class Range(Struct, frozen=True):
     """Neighbouring addresses of one table, read with one request."""
 
     unit: int

@@ -3,8 +3,9 @@
 Only functions 1 to 6 are used: they read the four tables, and write one coil or one register.
 """
 
-from dataclasses import dataclass
 from typing import Final, NamedTuple, Protocol
+
+from msgspec import Struct
 
 from drivers.hal import HalError
 from drivers.hal.modbus.points import Table
@@ -35,8 +36,7 @@ EXCEPTIONS: Final = {
 ILLEGAL_ADDRESS: Final = 2
 
 
-@dataclass(frozen=True, slots=True)
-class Question:
+class Question(Struct, frozen=True):
     """One request. `value`: how many bits or registers are read, or what is sent to be written."""
 
     unit: int

@@ -1,11 +1,11 @@
 """The demo calls a day right only when it was: each thing that can go wrong is seen and named."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
 import yaml
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf.words import Stated

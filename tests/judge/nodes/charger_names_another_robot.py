@@ -1,6 +1,6 @@
 """The robot's name is what stood on the pad last."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_charger import RightCharger

@@ -1,6 +1,6 @@
 """error_message has the status line of the station in every state."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_charger import RightCharger

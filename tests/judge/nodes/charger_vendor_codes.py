@@ -1,6 +1,6 @@
 """The station's own code is published as RMF's state: 5 is charging, 238 an error."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_charger import RELEASED, RightCharger

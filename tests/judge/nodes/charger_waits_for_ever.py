@@ -1,6 +1,6 @@
 """start_timeout is not looked at."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_charger import RightCharger

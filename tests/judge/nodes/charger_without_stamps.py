@@ -1,6 +1,6 @@
 """charger_time is never filled."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_charger import RightCharger

@@ -1,6 +1,6 @@
 """Right nodes that differ from ours as much as the contract lets them: none may be accused."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics

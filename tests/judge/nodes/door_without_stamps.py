@@ -1,6 +1,6 @@
 """door_time is never filled."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_door import RightDoor

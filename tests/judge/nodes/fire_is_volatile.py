@@ -1,6 +1,6 @@
 """The fire alarm is told once, and volatile: no fleet adapter hears it (low_level_lift)."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics

@@ -1,6 +1,6 @@
 """The floor's number is its name's last character: L10 is the floor below L1."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import RightLift

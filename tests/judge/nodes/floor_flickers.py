@@ -1,6 +1,6 @@
 """The floor's code is sampled unfiltered: for a moment it is another floor."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import RightLift

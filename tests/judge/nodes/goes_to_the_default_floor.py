@@ -1,6 +1,6 @@
 """A floor that it does not serve is taken for the first one."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import RightLift

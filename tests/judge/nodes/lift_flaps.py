@@ -1,6 +1,6 @@
 """The door's contact is not debounced: OPEN flickers while the robot drives in."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import LOOP_S, RightLift

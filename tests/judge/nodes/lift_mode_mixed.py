@@ -1,6 +1,6 @@
 """The state's mode has the request's numbers: AGV is 1 there, and HUMAN here."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import RightLift

@@ -1,6 +1,6 @@
 """The controller is lost while the door is open; what was read last is said for ever."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import RightLift

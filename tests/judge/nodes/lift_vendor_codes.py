@@ -1,6 +1,6 @@
 """The door's status word of the vendor, as it came: 3 is locked."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import RightLift

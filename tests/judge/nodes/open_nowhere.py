@@ -1,6 +1,6 @@
 """OPEN with no floor: the floor's code is not read yet."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import RightLift

@@ -1,6 +1,6 @@
 """OPEN is a contact that is passed on the way."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import RightLift

@@ -1,6 +1,6 @@
 """The name is looked at when it is too late (sharp-rmf/low_level_lift)."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf_rules import Said

@@ -1,6 +1,6 @@
 """session_id is the vendor's booking number, not the requester's."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import RightLift

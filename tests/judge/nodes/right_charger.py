@@ -1,7 +1,8 @@
 """A charger's node that keeps the contract in its own way: it charges whoever is promised, at once."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics

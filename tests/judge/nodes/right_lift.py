@@ -1,7 +1,8 @@
 """A lift's node that keeps the contract in its own way, in a loop of a quarter second."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics

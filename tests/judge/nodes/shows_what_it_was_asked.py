@@ -1,6 +1,6 @@
 """destination_floor is whatever was asked, served or not."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.rmf import definitions as d
 from tests.judge.nodes.right_lift import RightLift

@@ -1,6 +1,6 @@
 """Hatches: to RMF they are doors, with a section of their own in the YAML."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from bridges.door import KIND as DOOR
 

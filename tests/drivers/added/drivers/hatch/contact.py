@@ -1,6 +1,6 @@
 """A hatch on contacts, as a door's."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from drivers.door.dry_contact import DRIVER as DOOR
 
