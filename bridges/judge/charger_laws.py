@@ -10,6 +10,7 @@ from bridges.judge.charger_scene import (
     IDLE,
     RELEASED,
     ChargerScene,
+    unrequested,
 )
 from bridges.judge.law import KEPT, Doubt, Finding, Law, shown
 from bridges.judge.scene import NOT_YET
@@ -18,8 +19,6 @@ from bridges.rmf import definitions as d
 from bridges.rmf import words
 from bridges.rmf.stamps import in_seconds
 
-UNREQUESTED: Final = "unrequested/"
-"""Whatever follows it, nobody asked for this charge."""
 LATE_S: Final = 10.0
 CANCELLED_WITHIN_S: Final = 5.0
 RAMPS_DOWN_S: Final = 120.0
@@ -64,22 +63,33 @@ def _same_robot(scene: ChargerScene) -> Finding:
     asked = scene.requests.get(state.request_id) if state else None
     if state is None or asked is None or state.state == IDLE:
         return None
-    wanted, robot = (asked.fleet_name, asked.robot_name), (state.robot_fleet, state.robot_name)
-    if robot == wanted:
+    wanted = asked.fleet_name, asked.robot_name
+    if _robot(state) == wanted:
         return KEPT
     whose = f"request {shown(asked.request_id)} is for {shown('/'.join(wanted))}"
     return f"{whose}: {words.described(state)}"
 
 
 def _keeps(scene: ChargerScene) -> Finding:
-    """One charge belongs to one request."""
+    """One charge belongs to one request. What nobody requested becomes its own robot's charge when that
+    robot's request comes, and a node that has started again may know of no request."""
     state, before = scene.new, scene.before
     if state is None or before is None or (before.state, state.state) != (CHARGING, CHARGING):
         return None
-    same = state.request_id == before.request_id or state.request_id.startswith(UNREQUESTED)
+    same = state.request_id == before.request_id or unrequested(state.request_id)
     if same or not before.request_id:
         return KEPT
-    return f"charged for {shown(before.request_id)}, and now calls it {shown(state.request_id)}"
+    if unrequested(before.request_id) and before.robot_name and _robot(before) == _robot(state):
+        return KEPT
+    return f"charged for {_whose(before)}, and now calls it {_whose(state)}"
+
+
+def _robot(state: d.ChargerState) -> tuple[str, str]:
+    return state.robot_fleet, state.robot_name
+
+
+def _whose(state: d.ChargerState) -> str:
+    return f"{shown(state.request_id)} of {shown('/'.join(_robot(state)))}"
 
 
 def _starts_in_time(scene: ChargerScene) -> Finding:
@@ -115,6 +125,8 @@ def _foreign_cancel(scene: ChargerScene) -> Finding:
     state, before = scene.new, scene.before
     if state is None or before is None or before.state != ASSIGNED or not before.request_id:
         return None
+    if unrequested(before.request_id):
+        return None  # it ends when its robot leaves, which nobody announces
     if scene.now - scene.foreign_at > FOREIGN_S:
         return None
     if state.state not in (IDLE, RELEASED) or before.request_id in scene.cancels:
@@ -175,7 +187,8 @@ LAWS: Final[tuple[Law[ChargerScene], ...]] = (
     ),
     Law(
         "C1.keeps",
-        "A charge keeps its request_id until it ends",
+        "A charge keeps its request_id until it ends; one that nobody requested (`unrequested/…`) may"
+        " get that of the robot that it shows",
         "The next robot's request must not take a charge over while the first robot stands there",
         "ChargerRequest.msg, request_id",
         _keeps,

@@ -11,12 +11,14 @@ ASSIGNED: Final = d.ChargerStateValue.CHARGER_ASSIGNED
 CHARGING: Final = d.ChargerStateValue.CHARGER_CHARGING
 RELEASED: Final = d.ChargerStateValue.CHARGER_RELEASED
 ERROR: Final = d.ChargerStateValue.CHARGER_ERROR
+UNREQUESTED: Final = "unrequested/"
+"""Whatever follows it, nobody asked for this charge. A station's next one may have the same id."""
 
 
 class ChargerScene(Scene[d.ChargerState]):
-    """`requests`: by id, the latest. `cancels`: id -> when it was first cancelled. `same_since`: since
-    when state and request have been as they are. `foreign_at`: the last cancel of an id that the
-    station does not show."""
+    """`requests`: by id, the latest. `cancels`: id -> when it was first cancelled; the cancel of a
+    charge that nobody requested is forgotten with it. `same_since`: since when state and request have
+    been as they are. `foreign_at`: the last cancel of an id that the station does not show."""
 
     kind = d.ChargerState
 
@@ -31,7 +33,8 @@ class ChargerScene(Scene[d.ChargerState]):
         match heard.message:
             case d.ChargerRequest(charger_name=self.name):
                 self.asked()
-                keep(self.requests, heard.message.request_id, heard.message)
+                if not unrequested(heard.message.request_id):
+                    keep(self.requests, heard.message.request_id, heard.message)
             case d.ChargerCancel(charger_name=self.name):
                 self._cancel(heard.message.request_id)
             case _:
@@ -41,14 +44,24 @@ class ChargerScene(Scene[d.ChargerState]):
     def forget(self) -> None:
         """A silence is over."""
         self.same_since = self.now
+        self.cancels.pop(UNREQUESTED + self.name, None)
 
     def settle(self, state: d.ChargerState) -> None:
         """Since when it shows this."""
         before = self.before
         if before is None or (before.state, before.request_id) != (state.state, state.request_id):
             self.same_since = self.now
+        if state.state in (IDLE, RELEASED):
+            self.cancels.pop(UNREQUESTED + self.name, None)
 
     def _cancel(self, request_id: str) -> None:
-        keep(self.cancels, request_id, self.cancels.get(request_id, self.now))
-        if self.state is not None and request_id != self.state.request_id:
+        shown = self.state is not None and request_id == self.state.request_id
+        if shown or not unrequested(request_id):
+            keep(self.cancels, request_id, self.cancels.get(request_id, self.now))
+        if self.state is not None and not shown:
             self.foreign_at = self.now
+
+
+def unrequested(request_id: str) -> bool:
+    """Does nobody's request have this id?"""
+    return request_id.startswith(UNREQUESTED)
