@@ -19,7 +19,7 @@ from bridges import log
 from bridges.commands.by_hand import NoDevice, device_of
 from bridges.commands.completion import completed_by, device_names
 from bridges.commands.doctoring.finding import Finding, exit_code
-from bridges.commands.graph import TRANSPORTS, interruptible, overridden, seconds
+from bridges.commands.graph import TRANSPORTS, command_line, interruptible, overridden, seconds
 from bridges.commands.paint import bold, red
 from bridges.rmf.words import printable
 from bridges.settings.load import Config, SettingsError, load
@@ -138,6 +138,7 @@ def _examined(
         localhost=args.localhost,
         ros_args=args.ros_args,
         kill_test=(args.device, args.output) if args.kill_test else None,
+        line=command_line(argparse.Namespace(**vars(args), config=args.file)),
     )
     return examined(config, building, Machine(), asked)
 

@@ -17,6 +17,7 @@ from bridges.commands import faults
 from bridges.commands.board import SECONDS
 from bridges.commands.graph import (
     add_graph_arguments,
+    command_line,
     complain,
     interruptible,
     open_graph,
@@ -139,7 +140,8 @@ def _tell(found: Explanation, *, as_json: bool) -> None:
 
 def _live(args: argparse.Namespace) -> int:
     with interruptible(), closing(open_graph(args, "rmf_bridge_explain")) as transport:
-        ear, site = Ear(transport), Site(args.live, args.session)
+        ear = Ear(transport)
+        site = Site(args.live, args.session, graph=command_line(args).options)
         if args.follow:
             _follow(ear, site, args)
         _listen(ear, site, args.for_s)

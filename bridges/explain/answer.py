@@ -51,7 +51,8 @@ def unheard(device: Device, around: Heard, clock: Clock) -> Answer:
         answer.say(
             "Nothing at all was heard.",
             Step(
-                "a person", "look at the domain, the network and the transport: `rmf-bridge doctor`"
+                "a person",
+                "look at the domain, the network and the transport: `rmf-bridge doctor FILE`",
             ),
         )
         return answer
@@ -91,7 +92,7 @@ def silent(device: Device, clock: Clock) -> Answer | None:
         Step(
             "a person",
             f"look at the daemon of {device.name} and its network: `rmf-bridge status` and"
-            " `rmf-bridge doctor` on its machine",
+            " `rmf-bridge doctor FILE` on its machine",
         ),
     )
 

@@ -5,6 +5,7 @@ lists the robot for this door. DoorClose waits until no heartbeat lists it (rmf_
 DoorClose.cpp). A robot that drives through says nothing meanwhile.
 """
 
+from shlex import quote
 from typing import Final
 
 from bridges.explain import answer as common
@@ -209,7 +210,7 @@ def _held_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
         " left, keeps the door open for ever.",
         Step(
             "a person",
-            f"look into the doorway; if nobody is there: `rmf-bridge send door {door.name} close"
-            f" --requester {who}`",
+            f"look into the doorway; if nobody is there: `rmf-bridge send door {quote(door.name)}"
+            f" close --requester {quote(who)}`",
         ),
     )

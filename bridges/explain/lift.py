@@ -5,6 +5,7 @@ its floor and its door (rmf_ros2, RequestLift.cpp:322-326). The answer says whic
 why, and who has to do the next thing.
 """
 
+from shlex import quote
 from typing import Final
 
 from bridges.explain import answer as common
@@ -235,13 +236,17 @@ def _without_word(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> 
         f" each state: its fleet adapter is gone.{once}",
         Step(
             "a person",
-            f"look into the car: if it is empty, `rmf-bridge release {lift.name}` ends the session",
+            f"look into the car: if it is empty, {_release(lift)} ends the session",
         ),
     )
     own = lift.own(clock.now)
     if own is not None and own.values.get("boarded") in ("yes", "no"):
         inside = own.values["boarded"] == "yes"
         found.say("A robot may be in the car." if inside else "No robot has been let into the car.")
+
+
+def _release(lift: LiftFacts) -> str:
+    return f"`rmf-bridge release {quote(lift.name)}`"
 
 
 def _once(claim: Claim | None) -> bool:
@@ -260,13 +265,19 @@ def _end_not_obeyed(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) 
         found.say(
             f"{claim.who} sent END at {clock.time(claim.ended.wall)}, and the supervisor has not passed"
             " it on.",
-            Step("the supervisor", f"pass on END; until then: `rmf-bridge release {lift.name}`"),
+            Step(
+                "the supervisor",
+                f"pass on END; until then: {_release(lift)}",
+            ),
         )
         return
     found.say(
         f"{claim.who} sent END at {clock.time(claim.ended.wall)}, and the lift still shows its"
         " session.",
-        Step("the device's node", f"end the session; until then: `rmf-bridge release {lift.name}`"),
+        Step(
+            "the device's node",
+            f"end the session; until then: {_release(lift)}",
+        ),
     )
 
 

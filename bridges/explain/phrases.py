@@ -1,10 +1,15 @@
-"""Times, durations and lists as a person says them."""
+"""Times, durations, lists and commands as a person says them."""
 
+import re
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, tzinfo
+from typing import Final
 
 DAY_S = 86400.0
+JOINS: Final = re.compile(r"`(rmf-bridge (doctor|explain|judge|page|release|send|watch)\b[^`]*)`")
+"""A command in a sentence that joins RMF's graph."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +41,20 @@ def listed(names: Sequence[str], word: str = "and") -> str:
     """`a`, `a and b`, `a, b and c`."""
     *first, last = names
     return f"{', '.join(first)} {word} {last}" if first else last
+
+
+def on_graph(text: str, options: Sequence[str]) -> str:
+    """The text, with the options that name a graph in each command of it that joins one."""
+
+    def joined(found: re.Match[str]) -> str:
+        command, name = found.groups()
+        words = [*options]
+        if name == "doctor" and "--config" in words:  # it is given that file itself
+            at = words.index("--config")
+            del words[at : at + 2]
+        return f"`{command} {shlex.join(words)}`" if words else found[0]
+
+    return JOINS.sub(joined, text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,8 @@ memory than a minute's.
 """
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import tzinfo
 from typing import Final
 
@@ -16,10 +17,10 @@ from bridges.explain.answer import Answer, Remedies
 from bridges.explain.charger_facts import ChargerFacts
 from bridges.explain.device import MOST_LINES, SILENT_S, Device
 from bridges.explain.door_facts import DoorFacts
-from bridges.explain.explanation import Explanation, Line
+from bridges.explain.explanation import Explanation, Line, Step
 from bridges.explain.lift_facts import LiftFacts
 from bridges.explain.noted import noted
-from bridges.explain.phrases import Clock, Moment, lasted
+from bridges.explain.phrases import Clock, Moment, lasted, on_graph
 from bridges.explain.rows import label
 from bridges.explain.timeline import Kind
 from bridges.recording.heard import Heard, Own
@@ -49,10 +50,13 @@ class Site:
         session: str = "",
         most: int = MOST_DEVICES,
         most_lines: int = MOST_LINES,
+        graph: Sequence[str] = (),
     ) -> None:
-        """`most`: how many devices of each kind are remembered, and `most_lines` of what each did."""
+        """`most`: how many devices of each kind are remembered, and `most_lines` of what each did.
+        `graph`: the options that name this graph, for commands."""
         self._most = most
         self._most_lines = most_lines
+        self._graph = graph
         self.messages = 0
         self._story_from = float("-inf")
         self._name = name
@@ -129,10 +133,16 @@ class Site:
             device=label(name),
             heard=f"{clock.date(began.wall)} to {clock.time(self._now.wall)} ({for_s})",
             now=tuple(answer.now),
-            next=tuple(dict.fromkeys(answer.next)),
+            next=tuple(
+                Step(step.who, on_graph(step.what, self._graph))
+                for step in dict.fromkeys(answer.next)
+            ),
             asks=answer.asks,
             fields=answer.fields,
-            faults=common.faults(device, clock, remedies or {}),
+            faults=tuple(
+                replace(fault, do=on_graph(fault.do, self._graph))
+                for fault in common.faults(device, clock, remedies or {})
+            ),
             notes=(*answer.notes, *common.notes(device, clock), *self._stepped(clock)),
             story=story[-STORY_LINES:],
             left_out=max(0, len(story) - STORY_LINES),

@@ -4,6 +4,7 @@ Pure: time comes with each message. Names come from the network, where anybody m
 everything has a bound; who is known stays, whoever comes later.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -88,7 +89,8 @@ class Shown:
 class Site:
     """Everything heard so far, within bounds."""
 
-    def __init__(self) -> None:
+    def __init__(self, graph: Sequence[str] = ()) -> None:
+        """`graph`: the options that name the page's graph, for commands."""
         self._board = Board()
         self._last_at: dict[Device, float] = {}
         self._states: dict[Device, Stated] = {}
@@ -96,7 +98,7 @@ class Site:
         self._changed: set[Device] = set()
         self._since: dict[str, tuple[str, float, bool]] = {}
         self._robots: dict[tuple[str, str], Robot] = {}
-        self._story = site.Site(most=MOST_DEVICES, most_lines=MOST_LINES)
+        self._story = site.Site(most=MOST_DEVICES, most_lines=MOST_LINES, graph=graph)
         self.crowded: set[str] = set()
         self._full_until: dict[str, float] = {}
         self.heard_at: float | None = None

@@ -101,7 +101,7 @@ def _live(
     login: Login,
     graph: Sequence[str],
 ) -> Listener:
-    site = Site()
+    site = Site(graph)
     listener = Listener(site, join)
     gallery, here = Gallery(site, listener), Here(args.runtime_dirs)
     state = os.environ.get("STATE_DIRECTORY")

@@ -498,7 +498,7 @@ def test_a_robot_that_waits_is_said_to_wait_and_how_to_withdraw_it() -> None:
     waits = tell(QUEUE, every_second(OTHERS), timeout_s=5.0)
     text = (
         "no charger serves fleet/robot yet: it waits in the charger coordinator's queue"
-        " (see `rmf-bridge watch`), or the request was refused (see the coordinator's log);"
+        " (see `rmf-bridge watch --localhost`), or the request was refused (see the coordinator's log);"
         " to withdraw the request: rmf-bridge send charger any --queue --cancel r1 --localhost"
     )
     assert (waits.hints, waits.outcome) == ([text], Failed("gave up after 5 s"))

@@ -15,6 +15,7 @@ from bridges.rmf import topics
 from bridges.rmf.definitions import LiftState
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.releases import NEWEST
+from hal_fakes.wire import wire
 from tests.explain.scenes import fire, held_by_another
 from tests.recording.written import MCAP, SQLITE, write
 
@@ -180,6 +181,15 @@ def test_nothing_heard_live_says_so() -> None:
     site.passed(100.0, 1_800_000_000.0)
     site.passed(105.0, 1_800_000_005.0)
     assert site.explain("lift", "Lift1", None).now == ("Nothing at all was heard.",)
+
+
+def test_what_is_proposed_live_names_the_graph_as_the_typed_command_did(
+    domain: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ("--domain-id", str(domain), "--transport", wire(), "--localhost")
+    assert run("explain", "--live", "Lift1", "--for", "0.1", *options) == 1
+    told = " ".join(capsys.readouterr().out.split())
+    assert f"`{' '.join(('rmf-bridge', 'doctor', 'FILE', *options))}`" in told
 
 
 def test_diagnostics_that_only_count_on_are_taken_now_and_then() -> None:

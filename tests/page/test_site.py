@@ -145,3 +145,15 @@ def test_faults_and_simulations_come_from_the_daemons_diagnostics() -> None:
     site.take(heard(0.1, topics.DIAGNOSTICS, told))
     (shown,) = site.devices(0.2, WALL + 0.2)
     assert (shown.row.faults, shown.row.simulated) == ("OVERLOAD (3 s)", True)
+
+
+def test_what_a_person_is_told_to_type_names_the_pages_graph() -> None:
+    site = Site(("--domain-id", "7"))
+    for n in range(9):
+        state = d.LiftState(stamp(WALL + n), "Lift1", ("L1",), "L1", session_id="fleet/red")
+        site.take(heard(float(n), topics.LIFT_STATES, state))
+    told = site.explain("lift", "Lift1", 9.0, WALL + 9.0, {})
+    assert told is not None
+    assert [step.what.split("`")[1] for step in told.next] == [
+        "rmf-bridge release Lift1 --domain-id 7"
+    ]

@@ -13,6 +13,7 @@ from bridges.commands.doctoring.finding import Finding, note, ok, wrong
 from bridges.commands.doctoring.machine import Machine
 from bridges.commands.doctoring.served import DAEMON, NOT_ASKED, Served, served, unseen
 from bridges.commands.doctoring.users import User, user, users
+from bridges.commands.graph import CommandLine
 from bridges.serve import directory
 from bridges.serve import places as kept
 from bridges.serve.places import Places
@@ -31,6 +32,7 @@ class Options:
     """What the command line asks for. `kill_test`: device and output; None without the test.
 
     `whole_scan`: every unit or node of a bus. `listen_s`: how long to hear RMF's graph; 0 for not.
+    `line`: with the options that name that graph.
     """
 
     runtime_dir: str | None = None
@@ -39,6 +41,7 @@ class Options:
     localhost: bool = False
     ros_args: Sequence[str] = ()
     kill_test: tuple[str, str | None] | None = None
+    line: CommandLine = CommandLine()
 
 
 def examined(
@@ -65,7 +68,9 @@ def examined(
         from bridges.commands.doctoring.graph import Look, graph
 
         loopback = asked.localhost or now.simulated
-        look = Look(loopback, asked.listen_s, now.serving, asked.ros_args)
+        simulated = ["--localhost"] if loopback and not asked.localhost else []
+        watch = asked.line.other("watch", *simulated)
+        look = Look(loopback, asked.listen_s, now.serving, watch, asked.ros_args)
         yield from graph(config, look)
     if asked.kill_test:
         yield from _killed(config, machine, places, now, asked)

@@ -37,19 +37,24 @@ SENDERS: Final = {
 }
 """Without these nobody asks for anything. The other topics may be silent."""
 LIBRARIES: Final = {"dds": "cyclonedds", "zenoh": "eclipse-zenoh"}
-ALONE: Final = "docs/ros.md: domain, multicast, interfaces; rmf-bridge watch shows what is heard"
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
     """How to look. `listen_s`: how long. `serving`: our own daemon is on the graph too; None if
-    that is not known.
+    that is not known. `watch`: the command that shows this graph.
     """
 
     localhost: bool
     listen_s: float
     serving: bool | None
+    watch: str
     ros_args: Sequence[str] = ()
+
+    @property
+    def alone(self) -> str:
+        """What to do where nobody is heard."""
+        return f"docs/ros.md: domain, multicast, interfaces; {self.watch} shows what is heard"
 
 
 def graph(config: Config, look: Look) -> Iterator[Finding]:
@@ -66,9 +71,9 @@ def graph(config: Config, look: Look) -> Iterator[Finding]:
                 yield from _heard(config, transport, look)
                 yield from _messages(transport)
         for text in dict.fromkeys(said):
-            yield warning(GRAPH, text, "the transport says this of its peers", ALONE)
+            yield warning(GRAPH, text, "the transport says this of its peers", look.alone)
     except TransportError as error:
-        yield wrong(GRAPH, str(error), "RMF neither hears nor is heard", ALONE)
+        yield wrong(GRAPH, str(error), "RMF neither hears nor is heard", look.alone)
 
 
 def _interface(domain: int, loopback: bool) -> Finding:
@@ -97,10 +102,10 @@ def _heard(config: Config, transport: Transport, look: Look) -> Iterator[Finding
         found = _rivals(rivals, look.serving)
     else:
         messages = _listened(Ear(transport, [named_by(config, kind.states)]), look.listen_s)
-        found = _ours(list(config.devices), set(map(kind.device_name, messages)), look.serving)
+        found = _ours(list(config.devices), set(map(kind.device_name, messages)), look)
     yield ok(GRAPH, f"joined by {transport.speaks} for {look.listen_s:g} s")
     for topic, end in ends.items():
-        yield _senders(topic, end)
+        yield _senders(topic, end, look)
     yield from found
 
 
@@ -112,14 +117,14 @@ def _listened(ear: Ear, listen_s: float) -> list[Any]:
     return messages
 
 
-def _senders(topic: str, end: Subscription) -> Finding:
+def _senders(topic: str, end: Subscription, look: Look) -> Finding:
     nodes, who = end.matched(), SENDERS.get(topic)
     if nodes:
         return ok(GRAPH, f"{topic}: from {nodes} node{'s' if nodes > 1 else ''}")
     if who is None:
         return note(GRAPH, f"{topic}: nobody sends")
     means = "no robot's request arrives here"
-    return warning(GRAPH, f"{topic}: nobody sends", means, f"start {who}; {ALONE}")
+    return warning(GRAPH, f"{topic}: nobody sends", means, f"start {who}; {look.alone}")
 
 
 def _rivals(ends: Sequence[Subscription], serving: bool | None) -> Iterator[Finding]:
@@ -131,14 +136,15 @@ def _rivals(ends: Sequence[Subscription], serving: bool | None) -> Iterator[Find
         yield warning(GRAPH, f"{rivals} other node(s) do the same", means, do)
 
 
-def _ours(devices: Sequence[str], heard: set[str], serving: bool | None) -> Iterator[Finding]:
+def _ours(devices: Sequence[str], heard: set[str], look: Look) -> Iterator[Finding]:
+    serving = look.serving
     for name in devices:
         if name in heard and serving is False:
             means = "two nodes would publish one name, and RMF would believe both in turn"
             do = "stop the other one, on whichever machine it runs"
             yield wrong(GRAPH, f"somebody already publishes {name}", means, do)
         elif serving and name not in heard:
-            do = f"rmf-bridge log FILE; {ALONE}"
+            do = f"rmf-bridge log FILE; {look.alone}"
             yield warning(
                 GRAPH, f"{name} is not heard from our daemon", "nor by RMF, it may be", do
             )

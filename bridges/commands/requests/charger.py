@@ -155,7 +155,8 @@ class QueuedCharge(Charge):
         return Obstacle(
             True,
             f"no charger serves {self.who} yet: it waits in the {COORDINATOR}'s queue"
-            " (see `rmf-bridge watch`), or the request was refused (see the coordinator's log)",
+            f" (see `{self.line.other('watch')}`), or the request was refused (see the"
+            " coordinator's log)",
             f"to withdraw the request: {self.line.other(*cancel)}",
         )
 

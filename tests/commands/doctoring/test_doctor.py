@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import shlex
 import signal
 import socket
 import subprocess
@@ -406,3 +407,14 @@ def test_a_simulation_is_named_and_looked_for_on_loopback(tmp_path: Path) -> Non
     assert [(one.level, one.found) for one in found.findings][1:] == [
         ("note", "it is a SIMULATION")
     ]
+
+
+def test_how_to_look_at_the_graph_names_the_graph_that_was_asked_for(
+    module: Module, tmp_path: Path, capsys: pytest.CaptureFixture[str], domain: int
+) -> None:
+    options = ["--domain-id", str(domain), "--transport", wire(), "--localhost"]
+    words = ["doctor", str(module.file), "--listen", "0.1", "--json"]
+    cli.main([*words, "--runtime-dir", str(tmp_path / "run"), *options])
+    told = [one["do"] for one in json.loads(capsys.readouterr().out)]
+    watch = shlex.join(["rmf-bridge", "watch", "--config", str(module.file), *options])
+    assert [watch in do for do in told if "rmf-bridge watch" in do] == [True]
