@@ -185,9 +185,10 @@ def _nobody_asks(found: Answer, door: DoorFacts, clock: Clock) -> None:
 
 
 def _asked_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
-    """Only the supervisor was heard, as the door's own daemon hears it."""
+    """Only the supervisor was heard, or a person with `send --direct`, as the door's own daemon hears
+    them."""
     assert door.asked is not None
-    found.say(f"The supervisor asks for OPEN {clock.since(door.asked.since)}.")
+    found.say(f"On door_requests {door.sender} asks for OPEN {clock.since(door.asked.since)}.")
     opened = Step("the robot", "drive through; then its fleet adapter sends CLOSE")
     opens = Step("the controller", f"open {door.name} fully, and show it by its contact")
     found.next.append(opened if door.mode.value == OPEN else opens)

@@ -12,10 +12,14 @@ from bridges.rmf.stamps import in_seconds
 OPEN = "open"
 CLOSED = "closed"
 MOST_HOLDERS = 64
+SUPERVISOR = "door_supervisor"
+"""The requester_id that RMF's own uses on `door_requests` (door_supervisor/Node.hpp), and ours."""
 
 
 class DoorFacts(Device):
-    """`holders`: who the heartbeat lists, and since when. `asked`: the supervisor's last request."""
+    """`holders`: who the heartbeat lists, and since when. `asked`: what was asked last on
+    `door_requests`, and `sender` by whom.
+    """
 
     kind: Kind = "door"
 
@@ -26,18 +30,20 @@ class DoorFacts(Device):
         self.holders: dict[str, Moment] = {}
         self.last_heartbeat: Moment | None = None
         self.asked: Fact | None = None
+        self.sender = ""
         self.passages = 0
 
     def requested(self, moment: Moment, request: d.DoorRequest, *, passed_on: bool) -> None:
         """A request of a fleet adapter or, passed on, of the supervisor."""
         wants = words.plain(d.DoorModeValue, request.requested_mode.value)
+        who = label(request.requester_id)
         if passed_on:
+            self.sender = "the supervisor" if who == SUPERVISOR else who
             if self.asked is None:
                 self.asked = Fact(wants, moment)
             elif self.asked.say(wants, moment):
-                self.tell(moment, f"the supervisor asks for {wants}")
+                self.tell(moment, f"{self.sender} asks for {wants}")
             return
-        who = label(request.requester_id)
         claim, new = self.claims.ask(who, wants, moment)
         claim.stamped = request.request_time != d.Time()
         claim.stamp_age_s = moment.wall - in_seconds(request.request_time)

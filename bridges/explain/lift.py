@@ -13,7 +13,7 @@ from bridges.explain.answer import Answer
 from bridges.explain.claims import Claim
 from bridges.explain.device import SILENT_S
 from bridges.explain.explanation import Field, Step, Who
-from bridges.explain.lift_facts import NO_FLOOR, NOBODY, LiftFacts
+from bridges.explain.lift_facts import DIRECT, NO_FLOOR, NOBODY, LiftFacts
 from bridges.explain.lift_ungranted import SETTLES_S, not_granted
 from bridges.explain.phrases import Clock, lasted
 from bridges.explain.rows import label
@@ -212,10 +212,12 @@ def _forgotten(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> Non
         return
     if clock.now.at - asks.since.at < SETTLES_S and asks.since.seen:
         return
+    sender = lift.sender(asks.value)
+    it = "a supervisor that does so" if sender == DIRECT else "it"
     found.say(
-        f"The supervisor asks for {asks.value} {clock.since(asks.since)}, though {holder} has the lift:"
-        f" it has forgotten {holder}, by a restart or a lost END, and passes on nothing more of it."
-        " Our node then hears that robot's own requests and its END; other nodes do not."
+        f"{sender.capitalize()} asks for {asks.value} {clock.since(asks.since)}, though {holder} has"
+        f" the lift: {it} has forgotten {holder}, by a restart or a lost END, and passes on nothing"
+        " more of it. Our node then hears that robot's own requests and its END; other nodes do not."
     )
 
 

@@ -17,6 +17,8 @@ END: Final = d.LiftRequestType.REQUEST_END_SESSION
 HUMAN: Final = d.LiftRequestType.REQUEST_HUMAN_MODE
 NOBODY: Final = "nobody"
 NO_FLOOR: Final = "no known floor"
+DIRECT: Final = "the supervisor, or a person with `send --direct`,"
+"""Whoever sends on `lift_requests` what no fleet adapter was heard to ask for."""
 
 
 @dataclass(slots=True)
@@ -100,7 +102,13 @@ class LiftFacts(Device):
             self.supervisor.say(asks, moment) and asks and self.session.value not in (NOBODY, asks)
         ):
             holder = self.session.value
-            self.tell(moment, f"the supervisor asks for {asks}, though {holder} has the lift")
+            self.tell(moment, f"{self.sender(asks)} asks for {asks}, though {holder} has the lift")
+
+    def sender(self, who: str) -> str:
+        """Who asks for this session on `lift_requests`, as far as that is known."""
+        claim = self.claims.get(who)
+        passed_on = claim is not None and claim.own
+        return "the supervisor" if passed_on else DIRECT
 
     def _end(self, moment: Moment, who: str, passed_on: bool) -> None:
         claim = self.claims.get(who)
@@ -110,12 +118,10 @@ class LiftFacts(Device):
             if passed_on and who and who == self.session.value and claim is None:
                 claim, _ = self.claims.ask(who, "", moment)
                 claim.granted, claim.ended = self.session.since, moment
-                self.tell(
-                    moment, f"the supervisor ends the session of {who}, which nobody asks for"
-                )
+                self.tell(moment, f"{DIRECT} ends the session of {who}, which nobody asks for")
             return
         if passed_on:
-            self.tell(moment, f"the supervisor ends the session of {who}")
+            self.tell(moment, f"{DIRECT} ends the session of {who}")
             if claim.own and who != self.session.value:
                 return  # only its fleet adapter knows whether it still waits
         else:

@@ -54,7 +54,9 @@ def _not_passed_on(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -
         )
     else:
         other = lift.supervisor.value if lift.supervisor else ""
-        instead = f" It asks for {other}." if other not in ("", claim.who) else ""
+        instead = ""
+        if other not in ("", claim.who):
+            instead = f" {lift.sender(other).capitalize()} asks for {other}."
         found.say(
             f"The supervisor does not pass the request on.{instead}",
             Step(
