@@ -24,7 +24,7 @@ from bridges.commands.graph import (
     seconds,
 )
 from bridges.commands.live import Ear
-from bridges.commands.recordings import Span, add_span_arguments, told_between
+from bridges.commands.recordings import Span, add_span_arguments, told_between, unreadable
 from bridges.explain.explanation import Explanation
 from bridges.explain.site import Site
 from bridges.explain.text import SCREEN_LINES, lines
@@ -70,13 +70,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0; 1 when the device or anything of RMF was not heard, or FILE or graph cannot be read."""
+    """0; 1 when the device or anything of RMF was not heard, or the graph cannot be joined; 66 when
+    FILE is no recording that can be read."""
     if (args.file is None) == (args.live is None):
         complain("explain", "name a FILE, or --live DEVICE: one of them")
         return 2
     try:
         return _live(args) if args.file is None else _recorded(args)
-    except (BagError, TransportError) as error:
+    except BagError as error:
+        return unreadable("explain", error)
+    except TransportError as error:
         complain("explain", error)
         return 1
     except KeyboardInterrupt:

@@ -1,8 +1,9 @@
 """`rmf-bridge judge`: hold any lift, door or charger node against RMF's contract.
 
 `bridges/judge/` has the laws and the plays; here are the options, the graph, the clock and the verdict.
-Exit code 0: every law that was seen is kept. 1: one is broken. 2: a wrong command line. 69: nothing was
-heard, the graph cannot be joined, or what was to be played was not.
+Exit code 0: every law that was seen is kept. 1: one is broken. 2: a wrong command line. 66: the
+recording cannot be read. 69: nothing was heard, the graph cannot be joined, or what was to be played
+was not.
 """
 
 import argparse
@@ -24,7 +25,7 @@ from bridges.commands.graph import (
     seconds,
 )
 from bridges.commands.live import OF_DEVICES, Ear
-from bridges.commands.recordings import Span, add_span_arguments, within
+from bridges.commands.recordings import Span, add_span_arguments, unreadable, within
 from bridges.judge.judge import KINDS, Judge, Kind
 from bridges.judge.law import Verdict, shown
 from bridges.judge.plays import FLEET, Charge, Passages, Performance, Ride
@@ -174,8 +175,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         return _recorded(args)
     except BagError as error:
-        complain("judge", error)
-        return os.EX_UNAVAILABLE
+        return unreadable("judge", error)
 
 
 def _recorded(args: argparse.Namespace) -> int:

@@ -88,7 +88,7 @@ def _address(text: str) -> tuple[str, int]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 after Ctrl-C or SIGTERM; 64, 69 or 78 with what to do."""
+    """0 after Ctrl-C or SIGTERM; 64, 66, 69 or 78 with what to do."""
     from bridges.page.access import PasswordError, users
 
     log.start()
@@ -102,6 +102,8 @@ def run(args: argparse.Namespace) -> int:
     if why := _unsafe(args):
         complain("page", why)
         return os.EX_USAGE
+    if args.recording and (code := _unreadable(args.recording)):
+        return code
     address, port = args.listen
     try:
         opened = socket.create_server(args.listen, family=_family(address))
@@ -127,6 +129,18 @@ def _serve(args: argparse.Namespace, opened: socket.socket, known: Mapping[str, 
 
 def _family(address: str) -> socket.AddressFamily:
     return socket.AF_INET6 if ":" in address else socket.AF_INET
+
+
+def _unreadable(recording: Path) -> int:
+    """An exit code where nothing can be shown of this recording; 0 where something can."""
+    from bridges.commands.recordings import unreadable
+    from bridges.recording.bags import BagError, Notes, all_in
+
+    try:
+        next(all_in(recording, Notes()), None)
+    except BagError as error:
+        return unreadable("page", error)
+    return 0
 
 
 def _graph(args: argparse.Namespace) -> Sequence[str]:

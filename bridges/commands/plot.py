@@ -13,7 +13,7 @@ from typing import Final
 
 from bridges.commands import faults
 from bridges.commands.graph import complain
-from bridges.commands.recordings import Span, add_span_arguments, told_between
+from bridges.commands.recordings import Span, add_span_arguments, told_between, unreadable
 from bridges.explain.lanes import Drawing
 from bridges.explain.palette import PAPER, Theme
 from bridges.explain.picture import svg
@@ -74,12 +74,15 @@ def _width(text: str) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0; 1 when there is nothing to draw, or a file cannot be read or written."""
+    """0; 1 when there is nothing to draw, or the picture cannot be written; 66 when FILE is no
+    recording that can be read."""
     try:
         name = args.device or _only(args)
         timeline, words = _read(args, name)
         _write(args.output, _picture(args, timeline, words))
-    except (BagError, PlotError) as error:
+    except BagError as error:
+        return unreadable("plot", error)
+    except PlotError as error:
         complain("plot", error)
         return 1
     print(f"{args.output}: {timeline.kind} {timeline.device}, {len(timeline.lanes)} rows")

@@ -1,6 +1,7 @@
-"""What `explain` and `plot` share: reading a recording, or the part of it that is asked for."""
+"""What the commands that read a recording share: the part that is asked for, and how they refuse."""
 
 import argparse
+import os
 import re
 from collections import Counter, OrderedDict
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ from bridges.explain import noted
 from bridges.explain.noted import OWN_TOPICS
 from bridges.recording.bags import Keep, all_in
 from bridges.recording.heard import Heard, Own
-from bridges.recording.sources import Notes
+from bridges.recording.sources import BagError, Notes
 from bridges.rmf import topics
 
 CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[ T])?(\d\d?):(\d\d)(?::(\d\d(?:\.\d+)?))?")
@@ -50,6 +51,12 @@ class Span:
     from_: Time | None
     to: Time | None
     begins_at: float = float("-inf")
+
+
+def unreadable(command: str, error: BagError) -> int:
+    """Say why there is no recording to read, and give the exit code, 66 for every command."""
+    complain(command, error)
+    return os.EX_NOINPUT
 
 
 def add_span_arguments(parser: argparse.ArgumentParser) -> None:

@@ -10,11 +10,12 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
+from bridges.commands.recordings import unreadable
 from bridges.log import plain
 from bridges.recording.entries import Head
 from bridges.recording.files import opened
 from bridges.recording.replayed import Cores, Course, Difference, Replay, of_head
-from bridges.recording.sources import BagError, Notes
+from bridges.recording.sources import BagError, Notes, NotReplayable
 from bridges.recording.trees import Tree, UnknownValue, value
 from bridges.settings.load import SettingsError, load
 
@@ -35,13 +36,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: every decision is the same. 1: one is not. 65: it cannot be replayed. 78: a YAML is wrong."""
+    """0: every decision is the same. 1: one is not. 65: it cannot be replayed. 66: FILE is no recording
+    that can be read. 78: a YAML is wrong."""
     notes = Notes()
     try:
         head, entries = opened(args.file, notes)
         config = load(args.config) if args.config else of_head(head)
         if config.kind != head.kind:
-            raise BagError(f"{args.config} is of a {config.kind}, {args.file} of a {head.kind}")
+            raise NotReplayable(
+                f"{args.config} is of a {config.kind}, {args.file} of a {head.kind}"
+            )
         replay = Replay(entries, Cores(config))
         found = replay.changes() if args.config else replay.differences()
         differences = list(islice(found, MOST))
@@ -49,9 +53,11 @@ def run(args: argparse.Namespace) -> int:
         for problem in error.problems:
             print(problem, file=sys.stderr)
         return EX_CONFIG
-    except (BagError, UnknownValue) as error:
+    except (NotReplayable, UnknownValue) as error:
         print(error, file=sys.stderr)
         return EX_DATAERR
+    except BagError as error:
+        return unreadable("replay", error)
     return _told(args, head, replay.course, differences, notes)
 
 

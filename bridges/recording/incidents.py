@@ -11,7 +11,7 @@ from bridges.recording.entries import AnyEntry, Head
 from bridges.recording.incident import Note
 from bridges.recording.mcap_read import Damaged, records
 from bridges.recording.mcap_write import ENTRIES, HEAD, NOTES, String
-from bridges.recording.sources import BagError, Notes
+from bridges.recording.sources import BagError, Notes, NotReplayable
 from bridges.rmf import cdr
 
 NONE = "{} has no entries of an rmf-bridge daemon: only a recording that has them can be replayed"
@@ -27,7 +27,7 @@ def head_of(path: Path) -> Head:
         raise BagError(f"{path} cannot be read: {error.strerror}") from None
     except (Damaged, msgspec.MsgspecError, RecursionError) as error:
         raise BagError(f"{path}: {error}") from None
-    raise BagError(NONE.format(path))
+    raise NotReplayable(NONE.format(path))
 
 
 def entries_in(path: Path, notes: Notes) -> Iterator[AnyEntry]:

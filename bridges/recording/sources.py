@@ -19,6 +19,10 @@ class BagError(Exception):
     """The path holds no recording that can be read. The text says what to do."""
 
 
+class NotReplayable(BagError):
+    """It can be read, and nothing in it can be decided again."""
+
+
 @dataclass(slots=True)
 class Notes:
     """What was not given. `skipped`: messages by reason. `damage`: why the end is missing, if it is."""

@@ -95,22 +95,6 @@ def test_a_device_that_was_not_heard_is_exit_1(
     assert "(is it Lift1?)" in " ".join(capsys.readouterr().out.split())
 
 
-@pytest.mark.parametrize("command", [("explain",), ("plot", "-o", "x.svg")])
-@pytest.mark.parametrize(
-    "content", [b"", b"not a recording", b"\x89MCAP0\r\n", b"SQLite format 3\0"]
-)
-def test_a_file_that_is_no_recording_is_exit_1_and_a_sentence(
-    command: tuple[str, ...], content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "x.mcap"
-    file.write_bytes(content)
-    assert run(command[0], file, *command[1:]) == 1
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.startswith(f"rmf-bridge {command[0]}: ")
-    assert "Traceback" not in told.err
-
-
 def test_a_recording_that_was_cut_is_explained_as_far_as_it_goes(
     tmp_path: Path, heard: list[Heard], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -116,7 +116,7 @@ def test_a_recording_is_judged_from_a_time_to_a_time(
 def test_what_is_no_recording_and_a_file_that_cannot_be_written_are_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["judge", "lift", "Lift1", "--recording", __file__]) == 69
+    assert main(["judge", "lift", "Lift1", "--recording", __file__]) == 66
     bag = write(tmp_path / "bag", ride_that_outlives_its_end(), JAZZY)
     nowhere = str(tmp_path / "no" / "such" / "folder.xml")
     judge = ["judge", "lift", "Lift1", "--recording", str(bag), "--junit", nowhere]

@@ -117,7 +117,7 @@ def test_a_command_without_a_ring_or_a_recording_says_what_to_do(
     died = bridge("incident", lift, "--died", "--runtime-dir", str(none))
     nowhere = bridge("incident", lift, "-o", none / "a.mcap", "--runtime-dir", str(none))
     (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n")
-    no_entries = bridge("replay", tmp_path / "a.mcap")
+    no_head = bridge("replay", tmp_path / "a.mcap")
 
     assert (nothing.returncode, nothing.stdout) == (69, "")
     assert nothing.stderr == (
@@ -133,5 +133,5 @@ def test_a_command_without_a_ring_or_a_recording_says_what_to_do(
         "",
         f"{none}/a.mcap cannot be written: No such file or directory\n",
     )
-    assert no_entries.returncode == 65
-    assert "Traceback" not in nothing.stderr + no_entries.stderr
+    assert no_head.returncode == 66
+    assert "Traceback" not in nothing.stderr + no_head.stderr
