@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from bridges.commands.output import not_written
 from bridges.commands.sheets import text
 from bridges.commands.sheets.findings import Findings, findings, wrong
 from bridges.settings.across import Found, across
@@ -221,6 +222,5 @@ def _write_sheet(files: Sequence[Findings], path: str) -> int:
         with open(path, "w", encoding="utf-8") as sheet:
             sheet.write(page(files))
     except OSError as error:
-        _complain([f"{path} cannot be written: {error.strerror}"])
-        return os.EX_CANTCREAT
+        return not_written(path, error.strerror)
     return 0

@@ -1,20 +1,19 @@
 """`rmf-bridge incident FILE`: a recording of a daemon's last minutes, because a person wants one."""
 
 import argparse
-import errno
-import os
 import sys
 import time
 from datetime import datetime
 from pathlib import Path
 
+from bridges.commands.output import no_folder, not_written
 from bridges.recording.bags import INSTALL
 from bridges.recording.incident import AFTER_S, BEFORE_S, Incident, Note, part
 from bridges.recording.ring import DIED, NAME, Read, RingError
 from bridges.serve import directory as runtime
 from bridges.serve.clock import machine_s
 
-EX_UNAVAILABLE, EX_CANTCREAT = 69, 73
+EX_UNAVAILABLE = 69
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,8 +45,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"to write a recording, {error.name} is needed: {INSTALL}", file=sys.stderr)
         return EX_UNAVAILABLE
     path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
-    if why := _no_folder(path):  # before the wait
-        return _not_written(path, why)
+    if why := no_folder(path):  # before the wait
+        return not_written(path, why)
     try:
         places = runtime.find(args.file.absolute(), args.runtime_dir)
         follows = not args.died and runtime.holder(places) is not None
@@ -62,21 +61,9 @@ def run(args: argparse.Namespace) -> int:
     try:
         mcap_write.write(path, incident)
     except OSError as error:
-        return _not_written(path, error.strerror)
+        return not_written(path, error.strerror)
     print(f"{path}: {len(incident.entries)} entries")
     return 0
-
-
-def _no_folder(path: Path) -> str:
-    """Why nothing can be written there, as far as its folder shows; "" if it can."""
-    if not path.parent.is_dir():
-        return os.strerror(errno.ENOENT)
-    return "" if os.access(path.parent, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)
-
-
-def _not_written(path: Path, why: str | None) -> int:
-    print(f"{path} cannot be written: {why}", file=sys.stderr)
-    return EX_CANTCREAT
 
 
 def _hint(*, died: bool) -> str:

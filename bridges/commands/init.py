@@ -24,6 +24,7 @@ from bridges.commands.drafts.answers import (
     Level,
     Wiring,
 )
+from bridges.commands.output import no_folder, not_written
 from bridges.settings.building_map import BuildingMap, load_map
 from bridges.settings.load import understood
 from bridges.settings.nodes import SettingsError
@@ -142,8 +143,8 @@ def run(args: argparse.Namespace) -> int:
     """0; 64: answers are missing or do not go together; 66: the map; 73: the file is there already."""
     if os.path.lexists(args.file):  # before anything is asked
         return _there_already(args.file)
-    if not args.file.parent.is_dir():
-        return _not_written(args.file, f"{args.file.parent} is no folder")
+    if why := no_folder(args.file):
+        return not_written(args.file, why)
     try:
         given = answered(args, load_map(args.map) if args.map else None)
     except SettingsError as error:
@@ -163,11 +164,6 @@ def _there_already(file: Path) -> int:
     return EX_CANTCREAT
 
 
-def _not_written(file: Path, why: str | None) -> int:
-    print(f"{file} is not written: {why}", file=sys.stderr)
-    return EX_CANTCREAT
-
-
 def _written(file: Path, given: Given) -> int:
     """Write what `check` finds right."""
     try:
@@ -184,7 +180,7 @@ def _written(file: Path, given: Given) -> int:
     except FileExistsError:
         return _there_already(file)
     except OSError as error:
-        return _not_written(file, error.strerror)
+        return not_written(file, error.strerror)
     print(f"{file} is written. Compare it with the wires; then:")
     print(f"  rmf-bridge check {file}\n  rmf-bridge run {file} --simulate")
     return 0

@@ -224,7 +224,7 @@ def tell(found: Report, args: argparse.Namespace) -> int:
         try:
             args.junit.write_text(junit(found), "utf-8")
         except OSError as error:
-            complain("judge", f"{args.junit} is not written: {error.strerror or error}")
+            complain("judge", f"{args.junit} cannot be written: {error.strerror or error}")
             return os.EX_CANTCREAT
     width = shutil.get_terminal_size((WIDTH, 50)).columns if sys.stdout.isatty() else 10**6
     print(as_json(found) if args.json else text(found, width))

@@ -105,7 +105,7 @@ def test_a_folder_that_is_missing_is_told_before_a_question_is_asked(
 ) -> None:
     file = tmp_path / "none" / "device.yaml"
     assert cli.main(["init", str(file)]) == 73
-    assert capsys.readouterr().err == f"{file} is not written: {file.parent} is no folder\n"
+    assert capsys.readouterr().err == f"{file} cannot be written: No such file or directory\n"
 
 
 @pytest.mark.parametrize(

@@ -123,4 +123,4 @@ def test_what_is_no_recording_and_a_file_that_cannot_be_written_are_told(
     assert main(judge) == 73
     told = capsys.readouterr().err
     assert "is no recording" in told
-    assert f"{nowhere} is not written: No such file or directory" in told
+    assert f"{nowhere} cannot be written: No such file or directory" in told
