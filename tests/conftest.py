@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, settings
 from bridges.rmf.choose import missing_of_dds, missing_of_ros
 from hal_fakes.domain import domain_for_a_while
 from tests.depth import DEEP
+from tests.processes import end_with_us
 
 ON_WIRES = ("commands", "drivers", "hal_fakes", "page", "rmf", "serve", "site")
 """The folders whose tests have threads, processes and sockets. In the others time is virtual."""
@@ -41,6 +42,8 @@ signal.signal(
 gc.disable()
 atexit.register(gc.freeze)
 """No look for garbage while the tests are collected, which leaves none, nor when a worker ends."""
+
+end_with_us()
 
 _deselected: list[str] = []
 

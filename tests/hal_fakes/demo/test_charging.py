@@ -1,5 +1,6 @@
 """The charging demo itself: real processes on real DDS, and its verdict."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from hal_fakes.demo.charging import CHARGED, problems
 from hal_fakes.demo.journal import Journal
 from hal_fakes.wire import wire
 from tests.hal_fakes.demo.test_demo import PATIENTLY, directory
-from tests.processes import running
+from tests.processes import RUN, running
 
 __all__ = ["directory"]
 
@@ -20,7 +21,12 @@ __all__ = ["directory"]
 def demo(directory: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", "hal_fakes.demo", "charging", *PATIENTLY],
-        env={"TMPDIR": str(directory), "PATH": "/usr/bin:/bin", "TRANSPORT": wire()},
+        env={
+            "TMPDIR": str(directory),
+            "PATH": "/usr/bin:/bin",
+            "TRANSPORT": wire(),
+            RUN: os.environ[RUN],
+        },
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

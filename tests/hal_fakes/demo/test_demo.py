@@ -1,5 +1,6 @@
 """The demo itself: real processes on real DDS."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import pytest
 
 from hal_fakes.demo.daemons import Daemon, Wrong, stop_all
 from hal_fakes.wire import Wire, runs_here, wire
-from tests.processes import running
+from tests.processes import RUN, running
 from tests.waiting import PATIENCE_S, wait_until
 
 CONFIG = Path(__file__).parents[3] / "config"
@@ -23,7 +24,12 @@ PATIENTLY = ("--patience", "10")
 def demo(directory: Path, *options: str, on: Wire | None = None) -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen(
         [sys.executable, "-m", "hal_fakes.demo", *options],
-        env={"TMPDIR": str(directory), "PATH": "/usr/bin:/bin", "TRANSPORT": on or wire()},
+        env={
+            "TMPDIR": str(directory),
+            "PATH": "/usr/bin:/bin",
+            "TRANSPORT": on or wire(),
+            RUN: os.environ[RUN],
+        },
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
