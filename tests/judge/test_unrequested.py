@@ -1,9 +1,8 @@
 """A charge that nobody requested has an id that no request has: `unrequested/…`. It changes when its
 robot's request comes, and the station's next one has it again. No law takes either for a fault."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from bridges.judge.judge import Judge
 from bridges.judge.law import Verdict
