@@ -47,11 +47,11 @@ class Asked(Struct, frozen=True):
         (OSError("no such file"), "no such file"),
     ],
 )
-def test_a_value_is_said_in_words_without_python(value: object, text: str) -> None:
+def test_a_value_is_written_in_words_and_not_as_python(value: object, text: str) -> None:
     assert plain(value) == text
 
 
-def test_a_line_says_what_is_driven_as_a_person_would() -> None:
+def test_a_log_line_names_the_driven_outputs_as_a_person_would() -> None:
     outputs = LiftOutputs(agv_request=True, call="L3", hold_door=None)
     assert pairs("outputs", device="Lift1", outputs=outputs) == (
         'outputs device=Lift1 outputs="agv_request yes, call L3"'

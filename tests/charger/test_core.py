@@ -159,7 +159,7 @@ def test_a_request_that_does_not_charge_in_its_time_is_released_with_a_fault() -
     assert story.faults == ["START_TIMEOUT: tiny/AMR01 did not start to charge in time"]
 
 
-def test_a_start_timeout_of_zero_is_the_configured_one() -> None:
+def test_a_start_timeout_of_zero_means_the_configured_one() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("handshake 62")
     assert story.told[-1] == (61.0, "RELEASED", "req-1")
 

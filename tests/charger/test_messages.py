@@ -77,7 +77,7 @@ def test_a_name_of_256_letters_of_any_script_is_taken() -> None:
     assert asked(robot_name="充" * 256) == Requested("coordinator-7", "tiny", "充" * 256, 30.5)
 
 
-def test_a_charging_station_is_told_as_rmf_reads_it() -> None:
+def test_a_charging_station_is_reported_as_rmf_reads_it() -> None:
     shown = ChargerReport(
         read_at=1.0,
         state=ChargerStateValue.CHARGER_CHARGING,

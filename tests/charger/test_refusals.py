@@ -85,7 +85,7 @@ class Station:
         return [(m.state, m.request_id) for m in found]
 
 
-def test_who_asks_for_an_occupied_charger_is_told_who_has_it_and_the_state_stays_the_stations() -> (
+def test_a_robot_that_asks_for_an_occupied_charger_learns_who_has_it_and_the_state_is_unchanged() -> (
     None
 ):
     it = Station().hears().hears(FIRST).hears(SECOND).hears()

@@ -79,7 +79,9 @@ def test_the_rules_hold_within_some_steps_of_a_stage_at_a_verified_station(stage
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_from_every_state_a_sound_station_comes_back_and_charges_who_asks(site: str) -> None:
+def test_from_every_state_a_sound_station_comes_back_and_charges_the_robot_that_asks(
+    site: str,
+) -> None:
     limits = SITES[site]
     roots = [path(limits, *steps) for steps in STAGES.values()]
     for world in walker(limits).walk(roots, 1, check):

@@ -80,7 +80,9 @@ def test_a_robot_at_its_own_station_or_at_none_is_not_astray() -> None:
         assert found(site(at(ONE, place, 20.0), grants=EXPECTED), NEVER) == [[]]
 
 
-def test_who_was_charged_or_has_lost_its_station_is_not_astray_and_the_next_one_still_is() -> None:
+def test_a_robot_that_was_charged_or_has_lost_its_station_is_not_astray_and_the_next_still_is() -> (
+    None
+):
     two = Astray(TWO, A, 22.0, "r2", 2, expected=B)
     for first in (replace(EXPECTED[A], started=True), replace(EXPECTED[A], over=True)):
         grants = {A: first, B: Grant(TWO, "r2", 10.0, shown=True)}
@@ -143,7 +145,7 @@ def test_where_nobody_can_be_told_a_person_is_at_once(why: str) -> None:
     assert history(memory, 21.9, 22.0) == [(21.9, {}, False, False), (22.0, {}, False, True)]
 
 
-def test_the_core_wakes_for_every_step_of_it() -> None:
+def test_the_core_wakes_for_every_step_with_a_robot_astray() -> None:
     memory = site(at(ONE, AT[B], 20.0), grants=EXPECTED)
     dues = []
     for now in (21.0, 22.0, 37.0):
@@ -181,7 +183,7 @@ def test_nobody_blocks_where_nobody_waits_or_the_waiting_robot_itself_stands() -
     assert found(has_another, NEVER) == [[]]
 
 
-def test_who_waits_is_looked_for_among_all_wishes_and_their_pads_in_order() -> None:
+def test_waiting_robots_are_looked_for_among_all_wishes_and_their_pads_in_order() -> None:
     """THREE, which is first in the queue, has its station; ONE and TWO wait, and TWO stands on one."""
     memory = blocked(
         wishes=(Wish(THREE, "fleet"), Wish(TWO, "fleet"), Wish(ONE, "fleet")),
@@ -218,7 +220,9 @@ def test_an_old_position_blocks_nothing_now_and_the_core_still_wakes_for_it() ->
     assert found(memory, 89.9, 90.0, NEVER) == [[], [], [BLOCKS]]
 
 
-def test_who_blocks_is_told_once_then_a_person_is_and_it_is_forgotten_when_it_leaves() -> None:
+def test_a_blocking_robot_is_told_once_then_a_person_is_and_all_is_forgotten_when_it_leaves() -> (
+    None
+):
     memory, told = blocked(), {TWO: Nudge(A, 1, 90.0)}
     assert history(memory, 89.9, 90.0, 104.9, 105.0, 110.0) == [
         (89.9, {}, False, False),

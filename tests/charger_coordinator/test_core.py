@@ -125,7 +125,7 @@ def test_a_station_that_ends_a_charge_early_is_not_asked_again_until_the_battery
     assert site_.run(1) == [(34.0, "charger_a: AMR01")]
 
 
-def test_an_operators_robot_that_is_full_makes_room() -> None:
+def test_a_full_robot_that_an_operator_asked_for_makes_room() -> None:
     site_ = Alone()
     site_.hears(Wanted(ONE, "", "op-1", 0.0))
     site_.run(1)
@@ -193,9 +193,7 @@ def test_a_robot_that_is_charged_unasked_where_it_stands_has_that_station() -> N
 # ---- whose fault
 
 
-def test_an_error_of_neither_side_for_certain_counts_until_another_station_charges_the_robot() -> (
-    None
-):
+def test_an_error_of_an_unknown_side_counts_until_another_station_charges_the_robot() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
@@ -269,7 +267,7 @@ def test_a_failure_is_forgotten_when_its_station_names_itself_or_is_mended_witho
     assert site_.memory.strikes == left
 
 
-def test_a_strayed_robot_that_works_cannot_be_told_and_a_person_is_at_once() -> None:
+def test_a_strayed_robot_in_a_task_cannot_be_told_so_a_person_is_at_once() -> None:
     site_ = Alone()
     site_.hears(Wanted(ONE, "", "op-1", 0.0))
     site_.run(1)
@@ -321,7 +319,7 @@ def test_an_idle_robot_that_is_on_the_road_when_it_has_no_station_does_not_wait_
     assert site_.memory.wishes == ()
 
 
-def test_of_a_served_robot_the_mode_is_believed_again_when_it_has_left_or_stays_for_long() -> None:
+def test_a_served_robots_mode_is_believed_again_when_it_has_left_or_stays_long() -> None:
     for leaves, again_at in ((True, 9.0), (False, 304.0)):
         site_ = Alone()
         site_.wants(ONE, "charger_a", 95.0)

@@ -173,7 +173,7 @@ def test_a_file_that_would_lead_robots_astray_is_refused_where_it_is_wrong(
     assert problem in "\n".join(map(str, refused.value.problems))
 
 
-def test_a_charger_that_another_fleets_graph_alone_has_suits_no_robot_of_this_one(
+def test_a_charger_that_only_another_fleets_graph_has_suits_no_robot_of_this_fleet(
     tmp_path: Path,
 ) -> None:
     other = """    other:

@@ -125,6 +125,6 @@ def test_the_last_eight_requests_that_are_over_are_remembered() -> None:
     assert memory.without_wish(ONE) == Memory(over=tuple("bcdefghi"))
 
 
-def test_the_yamls_schedule_is_the_sites() -> None:
+def test_the_site_follows_the_yamls_schedule() -> None:
     night = Charging(at="22:00", until="05:00")
     assert Site.of(settings(schedule=[night])).schedule == (night,)

@@ -389,7 +389,7 @@ def test_4_a_robot_at_the_wrong_station_is_sent_to_its_own(finishing: Finishing)
 
 
 @EACH
-def test_4_where_nobody_reads_receivers_the_fleets_position_is_the_witness(
+def test_4_where_nobody_reads_receivers_the_fleets_position_tells_who_stands_there(
     finishing: Finishing,
 ) -> None:
     site = yard(finishing, knows=False)

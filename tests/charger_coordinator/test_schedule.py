@@ -60,20 +60,20 @@ def test_a_time_that_ends_when_it_begins_lasts_a_day() -> None:
         (["other"], ["tiny/AMR02"], [0.0, 80.0]),
     ],
 )
-def test_it_is_for_the_robots_and_fleets_that_it_names(
+def test_a_schedule_is_for_the_robots_and_fleets_that_it_names(
     fleets: list[str], robots: list[str], percents: list[float]
 ) -> None:
     one = Charging(at="00:00", until="00:00", fleets=fleets, robots=robots, percent=80.0)
     assert [target([one], who, at("12:00")) for who in (ONE, TWO)] == percents
 
 
-def test_of_several_the_highest_percent_counts_and_without_a_clock_none() -> None:
+def test_of_several_times_the_highest_percent_counts_and_without_a_clock_none_does() -> None:
     two = [Charging(at="08:00", until="20:00", percent=p) for p in (90.0, 95.0)]
     assert (target(two, ONE, at("12:00")), target(two, ONE, None)) == (95.0, 0.0)
     assert target(two, ONE, at("20:00")) == 0.0
 
 
-def test_its_text_names_time_days_robots_and_percent() -> None:
+def test_a_schedules_text_names_time_days_robots_and_percent() -> None:
     night = Charging(at="22:00", until="05:00", days=["mon", "tue"], fleets=["tiny"], percent=95)
     assert [night.text(when) for when in (None, at("22:00"), at("12:00"))] == [
         "22:00-05:00 mon tue tiny to 95 %",

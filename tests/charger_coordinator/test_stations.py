@@ -140,7 +140,7 @@ def test_a_station_that_is_not_reached_or_whose_pad_is_taken_keeps_the_request(e
 
 
 @pytest.mark.parametrize(("state", "started"), [(ASSIGNED, False), (CHARGING, True)])
-def test_a_charge_without_a_name_is_that_of_who_waits_and_stands_there_without_a_station(
+def test_an_unnamed_charge_is_that_of_a_robot_that_waits_there_without_a_station(
     state: int, started: bool
 ) -> None:
     robots = {who: at(who, "charger_a") for who in (ONE, TWO)}
@@ -210,7 +210,7 @@ def test_a_station_without_hope_is_to_let_the_robot_go_which_keeps_its_place(
     assert stations.in_time(memory, at_, SITE) == let_go
 
 
-def test_who_stays_away_is_given_up() -> None:
+def test_a_robot_that_stays_away_is_given_up() -> None:
     memory = site(stations={A: shows(ASSIGNED, heard=69.0)})
     assert stations.in_time(memory, 69.9, SITE) == memory
     assert stations.in_time(memory, 70.0, SITE) == replace(
@@ -273,7 +273,7 @@ def test_a_station_that_was_mended_after_the_robot_had_gone_was_at_fault_itself(
     assert after(memory, IDLE).strikes == ({} if acquitted else {ONE: (A,)})
 
 
-def test_who_has_been_charged_for_a_while_has_not_failed() -> None:
+def test_a_robot_that_has_been_charged_for_a_while_has_not_failed() -> None:
     charging = replace(GRANT, started=True)
     memory = site(grants={A: charging}, strikes={ONE: (B,), TWO: (B,)})
     seen = {A: shows(CHARGING, since=15.0), B: shows(CHARGING, since=0.0)}

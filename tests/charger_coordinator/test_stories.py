@@ -343,7 +343,7 @@ def dedicate(site: Yard, **places: str) -> Publisher[Any]:
     return schedule
 
 
-def test_beside_a_charging_schedule_the_stations_are_asked_that_it_dedicates() -> None:
+def test_beside_a_charging_schedule_the_stations_that_it_dedicates_are_asked() -> None:
     site = yard()
     schedule = dedicate(site, AMR01="dock_b", AMR02="wait_2")
     site.run(6.0)
@@ -475,7 +475,7 @@ def test_an_operators_request_is_withdrawn_by_its_id_and_its_repeats_start_nothi
     assert site.node.refused == {"request is over": 1}
 
 
-def test_a_request_sent_to_a_charger_directly_makes_that_robots_place() -> None:
+def test_a_request_sent_directly_to_a_charger_gives_that_robot_its_place() -> None:
     site = yard()
     request = d.ChargerRequest("charger_b", "tiny", "AMR02", d.Duration(60, 0), "somebody-1")
     site.rmf.publisher(topics.CHARGER_REQUESTS).publish(request)

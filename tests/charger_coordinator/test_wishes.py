@@ -97,13 +97,15 @@ def test_a_robot_stays_away_if_it_has_no_task_and_has_not_left_its_place_since_i
     assert wishes.stays_away(memory, A, CALLED, SITE) is stays
 
 
-def test_who_is_not_seen_or_wants_nothing_does_not_stay_away() -> None:
+def test_a_robot_that_is_not_seen_or_wants_nothing_does_not_stay_away() -> None:
     standing = Standing(seen(), 60.0)
     for memory in (Memory(wishes=(Wish(ONE, "fleet"),)), Memory(robots={ONE: standing})):
         assert wishes.stays_away(memory, A, CALLED, SITE) is False
 
 
-def test_who_did_not_come_loses_station_and_wish_and_is_not_called_for_ten_minutes() -> None:
+def test_a_robot_that_did_not_come_loses_station_and_wish_and_is_not_called_for_ten_minutes() -> (
+    None
+):
     memory = Memory(
         wishes=(Wish(TWO, "fleet"), Wish(ONE, "fleet")),
         grants={A: replace(CALLED, sent_at=60.0)},
@@ -266,7 +268,7 @@ def test_a_wish_begins_once_the_robot_has_stood_there_for_two_seconds() -> None:
         (seen("wait_2", 50.0, "t1", True), 9.0, 9.0),
     ],
 )
-def test_since_when_it_stands_there_and_does_the_same_is_remembered(
+def test_how_long_a_robot_has_stood_there_and_done_the_same_is_remembered(
     changed: Sighting, since: float, here_since: float
 ) -> None:
     memory = Memory(robots={ONE: Standing(seen("wait_1", 50.0, "t1", True), 8.0, 5.0, 4.0)})

@@ -36,7 +36,7 @@ def test_the_only_device_is_meant_and_of_several_the_one_that_is_named() -> None
         ("kind: door_supervisor\n", os.EX_USAGE, "a door_supervisor has no wires"),
     ],
 )
-def test_a_simulation_of_a_wrong_file_is_told_nothing(
+def test_a_simulation_of_a_wrong_file_gets_no_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, code: int, why: str
 ) -> None:
     file = tmp_path / "bad.yaml"

@@ -102,7 +102,7 @@ def test_the_installed_file_itself_is_enabled_again_without_a_copy(
 
 
 @pytest.mark.parametrize("command", ["enable", "disable"])
-def test_a_card_that_is_not_mounted_is_told_before_a_step(
+def test_a_card_that_is_not_mounted_is_reported_before_the_first_step(
     tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
     root = tmp_path / "card"

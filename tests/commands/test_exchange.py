@@ -226,7 +226,7 @@ def test_a_ride_that_fails_says_what_stands_in_its_way(state: d.LiftState, reaso
     assert ([*ran.hints, ran.outcome.text], ran.at) == (reason.splitlines(), 10.0)
 
 
-def test_what_a_person_can_do_about_it_is_said_within_seconds_and_not_only_at_the_end() -> None:
+def test_the_remedy_is_printed_within_seconds_and_not_only_at_the_end() -> None:
     held = replace(LIFT, session_id=OTHER, current_mode=2)
     ran = tell(RIDE, every_second(held), timeout_s=4.0)
     assert ran.hints == [
@@ -268,7 +268,7 @@ def test_a_graph_without_any_state_is_said_to_be_empty() -> None:
     )
 
 
-def test_who_waits_is_told_after_three_seconds_and_not_again_at_the_end() -> None:
+def test_a_waiting_user_is_informed_after_three_seconds_and_not_again_at_the_end() -> None:
     assert tell(RIDE, every_second(DOOR), timeout_s=2.9).hints == []
     ran = tell(RIDE, every_second(DOOR), timeout_s=3.5)
     assert (ran.hints, ran.outcome) == (
@@ -287,7 +287,7 @@ def test_a_name_of_another_kind_ends_the_wait_at_once(listeners: int) -> None:
     )
 
 
-def test_a_door_that_has_a_lifts_name_is_asked_all_the_same() -> None:
+def test_a_door_with_a_lifts_name_is_asked_all_the_same() -> None:
     request = DoorMove("Lift1", True, ME, direct=True)
     named = replace(DOOR, door_name="Lift1", current_mode=d.DoorMode(2))
     ran = tell(request, [*every_second(LIFT), *every_second(named)])
@@ -324,7 +324,7 @@ def test_end_of_a_given_session_is_sent_once_even_to_a_lift_that_does_not_show_i
     assert ran.outcome == Done("Lift1 is not held by fleet/robot: nothing to end")
 
 
-def test_the_end_of_a_session_that_has_not_the_lift_says_who_has_it() -> None:
+def test_ending_a_session_that_does_not_have_the_lift_says_who_has_it() -> None:
     ran = tell(LiftEnd("Lift1", OTHER, direct=True), every_second(GRANTED))
     assert [at for at, _ in ran.sent] == [0.5]
     assert ran.outcome == Done(
@@ -504,7 +504,7 @@ def test_a_robot_that_waits_is_said_to_wait_and_how_to_withdraw_it() -> None:
     assert (waits.hints, waits.outcome) == ([text], Failed("gave up after 5 s"))
 
 
-def test_a_charger_of_ones_own_choice_is_named_in_the_request() -> None:
+def test_a_chosen_charger_is_named_in_the_request() -> None:
     request = QueuedCharge("a", "fleet", "robot", "r1", 30)
     assert tell(request, []).sent[0][1] == d.ChargerRequest(
         "a", "fleet", "robot", d.Duration(30), "r1"

@@ -49,19 +49,21 @@ def test_a_recording_is_explained(bag: Path, capsys: pytest.CaptureFixture[str])
     assert told[2] == "fleet/blue waits for Lift1 at L1 since 08:00:08 (9.7 s)."
 
 
-def test_as_json(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_explain_prints_json_on_request(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("explain", bag, "Lift1", "--json") == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["asks"], told["next"][0]["who"]) == ("fleet/blue", "the robot")
     assert [field["met"] for field in told["fields"]] == [False, False, True]
 
 
-def test_until_a_time(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_explain_answers_for_the_time_of_to(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("explain", bag, "--to", "08:00:07") == 0
     assert "fleet/red waits for Lift1 at L2 since 08:00:06" in capsys.readouterr().out
 
 
-def test_the_story_from_a_time(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_explain_tells_the_story_from_the_time_of_from(
+    bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run("explain", bag, "--from", "+5") == 0
     told = capsys.readouterr().out
     assert "08:00:09.7  the door is open" in told
@@ -128,7 +130,7 @@ def test_a_wrong_command_line_is_exit_2(arguments: tuple[str, ...]) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["svg", "html", "png"])
-def test_a_ride_is_drawn_as(suffix: str, bag: Path, tmp_path: Path) -> None:
+def test_a_ride_is_drawn_in_each_format(suffix: str, bag: Path, tmp_path: Path) -> None:
     picture = tmp_path / f"ride.{suffix}"
     assert run("plot", bag, "--device", "Lift1", "-o", picture) == 0
     content = picture.read_bytes()

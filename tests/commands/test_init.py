@@ -92,7 +92,7 @@ def test_a_map_gives_the_only_lift_and_its_floors(tmp_path: Path) -> None:
     assert safe_load(file.read_text())["lifts"]["East"]["floors"] == ["Ground", "Ward 1"]
 
 
-def test_a_file_that_is_there_is_never_overwritten(tmp_path: Path) -> None:
+def test_an_existing_file_is_never_overwritten(tmp_path: Path) -> None:
     file = tmp_path / "device.yaml"
     file.write_text("mine")
     assert cli.main(["init", str(file), "--kind", "door", "--yes"]) == 73
@@ -100,7 +100,7 @@ def test_a_file_that_is_there_is_never_overwritten(tmp_path: Path) -> None:
     assert file.read_text() == "mine"
 
 
-def test_a_folder_that_is_missing_is_told_before_a_question_is_asked(
+def test_a_missing_folder_is_reported_before_any_question_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "none" / "device.yaml"
@@ -126,7 +126,7 @@ def test_a_folder_that_is_missing_is_told_before_a_question_is_asked(
         ("--kind door --name= --yes", "'' is no name for a door"),
     ],
 )
-def test_what_cannot_be_is_answered_and_nothing_is_written(
+def test_an_impossible_answer_is_reported_and_nothing_is_written(
     tmp_path: Path, words: str, answer: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "device.yaml"
@@ -135,7 +135,9 @@ def test_what_cannot_be_is_answered_and_nothing_is_written(
     assert not file.exists()
 
 
-def test_a_map_that_is_none_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_is_not_a_map_is_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     site = tmp_path / "site.yaml"
     site.write_text("a: 1\n")
     assert cli.main(["init", str(tmp_path / "x.yaml"), "--from", str(site), "--yes"]) == 66

@@ -55,7 +55,7 @@ def test_a_part_fails_and_is_mended(plant: LiftPlant, tmp_path: Path) -> None:
         (("press", "fire_alarm", "--device", "Lift2"), "no device 'Lift2'; there are Lift1"),
     ],
 )
-def test_what_is_not_there_is_answered_with_what_is(
+def test_an_unknown_name_is_answered_with_those_that_exist(
     plant: LiftPlant,
     tmp_path: Path,
     words: tuple[str, ...],
@@ -66,7 +66,7 @@ def test_what_is_not_there_is_answered_with_what_is(
     assert capsys.readouterr().err.startswith(answer)
 
 
-def test_what_was_done_is_said_and_stands_in_the_simulations_log(
+def test_each_press_and_failure_is_confirmed_and_is_in_the_simulations_log(
     plant: LiftPlant,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],

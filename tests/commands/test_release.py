@@ -108,9 +108,7 @@ def test_whether_a_robot_is_inside_is_read_from_the_lifts_own_diagnostics() -> N
     assert [(r.session_id, r.request_type) for r in asked] == [(ME, 0)]
 
 
-def test_without_a_supervisor_and_with_a_robot_that_may_be_inside_the_car_is_to_be_looked_into() -> (
-    None
-):
+def test_without_a_supervisor_a_person_must_look_into_a_car_that_may_hold_a_robot() -> None:
     _, hints, _ = told(RELEASE, [GRANTED] * 11, boarded="", listeners=0)
     assert hints == [
         "no lift supervisor runs in this domain: no node publishes lift_requests;"

@@ -119,7 +119,7 @@ def test_the_age_of_a_reading_counts_from_now_not_from_the_status_file(tmp_path:
         assert shown(seen(folder, age_s=0.9))[-1] == "  Lift1: mode AGV, floor L1; read 0.9 s ago"
 
 
-def test_outputs_that_nobody_has_verified_off_are_told_when_the_status_is_gone(
+def test_outputs_that_nobody_has_verified_off_are_reported_even_without_a_status(
     tmp_path: Path,
 ) -> None:
     with served(tmp_path / "lift_a", lift()) as folder:
@@ -136,7 +136,7 @@ def test_outputs_that_nobody_has_verified_off_are_told_when_the_status_is_gone(
     )
 
 
-def test_of_a_dead_simulation_nothing_is_to_be_switched_off(tmp_path: Path) -> None:
+def test_a_dead_simulation_has_nothing_to_switch_off(tmp_path: Path) -> None:
     with served(tmp_path / "lift_a", lift() | {"simulated": True}) as folder:
         pass
     (line,) = shown(seen(folder))
@@ -156,7 +156,7 @@ def test_a_unit_that_failed_is_shown_though_it_has_no_directory() -> None:
 
 
 @pytest.mark.parametrize("broken", ["", "{", "[1]", '{"devices": 1}'])
-def test_a_status_that_cannot_be_understood_is_none(tmp_path: Path, broken: str) -> None:
+def test_an_unreadable_status_counts_as_missing(tmp_path: Path, broken: str) -> None:
     with served(tmp_path / "lift_a", {}) as folder:
         (folder / "status.json").write_text(broken)
         assert [one.state for one in seen(folder)] == ["old"]
@@ -196,7 +196,7 @@ def test_the_page_of_faults_is_the_table_itself() -> None:
     assert (ROOT / "docs" / "faults.md").read_text() == faults.page()
 
 
-def test_a_name_that_nobody_has_is_answered_with_the_names_there_are(
+def test_an_unknown_name_is_answered_with_the_known_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))

@@ -76,7 +76,7 @@ def test_a_device_that_was_never_read_has_no_age_and_is_stale() -> None:
     assert (row.age, row.mark) == ("never read", "STALE")
 
 
-def test_a_device_that_is_heard_no_more_is_marked_silent_and_not_stale() -> None:
+def test_a_device_that_falls_silent_is_marked_silent_and_not_stale() -> None:
     (row,) = board(DOOR, at=100.0).rows(104.2, WALL + 4.2)
     assert (row.age, row.mark) == ("4.2 s", "SILENT 4 s")
 
@@ -97,7 +97,7 @@ def told(kind: str, name: str, *codes: str, node: str = "node") -> d.DiagnosticA
     return diagnosis(node, kind, {}, {name: status}, d.Time())
 
 
-def test_a_row_names_the_faults_that_its_daemon_and_its_supervisor_tell() -> None:
+def test_a_row_names_the_faults_that_its_daemon_and_its_supervisor_report() -> None:
     heard = board(
         LIFT,
         told("lift", "Lift1", "RMF_SILENT", "OVERLOAD"),
@@ -162,7 +162,7 @@ def test_what_a_narrow_terminal_would_cut_off_follows_on_a_line_of_its_own() -> 
     )
 
 
-def test_a_pipe_gets_a_line_for_a_change_and_none_for_an_age() -> None:
+def test_a_pipe_gets_a_line_for_each_change_and_none_for_an_age() -> None:
     opened = replace(DOOR, current_mode=d.DoorMode(2))
     first = board(DOOR, LIFT).rows(100.0, WALL)
     older = board(DOOR, LIFT).rows(102.0, WALL + 2)
@@ -234,7 +234,7 @@ def test_once_listens_for_three_seconds_unless_told_otherwise(
 
 
 @pytest.mark.parametrize("domain", ["-1", "233", "x", "1.5"])
-def test_a_domain_that_cannot_be_is_a_usage_error(domain: str) -> None:
+def test_an_impossible_domain_is_a_usage_error(domain: str) -> None:
     parser = argparse.ArgumentParser()
     watch.add_arguments(parser)
     with pytest.raises(SystemExit) as left:

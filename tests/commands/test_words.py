@@ -4,7 +4,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf import stamps, words
 
 
-def test_a_lift_state_says_where_the_car_is_and_goes_its_door_and_its_mode() -> None:
+def test_a_lift_state_says_where_the_car_is_and_where_it_goes_its_door_and_its_mode() -> None:
     state = d.LiftState(
         lift_name="Lift1",
         current_floor="L1",

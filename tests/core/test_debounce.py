@@ -33,12 +33,12 @@ def test_without_debounce_the_first_sample_counts() -> None:
     assert believed([(0.0, True), (0.0, False)], hold_s=0.0) == [True, False]
 
 
-def test_no_value_is_debounced_like_any_other() -> None:
+def test_the_absence_of_a_value_is_debounced_like_any_value() -> None:
     samples = [(0.0, None), (0.06, None), (0.1, "up"), (0.16, "up"), (0.2, None), (0.26, None)]
     assert believed(samples) == ["?", None, None, "up", "up", None]
 
 
-def test_it_says_when_the_value_that_is_seen_will_count() -> None:
+def test_the_debounce_says_when_the_value_now_seen_will_count() -> None:
     first = settle(None, 1, 10.0, HOLD_S)
     assert first.due_at(HOLD_S) == 10.0 + HOLD_S
     steady = settle(first, 1, 10.0 + HOLD_S, HOLD_S)
@@ -46,7 +46,7 @@ def test_it_says_when_the_value_that_is_seen_will_count() -> None:
     assert settle(steady, 2, 20.0, HOLD_S).due_at(HOLD_S) == 20.0 + HOLD_S
 
 
-def test_it_says_since_when_no_value_has_lasted() -> None:
+def test_the_debounce_says_since_when_no_value_has_lasted() -> None:
     seen = settle(None, 0, 0.0, HOLD_S)
     torn = []
     for i, value in enumerate([0, 0, 1, 0, 1, 1, 1]):

@@ -151,7 +151,7 @@ def test_a_requester_that_counts_by_its_repeats_is_remembered_from_then_on() -> 
     assert requester.requester.heard_at == 101.0
 
 
-def test_a_stamp_of_no_clock_is_refused_and_a_request_without_stamp_is_not() -> None:
+def test_an_impossible_stamp_is_refused_and_a_missing_one_is_not() -> None:
     assert [in_ns(Time(0, 0)), in_ns(Time(1, 999_999_999))] == [0, 1_999_999_999]
     for stamp, text in ((Time(-1, 0), "-1 s 0 ns"), (Time(0, 10**9), "0 s 1000000000 ns")):
         with pytest.raises(RequestRefused, match=f"^impossible request_time: {text}$"):

@@ -45,7 +45,7 @@ def fill(tmp_path: Path, arch: str) -> Path:
     return target
 
 
-def test_requirements_are_those_of_the_machine_that_is_meant(tmp_path: Path) -> None:
+def test_requirements_are_those_of_the_target_machine(tmp_path: Path) -> None:
     modules = sorted(file.stem for file in fill(tmp_path, "arm64").glob("*.py"))
     assert modules == ["first", "for_arm"]
 

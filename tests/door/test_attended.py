@@ -22,7 +22,7 @@ def test_by_default_a_door_stays_held_whoever_is_gone() -> None:
     assert door.faults == [(0.0, ())]
 
 
-def test_with_supervisor_lost_s_the_hold_ends_after_that_and_a_fault_says_why() -> None:
+def test_with_supervisor_lost_s_the_hold_ends_after_that_time_and_a_fault_says_why() -> None:
     door = held(supervisor_lost_s=60.0)
     door.run(200.0)
     assert [(round(at), on) for at, on in door.relay] == [(1, True), (80, False)]
@@ -52,7 +52,7 @@ def test_a_request_counts_as_a_sign_of_life_before_its_sender_is_seen_on_the_gra
     assert [(round(at), on) for at, on in door.relay][3:] == [(260, False)]
 
 
-def test_the_hold_does_not_end_onto_somebody_in_the_doorway() -> None:
+def test_the_hold_does_not_end_while_somebody_is_in_the_doorway() -> None:
     door = held(supervisor_lost_s=60.0)
     door.plant.press("obstruction", True, door.now)
     door.run(100.0)

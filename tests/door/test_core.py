@@ -450,7 +450,7 @@ def test_a_door_held_for_very_long_is_reported_and_stays_held() -> None:
     assert core.told[-1] == (0.0625, "OPEN", True)
 
 
-def test_an_older_reading_alone_is_no_news() -> None:
+def test_a_new_reading_that_says_the_same_is_not_news() -> None:
     core = CoreAlone()
     before, after = core.sees(OPEN, until=1.0).report, core.sees(OPEN, until=2.0).report
     assert (before.read_at, after.read_at) == (1.0, 2.0)

@@ -18,13 +18,13 @@ def request(mode: int, requester: str = "door_supervisor") -> DoorRequest:
     return DoorRequest(Time(7, 0), requester, "ward_door", DoorMode(mode))
 
 
-def test_open_and_closed_can_be_asked() -> None:
+def test_open_and_closed_can_be_requested() -> None:
     assert messages.accept(request(2), SETTINGS) == OpenRequested("door_supervisor")
     assert messages.accept(request(0), SETTINGS) == CloseRequested("door_supervisor")
 
 
 @pytest.mark.parametrize("mode", [1, 3, 4, 5, 7, 2**32 - 1])
-def test_no_other_mode_can_be_asked(mode: int) -> None:
+def test_no_other_mode_can_be_requested(mode: int) -> None:
     with pytest.raises(RequestRefused) as caught:
         messages.accept(request(mode), SETTINGS)
     assert (caught.value.kind, caught.value.detail) == (
@@ -33,7 +33,7 @@ def test_no_other_mode_can_be_asked(mode: int) -> None:
     )
 
 
-def test_a_requester_id_has_a_greatest_length() -> None:
+def test_a_requester_id_has_a_maximum_length() -> None:
     with pytest.raises(RequestRefused) as caught:
         messages.accept(DoorRequest(requester_id="x" * 257, door_name="ward_door"), SETTINGS)
     assert caught.value.kind == "impossible requester_id"

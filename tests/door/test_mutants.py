@@ -123,7 +123,7 @@ def test_a_failed_write_does_not_start_the_debounce_of_a_contact_again() -> None
     assert core.told[-1] == (1.0625, "OPEN", False)
 
 
-def test_the_reason_of_a_silence_is_its_own_and_not_that_of_an_earlier_failure() -> None:
+def test_a_silence_has_its_own_reason_and_not_that_of_an_earlier_failure() -> None:
     def silence_after(failure: Event) -> tuple[str, ...]:
         core = CoreAlone()
         core.sees(OPEN, until=1.0)
@@ -217,7 +217,7 @@ def test_the_core_wakes_when_a_door_that_was_not_read_for_a_while_is_estimated_c
     assert core.hears(Sampled(DoorSample())).wake_at == 8.0
 
 
-def test_a_door_has_been_held_too_long_in_the_instant_for_which_the_core_wakes() -> None:
+def test_a_door_counts_as_held_too_long_at_the_very_instant_for_which_the_core_wakes() -> None:
     core = CoreAlone(replace(limits(max_hold_s=0.5), debounce={}))
     core.hears(Sampled(OPEN))
     core.now = core.hears(OPENS).wake_at

@@ -89,7 +89,7 @@ def test_a_door_back_from_offline_is_opened_again_for_its_holder() -> None:
     assert desk.sent == [(0.0, "OPEN"), (20.25, "OPEN")]
 
 
-def test_open_is_repeated_for_5_s_because_the_first_may_be_lost_and_a_close_be_under_way() -> None:
+def test_open_is_repeated_for_5_s_as_the_first_may_be_lost_or_a_close_be_under_way() -> None:
     desk = Alone()
     desk.opens("b")
     desk.until(10.0)
@@ -115,7 +115,7 @@ def test_a_new_holders_open_is_sent_although_the_door_still_shows_open() -> None
     assert desk.sent == [(0.0, "OPEN"), (10.0, "CLOSED"), (10.1, "OPEN")]
 
 
-def test_requests_that_change_quickly_are_sent_at_10_hz_at_most_and_end_in_the_last() -> None:
+def test_quickly_changing_requests_are_sent_at_10_hz_at_most_and_the_last_one_always() -> None:
     desk = Alone()
     for hundredth in range(100):
         desk.until(hundredth / 100)

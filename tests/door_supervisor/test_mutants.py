@@ -19,12 +19,12 @@ def test_nothing_that_counts_is_refused() -> None:
     assert (desk.sent, desk.refused) == ([(0.0, "OPEN"), (0.5, "CLOSED")], [])
 
 
-def test_a_file_that_is_no_table_is_refused_by_what_it_should_be() -> None:
+def test_a_file_that_is_not_a_table_is_refused_with_what_it_should_be() -> None:
     with pytest.raises(ValueError, match=r"^not a table of who holds which door: "):
         keep.restore(b"[]", Settings(), 0.0)
 
 
-def test_a_repeat_is_of_the_same_visit_unless_it_comes_late() -> None:
+def test_a_repeat_belongs_to_the_same_visit_unless_it_comes_late() -> None:
     holder = Holder("fleet/a", since=1.0, asked_at=5.0, stamp=7, visit=3)
     late = 5.0 + VISIT_S
     assert holder.repeats(8, late) == replace(holder, asked_at=late, stamp=8)

@@ -67,7 +67,7 @@ class Graph:
         self.heard.append((round(self.now, 3), f"beat {' '.join(doors)}".strip()))
 
 
-def test_it_listens_for_the_quiet_start_then_speaks_and_beats_each_second() -> None:
+def test_it_listens_during_the_quiet_start_then_speaks_with_a_heartbeat_each_second() -> None:
     graph = Graph()
     graph.until(1.0)
     graph.asks("a", 2)
@@ -159,7 +159,7 @@ def test_nothing_is_published_before_it_is_on_disk() -> None:
     assert graph.heard[-1] == (4.1, "beat lab:b")
 
 
-def test_holders_of_made_up_doors_never_age_out_and_so_have_one_bound(
+def test_holders_of_made_up_doors_never_age_out_and_so_share_one_bound(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(graph_node, "MAX_REQUESTERS", 3)

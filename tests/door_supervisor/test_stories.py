@@ -138,7 +138,7 @@ def test_a_supervisor_and_a_door_daemon_that_restart_together_open_again_for_the
     assert site.door.door.told[-1][1] == "OPEN"
 
 
-def test_the_session_of_a_restarted_fleet_adapter_is_cleaned_by_the_next_heartbeat() -> None:
+def test_the_session_of_a_restarted_fleet_adapter_is_cleared_at_the_next_heartbeat() -> None:
     site = Site([(10.0, 60.0)])
     (a,) = site.walkers
     site.world.run(20.5)
@@ -168,7 +168,7 @@ def test_a_door_back_from_offline_with_an_open_session_is_opened_again() -> None
     assert [(round(at), what) for at, what in a.log[1:]] == [(32, "enters")]
 
 
-def test_a_door_that_lost_its_power_under_a_robot_is_opened_again_without_its_asking() -> None:
+def test_a_door_that_loses_power_over_a_robot_is_opened_again_without_being_asked() -> None:
     site = Site([(10.0, 60.0)])
     site.world.run(20.0)
     site.door.restart()
@@ -247,7 +247,7 @@ def test_each_door_has_its_own_table() -> None:
     assert asked == {(WARD, d.DoorModeValue.MODE_OPEN)}
 
 
-def test_a_door_that_is_heard_no_more_is_forgotten() -> None:
+def test_a_door_that_falls_silent_is_forgotten() -> None:
     site = Site()
     site.world.run(5.0)
     site.world.remove("ward")
@@ -287,12 +287,12 @@ def test_a_robot_in_the_doorway_keeps_its_door_when_the_door_and_our_supervisor_
     assert {word for at, word in site.words() if at >= 25.0} == {"OPEN"}
 
 
-def test_beside_a_rival_what_was_restored_waits_as_everything_does() -> None:
+def test_beside_a_rival_restored_holders_wait_like_everything_else() -> None:
     site = doorway(rival=True)
     assert {who for at, who, _ in to_door(site.world) if at >= 25.0} == {"rmf_supervisor"}
 
 
-def test_a_door_that_shows_closed_is_not_opened_by_what_was_restored() -> None:
+def test_a_door_that_shows_closed_is_not_opened_for_restored_holders() -> None:
     site = Site([(10.0, 60.0)])
     site.world.run(25.0)
     site.ours.leave()

@@ -150,16 +150,16 @@ def site(
     return Site(tmp_path, domain, *SITES[sort])
 
 
-def test_it_is_checked(site: Site, sort: str) -> None:
+def test_an_added_file_is_checked(site: Site, sort: str) -> None:
     assert site.check() == CHECKED[sort]
 
 
-def test_it_is_simulated(site: Site) -> None:
+def test_an_added_file_is_simulated(site: Site) -> None:
     told = site.served("--simulate")
     assert (told["simulated"], told["devices"]["ward_door"]["mode"]) == (True, "CLOSED")
 
 
-def test_it_is_run(site: Site) -> None:
+def test_an_added_file_is_run(site: Site) -> None:
     with site.far_side() as replace:
         site.point_at(replace)
         told = site.served()

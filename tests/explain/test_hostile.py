@@ -52,7 +52,7 @@ def test_a_flood_of_devices_is_bounded_and_the_first_ones_stay() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_names_that_control_a_terminal_are_shown_and_do_nothing(kind: str) -> None:
+def test_terminal_escapes_in_names_are_shown_and_have_no_effect(kind: str) -> None:
     site = Site()
     name = f"x{ESCAPE}" + "y" * 5000
     said: dict[str, tuple[d.Message, d.Message]] = {
@@ -80,14 +80,14 @@ def test_names_that_control_a_terminal_are_shown_and_do_nothing(kind: str) -> No
 
 
 @pytest.mark.parametrize("wall", [-1e18, -1.0, 0.0, 1e18, float("inf"), float("nan")])
-def test_any_clock_of_a_recording_is_told_somehow(wall: float) -> None:
+def test_no_clock_in_a_recording_keeps_it_from_being_explained(wall: float) -> None:
     site = Site()
     site.take(Heard(0.0, wall, "lift_states", STATE))
     site.take(Heard(1.0, wall, "lift_states", STATE))
     assert lines(site.explain("lift", "Lift1", None))[0].startswith("lift Lift1, heard from ")
 
 
-def test_a_clock_that_steps_bends_no_duration() -> None:
+def test_a_clock_that_steps_changes_no_duration() -> None:
     site = Site()
     for n in range(60):
         wall = WALL + n + (3600.0 if n >= 30 else 0.0)

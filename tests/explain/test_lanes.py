@@ -97,7 +97,7 @@ def test_a_session_lasts_until_a_state_shows_another() -> None:
     assert lane(drawn, "sessions").spans == (Span(0, 2, "red", "held"), Span(2, 3, "blue", "held"))
 
 
-def test_what_is_not_heard_any_more_is_not_known() -> None:
+def test_a_device_that_has_fallen_silent_is_shown_as_unknown() -> None:
     drawn = lanes([heard(0, STATE), heard(2, STATE), heard(60, STATE)], "lift", "Lift1")
     assert told(lane(drawn, "floors").spans) == [(0, 2, "L1"), (2, 60, "not heard")]
 
@@ -108,7 +108,7 @@ def test_a_silence_at_the_end_is_drawn_to_the_end() -> None:
     assert told(lane(drawn, "mode").spans) == [(0, 2, "AGV"), (2, 30, "not heard")]
 
 
-def test_requests_are_a_row_for_each_who_asks_and_one_for_the_supervisor() -> None:
+def test_requests_have_a_row_for_each_requester_and_one_for_the_supervisor() -> None:
     to_l2, end = replace(AGV, destination_floor="L2"), replace(AGV, request_type=0)
     said = [
         heard(0, to_l2, "adapter_lift_requests"),
@@ -185,7 +185,7 @@ def test_a_clock_that_is_stepped_moves_nothing_and_is_marked() -> None:
     assert drawn.steps == (Mark(1, "the clock was stepped by +3600 s", "wrong"),)
 
 
-def test_a_message_out_of_order_counts_as_of_now() -> None:
+def test_a_message_out_of_order_counts_as_if_it_came_now() -> None:
     said = [heard(5, STATE), heard(4, replace(STATE, current_floor="L2")), heard(6, STATE)]
     assert told(lane(lanes(said, "lift", "Lift1"), "floors").spans) == [(5, 6, "L2")]
 

@@ -44,7 +44,7 @@ def test_an_incident_says_what_its_daemon_refused_and_which_fault_it_has() -> No
     assert not told.notes
 
 
-def test_a_fault_that_is_noted_and_then_said_on_the_graph_is_told_once() -> None:
+def test_a_fault_that_is_noted_and_then_published_on_the_graph_is_shown_once() -> None:
     site = Site("Lift1")
 
     def state(at: float) -> Heard:
@@ -105,7 +105,7 @@ def test_notes_become_levels_when_they_change() -> None:
     "text",
     ["", "[", "[]", "7", '{"subject":7}', '{"outputs":{}}', "[" * 100_000, '{"subject":"a"}x'],
 )
-def test_a_text_of_another_shape_is_no_note(text: str) -> None:
+def test_a_text_of_another_shape_is_not_a_note(text: str) -> None:
     assert noted("outputs", text) is None
 
 

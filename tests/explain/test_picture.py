@@ -29,7 +29,7 @@ def hints(root: ElementTree.Element) -> list[str]:
     return [one.text or "" for one in root.iter(f"{NS}title")]
 
 
-def test_each_span_says_what_from_when_to_when() -> None:
+def test_each_span_says_what_it_shows_and_from_when_to_when() -> None:
     assert hints(drawn(SESSION, DOOR, FAULT)) == [
         "sessions: fleet/red, 08:00:00.0 to 08:00:30.0 (30 s)",
         "door: closed, 08:00:00.0 to 08:00:10.0 (10 s)",
@@ -98,11 +98,11 @@ def test_spans_too_narrow_to_be_seen_are_joined_and_what_is_wrong_shows() -> Non
     assert any(one.get("class") == "f-wrong" for one in boxes)
 
 
-def test_a_timeline_of_nothing_says_so() -> None:
+def test_an_empty_timeline_says_so() -> None:
     assert "Nothing of it was heard in this time." in texts(drawn())
 
 
-def test_what_was_left_out_is_said() -> None:
+def test_a_picture_says_what_was_left_out() -> None:
     root = drawn(Lane("floors", "", (Span(0, 9, "L1", "calm"),), (), left_out=12))
     assert "from 2027-01-15 08:00:00, 30 s, 12 older parts left out" in texts(root)
 

@@ -11,11 +11,11 @@ DRIVERS = [(kind, name) for kind in named.kind_names() for name in named.driver_
 
 
 @pytest.mark.parametrize(("kind", "driver"), DRIVERS)
-def test_a_driver_has_a_fake(kind: str, driver: str) -> None:
+def test_every_driver_has_a_fake(kind: str, driver: str) -> None:
     name = named.driver_called(kind, driver).fake or f"hal_fakes.plants.{kind}"
     assert isinstance(import_module(name).FAKE, Fake)
 
 
 @pytest.mark.parametrize("bus", named.bus_types())
-def test_a_bus_has_a_far_side(bus: str) -> None:
+def test_every_bus_has_a_far_side(bus: str) -> None:
     assert isinstance(import_module(named.bus_called(bus).fake).FAKE, Inside | Outside)

@@ -58,7 +58,7 @@ def test_it_charges_while_it_is_fed_and_stops_three_periods_after_the_last_frame
     assert bench.enabled() == [True, False]
 
 
-def test_a_machine_that_holds_it_up_for_a_while_does_not_make_it_stop() -> None:
+def test_a_short_delay_by_a_busy_machine_does_not_make_it_stop() -> None:
     bench = Bench()
     bench.passes(5.0, fed=True)
     bench.far.now += 10.0

@@ -113,7 +113,7 @@ def test_a_recording_is_judged_from_a_time_to_a_time(
     assert main([*judge, "--from", "+100"]) == 69
 
 
-def test_what_is_no_recording_and_a_file_that_cannot_be_written_are_told(
+def test_a_file_that_is_not_a_recording_or_cannot_be_written_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["judge", "lift", "Lift1", "--recording", __file__]) == 66

@@ -160,7 +160,9 @@ SHARED: list[tuple[str, Story, float, float]] = [
 
 
 @pytest.mark.parametrize(("law", "story", "right", "wrong"), SHARED)
-def test_the_limits_that_all_kinds_have(law: str, story: Story, right: float, wrong: float) -> None:
+def test_a_shared_law_is_broken_just_beyond_its_limit_and_not_before(
+    law: str, story: Story, right: float, wrong: float
+) -> None:
     assert [is_broken("door", law, story(x)) for x in (right, wrong)] == [False, True]
 
 
@@ -309,7 +311,9 @@ LIFT: list[tuple[str, Story, float, float]] = [
 
 
 @pytest.mark.parametrize(("law", "story", "right", "wrong"), LIFT)
-def test_the_limits_of_a_lifts_laws(law: str, story: Story, right: float, wrong: float) -> None:
+def test_a_lifts_law_is_broken_just_beyond_its_limit_and_not_before(
+    law: str, story: Story, right: float, wrong: float
+) -> None:
     assert [is_broken("lift", law, story(x)) for x in (right, wrong)] == [False, True]
 
 
@@ -403,7 +407,9 @@ DOOR: list[tuple[str, Story, float, float]] = [
 
 
 @pytest.mark.parametrize(("law", "story", "right", "wrong"), DOOR)
-def test_the_limits_of_a_doors_laws(law: str, story: Story, right: float, wrong: float) -> None:
+def test_a_doors_law_is_broken_just_beyond_its_limit_and_not_before(
+    law: str, story: Story, right: float, wrong: float
+) -> None:
     assert [is_broken("door", law, story(x)) for x in (right, wrong)] == [False, True]
 
 
@@ -445,5 +451,7 @@ CHARGER: list[tuple[str, Story, float, float]] = [
 
 
 @pytest.mark.parametrize(("law", "story", "right", "wrong"), CHARGER)
-def test_the_limits_of_a_chargers_laws(law: str, story: Story, right: float, wrong: float) -> None:
+def test_a_chargers_law_is_broken_just_beyond_its_limit_and_not_before(
+    law: str, story: Story, right: float, wrong: float
+) -> None:
     assert [is_broken("charger", law, story(x)) for x in (right, wrong)] == [False, True]

@@ -130,7 +130,7 @@ def test_our_own_daemons_keep_every_law(
 
 
 @pytest.mark.long(14)
-def test_a_volatile_fire_alarm_is_told_by_who_matches(speaks: Wire, domain: int) -> None:
+def test_a_volatile_fire_alarm_is_found_by_its_qos(speaks: Wire, domain: int) -> None:
     watch = ["judge", "lift", "Lift1", "--for", "6", "--json", "--localhost"]
     with (
         served(FireIsVolatile(), speaks, domain),
@@ -168,7 +168,9 @@ def test_a_node_that_answers_each_request_floods_nobody(speaks: Wire, domain: in
         assert len(asked) < 2000
 
 
-def test_others_who_speak_are_named_with_what_to_say(speaks: Wire, domain: int) -> None:
+def test_other_speakers_are_named_with_the_option_that_permits_them(
+    speaks: Wire, domain: int
+) -> None:
     ride = ["judge", "lift", "Lift1", "--active", "--ride", "L1", "L3", "--json", "--localhost"]
     node = open_transport(Rmf(transport=speaks, domain_id=domain), "supervisor", localhost=True)
     node.publisher(topics.LIFT_REQUESTS)

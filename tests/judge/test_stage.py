@@ -118,7 +118,7 @@ def test_an_interrupted_play_lets_the_device_go(
     assert stage.done
 
 
-def test_a_ride_that_another_takes_ends_with_our_end_alone() -> None:
+def test_a_ride_that_another_robot_takes_ends_with_our_own_end_only() -> None:
     """The supervisor of our play has been overruled: the lift goes to somebody else."""
     world = World()
     said = said_by_the_judge(world)
@@ -185,7 +185,7 @@ def test_names_of_the_network_are_shown_on_one_line_and_never_as_they_are() -> N
 
 
 @pytest.mark.parametrize("name", ["Lift1", "\x1b[31m<Lift>"])
-def test_nothing_heard_says_what_was_heard_instead(name: str) -> None:
+def test_a_device_that_was_not_heard_is_reported_with_what_was_heard_instead(name: str) -> None:
     judge = Judge("lift", name)
     judge.hear(Heard(0.0, EPOCH, "lift_states", replace(STATE, lift_name="Lift\n2")))
     found = report(judge, judge.end(3.0, EPOCH + 3.0), 3.0)
@@ -199,21 +199,21 @@ def test_a_clock_that_steps_an_hour_back_and_forth_accuses_nobody() -> None:
     assert not judged(*states, step_s=1.0).broken
 
 
-def test_two_nodes_with_clocks_of_their_own_are_told_by_their_stamps() -> None:
+def test_two_nodes_with_different_clocks_are_found_by_their_stamps() -> None:
     states = [replace(STATE, lift_time=stamp(EPOCH + n / 2 + 60.0 * (n % 2))) for n in range(20)]
     judge = judged(*states)
     found = {j.law.id for j in judge.verdicts() if j.verdict is Verdict.BROKEN}
     assert found == {"B0.one"}
 
 
-def test_a_node_that_dies_in_the_middle_is_found_silent_and_of_nothing_else() -> None:
+def test_a_node_that_dies_in_the_middle_is_accused_of_silence_and_nothing_else() -> None:
     judge = judged(STATE, lift("fleet/red", "L1"), replace(STATE, session_id="fleet/red"))
     found = {j.law.id: j for j in judge.end(30.0, EPOCH + 30.0) if j.verdict is Verdict.BROKEN}
     assert list(found) == ["L2.rate"]
     assert found["L2.rate"].evidence[0].text == "silent since then: 29.0 s"
 
 
-def test_a_node_that_comes_back_from_the_dead_has_forgotten_its_session_with_right() -> None:
+def test_a_node_that_comes_back_after_a_silence_may_have_forgotten_its_session() -> None:
     held = replace(STATE, session_id="fleet/red", lift_time=stamp(EPOCH + 1))
     judge = judged(STATE, lift("fleet/red", "L1"), held)
     back = replace(STATE, lift_time=stamp(EPOCH + 40))

@@ -87,14 +87,14 @@ def ride(broken: str, mode: FailureMode, broken_at: float) -> WiredStory:
 
 
 @pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 3))
-def test_no_part_broken_before_the_ride_shows_an_open_door_that_is_closed(
+def test_no_part_broken_before_the_ride_shows_a_closed_door_as_open(
     broken: str, mode: FailureMode
 ) -> None:
     ride(broken, mode, broken_at=1.0)
 
 
 @pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 3, 1))
-def test_no_part_that_breaks_on_the_way_shows_an_open_door_that_is_closed(
+def test_no_part_that_breaks_on_the_way_shows_a_closed_door_as_open(
     broken: str, mode: FailureMode
 ) -> None:
     ride(broken, mode, broken_at=3.0)

@@ -172,7 +172,7 @@ def test_the_fault_names_the_robot_that_the_supervisor_asks_for_and_not_its_sile
     assert lift.story.outputs.hold_door is not None
 
 
-def test_the_other_robots_end_is_the_end_of_it() -> None:
+def test_the_other_robots_end_ends_the_fault() -> None:
     lift = Overheard()
     lift.story.asks(B, "L1")
     lift.story.run(lift.story.now + 4.0)
@@ -183,7 +183,7 @@ def test_the_other_robots_end_is_the_end_of_it() -> None:
     assert ons(lift.story, "call") == 1
 
 
-def test_the_end_of_a_third_robot_is_not_and_before_anything_is_forgotten_no_end_is() -> None:
+def test_neither_a_third_robots_end_nor_an_earlier_end_ends_the_fault() -> None:
     lift = Overheard()
     lift.story.ends(B)
     assert (lift.story.faults, sessions(lift.story)) == ([], ["", A])

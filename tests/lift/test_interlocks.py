@@ -64,7 +64,7 @@ def test_no_call_and_no_door_command_while_the_agv_relay_has_to_rest() -> None:
     assert driven(Relays(), wishes, limits()) == ["A", "", "", "A L1"]
 
 
-def test_a_relay_switches_on_at_most_so_many_times_a_minute() -> None:
+def test_a_relay_switches_on_no_more_often_than_max_cycles_per_min() -> None:
     on, off = LiftOutputs(agv_request=True), LiftOutputs()
     wishes = [(float(i), (on, off)[i % 2]) for i in range(12)]
     rules = limits(max_cycles_per_min=3)
@@ -186,7 +186,7 @@ def test_a_pulse_lasts_its_whole_width(pulse_s: float) -> None:
     assert round(off - on, 2) == pulse_s
 
 
-def test_a_cycle_counts_for_a_minute_to_the_instant() -> None:
+def test_a_relay_cycle_counts_for_exactly_a_minute() -> None:
     once = Channel[str](ons=(0.0, 30.0))
     assert [once.recent(now) for now in (59.9, 60.0, 89.9, 90.0)] == [
         (0.0, 30.0),

@@ -149,7 +149,7 @@ def test_an_event_that_is_not_a_request_is_not_refused(event: Any) -> None:
     assert Alone()(0.0, AT_L1, event).decision.refused == ""
 
 
-def test_a_reading_no_longer_counts_in_the_instant_in_which_it_is_too_old() -> None:
+def test_a_reading_no_longer_counts_at_the_very_instant_at_which_it_is_too_old() -> None:
     burning = replace(AT_L1, door=Door.BOTH, hazards=frozenset({Hazard.EMERGENCY}))
     alone = Alone(stale_after_s=2.0)(0.0, burning)(2.0, IoFailed("timeout"))
     assert alone.faults == (Fault("INPUTS_NOT_FRESH", "timeout"),)
@@ -168,7 +168,7 @@ def test_each_input_has_its_own_debounce_and_the_core_wakes_when_it_is_over() ->
         assert alone.decision.wake_at == 1.0 + due_s
 
 
-def test_a_hazard_that_goes_wakes_the_core_when_it_is_gone() -> None:
+def test_a_hazard_that_clears_wakes_the_core() -> None:
     burning = replace(AT_L1, hazards=frozenset({Hazard.EMERGENCY}))
     alone = Alone(hazard_clear_s=0.7)(0.0, burning)(0.5, AT_L1)
     assert alone.decision.wake_at == 0.5 + 0.7
@@ -367,7 +367,7 @@ def test_a_car_that_a_call_has_brought_is_not_called_again_because_its_floor_is_
     ]
 
 
-def test_a_car_that_stands_there_is_called_again_when_agv_mode_has_ended_without_us() -> None:
+def test_a_car_at_its_destination_is_called_again_when_agv_mode_has_ended_by_itself() -> None:
     """With `by_call`: an overload has ended the call, and the floor was not seen, so nothing was on."""
     alone = Alone(by_call=True)
     below, gone = replace(CLOSED, level="L2"), replace(CLOSED, level=None)

@@ -44,7 +44,9 @@ def test_a_handover_warns_only_that_the_other_one_asked_too_early(
     assert set(rmf.story.node.refused) == {"released a moment ago"}
 
 
-def test_an_end_without_a_session_is_nothing_at_all(caplog: pytest.LogCaptureFixture) -> None:
+def test_an_end_without_a_session_is_ignored_and_not_logged(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     a = Robot(A, jazzy=True)
     rmf = World(Story(Controller()), a)
     rmf.supervisor = LiftSupervisor(jazzy=True)
@@ -55,7 +57,7 @@ def test_an_end_without_a_session_is_nothing_at_all(caplog: pytest.LogCaptureFix
     assert (warnings(caplog), rmf.story.node.refused) == ([], {})
 
 
-def test_such_an_end_does_not_touch_a_session_either() -> None:
+def test_an_end_without_a_session_leaves_a_held_session_alone() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks(A, "L2")

@@ -110,7 +110,7 @@ def test_a_floor_that_only_the_supervisor_asks_for_counts_after_a_while() -> Non
     assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
 
 
-def test_a_doubt_lasts_three_seconds_to_the_instant() -> None:
+def test_a_doubt_lasts_exactly_three_seconds() -> None:
     doubted = Doubted("L4", 10.0)
     session = Session(A, True, "L2", 0.0, doubted=doubted)
     request = Requested(A, True, "L4")

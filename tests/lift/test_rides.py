@@ -174,7 +174,7 @@ def test_a_floor_that_is_not_served_is_refused_and_the_session_goes_on_as_it_was
     assert story.node.refused == {"floor not served": 2}
 
 
-def test_human_mode_asked_by_the_holder_gives_the_lift_to_the_public_and_keeps_the_session() -> (
+def test_human_mode_requested_by_the_holder_gives_the_lift_to_the_public_and_keeps_the_session() -> (
     None
 ):
     story = Story(Controller())
@@ -193,7 +193,7 @@ def test_human_mode_asked_by_the_holder_gives_the_lift_to_the_public_and_keeps_t
     assert story.faults == []
 
 
-def test_human_mode_asked_by_a_stranger_is_a_session_without_outputs() -> None:
+def test_human_mode_requested_by_a_stranger_is_a_session_without_outputs() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("rmf-web", "L1", HUMAN)
@@ -383,7 +383,7 @@ def test_without_a_session_either_open_door_is_shown() -> None:
         (LiftRequest("Lift1", Time(), "A", 2, "", 2), "floor not served"),
     ],
 )
-def test_a_request_that_cannot_be_asked_is_refused_by_name(
+def test_an_impossible_request_to_a_lift_is_refused_by_name(
     request_: LiftRequest, kind: str
 ) -> None:
     with pytest.raises(RequestRefused) as refused:

@@ -227,7 +227,7 @@ def test_a_fast_car_may_skip_the_code_of_a_floor_that_it_has_had_time_to_pass() 
     assert (story.faults, story.state) == ([], "AGV, closed at L3, A to L1")
 
 
-def test_lines_that_mean_something_in_agv_mode_only_are_believed_in_agv_mode() -> None:
+def test_lines_that_have_a_meaning_only_in_agv_mode_are_believed_there() -> None:
     building = Building(LiftSample(None, Door.BETWEEN, motion=None, agv=False))
     story = Story(building)
     story.run(1.0)

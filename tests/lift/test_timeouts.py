@@ -260,7 +260,7 @@ def test_inputs_are_believed_though_outputs_cannot_be_written() -> None:
 
 
 @pytest.mark.parametrize("step_s", [3600.0, -3600.0])
-def test_a_jump_of_the_wall_clock_moves_no_timeout_and_bends_no_age(step_s: float) -> None:
+def test_a_jump_of_the_wall_clock_changes_neither_timeouts_nor_ages(step_s: float) -> None:
     straight, jumped = (
         lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0),
         lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0),

@@ -60,9 +60,7 @@ def test_a_state_that_shows_the_request_causes_no_repeat(match: StateHeard) -> N
     assert desk.sent == [(0.0, "AGV a L3")]
 
 
-def test_a_repeat_of_the_holders_is_passed_on_at_1_hz_so_that_the_node_hears_that_rmf_lives() -> (
-    None
-):
+def test_the_holders_repeats_are_passed_on_at_1_hz_so_that_the_node_hears_that_rmf_lives() -> None:
     desk = Alone()
     for tenth in range(25):
         desk.until(tenth / 10)
@@ -100,14 +98,14 @@ def test_a_floor_that_the_lift_does_not_serve_blocks_nobody_else() -> None:
     assert desk.refused == [(0.0, "floor not served")]
 
 
-def test_human_mode_needs_no_floor_that_is_served() -> None:
+def test_human_mode_needs_no_served_floor() -> None:
     desk = Alone()
     desk.shows("", floors=("L1", "L3"))
     desk.asks("web", "", kind=2)
     assert desk.sent == [(0.0, "HUMAN web")]
 
 
-def test_a_holder_that_asks_for_an_unserved_floor_keeps_what_it_asked_before_and_is_alive() -> None:
+def test_a_holder_that_asks_for_an_unserved_floor_keeps_its_request_and_counts_as_alive() -> None:
     desk = Alone(Limits(holder_alarm_s=20.0))
     desk.asks("a")
     for second in range(1, 30):
@@ -340,7 +338,7 @@ def test_a_robot_that_ends_while_it_waits_leaves_the_queue() -> None:
     assert desk.sent == [(0.0, "AGV a L3")]
 
 
-def test_a_queue_has_a_greatest_length() -> None:
+def test_a_queue_has_a_maximum_length() -> None:
     desk = Alone()
     for number in range(core.MAX_CLAIMS + 1):
         desk.asks(f"robot {number}")

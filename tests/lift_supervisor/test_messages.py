@@ -19,13 +19,13 @@ def test_an_adapters_request_is_what_it_asks_with_its_stamp_and_age() -> None:
     assert messages.accept_request(AGV, ANY, 101.0) == asked
 
 
-def test_human_mode_may_be_asked_without_a_floor() -> None:
+def test_human_mode_may_be_requested_without_a_floor() -> None:
     human = replace(AGV, request_type=2, destination_floor="", door_state=0)
     asked = Requested("fleet/a", Target(2, "", 0), 100.5, -0.5)
     assert messages.accept_request(human, ANY, 100.0) == asked
 
 
-def test_an_end_is_taken_as_fleet_adapters_send_it_and_whatever_else_it_says() -> None:
+def test_an_end_is_accepted_as_fleet_adapters_send_it_whatever_its_other_fields_say() -> None:
     bare = LiftRequest("Lift1", Time(100, 0), "fleet/a")
     odd = replace(bare, destination_floor="nowhere", door_state=77)
     ended = Ended("fleet/a", 100.0, 1.0)
@@ -49,7 +49,7 @@ def test_an_end_is_taken_as_fleet_adapters_send_it_and_whatever_else_it_says() -
         ({"request_time": Time(1, 10**9)}, "impossible request_time"),
     ],
 )
-def test_what_cannot_be_asked_is_refused_by_name(changes: dict[str, object], kind: str) -> None:
+def test_an_impossible_request_is_refused_by_name(changes: dict[str, object], kind: str) -> None:
     wrong = replace(AGV, **changes)
     with pytest.raises(RequestRefused) as refusal:
         messages.accept_request(wrong, Settings(lifts=["Lift1"]), 101.0)
@@ -90,7 +90,7 @@ def test_a_message_is_about_its_lift_and_is_stamped_when_it_is_sent() -> None:
     assert messages.stamped(AGV, Time(7, 8)) == replace(AGV, request_time=Time(7, 8))
 
 
-def test_the_summary_is_a_line_for_people() -> None:
+def test_the_summary_is_one_line_for_people() -> None:
     assert messages.summary(SupervisorReport(None), 50.0) == {
         "session": "-",
         "holder": "-",

@@ -136,7 +136,7 @@ def test_each_alarm_says_which_session_it_is_about() -> None:
     )
 
 
-def test_a_request_may_be_as_old_as_we_have_been_up_unless_the_clocks_agree() -> None:
+def test_a_request_may_be_as_old_as_our_uptime_or_as_the_yaml_says_if_clocks_agree() -> None:
     memory = Memory("Lift1", started_at=100.0)
     assert memory.rules(130.0, Limits()) == Rules(30.0, future_s=FUTURE_S)
     speaks = Memory("Lift1", started_at=100.0, may_speak=True)
@@ -145,13 +145,13 @@ def test_a_request_may_be_as_old_as_we_have_been_up_unless_the_clocks_agree() ->
     assert memory.rules(130.0, agreed) == Rules(7.0, known_clocks=False)
 
 
-def test_states_flow_for_three_seconds_after_the_last_to_the_instant() -> None:
+def test_states_count_as_flowing_until_exactly_three_seconds_after_the_last() -> None:
     state = StateHeard("", "L1", "", 0, 2)
     memory = Memory("Lift1", 0.0, shown=state, shown_at=10.0)
     assert [memory.flows(now) for now in (13.0, 13.1)] == [True, False]
 
 
-def test_the_limits_are_the_yamls() -> None:
+def test_the_limits_come_from_the_yaml() -> None:
     settings = Settings(
         silent_after_s=11.0,
         quiet_start_s=4.0,

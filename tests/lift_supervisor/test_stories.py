@@ -136,7 +136,7 @@ def test_robots_that_wait_move_no_relay() -> None:
     assert edges(B, C) == edges()
 
 
-def test_a_queue_is_served_in_order_and_who_falls_silent_in_it_is_passed_over() -> None:
+def test_a_queue_is_served_in_order_and_a_robot_that_falls_silent_in_it_is_skipped() -> None:
     world = World()
     OurSupervisor(world)
     LiftNode(world)
@@ -218,7 +218,7 @@ def test_a_hundred_old_requests_of_many_sessions_move_nothing_at_a_restart() -> 
     assert robot.done
 
 
-def test_an_adapter_that_restarts_gives_back_a_lift_that_it_knows_nothing_of() -> None:
+def test_an_adapter_that_restarts_releases_a_lift_that_it_knows_nothing_of() -> None:
     world = World()
     OurSupervisor(world)
     LiftNode(world)

@@ -13,7 +13,7 @@ def stored() -> str:
     return access.hashed("correct horse")
 
 
-def test_a_password_matches_its_own_hash_alone(stored: str) -> None:
+def test_a_password_matches_its_own_hash_only(stored: str) -> None:
     assert access.matches("correct horse", stored)
     assert not access.matches("Correct horse", stored)
     assert "correct" not in stored
@@ -23,7 +23,7 @@ def test_a_password_matches_its_own_hash_alone(stored: str) -> None:
     "text",
     ["", "secret", "scrypt$1$2$3$x$y", "scrypt$1048576$8$1$AAAA$AAAA", "md5$1$8$1$AA==$AA=="],
 )
-def test_what_is_no_hash_of_ours_is_refused_and_costs_nothing(text: str) -> None:
+def test_a_hash_that_is_not_ours_is_refused_without_computing_anything(text: str) -> None:
     with pytest.raises(PasswordError):
         access.matches("x", text)
 
@@ -40,7 +40,9 @@ def test_a_user_is_added_to_a_file_that_nobody_else_can_read(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(("user", "password"), [("a:b", "long enough"), ("ann", "short")])
-def test_a_user_that_cannot_be_is_not_added(tmp_path: Path, user: str, password: str) -> None:
+def test_an_impossible_user_or_a_short_password_is_not_added(
+    tmp_path: Path, user: str, password: str
+) -> None:
     with pytest.raises(PasswordError):
         access.add_user(tmp_path / "passwords", user, password)
     assert not (tmp_path / "passwords").exists()
@@ -83,7 +85,7 @@ def test_ten_thousand_addresses_are_not_all_remembered() -> None:
     assert len(tries._failed_at) == access.MOST_ADDRESSES
 
 
-def test_a_session_ends_after_an_hour_of_nothing_or_a_shift_or_a_logout() -> None:
+def test_a_session_ends_after_an_idle_hour_or_twelve_hours_or_a_logout() -> None:
     sessions = Sessions()
     idle, shift, out = (sessions.begin(user, 0.0) for user in ("ann", "bob", "eve"))
     sessions.end(out)

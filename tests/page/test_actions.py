@@ -26,7 +26,7 @@ def test_a_held_lift_can_be_released_whatever_it_and_its_holder_are_called(name:
     assert (found["domain_id"], found["config"], found["localhost"]) == (7, None, True)
 
 
-def test_a_lift_that_nobody_holds_and_a_door_have_nothing_to_do_on_the_graph() -> None:
+def test_a_free_lift_and_a_door_offer_no_action_on_the_graph() -> None:
     assert actions(Shown(Row("lift", "a", ""), d.LiftState()), None, GRAPH) == []
     assert actions(Shown(Row("door", "a", ""), d.DoorState()), None, GRAPH) == []
 

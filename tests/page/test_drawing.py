@@ -35,18 +35,18 @@ def test_a_shaft_has_its_highest_floor_on_top_and_says_what_it_shows() -> None:
     )
 
 
-def test_a_car_at_no_known_floor_is_drawn_nowhere() -> None:
+def test_a_car_at_no_known_floor_is_not_drawn() -> None:
     root = well_formed(drawing.shaft(d.LiftState(available_floors=("L1", "L2"))))
     assert [one.get("class") for one in root.iter("rect")] == ["shaft", "shaft"]
 
 
-def test_a_lift_of_a_thousand_floors_is_told_in_words_alone() -> None:
+def test_a_lift_with_a_thousand_floors_is_described_in_words_only() -> None:
     floors = tuple(map(str, range(1000)))
     assert drawing.shaft(d.LiftState(available_floors=floors)) == ""
 
 
 @pytest.mark.parametrize("kind", ["lift", "door", "charger", "coordinator", "robot"])
-def test_no_name_is_markup(kind: str) -> None:
+def test_a_name_is_shown_as_text_and_never_as_markup(kind: str) -> None:
     row = Row(kind, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, True, HOSTILE)
     states: dict[str, Stated] = {
         "lift": d.LiftState(available_floors=(HOSTILE,), current_floor=HOSTILE),
@@ -62,7 +62,7 @@ def test_a_device_has_a_page_of_its_own_whatever_its_name() -> None:
     assert drawing.path_of("door", "a/../b?c#d") == "/door/a%2F..%2Fb%3Fc%23d"
 
 
-def test_what_is_old_says_so_and_how_old_it_is() -> None:
+def test_an_old_state_says_that_it_is_old_and_how_old() -> None:
     html = drawing.card(Shown(Row("door", "ward", "open", age="12.0 s", mark="SILENT 12 s")))
     text = "".join(well_formed(html).itertext())
     assert "OLD: silent 12 s, last reading 12.0 s old" in text

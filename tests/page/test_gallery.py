@@ -35,7 +35,7 @@ def nowhere() -> Transport:
     raise TransportError("no graph in this test")
 
 
-def test_all_that_has_changed_in_a_turn_is_one_script_for_every_browser() -> None:
+def test_all_changes_of_a_turn_are_one_script_for_every_browser() -> None:
     site, walls, now = Site(), [Wall(), Wall()], [100.0]
     listener = Listener(site, nowhere)
     gallery = Gallery(site, listener, lambda: now[0])

@@ -16,14 +16,14 @@ def asked(host: str, origin: str = "", method: str = "GET", kind: str = "http") 
 @pytest.mark.parametrize(
     "host", ["127.0.0.1:8080", "LOCALHOST:8080", "rmf.example", "rmf.example:443"]
 )
-def test_its_own_names_are_answered(host: str) -> None:
+def test_requests_to_the_pages_own_names_are_answered(host: str) -> None:
     assert asked(host) == ""
 
 
 @pytest.mark.parametrize(
     "host", ["", "evil.example", "127.0.0.1:8080.evil.example", "rmf.example.evil"]
 )
-def test_another_name_is_not_answered_so_that_none_can_be_made_to_mean_this_machine(
+def test_a_request_to_any_other_name_is_not_answered_so_dns_rebinding_fails(
     host: str,
 ) -> None:
     assert asked(host) == "this page does not answer to that host name"
@@ -44,5 +44,5 @@ def test_a_socket_without_an_origin_is_not_answered() -> None:
 
 
 @pytest.mark.parametrize(("method", "kind"), [("POST", "http"), ("GET", "websocket")])
-def test_its_own_origin_may_post_and_open_a_socket(method: str, kind: str) -> None:
+def test_the_pages_own_origin_may_post_and_open_a_socket(method: str, kind: str) -> None:
     assert asked("rmf.example", "https://rmf.example", method, kind) == ""

@@ -29,7 +29,7 @@ def test_the_last_sample_and_the_last_outputs_are_shown_in_words() -> None:
     assert levels.driven["ward_door"]["hold open"] == "on"
 
 
-def test_a_reading_that_failed_is_told_as_failed() -> None:
+def test_a_failed_reading_is_shown_as_failed() -> None:
     levels = Levels(Path("nowhere"))
     levels.take([step(IoFailed("no answer"))])
     assert levels.sensed == {"ward_door": {"the last reading": "failed: no answer"}}

@@ -3,7 +3,7 @@
 from bridges.page.silent import MOST_SILENT_S, Silent
 
 
-def test_who_asks_for_nothing_is_named_after_a_while_and_who_goes_is_forgotten() -> None:
+def test_an_idle_connection_is_listed_after_a_while_and_a_closed_one_is_forgotten() -> None:
     silent = Silent()
     assert silent.too_long(["a", "b"], 0.0) == []
     assert silent.too_long(["a", "c"], MOST_SILENT_S) == []

@@ -42,7 +42,7 @@ def charger(at: float, robot: str = "") -> Heard:
     return heard(at, topics.CHARGER_STATES, state)
 
 
-def test_how_long_a_robot_has_a_charger_is_told_as_far_as_it_was_seen() -> None:
+def test_how_long_a_robot_has_had_a_charger_is_shown_as_far_as_it_was_seen() -> None:
     site, told = Site(), []
     for at in (0, 1, 2, 3, 4, 5, 6, 30, 31):  # silent from 6 to 30
         site.take(charger(float(at), "R1" if at < 3 else "" if at == 3 else "R2"))
@@ -61,7 +61,7 @@ def test_how_long_a_robot_has_a_charger_is_told_as_far_as_it_was_seen() -> None:
     assert [one.stands for one in site.devices(90.0, WALL + 90)] == [Stands(1.0, at_least=True)]
 
 
-def test_only_what_was_heard_of_since_is_drawn_again() -> None:
+def test_only_devices_heard_since_the_last_drawing_are_drawn_again() -> None:
     site = Site()
     site.take(lift(1.0))
     site.take(lift(1.0, "Lift2"))
@@ -71,7 +71,7 @@ def test_only_what_was_heard_of_since_is_drawn_again() -> None:
     assert [shown.row.name for shown in site.changed(2.1, WALL)] == ["Lift1"]
 
 
-def test_ten_thousand_made_up_lifts_push_no_known_one_out() -> None:
+def test_ten_thousand_made_up_lifts_displace_no_known_one() -> None:
     site = Site()
     site.take(lift(0.0))
     for number in range(10_000):
@@ -110,7 +110,7 @@ def test_made_up_robots_are_bounded() -> None:
     assert len(site.robots()) == MOST_ROBOTS
 
 
-def test_the_timeline_has_the_sessions_and_requests_of_its_device_alone() -> None:
+def test_the_timeline_has_the_sessions_and_requests_of_its_own_device_only() -> None:
     site = Site()
     held = replace(LIFT, session_id="fleet/a", lift_time=stamp(WALL))
     site.take(heard(0.0, topics.LIFT_STATES, held))

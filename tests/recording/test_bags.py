@@ -78,7 +78,9 @@ def test_the_files_of_a_long_recording_are_read_in_their_order(tmp_path: Path) -
     assert list(heard_in(whole)) == RIDE[:2]
 
 
-def test_a_clock_that_is_set_back_in_the_middle_turns_no_time_back(tmp_path: Path) -> None:
+def test_a_clock_that_is_set_back_in_the_middle_never_turns_recorded_time_back(
+    tmp_path: Path,
+) -> None:
     state = LiftState(lift_name="Lift1")
     walls = [WALL, WALL + 1, WALL - 3599, WALL - 3598.5, WALL - 3598.6]
     bag = write(tmp_path / "bag", [Heard(w, w, "lift_states", state) for w in walls], KILTED)
@@ -90,7 +92,7 @@ def test_a_clock_that_is_set_back_in_the_middle_turns_no_time_back(tmp_path: Pat
 
 
 @pytest.mark.parametrize("release", RELEASES.values(), ids=lambda release: release.name)
-def test_each_definition_is_known_again_from_our_text_and_from_that_of_rosbags(
+def test_each_definition_is_recognised_in_our_text_and_in_that_of_rosbags(
     release: Release,
 ) -> None:
     types = store(release)
@@ -119,7 +121,7 @@ def test_a_message_of_our_name_and_another_definition_is_skipped() -> None:
     assert releases("rmf_lift_msgs/msg/LiftRequest", "", "RIHS01_of_nobody") == []
 
 
-def test_what_is_no_recording_is_named_with_what_to_do(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_recording_is_named_with_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("hello")
     (tmp_path / "packed").mkdir()
     (tmp_path / "packed" / "ride_0.db3.zstd").touch()

@@ -27,7 +27,7 @@ def spoken(ring: Path) -> list[str]:
         return []
 
 
-def test_after_a_kill_the_ring_has_what_was_until_then_and_the_next_run_keeps_it(
+def test_after_a_kill_the_ring_has_everything_up_to_it_and_the_next_run_keeps_it(
     lift: Path, tmp_path: Path, domain: int
 ) -> None:
     place = tmp_path / "run"
@@ -76,9 +76,7 @@ def test_no_daemon_imports_what_only_files_need(lift: Path, tmp_path: Path, doma
     assert "imported []" in running.log.read_text()
 
 
-def test_a_daemon_that_shall_keep_nothing_has_no_ring(
-    lift: Path, tmp_path: Path, domain: int
-) -> None:
+def test_a_daemon_set_to_keep_nothing_has_no_ring(lift: Path, tmp_path: Path, domain: int) -> None:
     lift.write_text(f"recording: {{keep: nothing}}\n{lift.read_text()}")
     with daemon(lift, tmp_path / "run", "--simulate", "--domain-id", str(domain)) as running:
         running.wait_for("ready")

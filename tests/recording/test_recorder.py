@@ -150,7 +150,7 @@ def test_a_fault_makes_one_file_with_what_went_before_and_what_followed(machine:
     ],
     ids=["refused", "fault", "handover", "one failed reading"],
 )
-def test_what_is_a_reason_for_a_recording(
+def test_refusals_and_faults_are_reasons_for_a_recording_and_handovers_are_not(
     machine: Machine, happens: Callable[[Machine], None], why: str | None
 ) -> None:
     happens(machine)
@@ -170,7 +170,7 @@ def test_the_same_cause_makes_no_second_file_within_ten_minutes(machine: Machine
     assert len(machine.files()) == 2
 
 
-def test_who_waits_too_long_for_a_lift_makes_a_file_and_who_is_served_does_not(
+def test_a_robot_that_waits_too_long_for_a_lift_makes_a_file_and_a_served_one_does_not(
     machine: Machine,
 ) -> None:
     asked = LiftRequest("Lift1", session_id="r1", request_type=1, destination_floor="L3")
@@ -185,7 +185,7 @@ def test_who_waits_too_long_for_a_lift_makes_a_file_and_who_is_served_does_not(
     assert len(list(heard_in(machine.only()))) > 100
 
 
-def test_a_request_that_is_no_longer_repeated_waits_no_longer(machine: Machine) -> None:
+def test_a_request_that_is_no_longer_repeated_counts_as_waiting_no_longer(machine: Machine) -> None:
     asked = LiftRequest("Lift1", session_id="r1", request_type=1, destination_floor="L3")
     machine.live(100, lambda: machine.say("lift_requests", asked))
     machine.live(20)
@@ -194,7 +194,7 @@ def test_a_request_that_is_no_longer_repeated_waits_no_longer(machine: Machine) 
     assert machine.files() == []
 
 
-def test_a_run_that_was_killed_is_recorded_once_also_by_the_next_recorder(
+def test_a_killed_run_is_recorded_once_even_if_the_recorder_restarts(
     machine: Machine,
 ) -> None:
     machine.live(50)
@@ -235,7 +235,7 @@ def test_a_daemon_that_dies_again_and_again_makes_one_file_in_ten_minutes(
     assert len(machine.files()) == 2
 
 
-def test_a_start_that_fails_is_no_recording(machine: Machine) -> None:
+def test_a_start_that_fails_makes_no_recording(machine: Machine) -> None:
     machine.witness.ended(safe=True)
     head = Read(machine.runtime / "ring").head
     for number in range(3):
@@ -255,7 +255,7 @@ def test_a_run_that_ended_in_good_order_is_not_recorded(machine: Machine) -> Non
     assert not (machine.runtime / DIED).exists()
 
 
-def test_a_daemon_that_goes_before_all_followed_is_recorded_as_far_as_it_was(
+def test_a_daemon_that_ends_before_the_30_s_are_over_is_recorded_up_to_its_end(
     machine: Machine,
 ) -> None:
     machine.live(20)
@@ -284,7 +284,7 @@ def test_the_oldest_recordings_of_a_daemon_make_room_and_those_of_others_stay(
     assert machine.files() == sorted([other.name, *made[2:]])
 
 
-def test_a_full_disk_loses_recordings_and_is_said_once(
+def test_a_full_disk_loses_recordings_and_is_logged_once(
     machine: Machine, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(shelves, "LEAST_FREE", 1 << 62)
@@ -308,7 +308,9 @@ def test_continuous_files_follow_each_other_without_gap_or_overlap(tmp_path: Pat
     assert {name.split("_")[-2] for name in machine.files()} == {"all"}
 
 
-def test_a_ring_that_is_no_ring_stops_no_other(machine: Machine, tmp_path: Path) -> None:
+def test_a_damaged_ring_keeps_no_other_from_being_recorded(
+    machine: Machine, tmp_path: Path
+) -> None:
     broken = tmp_path / "run" / "broken"
     broken.mkdir()
     (broken / "ring").write_bytes(b"RMFRING1" + b"\xff" * 9000)

@@ -88,7 +88,7 @@ def test_the_ring_of_a_run_that_died_is_kept_beside_the_next_one(tmp_path: Path)
     assert list(Read(tmp_path / "ring").entries()) == []
 
 
-def test_a_ring_that_was_removed_or_replaced_lives_no_more(tmp_path: Path) -> None:
+def test_a_ring_whose_file_was_removed_or_replaced_counts_as_gone(tmp_path: Path) -> None:
     ring = Ring(tmp_path, HEAD, SIZE)
     assert ring.lives
     ring.path.rename(tmp_path / "elsewhere")
@@ -99,7 +99,7 @@ def test_a_ring_that_was_removed_or_replaced_lives_no_more(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("content", [b"", b"x" * 5000, b"RMFRING1" + b"\xff" * 5000])
-def test_what_is_no_ring_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_a_file_that_is_not_a_ring_is_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "ring").write_bytes(content)
 
     with pytest.raises(RingError):
@@ -119,7 +119,7 @@ def test_a_segment_whose_number_was_torn_is_left_out(tmp_path: Path) -> None:
     assert list(Read(ring.path).entries()) == [entry(1)]
 
 
-def test_who_follows_a_ring_gets_each_entry_once_and_misses_what_was_overwritten(
+def test_a_follower_of_a_ring_gets_each_entry_once_and_misses_what_was_overwritten(
     tmp_path: Path,
 ) -> None:
     ring = Ring(tmp_path, HEAD, SIZE)

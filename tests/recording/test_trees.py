@@ -46,7 +46,7 @@ VALUES: list[Any] = [
 
 
 @pytest.mark.parametrize("one", VALUES, ids=lambda one: type(one).__name__)
-def test_a_value_comes_back_as_it_was_also_through_bytes(one: Any) -> None:
+def test_a_value_comes_back_unchanged_even_through_bytes(one: Any) -> None:
     packed = msgspec.msgpack.decode(msgspec.msgpack.encode(tree(one)))
 
     assert value(packed) == one
@@ -77,12 +77,12 @@ def test_a_field_that_a_version_lacks_is_left_out_and_a_missing_one_has_its_defa
     ],
     ids=str,
 )
-def test_what_is_no_value_of_a_core_is_refused(told: Any) -> None:
+def test_a_tree_that_holds_no_value_of_a_core_is_refused(told: Any) -> None:
     with pytest.raises(UnknownValue):
         value(told)
 
 
-def test_what_no_core_has_has_no_tree() -> None:
+def test_an_object_that_no_core_uses_cannot_become_a_tree() -> None:
     with pytest.raises(TypeError, match="Exception is no value of a core"):
         tree(Exception())
 

@@ -56,7 +56,7 @@ class Daemon:
         return list(Read(self.folder / "ring").entries())
 
 
-def test_readings_that_change_nothing_cost_a_time_each_and_none_is_lost(tmp_path: Path) -> None:
+def test_unchanged_readings_cost_one_timestamp_each_and_none_is_lost(tmp_path: Path) -> None:
     daemon = Daemon(tmp_path)
     scanned: list[float] = []
     for _ in range(90):
@@ -73,7 +73,7 @@ def test_readings_that_change_nothing_cost_a_time_each_and_none_is_lost(tmp_path
     assert len(found) < 20
 
 
-def test_all_that_is_known_is_said_again_each_minute_and_whenever_it_is_not_what_was_decided(
+def test_the_whole_memory_is_written_each_minute_and_when_it_is_not_what_was_decided(
     tmp_path: Path,
 ) -> None:
     daemon = Daemon(tmp_path)
@@ -87,7 +87,7 @@ def test_all_that_is_known_is_said_again_each_minute_and_whenever_it_is_not_what
     assert known == [(101.0, True), (160.0, False), (220.0, False), (230.0, True)]
 
 
-def test_a_step_of_the_wall_clock_is_in_the_recording_and_turns_no_time_back(
+def test_a_step_of_the_wall_clock_is_recorded_and_recorded_time_never_goes_back(
     tmp_path: Path,
 ) -> None:
     daemon = Daemon(tmp_path)
@@ -153,7 +153,7 @@ def test_a_write_that_fails_ends_no_scan_and_the_next_ring_begins_anew(
     assert [type(one) for one in daemon.entries()][:3] == [Clocks, Known, Step]
 
 
-def test_what_cannot_be_kept_loses_itself_and_no_scan(
+def test_what_cannot_be_recorded_is_lost_and_no_scan_with_it(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     daemon = Daemon(tmp_path)

@@ -63,7 +63,7 @@ def test_an_example_is_of_a_shipped_file_where_there_is_one() -> None:
     assert msgspec.structs.fields(serial)
 
 
-def test_no_heading_stands_there_twice() -> None:
+def test_no_heading_appears_twice() -> None:
     page = Path(__file__).parents[2] / "docs" / "configuration.md"
     headings = Counter(line for line in page.read_text().splitlines() if line.startswith("#"))
     assert [heading for heading, many in headings.items() if many > 1] == []

@@ -30,7 +30,7 @@ def test_every_file_that_is_named_exists(page: str) -> None:
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_each_of_the_five_ways_is_told_file_by_file(way: str) -> None:
+def test_each_of_the_five_paths_is_described_file_by_file(way: str) -> None:
     page = (ROOT / "docs" / "architecture.md").read_text()
     section = page.partition(f"\n## The path of {way}\n")[2].partition("\n## ")[0]
     steps = re.split(r"\n\d\. ", section)[1:]

@@ -36,7 +36,7 @@ def test_the_yaml_names_the_domain_else_ros_does(
 
 
 @pytest.mark.parametrize("text", ["233", "-1", "1.0", "two", "²", "0x10"])
-def test_a_domain_that_cannot_be_is_refused_by_name(text: str) -> None:
+def test_an_impossible_domain_is_refused_by_name(text: str) -> None:
     with pytest.raises(TransportError, match=r"ROS_DOMAIN_ID is '.+': give a whole number"):
         domain_id(Rmf(), {"ROS_DOMAIN_ID": text})
 
@@ -216,7 +216,7 @@ def test_the_yamls_zenoh_section_reaches_the_transport(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_cannot_be_in_the_zenoh_section_is_named(
+def test_an_impossible_zenoh_setting_is_named(
     tmp_path: Path, zenoh: str, problems: list[str]
 ) -> None:
     shipped = (Path(__file__).parents[2] / "config" / "lift_supervisor.yaml").read_text()

@@ -170,5 +170,5 @@ def test_it_can_be_closed_while_there_is_no_network(
         echoed.alarm.publish(d.Bool(True))
 
 
-def test_loopback_and_what_has_no_link_are_no_way_to_another_machine() -> None:
+def test_loopback_and_interfaces_without_a_link_reach_no_other_machine() -> None:
     assert "127.0.0.1" not in {address for _, address in addresses.addresses()}

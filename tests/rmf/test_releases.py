@@ -61,7 +61,7 @@ def test_a_message_in_a_releases_bytes_is_read_by_that_release(
 
 
 @pytest.mark.parametrize(("release", "heard"), [(JAZZY, JAZZYS_FLEET), (KILTED, FLEET)])
-def test_auto_speaks_jazzys_until_a_fleet_adapter_tells_its_release(
+def test_auto_speaks_jazzys_messages_until_a_fleet_adapter_shows_its_release(
     join_of: Joining, release: Release, heard: d.FleetState, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
@@ -133,7 +133,7 @@ def told(nodes: list[Transport], faults: list[tuple[str, str]]) -> Callable[[], 
     return lambda: all(node.faults() == faults for node in nodes)
 
 
-def test_a_hash_that_is_missing_or_unknown_tells_no_release() -> None:
+def test_a_missing_or_unknown_hash_identifies_no_release() -> None:
     peers = Peers(None)
     peers.ours(topics.FLEET_STATES, publishes=False)
     fleet_state = "rmf_fleet_msgs/msg/FleetState"
@@ -146,7 +146,7 @@ def test_a_hash_that_is_missing_or_unknown_tells_no_release() -> None:
     ]
 
 
-def test_our_own_daemons_tell_no_release() -> None:
+def test_our_own_daemons_are_no_evidence_of_a_release() -> None:
     peers = Peers(None)
     for topic, publishes in ((topics.FLEET_STATES, False), (topics.EMERGENCY_SIGNAL, True)):
         kind = f"{d.PACKAGES[topic.type]}/msg/{topic.type.__name__}"

@@ -74,7 +74,7 @@ def test_jazzys_hashes_are_its_own_where_its_files_differ_and_the_newest_elsewhe
     assert {kind: type_hash(kind, JAZZY) for kind in JAZZY.messages()} == wanted
 
 
-def test_a_hash_tells_a_release_where_only_one_has_it() -> None:
+def test_a_hash_identifies_a_release_if_only_one_release_has_it() -> None:
     assert releases_of("RIHS01_" + HASHES[d.FleetState]) == [KILTED]
     assert releases_of("RIHS01_" + str(JAZZYS[d.FleetState])) == [JAZZY]
     assert releases_of("RIHS01_" + HASHES[d.LiftState]) == [JAZZY, KILTED]

@@ -267,7 +267,7 @@ def test_stamps_follow_the_simulated_clock_where_use_sim_time_says_so(domain: in
         gazebo.close()
 
 
-def test_ros_is_found_whole() -> None:
+def test_where_ros_is_installed_nothing_of_it_is_missing() -> None:
     assert missing_of_ros() == ""
 
 

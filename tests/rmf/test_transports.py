@@ -74,7 +74,7 @@ def test_a_late_joiner_gets_the_newest_retained_messages_as_deep_as_the_history(
     assert numbers(received) == list(range(30, 131))
 
 
-def test_a_volatile_subscription_is_told_nothing_of_the_past(join: Join) -> None:
+def test_a_volatile_subscription_gets_no_earlier_messages(join: Join) -> None:
     publisher = join("speaker").publisher(KEPT)
     publisher.publish(numbered(1))
     received: list[d.DoorRequest] = []

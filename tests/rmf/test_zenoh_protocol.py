@@ -158,7 +158,7 @@ def test_a_publisher_of_rmw_zenoh_is_heard(node: ZenohTransport) -> None:
     assert heard_from(node, LIFT_REQUESTS, key, token, request) == [request]
 
 
-def test_what_a_publisher_of_rmw_zenoh_retains_is_heard_however_late_it_comes(
+def test_what_a_publisher_of_rmw_zenoh_retains_is_heard_however_late_it_arrives(
     node: ZenohTransport,
 ) -> None:
     request = d.LiftRequest("Lift1", d.Time(5, 6), "fleet/robot", 1, "L3", 2)

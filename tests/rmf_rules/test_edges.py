@@ -30,9 +30,7 @@ OTHER_LIFT = replace(IDLE, lift_name="Lift2")
 # ---- Jazzy
 
 
-def test_jazzys_adapter_says_end_at_once_with_the_floor_and_no_stamp_and_again_without_one() -> (
-    None
-):
+def test_jazzys_adapter_sends_end_at_once_with_the_floor_and_later_without_one() -> None:
     robot = Robot(A, jazzy=True)
     assert robot.begin(RequestLift("Lift1", "L3", inside=False), 1.0) == [adapter_lift(AGV, 1.0)]
     end_at_l3 = replace(END, destination_floor="L3")

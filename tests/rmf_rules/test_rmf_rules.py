@@ -219,7 +219,7 @@ def test_a_lift_that_has_already_come_is_not_waited_for_again() -> None:
     assert robot.done
 
 
-def test_end_is_sent_only_when_a_state_shows_our_session_and_until_it_does_no_more() -> None:
+def test_end_is_sent_while_states_show_our_session_and_not_before_or_after() -> None:
     robot = Robot(A)
     robot.begin(RequestLift("Lift1", "L3", inside=True), 0.0)
     assert robot.begin(EndLiftSession("Lift1"), 1.0) == []

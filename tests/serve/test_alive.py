@@ -50,7 +50,7 @@ def _state(pid: int) -> str:
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
 
 
-def test_after_sigstop_no_state_of_before_is_shown_as_new(
+def test_after_sigstop_no_earlier_state_is_shown_as_new(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     scan_s = 2.0

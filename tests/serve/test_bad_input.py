@@ -102,7 +102,7 @@ def test_a_flood_ends_with_the_last_valid_request_and_states_go_on(lift: Lift) -
     assert len(edges) <= 4 + 2 * took_s
 
 
-def test_samples_that_are_no_requests_are_dropped_and_good_ones_are_obeyed(
+def test_samples_that_are_not_requests_are_dropped_and_good_ones_are_obeyed(
     lift: Lift,
 ) -> None:
     with peer.running("hostile", lift.domain, wire()):

@@ -79,7 +79,7 @@ def test_a_lost_device_whose_outputs_nobody_has_switched_on_ends_no_daemon() -> 
     assert "lab read" in [what for at, what in corridor.story if at > 20]
 
 
-def test_hardware_that_is_lost_is_no_defect() -> None:
+def test_lost_hardware_is_not_a_defect() -> None:
     corridor = held()
     corridor.doors["ward"].lost = True
     corridor.doors["ward"].during = lambda: breaks(DriverError("no answer"))

@@ -194,7 +194,7 @@ def test_the_guard_ends_with_a_daemon_that_ends_in_good_order(
     assert module.relay() == [True, False]
 
 
-def test_a_unit_has_no_guard(module: Module, tmp_path: Path) -> None:
+def test_a_daemon_in_a_systemd_unit_has_no_guard(module: Module, tmp_path: Path) -> None:
     with daemon(module.file, tmp_path / "run", **SERVICE) as running:
         running.wait_for("ready")
         assert _children(running.process.pid) == []
@@ -344,7 +344,7 @@ def test_hardware_that_a_dead_daemon_left_on_is_tried_until_it_answers(
     assert [p for p in before if p.exists()] == []
 
 
-def test_a_removed_directory_and_a_full_disk_end_no_daemon_nor_its_shutdown(
+def test_a_removed_directory_or_a_full_disk_stops_neither_a_daemon_nor_its_shutdown(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     run = tmp_path / "run"
@@ -366,7 +366,9 @@ def test_a_removed_directory_and_a_full_disk_end_no_daemon_nor_its_shutdown(
     assert module.relay() == [True, False]
 
 
-def test_no_descriptor_left_ends_no_daemon(module: Module, graph: Graph, tmp_path: Path) -> None:
+def test_running_out_of_file_descriptors_ends_no_daemon(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
     with daemon(module.file, tmp_path / "run", **SERVICE) as running:
         hold_open(module, graph, running)
         resource.prlimit(running.process.pid, resource.RLIMIT_NOFILE, (3, 3))
@@ -378,7 +380,7 @@ def test_no_descriptor_left_ends_no_daemon(module: Module, graph: Graph, tmp_pat
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root has others' directories to be careful of")
-def test_by_hand_nothing_is_switched_where_it_cannot_be_known_who_lives_and_as_execstoppost_it_is(
+def test_where_a_live_daemon_cannot_be_ruled_out_only_execstoppost_switches_off(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
     with daemon(module.file, tmp_path / "run", **SERVICE) as running:
@@ -473,7 +475,7 @@ def test_a_user_who_may_not_open_the_adapter_is_told_what_to_do(name: str) -> No
     assert "add the daemon's user to the group dialout" in done.stderr
 
 
-def test_missing_lgpio_or_permission_is_told_in_one_line(tmp_path: Path) -> None:
+def test_missing_lgpio_or_permission_is_reported_in_one_line(tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
     done = _told("outputs-off", file, "--runtime-dir", tmp_path / "run")
     assert done.returncode == 1

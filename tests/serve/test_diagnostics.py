@@ -25,9 +25,7 @@ def values(**pairs: str) -> tuple[d.KeyValue, ...]:
     return tuple(d.KeyValue(key.replace("__", " "), value) for key, value in pairs.items())
 
 
-def test_a_message_tells_of_the_daemon_and_of_each_device_with_its_faults_and_its_inputs_age() -> (
-    None
-):
+def test_a_message_reports_the_daemon_and_each_device_with_its_faults_and_its_inputs_age() -> None:
     found = diagnosis("node", "lift", DAEMON, {"Lift1": LIFT}, AT)
     daemons = values(kind="lift", simulated="no", pid="12", samples_dropped__door_requests="3")
     lifts = values(
@@ -81,9 +79,7 @@ def test_a_flood_of_names_does_not_make_the_message_grow_without_end() -> None:
     assert len(diagnosis("node", "lift", {}, devices, AT).status) == 1 + MOST
 
 
-def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(
-    domain: int, tmp_path: Path
-) -> None:
+def test_a_daemon_reports_its_door_and_the_lost_module(domain: int, tmp_path: Path) -> None:
     module = Module(tmp_path, domain)
     module.file.write_text(module.yaml.replace(PATIENT, "stale_after_s: 1"))
     listener = join("listener", domain)
@@ -103,7 +99,7 @@ def test_a_daemon_tells_of_its_door_and_of_the_module_that_is_gone(
         listener.close()
 
 
-def test_diagnostics_can_be_left_off(domain: int, tmp_path: Path) -> None:
+def test_diagnostics_can_be_switched_off(domain: int, tmp_path: Path) -> None:
     module = Module(tmp_path, domain)
     text = module.file.read_text()
     module.file.write_text(text.replace("rmf: {", "rmf: {diagnostics: false, "))

@@ -109,7 +109,7 @@ def test_while_another_publishes_it_is_passive_and_says_so_once(
     ]
 
 
-def test_lifts_are_served_apart_and_those_not_named_not_at_all() -> None:
+def test_lifts_are_served_separately_and_those_not_named_not_at_all() -> None:
     site = Site(Settings(lifts=["Lift1", "Lift2"]))
     site.until(3.0)
     for lift in ("Lift1", "Lift2", "Lift3"):
@@ -225,9 +225,7 @@ def test_the_lifts_of_the_yaml_keep_room_for_sessions(monkeypatch: pytest.Monkey
     assert (len(site.sent), site.node.refused) == (1, {})
 
 
-def test_a_robot_that_waits_for_a_lift_that_is_long_gone_is_forgotten_and_one_that_has_it_never() -> (
-    None
-):
+def test_of_a_lift_long_gone_a_waiting_robot_is_forgotten_and_its_holder_never() -> None:
     site = Site()
     site.until(3.0)
     for lift, session in (("Lift1", "fleet/a"), ("Lift2", "")):
@@ -242,7 +240,7 @@ def test_a_robot_that_waits_for_a_lift_that_is_long_gone_is_forgotten_and_one_th
     assert list(site.node.subjects) == ["Lift1"]
 
 
-def test_a_defect_in_a_core_costs_one_message_and_is_told_once(
+def test_a_defect_in_a_core_costs_one_message_and_is_logged_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     def breaks(*arguments: object) -> Any:

@@ -34,7 +34,7 @@ def test_only_the_mark_of_this_run_after_a_clean_stop_says_off(
     assert says_off(here | after) is off
 
 
-def test_no_mark_a_torn_one_and_one_that_is_no_file_say_nothing(tmp_path: Path) -> None:
+def test_a_mark_that_is_missing_or_torn_or_not_a_file_says_nothing(tmp_path: Path) -> None:
     here = RUN | {"RUNTIME_DIRECTORY": str(tmp_path)}
     mark = tmp_path / MARK
     found = [says_off(here)]

@@ -89,7 +89,9 @@ def with_huge(value: Any) -> Iterator[Any]:
 @pytest.mark.parametrize(
     ("name", "topic"), [(name, topic) for name, heard in HEARD.items() for topic in heard]
 )
-def test_no_string_of_a_message_is_kept_however_long_it_is(name: str, topic: Topic[Any]) -> None:
+def test_no_string_of_a_message_is_kept_beyond_a_maximum_length(
+    name: str, topic: Topic[Any]
+) -> None:
     take, message = taker(name, topic), HEARD[name][topic]
     take(message)
     for sent in with_huge(message):
@@ -100,6 +102,6 @@ def test_no_string_of_a_message_is_kept_however_long_it_is(name: str, topic: Top
         assert len(kept) < KEPT_MOST
 
 
-def test_every_topic_that_a_kind_hears_is_looked_at() -> None:
+def test_every_topic_that_a_kind_hears_is_covered() -> None:
     for name, heard in HEARD.items():
         assert set(heard) == set(kind_called(load(CONFIG / f"{name}.yaml").kind).requests)

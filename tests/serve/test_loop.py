@@ -83,7 +83,7 @@ def shown(state: DoorState) -> str:
     return f"{state.door_name} {mode.name.removeprefix('MODE_')}"
 
 
-def test_a_bus_that_takes_long_suspends_nobody(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_slow_bus_does_not_count_as_a_suspension(caplog: pytest.LogCaptureFixture) -> None:
     corridor = Corridor()
     corridor.round(0.0)
 

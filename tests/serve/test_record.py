@@ -29,7 +29,7 @@ def test_the_record_of_a_charger_has_its_profile_and_its_dbc() -> None:
     assert written.texts["wiferion.dbc"] == (texts.FOLDER / "wiferion.dbc").read_bytes()
 
 
-def test_what_was_claimed_is_understood_as_it_was_and_not_as_the_disk_now_has_it() -> None:
+def test_a_claim_is_read_as_it_was_recorded_and_not_as_the_disk_has_it_now() -> None:
     file = CONFIG / "charger_wiferion.yaml"
     written = record.of(load(file))
     profile = written.texts["wiferion.yaml"].replace(b"dbc: wiferion.dbc", b"dbc: gone.dbc")

@@ -96,7 +96,7 @@ def test_what_is_claimed_is_remembered_whole_until_it_is_released(tmp_path: Path
     again.close()
 
 
-def test_a_daemon_on_another_yaml_writes_over_nothing_that_is_unreleased(tmp_path: Path) -> None:
+def test_a_daemon_on_another_yaml_overwrites_no_unreleased_claim(tmp_path: Path) -> None:
     first = held(tmp_path)
     first.claim(CLAIMED)
     first.close()
@@ -118,7 +118,7 @@ def test_a_record_counts_only_for_the_file_that_it_names(tmp_path: Path) -> None
     other.close()
 
 
-def test_a_record_goes_where_it_outlives_a_power_cut_and_elsewhere_only_where_that_is_full(
+def test_a_record_goes_where_it_survives_a_power_cut_and_elsewhere_only_if_that_is_full(
     tmp_path: Path,
 ) -> None:
     both = Places(tmp_path / "run", tmp_path / "state")

@@ -29,7 +29,7 @@ def test_check_refuses_a_call_that_is_longer_than_the_watchdog(tmp_path: Path) -
         load(with_timeout(tmp_path, 5.1))
 
 
-def test_run_refuses_one_that_is_too_long_for_the_unit_as_it_is(tmp_path: Path) -> None:
+def test_run_refuses_a_call_that_is_too_long_for_the_unit_as_installed(tmp_path: Path) -> None:
     config = load(with_timeout(tmp_path, 3))
     bus = next(iter(config.buses))
     assert too_slow(config, 5.0) == (

@@ -157,7 +157,7 @@ def shipped(name: str, *changes: tuple[str, str]) -> str:
     return text
 
 
-def test_a_command_over_http_is_one_doors_or_chargers_alone(
+def test_a_command_over_http_belongs_to_one_door_or_charger_only(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     other = shipped("door_http.yaml", ("side_door", "back_door"))
@@ -173,7 +173,7 @@ def test_a_command_over_http_is_one_doors_or_chargers_alone(
     )
 
 
-def test_a_gateways_command_is_one_lifts_alone(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_gateways_command_belongs_to_one_lift_only(capsys: pytest.CaptureFixture[str]) -> None:
     other = shipped("lift_gateway.yaml", ("Lift1", "Lift2"))
     code, lines = said(capsys, shipped("lift_gateway.yaml"), other, "-q")
     assert (code, [line.partition(" ")[2] for line in lines[:-1]]) == (

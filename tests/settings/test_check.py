@@ -134,7 +134,7 @@ def test_warnings_do_not_make_a_file_wrong(capsys: pytest.CaptureFixture[str]) -
     )
 
 
-def test_check_loads_no_library_of_a_bus_that_is_not_asked() -> None:
+def test_check_loads_no_library_that_it_does_not_need() -> None:
     lift = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
     libraries = (
         "cantools can canopen pymodbus serial requests gpiozero cyclonedds zenoh rclpy jinja2"

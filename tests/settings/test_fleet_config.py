@@ -82,7 +82,7 @@ def site(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Site:
     return Site(tmp_path, capsys)
 
 
-def test_two_files_that_agree_are_right_and_the_transforms_error_is_told(site: Site) -> None:
+def test_two_files_that_agree_are_right_and_the_transforms_error_is_reported(site: Site) -> None:
     assert site.check() == (0, [])
     assert (
         "config.yaml: transformation error estimate for L1: 0"

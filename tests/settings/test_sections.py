@@ -17,7 +17,7 @@ TWO_BUSES = changed(
 )
 
 
-def test_an_unknown_kind_comes_with_the_kinds_that_there_are(file: Path) -> None:
+def test_an_unknown_kind_is_reported_with_the_known_ones(file: Path) -> None:
     (problem,) = problems_of(file, changed("kind: gate", "kind: gait"))
     assert problem.startswith("1:7: 'kind' is 'gait': ")
     assert problem.endswith(" (did you mean 'gate'?)")
@@ -40,7 +40,7 @@ def test_while_the_kind_is_unknown_other_sections_are_still_read(file: Path) -> 
     assert found[0].startswith("1:1: unknown key 'kinds': did you mean 'kind'? known here: ")
 
 
-def test_an_unknown_driver_comes_with_those_of_the_kind(file: Path) -> None:
+def test_an_unknown_driver_is_reported_with_those_of_the_kind(file: Path) -> None:
     assert problems_of(file, changed("driver: contact", "driver: contakt")) == [
         "2:9: 'driver' is 'contakt': write contact or web (did you mean 'contact'?)"
     ]
@@ -163,7 +163,7 @@ def test_a_device_is_a_mapping_with_a_name(file: Path) -> None:
     ]
 
 
-def test_a_point_that_is_not_there_is_told_by_the_bus(file: Path) -> None:
+def test_a_point_that_does_not_exist_is_reported_by_the_bus(file: Path) -> None:
     text = changed("{point: A0,", "{point: 17,")
     text = changed("{point: 1A,", "{point: no,", text)
     assert problems_of(file, text) == [
@@ -261,7 +261,7 @@ def test_unsafe_wiring_is_accepted_only_of_signals_that_there_are(file: Path) ->
     ]
 
 
-def test_a_misspelt_acceptance_is_told_beside_what_the_driver_says(file: Path) -> None:
+def test_a_misspelt_acceptance_is_reported_beside_the_drivers_own_problem(file: Path) -> None:
     text = changed("    limits:", "    accept_unsafe: {hald: by contract}\n    limits:")
     text = changed("tries: 2", "close_s: 9", changed("{1: in, 2: out}", "{1: yard}", text))
     assert problems_of(file, text) == [

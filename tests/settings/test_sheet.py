@@ -89,7 +89,7 @@ def test_a_sheet_needs_nothing_beside_itself() -> None:
     assert not {"script", "link", "img", "iframe"} & set(page.tags)
 
 
-def test_what_a_file_says_is_text_and_no_markup() -> None:
+def test_a_files_texts_are_text_in_the_sheet_and_never_markup() -> None:
     Path("gate.yaml").write_text(changed("{1: in, 2: out}", "{}").replace("in, out", f"in, {EVIL}"))
     page = sheet_of("gate.yaml")
     assert "script" not in page.tags

@@ -9,13 +9,13 @@ from tests.settings.reading import RIGHT, changed, config_of, problems_of
 INPUT = "point, active, pull, debounce_s"
 
 
-def test_an_unknown_key_comes_with_the_one_that_was_meant(file: Path) -> None:
+def test_an_unknown_key_is_reported_with_the_one_that_was_meant(file: Path) -> None:
     assert problems_of(file, changed("debounce_s: 1e-2", "debonce_s: 1e-2")) == [
         f"11:52: unknown key 'debonce_s': did you mean 'debounce_s'? known here: {INPUT}"
     ]
 
 
-def test_an_unknown_key_like_no_other_comes_with_the_known_ones(file: Path) -> None:
+def test_an_unknown_key_like_no_other_is_reported_with_the_known_ones(file: Path) -> None:
     assert problems_of(file, changed("debounce_s: 1e-2", "color: red")) == [
         f"11:52: unknown key 'color': known here: {INPUT}"
     ]
@@ -120,7 +120,7 @@ def test_a_list_has_no_more_entries_than_allowed(file: Path) -> None:
     ]
 
 
-def test_a_mapping_is_not_a_list_nor_a_word(file: Path) -> None:
+def test_a_mapping_is_neither_a_list_nor_a_word(file: Path) -> None:
     text = changed("{open_s: 3, tries: 2}", "[3, 2]")
     text = changed("{1: in, 2: out}", "none", text)
     assert problems_of(file, text) == [
@@ -141,7 +141,7 @@ def test_an_empty_value_is_named_even_if_the_key_is_optional(file: Path) -> None
     ]
 
 
-def test_a_structs_own_problem_is_told_at_the_place_that_it_names(file: Path) -> None:
+def test_a_structs_own_problem_is_reported_at_the_place_that_it_names(file: Path) -> None:
     text = changed("{1: in, 2: out}", "{1: in, 2: yard, 0x3: roof}")
     text = changed("tries: 2", "close_s: 9", text)
     assert problems_of(file, text) == [

@@ -90,5 +90,5 @@ if the text is meant, write "no" in quotes
 """
 
 
-def test_all_independent_problems_of_a_file_are_told_in_one_go(file: Path) -> None:
+def test_all_independent_problems_of_a_file_are_reported_at_once(file: Path) -> None:
     assert problems_of(file, BAD) == FOUND.splitlines()

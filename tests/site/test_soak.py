@@ -30,7 +30,7 @@ def test_a_site_lives_through_its_troubles(seed: int) -> None:
 
 
 @pytest.mark.long(3)
-def test_rmfs_supervisor_that_forgets_a_robot_stops_a_lift_for_good_without_what_saves_it(
+def test_without_our_remedy_a_robot_that_rmfs_supervisor_forgets_stops_a_lift_for_good(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The day finds the deadlock that `bridges/lift/forgotten.py` ends."""
@@ -50,7 +50,7 @@ def test_the_same_seed_is_the_same_day() -> None:
     assert list(days[0].laws.log) == list(days[1].laws.log)
 
 
-def test_what_grows_by_the_hour_is_told() -> None:
+def test_growth_from_hour_to_hour_is_reported() -> None:
     flat = [Look(hour, 1, 6, 33_000 + 100 * (hour % 2), 34.0) for hour in range(1, 6)]
     assert growth(flat) == []
     assert growth([*flat, Look(6, 2, 9, 39_000, 60.0)]) == [

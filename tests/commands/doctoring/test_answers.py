@@ -50,5 +50,5 @@ def _numbers(name: str) -> tuple[set[int], set[int]]:
     return set(numbers(config, bus, "unit")), set(numbers(config, bus, "node"))
 
 
-def test_numbers_are_told_as_ranges() -> None:
+def test_numbers_are_printed_as_ranges() -> None:
     assert [ranges(n) for n in ([], [4], [1, 2, 3, 9, 11, 12])] == ["", "4", "1 to 3, 9, 11 to 12"]

@@ -229,7 +229,7 @@ def test_the_kill_test_switches_nothing_on_against_a_fire_alarm(tmp_path: Path) 
     assert found["kill test"] == [("wrong", text)]
 
 
-def test_the_kill_test_asks_once_more(module: Module, tmp_path: Path) -> None:
+def test_the_kill_test_asks_before_it_switches(module: Module, tmp_path: Path) -> None:
     words = ("doctor", module.file, "--listen", "0", "--runtime-dir", tmp_path / "run")
     terminal = Terminal(*words, "--kill-test", environ=environment())
     terminal.wait_for("hold_open of ward_door will be ON for some seconds")
@@ -255,7 +255,7 @@ def test_without_a_terminal_or_an_output_there_is_no_kill_test(
     assert module.relay() == []
 
 
-def test_a_bad_yaml_is_told_as_check_tells_it(
+def test_a_bad_yaml_is_reported_as_check_reports_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "bad.yaml").write_text("kind: lift\n")
@@ -334,7 +334,7 @@ def test_a_canopen_receiver_answers_and_is_found_by_its_node(tmp_path: Path) -> 
 
 
 @pytest.mark.long(15)
-def test_who_sends_on_the_graph_is_seen_and_a_second_door_of_the_name_is_wrong(
+def test_senders_on_the_graph_are_listed_and_a_second_door_of_the_name_is_wrong(
     module: Module, tmp_path: Path
 ) -> None:
     rmf = join("rmf", module.domain)

@@ -41,7 +41,7 @@ def test_on_a_machine_that_is_set_up_well_all_is_well(tmp_path: Path) -> None:
     assert (code, found) == (0, [well[0], *warned, *well[1:]])
 
 
-def test_each_thing_that_is_amiss_is_told_and_the_rest_is_looked_at_all_the_same(
+def test_each_problem_is_reported_and_the_rest_is_examined_all_the_same(
     tmp_path: Path,
 ) -> None:
     made = pi(tmp_path / "pi")
@@ -68,7 +68,7 @@ def test_each_thing_that_is_amiss_is_told_and_the_rest_is_looked_at_all_the_same
     assert ("daemon", "ok") in found
 
 
-def test_chips_are_looked_at_by_their_numbers(tmp_path: Path) -> None:
+def test_chips_are_examined_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     made = pi(tmp_path / "pi")
     made.chip(10, "gpio-sim")
     made.chip(2, "gpio-sim")

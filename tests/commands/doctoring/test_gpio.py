@@ -112,7 +112,9 @@ def test_a_pin_that_another_program_holds_is_named(made: MadeUp) -> None:
     ]
 
 
-def test_a_doctor_that_may_not_open_the_chip_says_so_and_knows_nothing_of_it(made: MadeUp) -> None:
+def test_a_doctor_without_permission_for_the_chip_says_so_and_judges_nothing_on_it(
+    made: MadeUp,
+) -> None:
     made.chip(0, "pinctrl-rp1")
     made.chip(10, "gpio-brcmstb@107d508500")
     made.hidden = {"gpiochip0"}
@@ -159,12 +161,12 @@ def test_an_accepted_relay_that_is_on_at_boot_is_warned_of(made: MadeUp) -> None
 
 
 @pytest.mark.parametrize("line", ["gpio=23=op,dh", "  gpio=20-24=op,pn,dh", "gpio=4,23=op,dh"])
-def test_the_firmware_can_switch_it_off(made: MadeUp, line: str) -> None:
+def test_the_firmware_can_switch_a_relay_off_at_boot(made: MadeUp, line: str) -> None:
     made.write(CONFIG, f"# gpio=23=op,dl\n{line}\n")
     assert told(list(boot(made.machine, [RELAY], {}))) == [("ok", "off from power-on: door_open")]
 
 
-def test_the_firmware_can_switch_it_on(made: MadeUp) -> None:
+def test_the_firmware_can_switch_a_relay_on_at_boot(made: MadeUp) -> None:
     made.write(CONFIG, "gpio=18=op,dh\n")
     (found,) = boot(made.machine, [CALL], {})
     assert (found.level, found.do) == ("wrong", "gpio=18=op,dl in config.txt, and reboot")
@@ -179,7 +181,7 @@ def test_the_firmware_can_switch_it_on(made: MadeUp) -> None:
         ("", "", "warning", "rmf-bridge doctor FILE --kill-test"),
     ],
 )
-def test_whether_the_kernel_keeps_outputs(
+def test_it_says_whether_the_kernel_keeps_outputs_after_a_death(
     made: MadeUp, said: str, config: str, level: str, do: str
 ) -> None:
     made.write(PERSIST, said)

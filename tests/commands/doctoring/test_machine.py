@@ -70,7 +70,7 @@ def test_the_services_user_has_the_groups_of_the_unit(made: MadeUp) -> None:
         (None, "", [("note", "the kernel does not say whether it is synchronised")]),
     ],
 )
-def test_the_clock(
+def test_the_clock_is_judged_by_the_kernel_and_ntp(
     made: MadeUp, synchronised: bool | None, printed: str, found: list[tuple[str, str]]
 ) -> None:
     made.synchronised = synchronised
@@ -92,7 +92,9 @@ def test_this_machines_kernel_says_whether_its_clock_is_synchronised() -> None:
         (True, None, "note"),
     ],
 )
-def test_the_hardware_watchdog(made: MadeUp, device: bool, fed: str | None, level: str) -> None:
+def test_the_hardware_watchdog_must_exist_and_be_fed(
+    made: MadeUp, device: bool, fed: str | None, level: str
+) -> None:
     if device:
         made.write("/dev/watchdog0")
     if fed is not None:
@@ -135,7 +137,7 @@ def test_a_directory_that_the_user_may_not_write_is_wrong(tmp_path: Path) -> Non
     ]
 
 
-def test_a_port_that_is_there_and_permitted(made: MadeUp) -> None:
+def test_a_port_that_exists_and_is_permitted_is_well(made: MadeUp) -> None:
     made.write("/dev/ttyUSB0")
     made.link(BY_ID, "../../ttyUSB0")
     assert list(port(made.machine, BY_ID, made.user, served=False)) == [
@@ -143,7 +145,7 @@ def test_a_port_that_is_there_and_permitted(made: MadeUp) -> None:
     ]
 
 
-def test_a_port_that_is_missing_is_wrong_and_those_that_are_there_are_named(made: MadeUp) -> None:
+def test_a_missing_port_is_wrong_and_existing_ones_are_named(made: MadeUp) -> None:
     made.write("/dev/ttyUSB0")
     made.link(BY_ID, "../../ttyUSB0")
     (found,) = port(made.machine, "/dev/ttyUSB7", made.user, served=False)
@@ -198,7 +200,7 @@ def can_found(made: MadeUp, bitrate: int | None = None) -> list[tuple[str, str]]
     return told(list(interface(made.machine, "can0", bitrate)))
 
 
-def test_an_interface_that_is_up_and_recovers_by_itself(made: MadeUp) -> None:
+def test_an_interface_that_is_up_and_recovers_by_itself_is_well(made: MadeUp) -> None:
     can0(made, state="ERROR-ACTIVE", bittiming={"bitrate": 250000}, restart_ms=100)
     text = "can0 is up at 250000 bit/s; compare that with the stations"
     assert can_found(made, 250_000) == [("ok", text)]
@@ -215,7 +217,7 @@ def test_each_fault_of_a_can_interface_is_named(made: MadeUp) -> None:
     assert can_found(made)[1:] == [("warning", "can0 is error-passive")]
 
 
-def test_an_interface_that_is_down_missing_or_no_can(made: MadeUp) -> None:
+def test_an_interface_that_is_down_or_missing_or_not_can_is_wrong(made: MadeUp) -> None:
     assert can_found(made) == [("wrong", "there is no interface can0; CAN interfaces here: none")]
     can0(made, flags="0x80")
     assert can_found(made) == [("wrong", "can0 is down")]

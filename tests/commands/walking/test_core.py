@@ -118,7 +118,7 @@ def test_feedback_counts_also_after_the_output_has_gone_off() -> None:
     assert walk.memory.results == {0: "seen: the door is open"}
 
 
-def test_what_no_input_shows_is_seen_by_eye() -> None:
+def test_an_output_that_no_input_shows_is_confirmed_by_eye() -> None:
     walk = Walk()
     walk.does(Switch(1))
     walk.until(6.0)

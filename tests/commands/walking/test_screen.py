@@ -87,11 +87,13 @@ def test_a_wide_and_high_terminal_shows_every_wire_and_every_output() -> None:
         (9, (0, 5), Room(0, 5)),
     ],
 )
-def test_how_the_rows_are_shared(rows: int, known: tuple[int, int], fit: Room) -> None:
+def test_rows_are_shared_between_inputs_and_outputs(
+    rows: int, known: tuple[int, int], fit: Room
+) -> None:
     assert room(rows, *known) == fit
 
 
-def test_a_device_without_contacts_has_what_is_decoded_alone() -> None:
+def test_a_device_without_contacts_shows_only_what_is_decoded() -> None:
     lines = shown(40, 24, count=0)
     assert lines[1] == "no contacts: registers or messages,"
     assert "input" not in " ".join(lines)

@@ -379,7 +379,7 @@ def test_setpoints_are_those_that_the_map_takes() -> None:
 
 
 @pytest.mark.parametrize("amps", [-1.0, 4000.0])
-def test_a_setpoint_that_the_frame_cannot_say_is_a_problem(amps: float) -> None:
+def test_a_setpoint_that_the_frame_cannot_carry_is_a_problem(amps: float) -> None:
     assert problems(setpoints=SETPOINTS | {"amps": amps}) == [
         (("setpoints", "amps"), f"is {amps:g}: ChargerControl.RefCurrent takes 0 to 3276.7 A")
     ]
@@ -430,7 +430,7 @@ def map_problems(**changed: Any) -> list[tuple[tuple[str, ...], str]]:
         ),
     ],
 )
-def test_a_map_that_its_dbc_file_does_not_bear_out_is_a_problem_at_its_place(
+def test_a_map_that_contradicts_its_dbc_file_is_a_problem_at_its_place(
     changed: dict[str, Any], path: tuple[str, ...], text: str
 ) -> None:
     found = map_problems(**changed)

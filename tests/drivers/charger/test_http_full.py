@@ -62,7 +62,7 @@ def test_a_receivers_number_is_its_id() -> None:
     assert read(answer(receiver=17)).measured.receiver_id == "17"
 
 
-def test_a_robots_error_is_told_from_the_stations_and_an_unknown_word_is_unknown() -> None:
+def test_a_robots_error_is_distinguished_from_the_stations_and_an_unknown_word_is_unknown() -> None:
     found = [read(answer(word)) for word in ("FAULT", "PAIRING_FAILED", "UPDATING\n firmware")]
     assert [(sample.activity, sample.code, sample.side) for sample in found] == [
         (Activity.ERROR, 5, "station"),
@@ -231,7 +231,7 @@ def test_without_a_wanted_level_nothing_is_sent_whatever_the_station_does() -> N
     assert [scan(AS_IT_IS, state) for state in FULL.state_words] == [[]] * 7
 
 
-def test_a_station_that_pairs_by_itself_is_started_once_for_who_asked() -> None:
+def test_a_station_that_pairs_by_itself_is_started_once_for_the_robot_that_asked() -> None:
     _, scan = driver()
     assert [scan(ON, "PAIRING"), scan(ON, "PAIRING")] == [[START], []]
 
@@ -290,7 +290,7 @@ def test_a_profile_that_cannot_be_right_is_refused(
     )
 
 
-def test_what_cannot_be_stopped_cannot_be_kept_and_who_is_not_known_cannot_be_served(
+def test_keep_needs_a_station_that_can_be_stopped_and_serve_known_needs_receivers(
     tmp_path: Path,
 ) -> None:
     seed = Settings(codes=Codes(idle=[0], charging=[5]), on_death="keep", unrequested="serve_known")

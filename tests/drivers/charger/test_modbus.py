@@ -39,13 +39,13 @@ def test_no_other_device_may_use_its_coils() -> None:
     ]
 
 
-def test_check_warns_that_it_is_untried_and_that_it_tells_no_receiver() -> None:
+def test_check_warns_that_it_is_untried_and_that_it_reports_no_receiver() -> None:
     known = msgspec.structs.replace(SETTINGS, receivers={"1": "tiny/AMR01"})
     assert [path for path, _ in warnings(known)] == [(), (), ("receivers",)]
     assert [path for path, _ in warnings(SETTINGS)] == [(), ()]
 
 
-def test_a_receiver_that_is_lost_while_it_is_enabled_is_let_go_without_a_word() -> None:
+def test_closing_an_enabled_receiver_that_was_lost_is_no_error() -> None:
     plant, clock = rcu_plant("c"), Time()
     server = ModbusServer([ModbusRcu(plant, SETTINGS)], slow_s=0.3)
     plain = {"type": "modbus", "timeout_s": 5.0, "retries": 0, **server.replace}

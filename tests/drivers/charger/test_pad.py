@@ -77,7 +77,7 @@ class TestOnContacts(MovingPadContract):
         return _Contacts().benches()
 
 
-def test_xnergys_receiver_on_modbus_tells_its_two_temperatures() -> None:
+def test_xnergys_receiver_on_modbus_reports_its_two_temperatures() -> None:
     with switched.TestAReceiverOnModbus().benches() as bench:
         bench.driver.open()
         bench.scan(OFF)

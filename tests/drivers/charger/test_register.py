@@ -126,7 +126,7 @@ def test_without_power_it_is_only_observed() -> None:
     assert isinstance(made.map, ChargerMap)
 
 
-def test_each_value_is_told_by_what_its_registers_hold() -> None:
+def test_the_table_says_what_each_registers_number_means() -> None:
     wide = Number(at="input register 9", words=2, low_first=True, scale=0.001)
     flag = Number(at="input register 2", bit=3)
     assert SETTINGS.map

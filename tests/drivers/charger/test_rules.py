@@ -83,7 +83,7 @@ def test_rules_come_before_codes_and_errors_before_both() -> None:
     assert read(several, station) == (Activity.ERROR, 1, text, "station")
 
 
-def test_a_test_holds_for_what_it_says_and_nothing_else() -> None:
+def test_a_rules_test_holds_for_what_it_says_and_nothing_else() -> None:
     assert [Condition(one_of=[1, "on"]).holds(v) for v in (1, 1.0, "on", True, 0, None)] == [
         *[True] * 3,
         *[False] * 3,

@@ -76,7 +76,7 @@ def test_error_words_name_the_side_at_fault_and_the_stations_first(
     assert (made.side, made.error_text) == (side, text)
 
 
-def test_an_error_that_has_gone_is_told_by_the_latched_words_while_the_state_is_error() -> None:
+def test_an_error_that_has_gone_is_named_by_the_latched_words_while_the_state_is_error() -> None:
     latched = {"latched_low": 0x0100, "latched_high": 0}
     assert xnergy.sample(words(state=238) | latched).error_text == (
         "communication lost while charging"

@@ -127,7 +127,7 @@ SAFEST = ("agv_mode", "normal", "fire_alarm")
     st.lists(st.sampled_from([*SAFEST, "fault"]), min_size=8, max_size=8),
     st.lists(st.sampled_from([line, alarm]), min_size=3, max_size=3),
 )
-def test_exactly_the_lines_are_refused_that_can_make_it_less_safe(
+def test_exactly_the_lines_that_can_make_it_less_safe_are_refused(
     states: list[str], polarity: list[Any]
 ) -> None:
     lift = service(dict(enumerate(states)), [wire(60 + i) for i, wire in enumerate(polarity)])

@@ -370,7 +370,7 @@ def test_every_hazard_has_a_line_of_its_name() -> None:
     assert names <= set(settings().inputs.__struct_fields__)
 
 
-def test_what_is_unsafe_is_told_with_all_that_is_wrong_not_after_it() -> None:
+def test_unsafe_wiring_is_reported_with_all_other_problems_and_not_after_them() -> None:
     wired = settings(floors=["B1", "G", "1", "G"], inputs=inputs(fire_alarm=line(40)))
     assert found(wired) == [
         ("floors", "a floor is named twice: delete one"),
@@ -394,7 +394,7 @@ def test_agv_mode_that_no_output_asks_for_is_warned_of() -> None:
 BY_CALL = {"agv_mode": "by_call", "outputs": {"door_open": coil(1)}}
 
 
-def test_agv_mode_by_call_is_told_by_the_lift_and_asked_for_by_calls_alone() -> None:
+def test_agv_mode_by_call_is_shown_by_the_lift_and_asked_for_by_calls_only() -> None:
     assert (found(settings(**BY_CALL)), warned(settings(**BY_CALL))) == ([], [])
     assert found(settings(**BY_CALL, inputs=inputs(agv_mode=None))) == [
         ("agv_mode", "by_call needs an agv_mode input: nothing else tells that a call was taken")
@@ -413,7 +413,7 @@ def test_agv_mode_by_call_is_told_by_the_lift_and_asked_for_by_calls_alone() -> 
     ]
 
 
-def test_a_fire_that_no_topic_tells_of_is_noted_and_not_warned_of() -> None:
+def test_a_fire_that_no_topic_announces_is_noted_and_not_warned_of() -> None:
     silent = [
         (
             ("alarm",),

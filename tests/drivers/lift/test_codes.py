@@ -61,7 +61,7 @@ def shown(text: str) -> dict[str, bool]:
 BINARY = {"encoding": "binary", "bits": bits(3), "codes": {1: "B1", 2: "G", 4: "1"}}
 
 
-def test_only_listed_codes_are_floors_and_none_is_between_them() -> None:
+def test_only_listed_codes_are_floors_and_no_line_on_is_between_floors() -> None:
     binary = code(**BINARY)
     assert {text: binary.read(shown(text)) for text in ("000", "001", "010", "011", "100")} == {
         "000": (None, ""),

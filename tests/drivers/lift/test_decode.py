@@ -128,7 +128,7 @@ def test_service_by_code_gives_agv_mode_and_hazards() -> None:
     }
 
 
-def test_a_service_code_without_agv_mode_does_not_tell_it() -> None:
+def test_a_service_code_without_agv_mode_does_not_show_it() -> None:
     two = {"bits": bits(1, 50), "codes": {0: "normal", 1: "manual_mode"}}
     wired = settings(inputs=inputs(agv_mode=None, service=two))
     assert sample(wired, "service_bit0") == LiftSample(

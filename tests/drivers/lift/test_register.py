@@ -29,7 +29,7 @@ def sample(**words: int) -> LiftSample:
 AT_L1 = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=True)
 
 
-def test_a_car_at_a_landing() -> None:
+def test_a_car_at_a_landing_is_read_from_its_registers() -> None:
     assert sample() == AT_L1
 
 
@@ -195,7 +195,7 @@ def test_each_command_is_a_row_with_what_is_written() -> None:
     ]
 
 
-def test_floors_the_wrong_way_round_show() -> None:
+def test_the_table_shows_floors_that_are_the_wrong_way_round() -> None:
     settings = shipped()
     turned = msgspec.structs.replace(settings, floors=list(settings.floors)[::-1])
     first = next(iter(tables(turned)))

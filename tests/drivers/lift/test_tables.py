@@ -92,7 +92,7 @@ def test_the_table_says_how_long_a_call_lasts(tmp_path: Path) -> None:
     ]
 
 
-def test_service_and_motion_codes_are_told_number_by_number(tmp_path: Path) -> None:
+def test_service_and_motion_codes_are_listed_number_by_number(tmp_path: Path) -> None:
     more = ("    # A number on three lines", f"{MORE}    # A number on three lines")
     told = "the controller watches its lines"
     accepted = f"{{service_bit0: {told}, service_bit1: {told}, motion_bit0: {told}}}"

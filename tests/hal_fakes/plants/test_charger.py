@@ -267,7 +267,7 @@ def test_a_station_that_is_commanded_charges_while_it_is_told_to() -> None:
     ]
 
 
-def test_power_taken_in_the_handshake_ends_it() -> None:
+def test_power_switched_off_during_the_handshake_ends_it() -> None:
     plant = commanded()
     plant.press("robot", True, 1.0)
     plant.drive("power", True, 2.0)
@@ -275,7 +275,7 @@ def test_power_taken_in_the_handshake_ends_it() -> None:
     assert states(plant, 20.0) == [(2.0, "handshake"), (3.0, "idle")]
 
 
-def test_the_station_sees_the_receiver_of_who_came_last_and_nobodys_when_it_is_silent() -> None:
+def test_the_station_sees_the_receiver_of_the_last_arrival_and_none_when_it_is_silent() -> None:
     plant = commanded()
     seen = []
     for robot, here in (
@@ -310,7 +310,7 @@ def test_a_battery_fills_and_the_station_says_how_long_it_takes() -> None:
     ]
 
 
-def test_a_battery_stays_as_full_as_it_is_when_the_power_goes() -> None:
+def test_a_battery_keeps_its_level_when_the_power_goes() -> None:
     plant = powered()
     plant.advance(21.0)
     plant.drive("power", False, 21.0)
@@ -344,7 +344,7 @@ def test_the_coil_warms_while_current_flows_and_cools_again() -> None:
     assert [*warm, round(at(plant, 200.0).celsius)] == [25, 39, 52, 25]
 
 
-def test_a_robot_that_stands_badly_is_seen_so_and_cannot_be_charged() -> None:
+def test_a_badly_parked_robot_is_reported_so_and_cannot_be_charged() -> None:
     plant = parked()
     assert at(plant, 1.5).in_range is True
     plant.press("misparked", True, 2.0)
@@ -366,7 +366,7 @@ def ranges(plant: ChargerPlant) -> list[str]:
     return [at(plant, now).range_result for now in (5.1, 6.0)]
 
 
-def test_a_range_check_is_under_way_and_then_says_what_is_so() -> None:
+def test_a_range_check_shows_that_it_is_under_way_and_then_its_result() -> None:
     assert ranges(parked()) == ["ongoing", "in"]
     assert ranges(parked(("receiver", "off"))) == ["ongoing", "failed"]
     badly = parked()

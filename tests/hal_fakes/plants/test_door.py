@@ -40,7 +40,7 @@ def test_a_door_opens_while_it_is_held_and_closes_by_itself_afterwards() -> None
     assert door.next_at() == float("inf")
 
 
-def test_somebody_in_the_doorway_turns_it_round_half_way() -> None:
+def test_somebody_in_the_doorway_makes_the_door_reverse_half_way() -> None:
     door = plant()
     door.drive("hold_open", True, 0.0)
     door.drive("hold_open", False, 5.0)

@@ -25,7 +25,7 @@ def in_agv_mode(**changes: Any) -> LiftPlant:
     return plant
 
 
-def test_at_first_it_stands_at_the_lowest_landing_closed() -> None:
+def test_it_starts_at_the_lowest_landing_with_its_door_closed() -> None:
     plant = lift()
     now = {s: plant.sense(s) for s in ("floor_B1", "floor_G", "door_opened", "door_closed")}
     assert (now, plant.edges, plant.next_at()) == (
@@ -460,7 +460,7 @@ def test_an_unknown_part_or_signal_is_named_with_those_that_exist() -> None:
     )
 
 
-def test_every_edge_is_told_as_it_happens() -> None:
+def test_every_edge_is_reported_as_it_happens() -> None:
     plant = lift()
     told: list[Edge] = []
     plant.on_edge = told.append

@@ -20,7 +20,7 @@ def test_the_shipped_fleet_has_its_robots_at_their_places_and_its_finishing_requ
     }
 
 
-def test_a_part_of_the_fleet_needs_a_part_of_the_graph() -> None:
+def test_a_part_of_the_fleet_needs_only_its_part_of_the_graph() -> None:
     fleet = tutorial_fleet(TINY, {"wait_1": GRAPH["wait_1"]}, 1.0, only=("AMR01",))
     assert list(fleet.robots) == ["AMR01"]
 

@@ -88,7 +88,7 @@ def address(module_domain: int, folder: Path) -> Iterator[str]:
         yield found
 
 
-def test_a_simulation_is_pressed_and_failed_and_each_deed_is_kept(
+def test_a_simulation_can_be_pressed_and_failed_and_each_action_is_recorded(
     tab: Page, address: str, until: Until, folder: Path, shot: Shot
 ) -> None:
     tab.goto(address)

@@ -65,7 +65,7 @@ def address(
         yield found
 
 
-def test_when_the_network_goes_all_turns_old_and_comes_back_without_a_reload(
+def test_when_the_network_fails_everything_is_marked_old_and_recovers_without_a_reload(
     tab: Page, address: str, graph: Graph, router: Router, until: Until
 ) -> None:
     graph.lift("Lift1", "L1", 0, "fleet/robot")
@@ -114,9 +114,7 @@ def test_a_browser_that_never_reads_is_ended_and_others_see_all(
         del graph.lifts[f"Tower{number:02}"]
 
 
-def test_sockets_that_ask_for_nothing_or_for_nonsense_keep_nobody_out(
-    tab: Page, address: str
-) -> None:
+def test_idle_sockets_and_nonsense_keep_nobody_out(tab: Page, address: str) -> None:
     place = urlsplit(address)
     there = (place.hostname or "", place.port or 0)
     with ExitStack() as opened:

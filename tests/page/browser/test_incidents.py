@@ -89,7 +89,7 @@ def test_a_recording_is_shown_without_any_graph(tab: Page, address: str) -> None
         ("passwd.mcap", "no incident"),
     ],
 )
-def test_a_recording_from_elsewhere_is_told_to_be_damaged_or_none(
+def test_a_foreign_file_is_reported_as_damaged_or_as_no_recording(
     tab: Page, address: str, name: str, told: str
 ) -> None:
     tab.goto(f"{address}incidents/{name}")
@@ -132,7 +132,7 @@ def test_axe_finds_no_serious_fault_in_an_opened_incident(tab: Page, address: st
     assert serious_faults(tab) == []
 
 
-def test_a_device_of_a_hostile_name_in_a_recording_is_text(tab: Page, address: str) -> None:
+def test_a_hostile_device_name_in_a_recording_is_shown_as_text(tab: Page, address: str) -> None:
     tab.goto(f"{address}incidents/hostile.mcap")
     tab.locator(".timeline svg").wait_for()
     assert tab.locator("main img").count() == 0

@@ -39,7 +39,7 @@ def test_a_ride_is_seen_moving(
     shot("site")
 
 
-def test_a_device_that_is_heard_no_more_turns_old_and_says_so(
+def test_a_device_that_falls_silent_is_marked_as_old(
     tab: Page, address: str, graph: Graph, until: Until
 ) -> None:
     graph.lift("Lift1")
@@ -52,7 +52,9 @@ def test_a_device_that_is_heard_no_more_turns_old_and_says_so(
     assert "OLD" not in card(tab, "Lift1")
 
 
-def test_a_name_from_the_graph_is_text(tab: Page, address: str, graph: Graph, until: Until) -> None:
+def test_a_name_from_the_graph_is_shown_as_text(
+    tab: Page, address: str, graph: Graph, until: Until
+) -> None:
     graph.lift(HOSTILE, HOSTILE, 2, HOSTILE)
     tab.goto(address)
     until(lambda: HOSTILE in card(tab, "onerror"), "the hostile name")
@@ -97,7 +99,7 @@ def test_a_wrong_password_is_refused(tab: Page, address: str, complaints: list[s
     complaints.clear()
 
 
-def test_who_has_logged_in_is_asked_once_more_and_releases_a_lift(
+def test_a_logged_in_user_confirms_and_then_releases_a_lift(
     tab: Page, context: BrowserContext, address: str, graph: Graph, until: Until
 ) -> None:
     see_lift_held(tab, address, graph, until)
@@ -161,7 +163,7 @@ def test_everything_can_be_reached_by_keyboard_and_the_focus_is_seen(
     until(lambda: tab.locator("h1", has_text="Lift1").count() == 1, "its page")
 
 
-def test_a_car_that_moves_is_seen_to_move_unless_the_reader_wants_none(
+def test_a_moving_car_is_animated_unless_the_reader_prefers_no_motion(
     tab: Page, address: str, graph: Graph, until: Until
 ) -> None:
     tab.emulate_media(reduced_motion="reduce")

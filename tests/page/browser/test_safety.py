@@ -89,19 +89,19 @@ def test_a_cookie_is_for_this_page_alone_and_secure_where_the_login_came_over_tl
     assert "Secure" in headers["set-cookie"]
 
 
-def test_a_session_given_before_the_login_is_not_taken(address: str) -> None:
+def test_a_session_id_chosen_before_the_login_is_not_used(address: str) -> None:
     given = {**FORM, "Cookie": "rmf_bridge_page=chosen-by-somebody-else"}
     _, headers, _ = ask(address, "/login", given, form())
     assert "chosen-by-somebody-else" not in headers["set-cookie"]
 
 
 @pytest.mark.parametrize("path", ["//evil.example", "https://evil.example", "/\\evil.example"])
-def test_a_login_leads_to_no_other_site(address: str, path: str) -> None:
+def test_a_login_never_redirects_to_another_site(address: str, path: str) -> None:
     _, headers, _ = ask(address, f"/login?next={quote(path)}", FORM, form())
     assert headers["location"] == "/"
 
 
-def test_a_logout_without_the_forms_proof_is_refused(address: str) -> None:
+def test_a_logout_with_a_guessed_proof_is_refused(address: str) -> None:
     _, headers, _ = ask(address, "/login", FORM, form())
     cookie = {"Cookie": headers["set-cookie"].split(";")[0]}
     assert ask(address, "/logout", FORM | cookie, "proof=guessed")[0] == 403
@@ -128,7 +128,7 @@ def test_after_five_wrong_passwords_the_right_one_has_to_wait_at_that_address(ad
     assert ask(address, "/login", FORM, form())[0] == 303
 
 
-def test_a_proxys_header_is_believed_from_the_proxy_alone(address: str) -> None:
+def test_a_proxys_header_is_believed_only_from_the_proxy(address: str) -> None:
     claims = {"X-Remote-User": "<b>mallory</b>"}
     assert "mallory" not in ask(address, "/", claims)[2]
     found = ask(address, "/", claims, came_from=PROXY)[2]
@@ -136,7 +136,7 @@ def test_a_proxys_header_is_believed_from_the_proxy_alone(address: str) -> None:
     assert "<b>mallory" not in found
 
 
-def test_beyond_this_machine_nothing_is_shown_before_the_login_and_then_so_many_views(
+def test_beyond_this_machine_nothing_is_shown_before_the_login_and_views_are_bounded(
     folder: Path,
 ) -> None:
     words = (str(folder / "incidents/ride.mcap"), "--passwords", str(folder / "passwords"))

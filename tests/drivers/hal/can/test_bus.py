@@ -40,7 +40,7 @@ def test_a_frame_goes_to_whoever_wants_its_id_and_to_nobody_else(ends: Ends) -> 
     assert any_node == [Frame(0x707, b"\5"), Frame(0x70A, b"\x7f")]
 
 
-def test_an_id_of_29_bits_is_another_than_the_same_of_11(ends: Ends) -> None:
+def test_a_29_bit_id_differs_from_the_same_11_bit_id(ends: Ends) -> None:
     bus, far, _ = ends
     short, long = heard_by(bus, Wanted(0x123)), heard_by(bus, Wanted(0x123 | EXTENDED))
     far.send(0x123, "01")
@@ -65,7 +65,7 @@ def test_what_is_sent_is_on_the_bus_as_it_is(ends: Ends) -> None:
     assert far.heard() == [(0x60A, "2f00200101000000"), (0x1806E5F4, "aa")]
 
 
-def test_a_silent_bus_is_told_from_one_on_which_others_speak(ends: Ends) -> None:
+def test_a_silent_bus_is_distinguished_from_one_on_which_others_speak(ends: Ends) -> None:
     bus, far, clock = ends
     heard_by(bus, Wanted(0x70A))
     assert bus.silence() == SILENT
@@ -87,7 +87,7 @@ def test_others_are_remembered_up_to_a_bound(ends: Ends) -> None:
     assert bus.silence().endswith(" …")
 
 
-def test_what_has_come_while_we_hung_is_of_unknown_age_and_thrown_away(ends: Ends) -> None:
+def test_frames_that_came_while_we_hung_are_discarded_as_their_age_is_unknown(ends: Ends) -> None:
     bus, far, clock = ends
     heard = heard_by(bus, Wanted(1))
     far.send(1, "01")
@@ -177,7 +177,7 @@ def test_pauses_grow_while_the_bus_stays_off_and_are_short_again_after_a_frame(e
         (0x01, "frames cannot be sent in time"),
     ],
 )
-def test_lesser_troubles_of_the_controller_are_told_where_somebody_is_silent(
+def test_minor_faults_of_the_controller_are_named_where_a_station_is_silent(
     ends: Ends, error_id: int, text: str
 ) -> None:
     bus, far, clock = ends

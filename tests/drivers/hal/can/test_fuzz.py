@@ -75,7 +75,7 @@ def says_charging(message: can.Message) -> bool:
 @example([frame(STATUS, bytes(7) + b"\5", True), frame(SERIAL, bytes(8), True)])
 @example([frame(STATUS, bytes(6) + b"\5", True), frame(SERIAL, bytes(8), True)])
 @given(frames)
-def test_no_frames_break_the_driver_of_makers_frames_or_make_a_charge(
+def test_no_frames_break_the_driver_of_makers_frames_or_fake_a_charge(
     sent: list[can.Message],
 ) -> None:
     far = Reactive()
@@ -147,7 +147,7 @@ spoils = st.one_of(
 
 @settings(max_examples=examples(400))
 @given(st.lists(spoils, min_size=1, max_size=8), frames)
-def test_no_answers_break_the_canopen_driver_or_make_a_charge(
+def test_no_answers_break_the_canopen_driver_or_fake_a_charge(
     spoiled: list[Callable[[can.Message], list[can.Message]]], between: list[can.Message]
 ) -> None:
     far, sent, turns = Reactive(), list[can.Message](), 0

@@ -41,7 +41,7 @@ class Interface(can.BusABC):
         self.far.close()
 
 
-def test_a_clock_that_is_set_back_during_a_wait_makes_it_no_longer(
+def test_a_clock_that_is_set_back_during_a_wait_does_not_prolong_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     shown = iter([0.0, -HOUR_S, HOUR_S, HOUR_S, HOUR_S, HOUR_S])

@@ -157,7 +157,7 @@ def test_a_node_that_owes_an_answer_is_asked_nothing(side: Side) -> None:
     assert ours.read(*STATE) == 1
 
 
-def test_what_switches_off_before_the_end_is_sent_whatever_the_pause(side: Side) -> None:
+def test_a_switch_off_at_the_daemons_end_is_sent_in_spite_of_the_pause(side: Side) -> None:
     ours, node, _, bus = side
     node.answer = lambda request: []
     assert failure(lambda: ours.write(*ENABLE, 1))

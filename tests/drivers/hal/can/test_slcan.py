@@ -76,7 +76,7 @@ def desk() -> Iterator[Desk]:
     made.close()
 
 
-def test_frames_go_there_and_back(desk: Desk) -> None:
+def test_frames_go_both_ways(desk: Desk) -> None:
     desk.bus.send(Frame(0x123, b"\1\2"))
     desk.bus.send(Frame(0x18FF50E5 | EXTENDED, bytes(8)))
     assert desk.bus.wait(lambda: len(desk.heard) == 2, PATIENCE_S)

@@ -32,7 +32,7 @@ def test_every_call_but_those_for_edges_is_the_daemons(lgpio: StandIn) -> None:
     ]
 
 
-def test_a_line_that_another_has_is_told_with_its_holder_and_nothing_stays_claimed(
+def test_a_line_that_another_has_is_reported_with_its_holder_and_nothing_stays_claimed(
     lgpio: StandIn,
 ) -> None:
     lgpio.holders = {18: "lg"}

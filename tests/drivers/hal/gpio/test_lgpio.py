@@ -33,7 +33,7 @@ def test_an_active_high_output_is_claimed_once_at_low(lgpio: StandIn) -> None:
     bus.close()
 
 
-def test_from_claim_to_close_lgpio_is_called_exactly_so(lgpio: StandIn) -> None:
+def test_from_claim_to_close_lgpio_gets_exactly_these_calls(lgpio: StandIn) -> None:
     bus = header()
     lines = bus.lines(
         {"BCM4": "down", "BCM2": "up", "BCM5": "none"}, {"BCM18": False, "BCM7": True}
@@ -230,7 +230,7 @@ def test_the_headers_chip_is_found_by_its_label(lgpio: StandIn, tmp_path: Path) 
         ({}, (3,), "{dev}/gpiochip3: can not open gpiochip"),
     ],
 )
-def test_a_machine_without_a_header_is_told_so(
+def test_a_machine_without_a_header_is_reported(
     lgpio: StandIn, tmp_path: Path, chips: dict[int, str], present: tuple[int, ...], text: str
 ) -> None:
     lgpio.chips = chips

@@ -90,7 +90,7 @@ def test_pins_are_pulled_up_to_bcm8_and_down_from_bcm9_until_they_are_claimed() 
         (wire("18"), []),
     ],
 )
-def test_a_wire_that_cannot_be_is_told_why(checked: Wire, texts: list[str]) -> None:
+def test_an_impossible_wire_is_reported_with_the_reason(checked: Wire, texts: list[str]) -> None:
     assert list(wire_problems(checked)) == texts
 
 

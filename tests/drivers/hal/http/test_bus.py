@@ -353,7 +353,7 @@ def test_a_post_ends_at_the_deadline(talk: Conversation) -> None:
         bus.close()
 
 
-def test_a_body_that_pours_without_end_is_cut_at_its_cap() -> None:
+def test_an_endless_body_is_cut_at_its_cap() -> None:
     def pours(caller: Caller) -> None:
         caller.request()
         caller.send(b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n\r\n")

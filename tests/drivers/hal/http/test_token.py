@@ -25,7 +25,7 @@ def test_a_token_is_read_from_its_file_for_each_call(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("held", [None, b"", b"two words", b"two\nlines", b"\xff"])
-def test_a_token_file_that_holds_none_is_an_error_that_does_not_show_it(
+def test_a_token_file_without_a_token_is_an_error_that_does_not_show_its_content(
     tmp_path: Path, held: bytes | None
 ) -> None:
     file = tmp_path / "token"

@@ -68,7 +68,7 @@ def _check(module: Module, case: Recorded) -> None:
 
 
 @pytest.mark.parametrize("case", recorded("tcp"), ids=lambda case: case.what)
-def test_on_tcp_a_module_is_believed_only_what_it_may_be(module: Module, case: Recorded) -> None:
+def test_on_tcp_only_a_right_reply_of_a_module_is_believed(module: Module, case: Recorded) -> None:
     door(module)
     replies = chain(case.replies, repeat("-"))
     module.reply = lambda request: _bytes(next(replies), request)
@@ -76,7 +76,7 @@ def test_on_tcp_a_module_is_believed_only_what_it_may_be(module: Module, case: R
 
 
 @pytest.mark.parametrize("case", recorded("rtu"), ids=lambda case: case.what)
-def test_on_a_line_a_unit_is_believed_only_what_it_may_be(
+def test_on_a_serial_line_only_a_right_reply_of_a_unit_is_believed(
     line: SerialModule, case: Recorded
 ) -> None:
     door(line)

@@ -317,7 +317,7 @@ def test_the_fake_modules_pulse_is_ended_by_a_coil_that_is_written_off(
         ),
     ],
 )
-def test_a_flash_that_cannot_be_is_found_where_it_stands(
+def test_an_impossible_flash_is_reported_where_it_stands(
     tmp_path: Path, flash: str, problem: str
 ) -> None:
     text = SHIPPED.read_text().replace('"unit 1 coil 0x200"', f'"{flash}"')

@@ -121,7 +121,7 @@ def test_against_another_master_off_is_written_at_once_and_as_often_as_it_takes(
     assert [fault.startswith(NAMED) for fault in faults[5:]] == [True] * 15
 
 
-def test_a_stop_is_written_in_the_midst_of_a_pause(door: Door) -> None:
+def test_a_stop_is_written_during_a_pause(door: Door) -> None:
     door.rival = False
     door.scans(3.0)
     door.rival = None

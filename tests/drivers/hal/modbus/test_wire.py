@@ -95,7 +95,7 @@ def test_a_serial_line_says_all_of_its_settings() -> None:
             msgspec.convert({k: v for k, v in LINE.items() if k != key}, Serial)
 
 
-def test_a_port_is_a_path_and_best_a_stable_one() -> None:
+def test_a_port_is_a_path_and_preferably_a_stable_one() -> None:
     def found(port: str) -> tuple[list[Any], list[Any]]:
         line = msgspec.convert({**LINE, "port": port}, Serial)
         settings = Settings(serial=line)
