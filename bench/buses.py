@@ -167,7 +167,7 @@ class Known:
 
 
 def _bad_chargers(scratch: Path) -> Rows:
-    """Beside it, on the same servers at the same time, the loop that needs no thought: one
+    """For comparison, on the same servers at the same time, the naive loop: one
     `requests.get` after the other, each second, with a timeout that applies to each read."""
     rmf, plain, done = Known(), Known(), threading.Event()
     with http_chargers(SOUND, DEAD, TRICKLING) as ports, graph() as transport:
@@ -186,7 +186,7 @@ def _bad_chargers(scratch: Path) -> Rows:
 
 
 def _mixed(ports: Sequence[int]) -> list[int]:
-    """The bad ones not all together."""
+    """The bad ones spread among the sound ones."""
     bad, sound = list(ports[SOUND:]), list(ports[:SOUND])
     every = len(ports) // len(bad)
     mixed = [

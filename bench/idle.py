@@ -41,7 +41,7 @@ def _many(scratch: Path, name: str, contents: dict[int, Content]) -> Rows:
 
 
 def _http(scratch: Path) -> Rows:
-    """Their servers are a process of its own: simulated ones would cost the daemon something."""
+    """Their servers are a separate process: simulated ones would cost the daemon something."""
     rows: Rows = {}
     for n in HTTP_CHARGERS:
         with http_chargers(n) as ports:

@@ -37,11 +37,11 @@ settings.load_profile("here")
 
 signal.signal(
     signal.SIGHUP, signal.SIG_DFL
-)  # nohup, or a CI's shell, has daemons inherit another one
+)  # or daemons inherit what nohup or a CI's shell has set
 
 gc.disable()
 atexit.register(gc.freeze)
-"""No look for garbage while the tests are collected, which leaves none, nor when a worker ends."""
+"""No garbage collection while the tests are collected, which leaves none, nor when a worker ends."""
 
 end_with_us()
 
@@ -50,7 +50,7 @@ _deselected: list[str] = []
 
 @pytest.fixture(autouse=True)
 def _log_as_before() -> Iterator[None]:
-    """A command that a test calls in this process starts a log of its own; the next test has none."""
+    """A command called in this process sets up its own log; undo that for the next test."""
     root = logging.getLogger()
     handlers, level = list(root.handlers), root.level
     yield
@@ -74,8 +74,8 @@ def module_domain() -> Iterator[int]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the tests in order; what hangs on a wire ends. Without cyclonedds, as on arm64, the tests of
-    the dds transport cannot be run."""
+    """Order the tests, and end those on wires that hang. Without cyclonedds, as on arm64, the tests of
+    the dds transport are left out."""
     if missing_of_dds():
         items[:] = [item for item in items if not item.get_closest_marker("dds")]
     items[:] = _mixed(items)
@@ -84,7 +84,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """What was collected stays to the end: what looks for garbage leaves it out."""
+    """What was collected stays until the end, so the garbage collector need not scan it."""
     gc.freeze()
     gc.enable()
 
@@ -103,9 +103,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 
 
 def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
-    """In an order in which tests that wait and tests that compute are mixed, so that the workers keep
-    all cores busy: file by file, always the same. Among those of the first quarter is what takes long,
-    the longest first."""
+    """Mix tests that wait with tests that compute, so that the workers keep all cores busy: file by
+    file, in an order that is always the same. Long tests are in the first quarter, the longest first."""
     random = Random(1)
     place = {path: random.random() for path in sorted({item.path for item in items})}
     early = sorted(filter(_seconds, items), key=_seconds, reverse=True)
@@ -124,14 +123,14 @@ def _is_on_wires(item: pytest.Item) -> bool:
 
 
 def pytest_deselected(items: Sequence[pytest.Item]) -> None:
-    """Remember what was not run for want of ROS."""
+    """Remember which tests were left out because there is no ROS."""
     _deselected.extend(item.nodeid for item in items if item.get_closest_marker("ros"))
 
 
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Say so: a green run without ROS has not seen the ros2 transport."""
+    """Report them: a green run without ROS has not seen the ros2 transport."""
     if missing := missing_of_dds():
         terminalreporter.write_line(f"not run: the tests of the dds transport, as {missing}")
     if _deselected and config.getoption("markexpr") == "not ros and not browser":

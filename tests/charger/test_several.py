@@ -1,4 +1,4 @@
-"""Several stations in one daemon: what is wrong with one is not the others' affair."""
+"""Several stations in one daemon: a fault of one does not touch the others."""
 
 import json
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""Who stands on a pad that is not theirs, rule by rule: memories made by hand, and whole answers."""
+"""Robots on the wrong pad, rule by rule: memories made by hand, and whole answers."""
 
 from collections.abc import Mapping
 
@@ -98,7 +98,7 @@ def test_the_stations_own_word_for_who_is_on_its_pad_counts_at_once_and_only_in_
 
 
 def history(memory: Memory, *times: float) -> list[tuple[float, dict[Robot, Nudge], bool, bool]]:
-    """(s, who was told so far, is ONE told just now, is a person to see to it), as time passes."""
+    """(s, who was told so far, whether ONE is told now, whether a person must come), as time passes."""
     lines = []
     for now in times:
         memory = astray.told(memory, now, SITE)

@@ -149,8 +149,8 @@ class Ledger:
             self.hears(FleetSeen((sighting,)))
         self.hears(Woken())
 
-    def ends_well(self) -> None:
-        """All is mended, and all goes on: everybody who wants to be charged is."""
+    def check_all_are_charged_in_the_end(self) -> None:
+        """Everything is mended and goes on; fail unless every robot that wants to be charged is."""
         if not self.speaks:
             self.hears(MaySpeak(True))
         before = dict(self.charged)
@@ -245,7 +245,7 @@ def test_every_history_of_so_many_moves_ends_well() -> None:
     ledger.passes()
     ledger.passes()
     for end, _ in histories(ledger, MOVES, depth(3, 4), after):
-        end.ends_well()
+        end.check_all_are_charged_in_the_end()
 
 
 @hypothesis_settings(max_examples=examples(150))
@@ -255,7 +255,7 @@ def test_every_long_history_ends_well(history: list[int]) -> None:
     for move in history:
         MOVES[move](ledger)
         ledger.passes()
-    ledger.ends_well()
+    ledger.check_all_are_charged_in_the_end()
 
 
 ROBOTS = st.sampled_from([ONE, TWO, Robot("tiny", "AMR03")])

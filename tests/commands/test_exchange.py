@@ -1,4 +1,4 @@
-"""`send`, in virtual time: what it sends when, when it is content, and what it says when not."""
+"""`send`, in virtual time: what it sends and when, when it is done, and what it says if it fails."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

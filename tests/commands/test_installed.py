@@ -1,4 +1,4 @@
-"""What a plain `pip install` brings: every file, and commands that need no extra to start."""
+"""What a plain `pip install` installs: every file, and commands that need no extra to start."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""A door whose supervisor has gone: it stays held, unless the site has said for how long."""
+"""A door whose supervisor has gone: it stays held, unless the site limits that time."""
 
 from bridges.core.decision import Attended
 from tests.door.virtual import OBSTRUCTION, Door

@@ -78,8 +78,8 @@ def test_each_stage_of_a_passage_is_what_its_name_says() -> None:
     }
 
 
-def all_is_true_within(steps: int, roots: list[World], limits: DoorLimits) -> int:
-    """Check every step and state; the number of states."""
+def check_rules_within(steps: int, roots: list[World], limits: DoorLimits) -> int:
+    """Check every step and state; return the number of states."""
     found = walker(limits).walk(roots, steps, check)
     for world in found:
         nothing_changes_before_wake_at(world, limits)
@@ -89,33 +89,33 @@ def all_is_true_within(steps: int, roots: list[World], limits: DoorLimits) -> in
 @pytest.mark.parametrize("site", SITES)
 def test_the_rules_hold_within_some_steps_of_the_start(site: str) -> None:
     limits = SITES[site]
-    assert all_is_true_within(depth(2, 3), [start(limits)], limits) > depth(80, 500)
+    assert check_rules_within(depth(2, 3), [start(limits)], limits) > depth(80, 500)
 
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_the_rules_hold_within_some_steps_of_each_stage_of_a_passage(stage: str) -> None:
-    assert all_is_true_within(depth(2, 3), [path(*STAGES[stage])], PLAIN) > depth(100, 500)
+    assert check_rules_within(depth(2, 3), [path(*STAGES[stage])], PLAIN) > depth(100, 500)
 
 
 @pytest.mark.parametrize("site", SITES)
 def test_the_rules_hold_within_some_steps_of_all_stages_at_each_kind_of_site(site: str) -> None:
     limits = SITES[site]
     roots = [path(*steps, limits=limits) for steps in STAGES.values()]
-    assert all_is_true_within(depth(1, 2), roots, limits) > depth(80, 800)
+    assert check_rules_within(depth(1, 2), roots, limits) > depth(80, 800)
 
 
-def calm(world: World, limits: DoorLimits) -> World:
+def mended(world: World, limits: DoorLimits) -> World:
     """The building mends itself: the door is shut, nobody is in it, nothing burns, all answer."""
     world = replace(world, sample=start(limits).sample, readable=True, writable=True)
-    return then(world, limits, 6.0)
+    return path_checked(world, limits, 6.0)
 
 
-def then(world: World, limits: DoorLimits, *steps: str | float) -> World:
+def path_checked(world: World, limits: DoorLimits, *steps: str | float) -> World:
     """After these moves and waits, each step of them checked."""
     return walker(limits).path(world, *steps, seen=check)
 
 
-def around_all_stages(limits: DoorLimits) -> list[World]:
+def states_around_all_stages(limits: DoorLimits) -> list[World]:
     """Every state within a step of them."""
     roots = [path(*steps, limits=limits) for steps in STAGES.values()]
     return walker(limits).walk(roots, 1, check)
@@ -126,22 +126,22 @@ def test_from_every_state_a_sound_door_opens_when_asked_and_is_let_go_when_asked
     site: str,
 ) -> None:
     limits = SITES[site]
-    for world in around_all_stages(limits):
-        sound = calm(world, limits)
-        wanted = then(sound, limits, "A opens", "at open", 5.0)
+    for world in states_around_all_stages(limits):
+        sound = mended(world, limits)
+        wanted = path_checked(sound, limits, "A opens", "at open", 5.0)
         assert (Scan(wanted, limits).mode, Scan(wanted, limits).hold) == ("OPEN", True)
-        asked = then(wanted, limits, "A closes", 2.0)
+        asked = path_checked(wanted, limits, "A closes", 2.0)
         assert Scan(asked, limits).hold
-        assert not Scan(then(asked, limits, 1.0), limits).hold
-        shut = then(asked, limits, 1.0, "at closed", 16.0)
+        assert not Scan(path_checked(asked, limits, 1.0), limits).hold
+        shut = path_checked(asked, limits, 1.0, "at closed", 16.0)
         assert (Scan(shut, limits).mode, Scan(shut, limits).hold) == ("CLOSED", False)
 
 
 @pytest.mark.parametrize("site", SITES)
 def test_from_every_state_silence_never_lets_go_of_a_door_that_is_wanted_open(site: str) -> None:
     limits = SITES[site]
-    for world in around_all_stages(limits):
-        wanted = then(calm(world, limits), limits, "A opens", "at open", 200.0)
+    for world in states_around_all_stages(limits):
+        wanted = path_checked(mended(world, limits), limits, "A opens", "at open", 200.0)
         scan = Scan(wanted, limits)
         assert (scan.mode, scan.hold) == ("OPEN", True)
         assert scan.codes == ("DOOR_OPEN_TOO_LONG",)

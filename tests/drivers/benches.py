@@ -56,11 +56,11 @@ class Bench(Generic[Sample, Outputs]):
         at_last(lambda: self.driver.write(outputs), "written", self.a_moment)
 
     def a_moment(self) -> None:
-        """All pauses are over."""
+        """Time passes until all pauses are over."""
         self.clock.now += 60.0
 
     def patiently(self) -> Sample | str:
-        """What it reads with all pauses over; or why it cannot be read."""
+        """Its reading, once all pauses are over; or the reason why there is none."""
         self.a_moment()
         try:
             return self.driver.read()

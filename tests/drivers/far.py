@@ -21,7 +21,7 @@ WATCHDOG_S = 2.0
 
 
 class Clocked(Protocol):
-    """Whose time it is."""
+    """Whatever has the virtual time of the test."""
 
     @property
     def now(self) -> float:

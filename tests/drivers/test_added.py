@@ -60,7 +60,7 @@ ON_A_LINE = {"type": "line", "host": "192.0.2.1"}
 
 @pytest.fixture(scope="module")
 def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the rooms, with what is added put beside what is there."""
+    """A copy of the project's folders, with the added files put beside the existing ones."""
     made = tmp_path_factory.mktemp("house")
     for room in ROOMS:
         shutil.copytree(ROOT / room, made / room)
@@ -70,7 +70,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Site:
-    """One file, and whoever is asked about it in the house that we stand in."""
+    """One file, and the commands that are asked about it in this copy."""
 
     def __init__(self, here: Path, domain: int, text: str, bus: dict[str, Any]) -> None:
         self.here, self._text = here, text

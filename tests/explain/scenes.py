@@ -125,7 +125,7 @@ def unknown_floor() -> Case:
 
 
 def foreign_node_refuses() -> Case:
-    """Another maker's node never grants a session, and says no reason."""
+    """Another maker's node never grants a session, and gives no reason."""
     scene = Scene(diagnoses=False)
     _Foreign(scene, available_floors=("L1", "L2"))
     scene.robot("fleet/red").asks("Lift9", "L2")
@@ -171,7 +171,7 @@ def daemon_is_gone() -> Case:
 
 
 def stamps_of_another_clock() -> Case:
-    """The robots' machine lives an hour ago."""
+    """The clock of the robots' machine is an hour slow."""
     scene = Scene("Lift1")
     red = scene.robot("fleet/red")
     red.behind_s = 3600.0
@@ -216,7 +216,7 @@ def door_held_by_a_dead_robot() -> Case:
     return scene.heard, "door", "ward"
 
 
-def door_opens_not() -> Case:
+def door_does_not_open() -> Case:
     """The door is told to open and stays shut."""
     scene = Scene("ward")
     scene.fail("ward", "operator", "stuck")
@@ -236,7 +236,7 @@ def door_without_supervisor() -> Case:
     return scene.heard, "door", "ward"
 
 
-def door_of_people() -> Case:
+def door_held_open_by_a_person() -> Case:
     """A person keeps the door open."""
     scene = Scene("ward")
     scene.press("ward", "push", True)
@@ -300,9 +300,9 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         two_nodes,
         all_is_well,
         door_held_by_a_dead_robot,
-        door_opens_not,
+        door_does_not_open,
         door_without_supervisor,
-        door_of_people,
+        door_held_open_by_a_person,
         charger_refuses,
         wrong_station,
         coordinator_queues,

@@ -142,7 +142,7 @@ def told(stage: Stage, now: float) -> Verdicts:
 def rides(
     *nodes: Party, robots: int = 1, restarts: bool = False, name: str = "Lift1"
 ) -> tuple[Verdicts, str]:
-    """The verdict on a lift that robots ride from L1 to L3, and why they did not, if so."""
+    """The verdict on a lift that robots ride from L1 to L3, and why, if they did not."""
     world = World()
     world.add(*nodes)
     ride = Ride(name, ("L1", "L3"), robots, 60.0, restarts=restarts)
@@ -167,7 +167,7 @@ def charges(*nodes: Party) -> tuple[Verdicts, str]:
 
 
 def watched(kind: Kind, name: str, *parties: Party, for_s: float = 60.0) -> Verdicts:
-    """The verdict on who is only looked at."""
+    """The verdict on a device that the judge only listens to."""
     world = World()
     world.add(*parties)
     stage = world.judge(kind, name, for_s=for_s, most_s=for_s + 1.0)

@@ -53,8 +53,8 @@ def test_each_stage_of_a_ride_is_what_its_name_says() -> None:
     }
 
 
-def all_is_true_around(*roots: World) -> int:
-    """Check every step and state; the number of states."""
+def check_rules_around(*roots: World) -> int:
+    """Check every step and state; return the number of states."""
     found = WALKER.walk(roots, DEPTH, check)
     for world in found:
         nothing_changes_before_wake_at(world, LIMITS)
@@ -62,16 +62,16 @@ def all_is_true_around(*roots: World) -> int:
 
 
 def test_the_rules_hold_within_some_steps_of_the_start() -> None:
-    assert all_is_true_around(start(LIMITS)) > depth(300, 4000)
+    assert check_rules_around(start(LIMITS)) > depth(300, 4000)
 
 
 @pytest.mark.parametrize("root", ROOTS)
 def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> None:
     stage = WALKER.path(start(LIMITS), *ROOTS[root])
-    assert all_is_true_around(stage) > depth(150, 1000)
+    assert check_rules_around(stage) > depth(150, 1000)
 
 
-def home(world: World) -> World:
+def mended_and_idle(world: World) -> World:
     """The building mends itself and stands idle at L1; RMF ends every session; an operator resets."""
     world = replace(world, sample=IDLE, readable=True, writable=True)
     return WALKER.path(world, 6.0, "A ends", "B ends", "reset", 9.0, seen=check)
@@ -90,7 +90,7 @@ def serves(world: World) -> bool:
 def test_from_every_state_a_building_without_faults_returns_to_idle_and_serves_again() -> None:
     roots = [WALKER.path(start(LIMITS), *steps) for steps in ((), *ROOTS.values())]
     for world in WALKER.walk(roots, depth(1, 2)):
-        idle = home(world)
+        idle = mended_and_idle(world)
         assert (idle.memory.session, idle.memory.grace) == (None, None)
         assert idle.memory.relays.outputs() == OFF
         assert serves(idle)

@@ -45,11 +45,11 @@ def theirs(value: Any) -> Any:
 def test_rosbags_writes_the_same_bytes(kind: Any) -> None:
     @repeatable
     @given(values(kind))
-    def written_alike(message: Any) -> None:
+    def check_written_alike(message: Any) -> None:
         written = bytes(STORE.serialize_cdr(theirs(message), name(kind), little_endian=True))
         assert encode(kind, message) == written
 
-    written_alike()
+    check_written_alike()
 
 
 @EVERY_TYPE

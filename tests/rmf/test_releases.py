@@ -129,7 +129,7 @@ def test_each_of_many_nodes_in_one_process_reads_what_the_others_speak(join_of: 
 
 
 def told(nodes: list[Transport], faults: list[tuple[str, str]]) -> Callable[[], bool]:
-    """Whether each of the nodes tells these faults."""
+    """Whether each of the nodes reports these faults."""
     return lambda: all(node.faults() == faults for node in nodes)
 
 

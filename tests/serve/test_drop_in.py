@@ -53,7 +53,7 @@ SHIPPED = {
 
 
 def permits(config: Config, groups: tuple[str, ...] = GROUPS) -> list[str]:
-    """The lines, without the head, sections and the word that says whom it fits."""
+    """The lines, without head, sections and the fingerprint of the needs that it fits."""
     lines = text(config, groups).splitlines()
     return [line for line in lines if line[:1] not in ("#", "[") and FITS not in line]
 

@@ -1,4 +1,4 @@
-"""`ros_setup:`: a daemon that nobody has sourced ROS's setup file for goes on as one that has."""
+"""`ros_setup:`: the daemon sources ROS's setup file by itself, and goes on as if a shell had."""
 
 import logging
 import os

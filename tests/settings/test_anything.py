@@ -17,7 +17,7 @@ BITS += ["017", "1:30", "no", "1e3", "null", "2024-01-01", ".inf", "0x10", "é",
 BITS += ["lanes", "inputs", "point", "active", "codes", "limits", "bus", "header", "type", "north"]
 
 
-def is_judged(file: Path, text: str | bytes) -> None:
+def check_config_or_settings_error(file: Path, text: str | bytes) -> None:
     if isinstance(text, str):
         text = text.encode("utf-8", "surrogatepass")
     for problem in problems_of(file, text):
@@ -30,13 +30,13 @@ def is_judged(file: Path, text: str | bytes) -> None:
 @MANY
 @given(st.binary(max_size=200))
 def test_arbitrary_bytes_are_right_or_refused_at_their_place(file: Path, text: bytes) -> None:
-    is_judged(file, text)
+    check_config_or_settings_error(file, text)
 
 
 @MANY
 @given(st.lists(st.sampled_from(BITS), max_size=40).map("".join))
 def test_arbitrary_bits_of_yaml_are_right_or_refused_at_their_place(file: Path, text: str) -> None:
-    is_judged(file, text)
+    check_config_or_settings_error(file, text)
 
 
 @MANY
@@ -48,7 +48,7 @@ def test_a_file_with_bits_put_in_and_taken_out_is_right_or_refused_at_its_place(
         start = data.draw(st.integers(0, len(text)))
         length = data.draw(st.integers(0, 20))
         text = text[:start] + data.draw(st.sampled_from(["", *BITS])) + text[start + length :]
-    is_judged(file, text)
+    check_config_or_settings_error(file, text)
 
 
 SCALARS = st.one_of(
@@ -67,6 +67,6 @@ def test_arbitrary_values_in_the_place_of_sections_are_right_or_refused_at_their
     file: Path, sections: dict[str, object], gate: object
 ) -> None:
     document = {**yaml.safe_load(RIGHT), **sections}
-    is_judged(file, yaml.dump(document, allow_unicode=True))
+    check_config_or_settings_error(file, yaml.dump(document, allow_unicode=True))
     document["gates"] = {"north": gate}
-    is_judged(file, yaml.dump(document))
+    check_config_or_settings_error(file, yaml.dump(document))

@@ -1,4 +1,4 @@
-"""What every type allows and nobody means is refused, or warned of, by name."""
+"""Values that the types allow but nobody means are refused, or warned of, by name."""
 
 from pathlib import Path
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 WARM_UP = 2
-"""Looks before caches, queues and laws' logs have their size."""
+"""Looks to skip, while caches, queues and laws' logs grow to their size."""
 MOST_OBJECTS = 1.05
 MOST_MB = 4.0
 

@@ -34,7 +34,7 @@ LIFT, DOOR = "Lift1", "ward_door"
 PLACES = Places(["L1", "L2"], [LIFT], [DOOR])
 PACE = 0.05
 PATIENCE_S = 240.0
-"""Nobody waits for longer, whoever was killed meanwhile and however busy the machine is."""
+"""Nobody waits longer, whoever was killed meanwhile and however busy the machine is."""
 
 
 class RealTime(Timeline):

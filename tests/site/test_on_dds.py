@@ -28,14 +28,14 @@ def test_three_robots_share_a_lift_and_a_door_while_everybody_is_killed_once(
 ) -> None:
     for robot in site.robots:
         robot.start()
-    _they_get_on(site)
+    _wait_for_a_ride_and_two_passages(site)
     for party, how in (("lift supervisor", signal.SIGTERM), ("door", signal.SIGKILL)):
         site.restart(party, how)
     site.restart_adapter(site.robots[0])
-    _they_get_on(site)
+    _wait_for_a_ride_and_two_passages(site)
     for party, how in (("lift", signal.SIGKILL), ("door supervisor", signal.SIGKILL)):
         site.restart(party, how)
-    _they_get_on(site)
+    _wait_for_a_ride_and_two_passages(site)
     for robot in site.robots:
         robot.homing = True
     site.until(lambda: all(robot.at_rest for robot in site.robots))
@@ -44,7 +44,7 @@ def test_three_robots_share_a_lift_and_a_door_while_everybody_is_killed_once(
     assert site.voices.matched() == 1
 
 
-def _they_get_on(site: RealSite) -> None:
+def _wait_for_a_ride_and_two_passages(site: RealSite) -> None:
     """Somebody has ridden, and two have gone through the door."""
     rides, doors = site.done("rides"), site.done("doors")
     site.until(lambda: site.done("rides") > rides and site.done("doors") > doors + 1)

@@ -31,12 +31,12 @@ def test_the_devices_of_each_example_answer_an_unopened_driver(name: str, tmp_pa
             with closing(config.bus_type(bus_name).open_bus(there)) as bus:
                 devices = config.devices_on(bus_name)
 
-                def all_answer(bus_name: str = bus_name, bus: object = bus) -> bool:
+                def check_all_answer(bus_name: str = bus_name, bus: object = bus) -> bool:
                     found = list(readings(config, bus_name, bus, "bus"))
                     assert [one.subject for one in found] == ["bus"] * len(found)
                     return {one.level for one in found} == {"ok"}
 
-                wait_until(all_answer, f"{', '.join(devices)} answer")
+                wait_until(check_all_answer, f"{', '.join(devices)} answer")
 
 
 def test_the_units_and_nodes_of_a_file_are_known() -> None:

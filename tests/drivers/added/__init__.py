@@ -1,1 +1,1 @@
-"""What somebody adds: the files below are put into the rooms of a copy, and nothing there is edited."""
+"""Files that somebody adds: they are put into the folders of a copy, and nothing there is edited."""

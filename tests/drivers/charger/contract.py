@@ -1,4 +1,4 @@
-"""What every driver of a charger that is switched has to do, on whatever it stands.
+"""What every driver of a charger that can be switched must do, on any bus.
 
 A test class derives from `ChargerContract` and says how its benches are built.
 """
@@ -26,7 +26,7 @@ from tests.waiting import wait_until
 
 ON, OFF, AS_IT_IS = ChargerOutputs(True), ChargerOutputs(False), ChargerOutputs(None)
 PACE = 20.0
-"""A charger that is not worth waiting for."""
+"""A charger so quick that no test has to wait for it."""
 
 ChargerDriver = Driver[ChargerSample, ChargerOutputs]
 OnDeath = Literal["stop", "keep"]

@@ -1,4 +1,4 @@
-"""Every driver of a charger that is switched keeps the same contract."""
+"""Every driver of a charger that can be switched keeps the same contract."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

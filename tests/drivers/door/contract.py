@@ -28,7 +28,7 @@ class Pace(TypedDict):
 
 
 QUICK: Pace = {"open_s": 0.05, "close_s": 0.05, "auto_close_s": 0.05}
-"""A door that is not worth waiting for."""
+"""A door so quick that no test has to wait for it."""
 
 
 Ends = tuple[bool | None, bool | None]
@@ -143,5 +143,5 @@ class WiredDoorContract(DoorContract):
 
 
 def quick(name: str, wires: Iterable[Wire]) -> DoorPlant:
-    """A door that is there in no time."""
+    """A door that reaches either end at once."""
     return DoorPlant(name, wires, **QUICK)

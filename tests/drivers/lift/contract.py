@@ -19,7 +19,7 @@ from tests.drivers.benches import Contract
 from tests.waiting import wait_until
 
 QUICK = Pace(floor_s=0.2, door_s=0.05, agv_s=0.02, dwell_s=0.1)
-"""A lift that is not worth waiting for."""
+"""A lift so quick that no test has to wait for it."""
 
 IDLE = LiftSample("B1", Door.CLOSED, motion=Motion.STOPPED, agv=False)
 OFF, AGV = LiftOutputs(), LiftOutputs(agv_request=True)

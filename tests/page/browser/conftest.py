@@ -40,7 +40,7 @@ USER, PASSWORD = "ann", "correct horse"
 SCHEMES: Final[tuple[Literal["light", "dark"], ...]] = ("light", "dark")
 SHOTS = Path("build/screenshots")
 VIOLATIONS = {"resultTypes": ["violations"]}
-"""axe-core tells of these alone in full."""
+"""axe-core reports only these in full."""
 
 
 class Graph:
@@ -197,7 +197,7 @@ def context(profile: BrowserContext) -> Iterator[BrowserContext]:
 
 @pytest.fixture
 def tab(context: BrowserContext, address: str, complaints: list[str]) -> Iterator[Page]:
-    """An empty tab. At the end nothing may have been complained of, or asked of another machine."""
+    """An empty tab. It fails at its end if the browser complained or asked another machine."""
     opened = context.new_page()
     opened.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
     opened.on("pageerror", lambda error: complaints.append(str(error)))

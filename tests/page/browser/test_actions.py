@@ -71,7 +71,7 @@ def logged(folder: Path) -> str:
 
 
 def deeds(folder: Path) -> list[tuple[str, int, str]]:
-    """Who did what, as it is kept."""
+    """Who did what, as the page has recorded it."""
     file = folder / "state/actions.jsonl"
     lines = file.read_text().splitlines() if file.exists() else []
     told = [json.loads(line) for line in lines]

@@ -20,7 +20,7 @@ SERIAL = 0x1FFD0001
 
 
 def attempt(far: Reactive, step: Callable[[], object]) -> object:
-    """Take the step with all pauses over. What it gives; None for a DriverError."""
+    """Take the step once all pauses are over; its result, or None for a DriverError."""
     far.now += 0.9
     try:
         return step()

@@ -26,7 +26,7 @@ from tests.drivers.hal.http.far_end import (
 )
 
 TIMEOUT_S = 0.3
-"""Of a call whose failure is the point."""
+"""The timeout of a call that is meant to fail."""
 
 
 class Clock:
@@ -46,7 +46,7 @@ def bus_to(port: int, timeout_s: float = 5.0, **more: Any) -> HttpBus:
 
 
 def failure(talk: Conversation, timeout_s: float = 5.0) -> str:
-    """What a GET says that meets this server."""
+    """The error text of a GET to this server."""
     with FarEnd(talk) as far:
         bus = bus_to(far.port, timeout_s)
         with pytest.raises(HalError) as caught:
@@ -57,7 +57,7 @@ def failure(talk: Conversation, timeout_s: float = 5.0) -> str:
 
 CHUNKED = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
 CHUNK_SIZES = [b"-1", b"-5", b"-" + b"f" * 16, b"-" + b"f" * 5000, b"f" * 5000, b"zz", b""]
-"""Of which no chunk can be."""
+"""No chunk can have any of these sizes."""
 
 # ---- what works
 
@@ -142,7 +142,7 @@ def test_cookies_are_not_kept() -> None:
 
 
 def _answers_twice(caller: Caller) -> None:
-    """Each request gets its reply, and that of the request before it once more."""
+    """Each request gets its own reply, and the previous one again."""
     last = answer(b'{"state": 0}')
     for n in itertools.count(1):
         if not caller.request():

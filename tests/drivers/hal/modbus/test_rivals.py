@@ -32,7 +32,7 @@ NAMED = (
 
 
 class Door:
-    """The loop's scans of a door, and another master that writes what it likes after each."""
+    """The loop's scans of a door, and another master that writes what it likes after each scan."""
 
     def __init__(self, module: Module) -> None:
         module.inputs.update({(1, 0): False, (1, 1): True})
