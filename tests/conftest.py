@@ -103,8 +103,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 
 
 def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
-    """Mix tests that wait with tests that compute, so that the workers keep all cores busy: file by
-    file, in an order that is always the same. Long tests are in the first quarter, the longest first."""
+    """Mix tests that wait with tests that compute, to keep all cores busy: file by file, in an order
+    that is always the same. Long tests are in its first quarter, the longest first."""
     random = Random(1)
     place = {path: random.random() for path in sorted({item.path for item in items})}
     early = sorted(filter(_seconds, items), key=_seconds, reverse=True)
