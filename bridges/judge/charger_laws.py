@@ -152,7 +152,7 @@ LAWS: Final[tuple[Law[ChargerScene], ...]] = (
     named(
         ANSWERED,
         "C4.answer",
-        reason="Who repeats a request until a state answers it would never be quiet",
+        reason="A node that repeats its request until a state answers would never stop",
         source="as for lifts: rmf_ros2 agv/RobotContext.cpp:1732-1735",
     ),
     named(ONE, "B0.one"),
@@ -217,7 +217,7 @@ LAWS: Final[tuple[Law[ChargerScene], ...]] = (
     ),
     Law(
         "C4.fresh",
-        "A station that is not reached says ERROR: another state's charger_time goes on",
+        "A station that cannot be reached shows ERROR; in any other state charger_time advances",
         "IDLE from memory sends a robot to a station that may be on fire",
         "ChargerState.msg, charger_time",
         fresh(_claims, UNREACHED_S),

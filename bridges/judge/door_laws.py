@@ -181,7 +181,7 @@ LAWS: Final[tuple[Law[DoorScene], ...]] = (
     ),
     Law(
         "D3.fresh",
-        "OPEN is no memory: its door_time goes on",
+        "OPEN is not shown from memory: its door_time advances",
         "A controller that is not reached any more may have closed the door: OFFLINE says so",
         "DoorState.msg, door_time",
         fresh(_opened),

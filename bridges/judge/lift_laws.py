@@ -26,7 +26,7 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
     Law(
         "L1.other",
         "A request for another lift changes nothing here",
-        "All lifts share one topic: who looks at the name too late gives this lift to that robot",
+        "All lifts share one topic: a node that checks the name too late gives this lift to that robot",
         "LiftRequest.msg; sharp-rmf/low_level_lift did so",
         checks.other_lift,
     ),
@@ -46,7 +46,7 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
     ),
     Law(
         "L4.grants",
-        "A free lift in service shows the session of who asks for it",
+        "A free lift in service shows the session of the robot that asks for it",
         "A fleet adapter has no timeout: it asks and waits for ever. AGV_MODE is 1 in a request",
         "rmf_ros2 phases/RequestLift.cpp; LiftRequest.msg",
         checks.grants,
@@ -98,7 +98,7 @@ LAWS: Final[tuple[Law[LiftScene], ...]] = (
     ),
     Law(
         "L7.fresh",
-        "DOOR_OPEN is no memory: its lift_time goes on",
+        "DOOR_OPEN is not shown from memory: its lift_time advances",
         "A controller that is not reached any more may have closed the door long ago",
         "LiftState.msg, lift_time",
         fresh(checks.opened),

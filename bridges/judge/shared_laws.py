@@ -92,7 +92,7 @@ ANSWERED: Final[Law[AnyScene]] = Law(
 )
 ONE: Final[Law[AnyScene]] = Law(
     "ONE",
-    "One node alone speaks under this name",
+    "Only one node speaks under this name",
     "RMF believes the latest state, so two nodes make a device that jumps between two truths",
     "follows from RequestLift.cpp and DoorOpen.cpp, which keep one state",
     one_node,
