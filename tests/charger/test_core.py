@@ -61,7 +61,7 @@ def test_every_state_but_idle_names_the_robot_and_its_request() -> None:
     )
 
 
-def test_time_to_full_and_measurements_are_reported_but_are_no_news() -> None:
+def test_time_to_full_and_measurements_are_reported_but_are_not_news() -> None:
     story = Story().polls("idle 1").event(AMR1)
     reports = []
     for volts in (48.0, 48.5):
@@ -169,7 +169,7 @@ def test_charging_that_has_started_is_not_timed_out() -> None:
     assert story.told[-1] == (1.0, "CHARGING", "req-1")
 
 
-def test_a_coupling_lost_and_sought_again_gets_its_start_timeout_anew() -> None:
+def test_a_coupling_lost_and_sought_again_gets_its_whole_start_timeout_again() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 100, handshake 59, charging 1")
     story.polls("handshake 61, idle 3")
     assert story.told[2:] == [
@@ -388,7 +388,7 @@ def test_a_station_that_was_never_read_is_in_error_and_nothing_is_driven() -> No
     assert story.outputs == ChargerOutputs(power=None)
 
 
-def test_before_the_first_reading_the_error_says_that_none_was_made() -> None:
+def test_before_the_first_reading_the_error_says_that_there_was_none() -> None:
     story = Story().event(AMR1)
     assert story.faults == ["CHARGER_UNREACHABLE: not read yet"]
 

@@ -171,7 +171,7 @@ def test_the_last_refusal_is_in_the_status_and_in_diagnostics() -> None:
     assert values["refused charger occupied"] == "1"
 
 
-def test_a_status_that_is_no_refusal_is_not_read_as_one() -> None:
+def test_a_status_that_is_not_a_refusal_is_not_read_as_one() -> None:
     message = REFUSED.message()
     others = [replace(message, name="x"), replace(message, values=()), DiagnosticStatus()]
     assert [read(status) for status in (message, *others)] == [REFUSED, None, None, None]

@@ -559,7 +559,7 @@ def test_a_pad_that_leaves_its_height_under_power_is_a_fault_of_the_station() ->
     assert True not in it.powered[4:]
 
 
-def test_a_pad_that_sinks_when_no_current_flows_is_no_fault() -> None:
+def test_a_pad_that_sinks_when_no_current_flows_is_not_a_fault() -> None:
     it = story().event(AMR1).sees((A.IDLE, ONE, 1), (A.CHARGING, ONE, 1), at_height=True)
     it.sees((A.STOPPING, ONE, 1), (A.IDLE, NOBODY, 4), at_height=False)
     assert it.powered[1:] == [True, True, False, False, False, False, False]

@@ -127,7 +127,7 @@ def test_a_stray_is_told_twice_for_one_request_and_then_a_person_is() -> None:
     ]
 
 
-def test_another_request_is_told_anew_and_the_same_one_is_remembered_on_the_way() -> None:
+def test_a_stray_is_told_again_for_a_new_request_and_the_count_lasts_on_its_way() -> None:
     memory = site(at(ONE, AT[B], 20.0), grants=EXPECTED, nudges={ONE: Nudge("r0", 2, 21.0)})
     assert astray.told(memory, 22.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
     left = site(at(ONE, None, 50.0), grants=EXPECTED, nudges={ONE: Nudge("r1", 1, 22.0)})
@@ -135,7 +135,7 @@ def test_another_request_is_told_anew_and_the_same_one_is_remembered_on_the_way(
 
 
 @pytest.mark.parametrize("why", ["it works", "another node assigns", "we may not speak"])
-def test_where_nobody_can_be_told_a_person_is_at_once(why: str) -> None:
+def test_where_no_robot_can_be_told_a_person_is_alerted_at_once(why: str) -> None:
     standing = at(ONE, AT[B], 20.0, task="work" if why == "it works" else "")
     memory = site(standing, grants=EXPECTED)
     if why == "another node assigns":

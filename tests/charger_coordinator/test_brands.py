@@ -68,7 +68,7 @@ def test_a_robot_of_the_other_brand_at_the_wrong_station_is_sent_on_in_its_own_w
 
 
 @pytest.mark.parametrize(("state", "error"), [(3, ""), (200, "robot: NTC")])
-def test_a_robots_own_receiver_is_no_station(state: int, error: str) -> None:
+def test_a_robots_own_receiver_is_not_a_station(state: int, error: str) -> None:
     told = d.ChargerState(charger_name="rcu_b01", state=state, error_message=error)
     heard = messages.accept_state(told, two_brands(), 0.0)
     assert heard == ReceiverHeard(Robot("big", "B01"), error)

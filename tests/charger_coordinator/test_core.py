@@ -483,7 +483,7 @@ def test_who_stands_on_a_pad_is_read_from_its_error() -> None:
 # ---- what is kept
 
 
-def test_a_restart_remembers_who_was_charging_and_whom_a_station_is_to_let_go() -> None:
+def test_a_restart_remembers_who_was_charging_and_which_robot_a_station_must_release() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.wants(TWO)

@@ -194,7 +194,7 @@ def test_a_file_without_its_section_says_what_is_missing(tmp_path: Path) -> None
         load(file)
 
 
-def test_what_works_but_not_well_is_a_warning() -> None:
+def test_a_setting_that_works_but_not_well_is_warned_of() -> None:
     warnings = "\n".join(map(str, load(CONFIG).warnings))
     assert warnings.endswith(
         "tiny/AMR03 charges at 'charger_b' alone: when it fails there, nothing tells whose fault it is"

@@ -473,7 +473,7 @@ def test_a_coordinator_that_remembers_nothing_keeps_an_empty_memory() -> None:
     assert (kept.wishes, dict(kept.grants), kept.count) == ((), {}, 0)
 
 
-def test_a_file_that_is_no_memory_is_refused_by_what_it_should_be() -> None:
+def test_a_file_that_is_not_a_memory_is_refused_with_what_it_should_be() -> None:
     with pytest.raises(ValueError, match=r"^not a coordinator's memory: "):
         keep.restore(b"[]", SETTINGS, 0.0)
 

@@ -97,7 +97,7 @@ def test_a_silent_station_and_one_where_another_robot_stands_say_so() -> None:
     ]
 
 
-def test_how_long_a_charge_still_takes_is_told_in_seconds_or_minutes() -> None:
+def test_the_remaining_time_of_a_charge_is_shown_in_seconds_or_minutes() -> None:
     found = [said(12.0, shows(CHARGING, full_s)) for full_s in (1.0, 101.0, 102.0, 3602.0)]
     assert found == [
         f"s1 is not free yet, s1 is free in {lasts}" for lasts in ("0 s", "99 s", "2 min", "60 min")

@@ -301,7 +301,7 @@ def test_3_a_finished_robot_is_sent_to_its_place_and_the_next_is_called(
     assert site.faults == []
 
 
-def test_3_a_finished_robot_that_rmf_does_not_move_is_alerted_with_whom_it_blocks() -> None:
+def test_3_an_alert_names_a_finished_robot_that_rmf_does_not_move_and_whom_it_blocks() -> None:
     site = three_at_two("nothing")
     why = "RMF has no charging task that would send it away (finishing_request: charge has one)"
     assert site.run(110.0) == [

@@ -113,7 +113,7 @@ def test_a_card_that_is_not_mounted_is_reported_before_the_first_step(
     assert (root.exists(), calls) == (False, [])
 
 
-def test_a_dry_run_prints_every_step_and_takes_none(
+def test_a_dry_run_prints_every_step_and_does_nothing(
     tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["disable", str(LIFT), "--dry-run"]) == 0

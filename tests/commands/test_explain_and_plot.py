@@ -75,7 +75,7 @@ def test_another_session_is_asked_about(bag: Path, capsys: pytest.CaptureFixture
     assert "What RMF looks at for fleet/red:" in capsys.readouterr().out
 
 
-def test_several_devices_get_a_line_each(
+def test_explain_gives_each_of_several_devices_a_line(
     tmp_path: Path, heard: list[Heard], capsys: pytest.CaptureFixture[str]
 ) -> None:
     states = [(one, one.message) for one in fire()[0]]
@@ -162,7 +162,7 @@ def test_a_live_graph_is_heard_by_topic(heard: list[Heard]) -> None:
     assert [(one.topic, one.message) for one in ear.listen(0.0)] == [("lift_states", state)]
 
 
-def test_nothing_heard_live_says_so() -> None:
+def test_explain_says_that_nothing_was_heard_live() -> None:
     site = Site("Lift1")
     site.passed(100.0, 1_800_000_000.0)
     site.passed(105.0, 1_800_000_005.0)

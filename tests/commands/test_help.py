@@ -41,7 +41,7 @@ def test_each_example_is_a_right_command_line(command: str) -> None:
         ("status --frequency 2 lift", "status", "--frequency lift"),
     ],
 )
-def test_what_a_command_does_not_know_is_answered_with_its_own_usage(
+def test_an_unknown_option_is_answered_with_the_commands_own_usage(
     line: str, usage: str, unknown: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as left:

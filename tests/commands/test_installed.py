@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 WITHOUT_MCAP = "import sys; sys.modules['mcap'] = None; from bridges.cli import main; main()"
 
 
-def test_every_file_that_is_no_module_is_installed() -> None:
+def test_every_file_that_is_not_a_module_is_installed() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
     data = settings["tool"]["setuptools"]["package-data"]
     installed = {

@@ -31,7 +31,7 @@ def command(*words: str) -> list[str]:
     return log.command(parser.parse_args(words))
 
 
-def test_it_asks_the_journal_for_the_unit_of_this_file() -> None:
+def test_log_asks_the_journal_for_the_unit_of_this_file() -> None:
     assert command("config/lift_a.yaml", "-f", "-n", "5", "--since", "today") == [
         "journalctl",
         "--unit=rmf-bridge@lift_a",
@@ -53,7 +53,7 @@ def test_it_asks_the_journal_for_the_unit_of_this_file() -> None:
         (("--event", "f.*t"), []),
     ],
 )
-def test_it_finds_only_what_is_about_this_event_or_device(
+def test_log_finds_only_lines_about_this_event_or_device(
     words: tuple[str, ...], found: list[int]
 ) -> None:
     (grep,) = [word for word in command("lift_a.yaml", *words) if word.startswith("--grep=")]

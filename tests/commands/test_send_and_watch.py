@@ -414,7 +414,7 @@ def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
         router.leave()
 
 
-def test_a_file_that_is_no_yaml_of_ours_is_refused_at_its_place(
+def test_a_file_that_is_not_a_yaml_of_ours_is_refused_at_its_place(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "bad.yaml").write_text("kind: nothing\n")

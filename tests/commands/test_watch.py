@@ -148,7 +148,7 @@ def test_a_device_is_shown_once_it_is_known_whether_it_is_simulated() -> None:
     assert [row.name for row in watch.settled(young, 100.0, WALL)] == ["Lift1"]
 
 
-def test_what_a_narrow_terminal_would_cut_off_follows_on_a_line_of_its_own() -> None:
+def test_text_that_a_narrow_terminal_would_cut_off_follows_on_its_own_line() -> None:
     faulty = board(LIFT, DOOR, told("door", "ward", "DOOR_SILENT")).rows(100.0, WALL)
     text, lines = repaint(faulty, 0, columns=40, lines=24, coloured=False)
     assert (lines, text.replace("\r\x1b[K", "").replace("\x1b[J", "").splitlines()) == (
@@ -199,7 +199,7 @@ def test_an_empty_graph_is_said_to_be_empty_until_the_first_row_comes() -> None:
     assert shown == 2
 
 
-def test_a_repaint_goes_back_over_its_own_lines_and_wraps_none() -> None:
+def test_a_repaint_goes_back_over_its_own_lines_and_wraps_no_line() -> None:
     rows = board(LIFT, DOOR).rows(100.0, WALL)
     text, shown = repaint(rows, 0, columns=20, lines=24)
     assert shown == 3

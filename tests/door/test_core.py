@@ -92,7 +92,7 @@ def test_an_open_within_the_grace_cancels_the_close() -> None:
     assert core.told[-1] == (0.0625, "OPEN", True)
 
 
-def test_the_grace_begins_anew_with_the_close_after_that() -> None:
+def test_the_grace_begins_again_with_the_close_after_that() -> None:
     core = CoreAlone(limits(close_grace_s=2.0))
     core.hears(OPENS)
     core.sees(OPEN, until=1.0)

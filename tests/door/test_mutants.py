@@ -141,7 +141,7 @@ def test_a_silence_has_its_own_reason_and_not_that_of_an_earlier_failure() -> No
     assert core.faults() == (f"COMMUNICATION_LOST: no reading for {STALE_S} s",)
 
 
-def test_a_hazard_half_seen_before_a_gap_is_no_hazard() -> None:
+def test_a_hazard_half_seen_before_a_gap_is_not_a_hazard() -> None:
     core = CoreAlone(replace(limits(), on_fire="open"))
     core.hears(Sampled(replace(OPEN, fire=False, obstruction=False)))
     decided = core.hears(IoFailed("no reply"))
@@ -168,7 +168,7 @@ def test_a_hold_that_ended_at_once_still_gives_way_to_an_obstruction() -> None:
     assert core.told[-3:] == [(1.0, "OPEN", True), (1.0, "OPEN", False), (1.0625, "MOVING", True)]
 
 
-def test_an_obstruction_at_a_door_that_is_not_held_is_no_fault() -> None:
+def test_an_obstruction_at_a_door_that_is_not_held_is_not_a_fault() -> None:
     core = CoreAlone()
     core.sees(replace(OPEN, obstruction=True), until=1.0)
     assert core.faults() == ()

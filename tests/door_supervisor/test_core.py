@@ -343,7 +343,7 @@ def test_a_door_that_one_requester_has_held_for_too_long_is_a_fault_and_nothing_
     assert [word for at, word in desk.sent if at < 41.0].count("CLOSED") == 0
 
 
-def test_repeats_do_not_put_off_the_alarm_but_another_visit_begins_anew() -> None:
+def test_repeats_do_not_put_off_the_alarm_but_another_visit_restarts_its_time() -> None:
     desk = Alone(Limits(open_alarm_s=20.0))
     for second in range(45):
         desk.until(float(second))

@@ -245,7 +245,7 @@ def test_a_flood_of_names_and_changes_is_bounded_and_counted() -> None:
     assert drawn.left_out == 3 * MOST_SPANS - MOST_ROWS
 
 
-def test_what_is_older_than_a_live_page_shows_is_forgotten() -> None:
+def test_spans_older_than_a_live_page_shows_are_forgotten() -> None:
     drawing = Drawing("lift", "Lift1", past_s=20.0)
     for n in range(100):
         floor = f"L{n // 10}"

@@ -27,7 +27,7 @@ def told(name: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_situation_is_told_on_one_screen(name: str) -> None:
+def test_a_situation_is_explained_on_one_screen(name: str) -> None:
     screen = told(name)
     assert len(screen) <= SCREEN_LINES
     assert screen == (GOLDEN / f"{name}.txt").read_text(encoding="utf-8").splitlines()

@@ -49,7 +49,7 @@ class Bench:
         return [edge.value for edge in self.plant.edges if edge.signal == "power"]
 
 
-def test_it_charges_while_it_is_fed_and_stops_three_periods_after_the_last_frame() -> None:
+def test_a_charger_charges_while_it_is_fed_and_stops_three_periods_after_the_last_frame() -> None:
     bench = Bench()
     bench.passes(5.0, fed=True)
     bench.passes((PERIODS - 1) * FED_EVERY_S - STATUS_S, fed=False)

@@ -82,7 +82,7 @@ def test_a_device_that_is_not_there_is_waited_for_a_while_and_not_played_with() 
     assert (stage.done, said, world.timeline.now) == (True, [], 15.0)
 
 
-def test_whoever_else_speaks_stops_the_play_before_it_begins() -> None:
+def test_another_speaker_stops_the_play_before_it_begins() -> None:
     stage = Stage(Judge("lift", "Lift1"), ride(), 60.0, lambda: "others publish on lift_requests")
     stage.begin(0.0, EPOCH)
     stage.hear(Heard(1.0, EPOCH + 1.0, "lift_states", STATE))
@@ -222,7 +222,7 @@ def test_a_node_that_comes_back_after_a_silence_may_have_forgotten_its_session()
     assert broken == {"L2.rate"}
 
 
-def test_a_request_before_the_first_state_is_no_harm() -> None:
+def test_a_request_before_the_first_state_does_no_harm() -> None:
     world = World()
     world.add(asks(0.5, "fleet/red", "L3"), RightLift())
     assert told(world.judge("lift", "Lift1", for_s=20.0), 20.0)["broken"] == set()

@@ -214,7 +214,7 @@ def test_the_time_of_an_overload_does_not_count_as_waiting() -> None:
     assert story.faults == ["RUNTIME_LIMIT_EXCEEDED"]
 
 
-def test_a_car_that_a_hazard_has_left_between_floors_is_called_anew() -> None:
+def test_a_car_that_a_hazard_has_left_between_floors_is_called_again() -> None:
     story = inside()
     building = story.building
     building.hazard(Hazard.CODE_BLUE)

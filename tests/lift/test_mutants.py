@@ -313,7 +313,7 @@ def test_an_illegal_door_number_names_the_rear_door() -> None:
     assert alone.faults == (Fault("DOOR_CODE_ILLEGAL", "the rear door's number means nothing"),)
 
 
-def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_anew() -> None:
+def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_again() -> None:
     def history(reset_at: float) -> list[tuple[float, bool, list[str]]]:
         """(s, AGV request, faults) at each change, scanned twice a second."""
         alone = Alone(agv_timeout_s=5.0)

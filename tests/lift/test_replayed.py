@@ -118,7 +118,7 @@ def test_a_doubt_lasts_exactly_three_seconds() -> None:
     assert lasts == [doubted, None]
 
 
-def test_a_request_for_the_present_floor_ends_the_doubt_and_the_next_one_begins_anew() -> None:
+def test_a_request_for_the_present_floor_ends_the_doubt_and_a_new_one_begins_afterwards() -> None:
     lift = Overheard()
     lift.adapter(AGV, "L2")
     lift.story.asks(A, "L4")

@@ -286,7 +286,7 @@ def test_a_pulsed_call_is_given_once_and_for_its_time() -> None:
 
 
 @pytest.mark.parametrize("pulse_s", [None, 0.5])
-def test_a_car_that_has_drifted_from_its_destination_is_called_anew(pulse_s: float | None) -> None:
+def test_a_car_that_has_drifted_from_its_destination_is_called_again(pulse_s: float | None) -> None:
     story = Story(Building(at("L2")), call_pulse_s=pulse_s)
     story.run(1.0)
     story.asks("A", "L1")

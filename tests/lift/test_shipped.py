@@ -12,7 +12,7 @@ from tests.lift.story import STANDING, Building, Story
 CONFIG = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
 
 
-def test_a_contact_that_bounces_for_50_ms_on_the_way_past_a_floor_is_no_open_door() -> None:
+def test_a_contact_that_bounces_for_50_ms_on_the_way_past_a_floor_is_not_an_open_door() -> None:
     shipped = dict(debounce(load(CONFIG).devices["Lift1"]))
     building = Building(replace(STANDING, door=Door.CLOSED, motion=None))
     story = Story(building, debounce=shipped)

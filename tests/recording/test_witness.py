@@ -106,7 +106,7 @@ def test_a_step_of_the_wall_clock_is_recorded_and_recorded_time_never_goes_back(
     assert [steady for _, steady, _ in timed(entries)] == sorted(s for _, s, _ in timed(entries))
 
 
-def test_without_room_for_a_ring_the_daemon_is_told_once_and_tries_again(
+def test_without_room_for_a_ring_the_witness_reports_it_once_and_tries_again(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     full = [True]
@@ -132,7 +132,7 @@ def test_without_room_for_a_ring_the_daemon_is_told_once_and_tries_again(
     assert [type(one) for one in daemon.entries()][:3] == [Clocks, Known, Step]
 
 
-def test_a_write_that_fails_ends_no_scan_and_the_next_ring_begins_anew(
+def test_a_write_that_fails_ends_no_scan_and_the_next_ring_begins_afresh(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     daemon = Daemon(tmp_path)

@@ -116,7 +116,7 @@ def test_without_rmfs_packages_the_error_names_the_one_that_is_missing(bare_rclp
 
 
 @pytest.mark.parametrize("transport", ["auto", DDS, "zenoh"])
-def test_ros_args_are_for_ros_alone(
+def test_ros_args_are_accepted_by_ros2_only(
     no_ros: None, transport: Literal["auto", "dds", "zenoh"]
 ) -> None:
     rmf = Rmf(transport=transport, domain_id=domain_of_this_run())

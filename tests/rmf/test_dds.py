@@ -137,7 +137,7 @@ def test_a_domain_that_is_open_on_the_network_is_not_taken_for_loopback(
         exposed.close()
 
 
-def test_a_reader_that_fails_joins_anew_and_hears_again(
+def test_a_reader_that_fails_joins_again_and_hears_again(
     join_dds: Join, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     received: list[d.LiftState] = []
@@ -170,7 +170,7 @@ def test_a_reader_that_fails_joins_anew_and_hears_again(
     ]
 
 
-def test_a_reader_that_fails_again_and_again_is_dead_and_says_so(
+def test_a_reader_that_keeps_failing_is_reported_as_dead(
     join_dds: Join, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = join_dds("here")

@@ -161,7 +161,7 @@ GOLDEN = {
 }
 
 
-def test_there_are_no_constants_beside_those_of_the_table() -> None:
+def test_there_are_no_constants_besides_those_of_the_table() -> None:
     enums = {kind for kind in vars(constants).values() if isinstance(kind, type)} - {IntEnum}
     assert enums == CONSTANTS.keys()
     assert enums == {kind for kind in vars(d).values() if isinstance(kind, type)} & enums

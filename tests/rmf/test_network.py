@@ -157,7 +157,7 @@ def test_an_alarm_that_is_raised_without_a_network_goes_out_when_there_is_one(
     wait_until(lambda: d.Bool(True) in echoed.heard, "the alarm is heard")
 
 
-def test_it_can_be_closed_while_there_is_no_network(
+def test_a_transport_can_be_closed_while_there_is_no_network(
     echoed: Echoed,
     machine: Machine,
     caplog: pytest.LogCaptureFixture,

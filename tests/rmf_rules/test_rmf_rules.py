@@ -159,7 +159,7 @@ def test_a_close_of_a_stranger_or_older_than_the_open_only_causes_a_heartbeat() 
     ("mode", "unwanted", "wanted"),
     [(OPENED, CLOSED, None), (MOVING, CLOSED, OPENED), (CLOSED, None, OPENED), (3, None, None)],
 )
-def test_states_cause_reminders_and_an_offline_door_none(
+def test_states_cause_reminders_but_those_of_an_offline_door_do_not(
     mode: d.DoorModeValue, unwanted: d.DoorModeValue | None, wanted: d.DoorModeValue | None
 ) -> None:
     supervisor = DoorSupervisor()

@@ -41,7 +41,7 @@ def test_a_defect_of_one_driver_switches_its_device_off_and_the_others_serve_on(
     assert {state.door_name for at, state in corridor.states if at > 20} == {"ward", "lab"}
 
 
-def test_a_device_with_a_defect_is_claimed_anew_after_a_pause_that_grows() -> None:
+def test_a_device_with_a_defect_is_claimed_again_after_a_pause_that_grows() -> None:
     corridor = Corridor()
     corridor.doors["lab"].during = lambda: breaks(KeyError("defect"))
     for i in range(400):

@@ -221,7 +221,7 @@ def test_the_runtime_directory_is_the_given_one_or_systemds_or_the_services_or_t
     assert find(FILE, "/tmp/here") == in_one(Path("/tmp/here"))
 
 
-def test_after_a_power_cut_the_record_alone_shows_the_service(machine: Path) -> None:
+def test_after_a_power_cut_only_the_record_shows_the_service(machine: Path) -> None:
     service = Places(machine / "run/lift", machine / "var/lift")
     serving = RuntimeDirectory(service, FILE, serves=True)
     serving.claim(CLAIMED)

@@ -60,7 +60,7 @@ def test_a_frame_that_is_lost_leaves_no_relay_on(module: Module, tmp_path: Path)
     assert module.coils[SILENT + 1, 0] is False
 
 
-def test_who_answered_last_is_in_the_status_of_the_dead_daemon(tmp_path: Path) -> None:
+def test_the_dead_daemons_status_says_which_devices_answered_last(tmp_path: Path) -> None:
     there = Places(tmp_path, tmp_path)
     assert ages(there) == {}
     status = tmp_path / "status.json"

@@ -154,7 +154,7 @@ def test_a_navigation_graph_is_read_down_to_its_names() -> None:
 
 @pytest.mark.parametrize("building", ["building.yaml", "graph.yaml"])
 @pytest.mark.parametrize("text", [LIFT, CHARGER])
-def test_names_that_agree_are_no_problem(
+def test_names_that_agree_cause_no_problem(
     capsys: pytest.CaptureFixture[str], text: str, building: str
 ) -> None:
     assert complaints(capsys, text, building) == []

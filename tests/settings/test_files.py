@@ -50,7 +50,7 @@ def test_an_empty_file_is_one_problem(file: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["- a\n- b\n", "gate\n", "---\n", "[]"])
-def test_a_file_that_is_no_mapping_is_one_problem(file: Path, text: str) -> None:
+def test_a_file_that_is_not_a_mapping_is_one_problem(file: Path, text: str) -> None:
     assert problems_of(file, text) == ["1:1: the file is not a mapping: begin it with 'kind: ...'"]
 
 

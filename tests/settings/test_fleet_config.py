@@ -150,7 +150,7 @@ def test_two_files_that_agree_are_right_and_the_transforms_error_is_reported(sit
         ),
     ],
 )
-def test_what_cannot_be_right_is_named_where_it_stands(
+def test_settings_that_cannot_be_right_are_named_where_they_stand(
     site: Site, old: str, new: str, problem: str
 ) -> None:
     assert THEIRS.count(old) == 1
@@ -158,7 +158,7 @@ def test_what_cannot_be_right_is_named_where_it_stands(
     assert (code, problem in found) == (os.EX_CONFIG, True), found
 
 
-def test_a_station_that_lets_go_before_rmf_is_content_is_a_mismatch(site: Site) -> None:
+def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(site: Site) -> None:
     code, found = site.check(ours=OURS + "  full_percent: 95\n")
     assert (code, found) == (
         78,
@@ -208,7 +208,7 @@ def test_a_station_that_lets_go_before_rmf_is_content_is_a_mismatch(site: Site) 
         ),
     ],
 )
-def test_what_may_be_a_mistake_is_warned_of(site: Site, old: str, new: str, warning: str) -> None:
+def test_a_likely_mistake_is_warned_of(site: Site, old: str, new: str, warning: str) -> None:
     assert THEIRS.count(old) == 1
     assert site.check(theirs=THEIRS.replace(old, new)) == (0, [warning])
 
@@ -255,7 +255,7 @@ def test_a_waypoint_on_another_level_is_named(site: Site) -> None:
     assert "ours.yaml:8:18: graph.yaml:6 has 'dock_b' on level 'L1'" in found
 
 
-def test_a_file_that_is_no_fleet_configuration_is_refused_with_its_line(site: Site) -> None:
+def test_a_file_that_is_not_a_fleet_configuration_is_refused_with_its_line(site: Site) -> None:
     code, found = site.check(theirs="rmf_fleet:\n  name: tiny\n  recharge_soc: 80\n")
     assert (code, found) == (
         78,

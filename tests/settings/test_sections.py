@@ -252,7 +252,7 @@ def test_the_bus_says_what_is_wrong_with_an_impossible_wire(file: Path, other: s
     assert len(problems_of(file, text)) == (4 if other else 3)
 
 
-def test_unsafe_wiring_is_accepted_only_of_signals_that_there_are(file: Path) -> None:
+def test_unsafe_wiring_is_accepted_only_for_signals_that_exist(file: Path) -> None:
     text = changed(
         "    limits:", "    accept_unsafe: {open: rusty, hold: by contract}\n    limits:"
     )

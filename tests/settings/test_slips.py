@@ -132,7 +132,7 @@ def test_a_no_break_space_that_is_meant_is_quoted(file: Path) -> None:
     assert problems_of(file, changed("  north:", f'  "north{NBSP}1":')) == []
 
 
-def test_what_is_no_number_is_not_taken_for_one() -> None:
+def test_a_text_that_is_not_a_number_is_not_taken_for_one() -> None:
     texts = ("", "-", "fast", "1:30", "017", "1_000", "1.2.3", "1,2,3", "3.5", "12")
     assert [number_meant(text, whole) for text in texts for whole in (False, True)] == [""] * 20
 

@@ -114,7 +114,7 @@ def test_a_module_is_read_and_its_units_are_found_and_nothing_is_written(
     assert code in (0, 1)  # the machine that runs this test may have no watchdog
 
 
-def test_what_does_not_answer_is_wrong(module: Module, tmp_path: Path) -> None:
+def test_a_device_that_does_not_answer_is_wrong(module: Module, tmp_path: Path) -> None:
     module.file.write_text(module.yaml.replace("unit 1", "unit 9"))
     code, found = doctor(module.file, tmp_path, "--listen", "0")
     (level, text), (scanned, units) = found["bus module"]

@@ -35,7 +35,7 @@ def test_the_exit_code_is_that_of_the_worst_finding() -> None:
     ]
 
 
-def test_without_the_unit_whoever_asks_is_the_daemons_user(made: MadeUp) -> None:
+def test_without_the_unit_the_user_who_asks_counts_as_the_daemons(made: MadeUp) -> None:
     assert told(list(users(made.machine))) == [
         ("note", f"the unit {UNIT} is not installed; what follows is judged for pi")
     ]

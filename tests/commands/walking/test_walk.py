@@ -71,7 +71,7 @@ def test_however_it_ends_the_output_goes_off(module: Module, tmp_path: Path, how
     assert "| the door is open | not tried |" not in (tmp_path / "record.md").read_text()
 
 
-def test_it_refuses_a_device_that_is_served(module: Module, tmp_path: Path) -> None:
+def test_walk_refuses_a_device_that_is_served(module: Module, tmp_path: Path) -> None:
     with daemon(module.file, tmp_path / "run") as running:
         running.wait_for("ready file")
         terminal = walk(module, tmp_path)

@@ -229,7 +229,7 @@ def _idle(charger: Charger) -> ChargerSample:
     return charger.driver.read()
 
 
-def test_a_robot_that_has_yet_to_come_is_no_error_though_its_position_is_not_right(
+def test_a_robot_still_to_come_is_not_an_error_though_its_position_is_not_right(
     charger: Charger,
 ) -> None:
     charger.says(0x1FFD2304, "0000000000004000")
@@ -303,7 +303,7 @@ def test_closing_takes_away_what_was_given_and_nothing_else(charger: Charger) ->
 # ---- what is not seen
 
 
-def test_a_missing_status_frame_is_no_state(charger: Charger) -> None:
+def test_without_a_status_frame_there_is_no_state(charger: Charger) -> None:
     charger.scan(OFF)
     charger.far.now += 0.9
     charger.driver.read()

@@ -93,7 +93,7 @@ def test_a_frame_without_a_state_number_is_judged_as_on_http_and_modbus(
     assert charger.shows(payload) == wanted
 
 
-def test_a_frame_that_rules_need_and_that_stays_away_is_no_reading(charger: Charger) -> None:
+def test_without_a_frame_that_rules_need_there_is_no_reading(charger: Charger) -> None:
     assert charger.shows("0000 0000 00 00 00 00")[0] is Activity.IDLE
     charger.far.now += 1.1
     assert "no Status (0x100)" in failure(charger.driver.read)

@@ -148,7 +148,7 @@ def test_the_result_of_a_range_check_is_believed_a_second_later(receiver: Receiv
     assert seen == [True, False, False, True]
 
 
-def test_a_receiver_that_starts_anew_is_told_again(receiver: Receiver) -> None:
+def test_a_receiver_that_restarts_is_told_again(receiver: Receiver) -> None:
     receiver.scan(ON)
     receiver.scan(ON)
     receiver.beat(0)
@@ -164,14 +164,14 @@ def test_the_daemons_end_keeps_or_stops_the_charge_as_the_yaml_says() -> None:
     assert receiver.writes == [DISABLE]
 
 
-def test_what_may_be_on_is_switched_off_when_it_is_let_go(receiver: Receiver) -> None:
+def test_a_receiver_that_may_be_on_is_switched_off_when_it_is_let_go(receiver: Receiver) -> None:
     receiver.scan(ON)
     receiver.driver.close()
     receiver.driver.close()
     assert receiver.writes == [ENABLE, DISABLE]
 
 
-def test_letting_go_of_what_does_not_answer_is_no_error(receiver: Receiver) -> None:
+def test_letting_go_of_a_receiver_that_does_not_answer_raises_nothing(receiver: Receiver) -> None:
     receiver.scan(ON)
     receiver.silent = {(0x2000, 1)}
     receiver.driver.close()

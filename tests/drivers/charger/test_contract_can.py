@@ -248,7 +248,7 @@ class Frames(CanContract):
         bench.until(Activity.IDLE, OFF)
         assert bench.switched() == [True, False]
 
-    def test_the_receiver_id_is_read_and_no_robot_has_none(self, pad: PadBench) -> None:
+    def test_the_receiver_id_is_read_and_is_empty_without_a_robot(self, pad: PadBench) -> None:
         def sees(receiver: str) -> bool:
             sample = pad.sample(OFF)
             return sample is not None and sample.measured.receiver_id == receiver

@@ -49,7 +49,7 @@ def test_everything_is_read_where_the_yaml_says_that_it_is() -> None:
     )
 
 
-def test_a_clear_pad_and_measurements_that_are_not_there_are_no_error() -> None:
+def test_a_clear_pad_and_missing_measurements_are_not_errors() -> None:
     assert read(answer()) == ChargerSample(
         Activity.IDLE, 0, measured=Measured(receiver_id="", in_range=False)
     )

@@ -45,7 +45,7 @@ def test_check_warns_that_it_is_untried_and_that_it_reports_no_receiver() -> Non
     assert [path for path, _ in warnings(SETTINGS)] == [(), ()]
 
 
-def test_closing_an_enabled_receiver_that_was_lost_is_no_error() -> None:
+def test_closing_an_enabled_receiver_that_was_lost_raises_nothing() -> None:
     plant, clock = rcu_plant("c"), Time()
     server = ModbusServer([ModbusRcu(plant, SETTINGS)], slow_s=0.3)
     plain = {"type": "modbus", "timeout_s": 5.0, "retries": 0, **server.replace}

@@ -44,7 +44,7 @@ def test_the_first_rule_that_holds_says_what_the_station_does(said: Any, wanted:
     assert read(said) == wanted
 
 
-def test_a_rule_about_what_is_not_there_is_no_reading() -> None:
+def test_a_rule_about_a_missing_value_gives_no_reading() -> None:
     with pytest.raises(DriverError, match=r"no 'temperature\.tC'"):
         read({"apower": 0.0, "output": False})
 
@@ -94,7 +94,7 @@ def test_a_rules_test_holds_for_what_it_says_and_nothing_else() -> None:
     ]
 
 
-def test_an_error_value_that_is_no_number_is_an_error_that_shows_it() -> None:
+def test_an_error_value_that_is_not_a_number_is_an_error_that_shows_it() -> None:
     assert ErrorNumber(at="a").errors("E7") == [("", "error E7")]
     assert ErrorNumber(at="a").errors(0) == []
     assert ErrorBits(at="a").errors(None) == [("", "error flags None")]

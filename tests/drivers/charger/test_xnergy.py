@@ -156,7 +156,7 @@ def test_a_stop_is_written_once_and_again_while_the_receiver_charges() -> None:
     ) == [(0.0, ENABLE), (1.0, DISABLE), (1.1, DISABLE), (9.0, DISABLE)]
 
 
-def test_what_is_to_be_left_alone_is_neither_started_nor_stopped() -> None:
+def test_a_station_to_be_left_alone_is_neither_started_nor_stopped() -> None:
     assert run((0.0, LEAVE, 5), (1.0, LEAVE, 0)) == []
 
 

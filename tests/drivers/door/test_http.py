@@ -135,14 +135,14 @@ def test_a_release_that_was_not_obeyed_or_heard_is_sent_again() -> None:
     assert relay.calls == [OFF, OFF, ON, OFF]
 
 
-def test_a_relay_that_stays_on_is_told_at_the_end() -> None:
+def test_a_relay_that_stays_on_is_reported_at_the_end() -> None:
     relay = Relay(held=True)
     door = create("door", SETTINGS, relay)
     with pytest.raises(DriverError, match="still on after it was switched off"):
         door.make_safe()
 
 
-def test_an_input_that_is_neither_yes_nor_no_is_no_reading() -> None:
+def test_an_input_that_is_neither_yes_nor_no_gives_no_reading() -> None:
     values: tuple[Any, ...] = (1, "true", 0.5, [])
     for value in values:
         with pytest.raises(DriverError, match=r"'input:0\.state' is .* true or false is expected"):

@@ -174,7 +174,7 @@ PROFILED = YAML[: YAML.index("    map:")] + "    profile: generic-register-door\
         ("{commands: {at: coil 4}}", ["9:15: unknown key 'commands': did you mean 'command'?"]),
     ],
 )
-def test_what_a_device_changes_is_judged_where_it_stands(
+def test_a_devices_changes_are_judged_where_they_stand(
     tmp_path: Path, changes: str, wanted: list[str]
 ) -> None:
     found = problems_of(tmp_path / "door.yaml", f"{PROFILED}    changes: {changes}\n")

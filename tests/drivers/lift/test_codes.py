@@ -38,7 +38,7 @@ def test_every_encoding_reads_and_shows_its_numbers(
     assert [list(encode(encoding, n, width)) for n in numbers] == [on(text) for text in shown]
 
 
-def test_a_bcd_digit_above_nine_is_no_number() -> None:
+def test_a_bcd_digit_above_nine_is_not_a_number() -> None:
     assert [decode("bcd", on(text)) for text in ("1010", "1111", "00011010")] == [None] * 3
 
 
@@ -108,7 +108,7 @@ def test_one_line_for_each_floor_and_never_two() -> None:
     assert [hot.show(level) for level in ("G", None)] == [{**none, "floor_G": True}, none]
 
 
-def test_a_bcd_code_that_is_no_digit_is_a_fault() -> None:
+def test_a_bcd_code_that_is_not_a_digit_is_a_fault() -> None:
     bcd = code(encoding="bcd", bits=bits(4), codes={1: "B1", 2: "G", 3: "1"})
     assert bcd.read(shown("1010")) == (None, "a BCD digit above 9")
 

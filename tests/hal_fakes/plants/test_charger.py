@@ -59,7 +59,7 @@ def test_a_robot_is_charged_until_it_is_full_and_then_left_alone() -> None:
     assert (plant.battery, plant.pressed["robot"]) == (1.0, True)
 
 
-def test_a_robot_that_leaves_is_disconnected_and_the_next_one_starts_anew() -> None:
+def test_a_robot_that_leaves_is_disconnected_and_the_next_one_starts_afresh() -> None:
     plant = parked()
     plant.press("robot", False, 10.0)
     assert plant.battery == 0.0

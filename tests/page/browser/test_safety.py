@@ -77,7 +77,7 @@ def test_a_socket_from_another_origin_is_refused(address: str, origin: str) -> N
     assert ask(address, path, asked)[0] == 403
 
 
-def test_a_cookie_is_for_this_page_alone_and_secure_where_the_login_came_over_tls(
+def test_a_cookie_is_for_this_page_only_and_secure_if_the_login_came_over_tls(
     address: str,
 ) -> None:
     host = urlsplit(address).netloc
@@ -159,7 +159,7 @@ def test_the_librarys_own_addresses_show_nothing_of_ours(address: str) -> None:
         assert "Traceback" not in text
 
 
-def test_a_socket_without_a_view_of_ours_is_told_nothing(address: str) -> None:
+def test_a_socket_without_a_view_of_ours_receives_nothing(address: str) -> None:
     opened = ask(address, "/_nicegui_ws/socket.io/?EIO=4&transport=polling")
     assert opened[0] in (200, 400)
     assert "client" not in opened[2]

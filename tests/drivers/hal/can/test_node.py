@@ -76,7 +76,7 @@ def test_a_number_that_is_too_short_or_too_great_is_refused(side: Side) -> None:
     )
 
 
-def test_a_refusal_is_named_and_is_no_reason_to_pause(side: Side) -> None:
+def test_a_refusal_is_named_and_causes_no_pause(side: Side) -> None:
     ours, node, *_ = side
     node.answer = lambda request: ["80" + request[1:4].hex() + "00000206"]
     for _ in range(2):
@@ -86,7 +86,7 @@ def test_a_refusal_is_named_and_is_no_reason_to_pause(side: Side) -> None:
     assert len(node.asked) == 2
 
 
-def test_no_answer_is_no_number_and_pauses_the_node(side: Side) -> None:
+def test_without_an_answer_there_is_no_number_and_the_node_pauses(side: Side) -> None:
     ours, node, far, _ = side
     node.answer = lambda request: []
     text = f"{NAME}, read 0x2002:0A: no reply within 0.05 s"
@@ -194,7 +194,7 @@ def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side
     assert failure(ours.alive) == ""
 
 
-def test_a_node_that_was_lost_counts_as_started_anew(side: Side) -> None:
+def test_a_node_that_was_lost_counts_as_restarted(side: Side) -> None:
     """Its boot-up frame may have come while nobody listened: what it was told is told again."""
     ours, _, far, _ = side
     far.say(0x70A, "05")

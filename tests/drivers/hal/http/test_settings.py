@@ -54,7 +54,7 @@ def test_the_default_timeout_and_scan_are_a_second() -> None:
     assert made == Settings(api_base="tpu", timeout_s=1.0, scan_s=1.0, token_file=None)
 
 
-def test_what_has_no_effect_is_refused() -> None:
+def test_a_setting_without_effect_is_refused() -> None:
     made = Settings(api_base="tpu", ca_file="/etc/ca.pem", token_header="X-API-Key")
     assert list(made.problems()) == [
         (("ca_file",), "is for https: write api_base: https://…, or leave this out"),

@@ -167,7 +167,7 @@ def test_the_late_reply_of_an_earlier_request_answers_no_other(module: Module) -
         ("a frame of length nought", lambda q: q[:4] + b"\x00\x00" + q[6:7] + b"\x02\x01\x01"),
     ],
 )
-def test_what_does_not_answer_the_question_is_no_answer(
+def test_a_reply_to_another_question_does_not_count_as_an_answer(
     module: Module, what: str, reply: object
 ) -> None:
     assert callable(reply)

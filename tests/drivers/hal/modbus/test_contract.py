@@ -187,7 +187,7 @@ def test_one_dead_unit_costs_the_other_its_tries_and_then_one_a_pause(either: Mo
 @pytest.mark.parametrize(
     "pdu", [b"\x05\x00\x01\xff\x00", b"\x05\x00\x00\x00\x00", b"\x05\x00\x00\x12\x34", b"\x05\x00"]
 )
-def test_the_echo_of_another_write_is_no_answer(either: Module, pdu: bytes) -> None:
+def test_the_echo_of_another_write_does_not_count_as_an_answer(either: Module, pdu: bytes) -> None:
     door(either)
     either.reply = lambda request: (
         frame(request, pdu) if request[7] == 5 else either.answer(request)

@@ -139,7 +139,7 @@ def test_a_flash_whose_reply_is_lost_is_a_failure_and_is_not_sent_again(either: 
 
 
 @pytest.mark.parametrize("pdu", ["0502000008", "0502010007", "050200ff00", "05020000"])
-def test_the_echo_of_another_flash_is_no_answer(either: Module, pdu: str) -> None:
+def test_the_echo_of_another_flash_does_not_count_as_an_answer(either: Module, pdu: str) -> None:
     either.reply = lambda request: frame(request, bytes.fromhex(pdu))
     lines = bus_to(either.port, timeout_s=1.0).lines({}, {COIL: False})
     with pytest.raises(HalError, match="tried 1x"):
@@ -152,7 +152,7 @@ def test_a_board_that_cannot_flash_says_so(line: SerialModule) -> None:
         bus_to(line.port).lines({}, {COIL: False}).flash(COIL, FLASH)
 
 
-def test_a_coil_that_goes_off_by_itself_after_a_flash_is_no_trip(either: Module) -> None:
+def test_a_coil_that_goes_off_by_itself_after_a_flash_is_not_a_trip(either: Module) -> None:
     driver = claimed(either)
     driver.write(PULSE)
     for level in (True, False):
@@ -199,7 +199,7 @@ def test_a_hold_that_ends_during_a_pulse_switches_off_at_once_and_verifies_it(
     assert (writes(either), either.coils[1, 0]) == ([FLASH_PDU, "0500000000"], False)
 
 
-def test_a_door_that_was_let_go_while_it_could_not_be_seen_is_flashed_anew(either: Module) -> None:
+def test_a_door_that_was_let_go_while_it_could_not_be_seen_is_flashed_again(either: Module) -> None:
     driver = claimed(either)
     for outputs in (PULSE, BETWEEN, RELEASE, PULSE):
         driver.write(outputs)

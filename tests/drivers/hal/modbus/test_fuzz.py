@@ -224,7 +224,7 @@ def test_a_register_reads_as_what_was_sent_or_not_at_all(sort: type[Module], pdu
 @settings(max_examples=examples(100))
 @given(pdu=PDUS)
 @example(pdu=bytes.fromhex("0502000007"))
-def test_a_pulse_is_asked_for_once_and_believed_by_its_echo_alone(
+def test_a_pulse_is_requested_once_and_only_its_echo_proves_it(
     sort: type[Module], pdu: bytes
 ) -> None:
     asked: list[bytes] = []

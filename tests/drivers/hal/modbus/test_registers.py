@@ -57,7 +57,7 @@ def test_a_coil_is_written_and_read_as_one(either: Module) -> None:
         "060009abcd",
     ],
 )
-def test_a_reply_that_does_not_answer_is_no_reading(module: Module, pdu: str) -> None:
+def test_a_reply_to_something_else_gives_no_reading(module: Module, pdu: str) -> None:
     module.reply = lambda request: frame(request, bytes.fromhex(pdu))
     with pytest.raises(HalError, match=r"no Modbus reply to it|no reply within"):
         bus_to(module.port, Time(), timeout_s=0.5, retries=0).cells([H0])
@@ -66,7 +66,7 @@ def test_a_reply_that_does_not_answer_is_no_reading(module: Module, pdu: str) ->
 @pytest.mark.parametrize(
     "pdu", ["060009abce", "060009abcd00", "06000aabcd", "0600", "050009ff00", "0302abcd"]
 )
-def test_the_echo_of_another_write_is_no_success(module: Module, pdu: str) -> None:
+def test_the_echo_of_another_write_does_not_count_as_a_success(module: Module, pdu: str) -> None:
     module.reply = lambda request: frame(request, bytes.fromhex(pdu))
     with pytest.raises(HalError):
         bus_to(module.port, Time(), timeout_s=0.5, retries=0).write(H9, 0xABCD)

@@ -139,7 +139,7 @@ def test_when_the_other_master_has_gone_the_relay_is_ours_again(door: Door) -> N
     assert door.module.coils[1, 0]
 
 
-def test_a_module_that_restarts_once_is_written_anew_at_once(door: Door) -> None:
+def test_a_module_that_restarts_once_is_written_again_at_once(door: Door) -> None:
     door.module.coils[1, 0] = False
     first, *others = door.scans(1.0)
     assert "reads 0 after 1 was written: the module has restarted" in first

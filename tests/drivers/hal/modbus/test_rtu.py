@@ -180,7 +180,7 @@ def test_an_adapter_that_echoes_is_understood_when_the_file_says_so(line: Serial
     assert (lines.read(), lines.outputs()) == ({IN0: False}, {COIL: True})
 
 
-def test_an_echo_alone_is_no_answer_even_to_a_write(line: SerialModule) -> None:
+def test_an_echo_alone_does_not_answer_even_a_write(line: SerialModule) -> None:
     line.on_wire = lambda frame: frame
     bus = bus_to(line.port, timeout_s=0.05, ignore_echo=True)
     with pytest.raises(HalError, match=r"no reply within 0\.05 s"):
@@ -250,7 +250,7 @@ def test_a_port_that_another_program_has_open_is_left_alone(line: SerialModule) 
         (os.path.dirname(__file__), "Is a directory"),
     ],
 )
-def test_what_is_no_serial_port_is_named(port: str, text: str) -> None:
+def test_a_path_that_is_not_a_serial_port_is_named(port: str, text: str) -> None:
     found = fails(bus_to(port), IN0)
     assert found.startswith(f"no serial port {port}: ")
     assert text in found

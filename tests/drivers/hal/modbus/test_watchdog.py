@@ -167,7 +167,7 @@ def test_a_trip_that_nobody_drives_through_is_seen_by_reading_back(site: Site) -
     assert site.bench.ends() == CLOSED
 
 
-def test_a_module_that_an_earlier_daemon_left_tripped_is_armed_anew(site: Site) -> None:
+def test_a_module_that_an_earlier_daemon_left_tripped_is_armed_again(site: Site) -> None:
     site.bench.driver.open()
     site.dead_men[0].expire()
     wait_until(lambda: site.register(STATE) == TRIPPED, "tripped")

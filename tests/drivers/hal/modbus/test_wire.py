@@ -42,7 +42,7 @@ def test_a_connection_that_cannot_be_made_says_what_to_look_at(failure: OSError,
     assert unreachable(failure).startswith(f"no Modbus TCP connection to gateway:502: {text}")
 
 
-def test_a_connection_that_is_reset_is_no_reply() -> None:
+def test_a_reset_connection_does_not_count_as_a_reply() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         connection = Connection("127.0.0.1", listener.getsockname()[1], 5.0)
         connection.connect()
