@@ -65,6 +65,6 @@ def timer_unseen(call: Call, off_s: float) -> bool:
     return not {off_s, 1000 * off_s}.intersection(map(float, numbers))
 
 
-def told(call: Call, api: http.Base) -> str:
+def described(call: Call, api: http.Base) -> str:
     """The command as `check` prints it: method, address and body."""
     return f"{call.method} {api.url(call.path)}{f' {call.body}' if call.body else ''}"

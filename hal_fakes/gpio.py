@@ -54,7 +54,7 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self._when_changed = None
         self._function = "input"
 
-    def shown(self, level: bool) -> None:
+    def follow_wire(self, level: bool) -> None:
         """The wire has this level now; an edge is told to whoever watches the pin."""
         if self._function == "input":
             (self.drive_high if level else self.drive_low)()
@@ -98,7 +98,7 @@ class WiredFactory(MockFactory):  # type: ignore[misc]
             for wiring in self._wirings:
                 for point, level in wiring.levels(now).items():
                     if point in claimed:
-                        claimed[point].shown(level)
+                        claimed[point].follow_wire(level)
 
 
 def open_bus(settings: GpioSettings, wirings: Sequence[Wiring], world: RealTime) -> GpioBus:

@@ -29,7 +29,7 @@ WRONG_DOCKING = "WRONG_DOCKING"
 WRONG_DOCKING_TEXT = "wrong docking: "
 UNKNOWN_RECEIVER_TEXT = "unknown receiver "
 HEIGHT_LOST_TEXT = "the pad left its height under power"
-RECEIVER_NOT_TOLD_TEXT = "receivers are given, and the charger does not say which one it sees"
+RECEIVER_NOT_TOLD_TEXT = "the YAML has receivers, but the charger does not say which one it sees"
 
 _BARE = r"[^\s\",/\\]+"
 _ID = rf'("(?:[^"\\]|\\.)*"|{_BARE})'

@@ -20,7 +20,7 @@ from bridges.rmf.topics import CHARGER_REFUSALS
 
 NAME = "ChargerRequest refused"
 OCCUPIED = "charger occupied"
-"""The reason that ends when the charger is let go."""
+"""The one reason that ends when the charger is released."""
 LONGEST_REASON = 500
 
 
@@ -50,10 +50,10 @@ class Refusal(msgspec.Struct, frozen=True, kw_only=True):
 
     def message(self) -> DiagnosticStatus:
         """As it is published: the values are the fields, by their names."""
-        values = tuple(KeyValue(key, value) for key, value in self.told().items())
+        values = tuple(KeyValue(key, value) for key, value in self.fields().items())
         return DiagnosticStatus(int(DiagnosticLevel.WARN), NAME, self.text, self.charger, values)
 
-    def told(self) -> Mapping[str, str]:
+    def fields(self) -> Mapping[str, str]:
         """The fields, for the status file."""
         return {key: getattr(self, key) for key in self.__struct_fields__}
 
@@ -76,16 +76,17 @@ def refused(request_id: str, charger: str, who: Robot, reason: str) -> Refusal:
     )
 
 
-def answer(name: str, asked: object, reason: str, report: ChargerReport) -> Answer | None:
-    """What is said when charger `name` refuses this; None for what is not a request.
+def answer(name: str, request: object, reason: str, report: ChargerReport) -> Answer | None:
+    """What is published when charger `name` refuses this; None for anything but a request.
 
-    `asked`: the message, if it is malformed, else the core's event. `report`: the charger as it is now.
+    `request`: the message, if it is malformed, else the core's event. `report`: the charger as it
+    is now.
     """
-    match asked:
+    match request:
         case ChargerRequest():
-            request_id, fleet, robot = asked.request_id, asked.fleet_name, asked.robot_name
+            request_id, fleet, robot = request.request_id, request.fleet_name, request.robot_name
         case Requested():
-            request_id, fleet, robot = asked.request_id, asked.fleet, asked.robot
+            request_id, fleet, robot = request.request_id, request.fleet, request.robot
         case _:
             return None
     refusal = replace(
@@ -95,7 +96,7 @@ def answer(name: str, asked: object, reason: str, report: ChargerReport) -> Answ
         held_request=report.request_id,
         error=report.error_message[:LONGEST_REASON],
     )
-    return Answer(CHARGER_REFUSALS, refusal.message(), refusal.told())
+    return Answer(CHARGER_REFUSALS, refusal.message(), refusal.fields())
 
 
 def _cut(text: str) -> str:

@@ -167,7 +167,7 @@ def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) 
     holder = memory.holder
     if holder is None:
         who = pad.seen(memory.sample, limits).robot or "the robot is not known"
-        fault = Fault("UNREQUESTED_CHARGING", f"nobody asked for it: {who}")
+        fault = Fault("UNREQUESTED_CHARGING", f"nobody requested it: {who}")
         return [fault] if shown is CHARGING else []
     stopping = memory.sample and memory.sample.activity is Activity.STOPPING
     if shown is CHARGING and not stopping and holder.over and holder.ended != "full":

@@ -37,7 +37,7 @@ def robot(text: str) -> Robot:
     """FLEET/ROBOT in its parts. Raises ValueError."""
     fleet, slash, name = text.partition("/")
     if not (fleet and slash and name):
-        raise ValueError(f"{text!r} is no robot: write FLEET/ROBOT, as RMF names them")
+        raise ValueError(f"{text!r} is not a robot: write FLEET/ROBOT, as RMF names them")
     return Robot(fleet, name)
 
 

@@ -1,7 +1,7 @@
 """What passes between a charger's driver and its core in one scan, and the core's events.
 
-A station with the first HTTP contract gives its activity and its error's text only. Richer
-controllers (CANopen, Modbus, another make's JSON) fill in `measured` and obey `power`.
+The simplest stations on HTTP give only their activity and an error text. Other controllers (CANopen,
+Modbus, another make's JSON) also fill in `measured` and obey `power`.
 """
 
 from enum import StrEnum
@@ -37,7 +37,7 @@ FaultSide = Literal["", "station", "robot"]
 
 
 class Measured(msgspec.Struct, frozen=True):
-    """What a richer controller knows beside its state; None where it does not say.
+    """What a controller reports besides its state; None where it does not say.
 
     `receiver_id`: the receiver on the pad, "" if there is none. `in_range`: the robot's coil is where
     it can be charged; False too until a range check has shown that. `range_ok`: the same where the

@@ -40,7 +40,7 @@ KIND: GraphKind[
     requests={
         CHARGER_STATES: messages.accept_state,
         FLEET_STATES: messages.accept_fleet,
-        ADAPTER_CHARGER_REQUESTS: messages.accept_wish,
+        ADAPTER_CHARGER_REQUESTS: messages.accept_request,
         ADAPTER_CHARGER_CANCELS: messages.accept_withdrawal,
         CHARGING_ASSIGNMENTS: messages.accept_assignments,
     },

@@ -5,8 +5,8 @@ assignment changes (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart). Tha
 only while its ChargeBattery runs: as a task, or as `finishing_request: charge`. Rules:
 1. A robot that is expected at one station and comes to another, or does not leave it for LEAVES_S, is
    told to wait, and TOLD_S later to charge at its own. Not more than twice for one request.
-2. A robot that has no station, and stands on a pad that another waits for, is told once more to wait,
-   with the other mode for TOLD_S. This happens `leaves_s` after it came or the station let it go.
+2. A robot that has no station, and stands on a pad that another waits for, is told to wait again,
+   by the other mode for TOLD_S. This happens `leaves_s` after it came or the station let it go.
 3. Where we may not assign, or the robot is in another task, nothing is told: RMF would not move it.
 4. If it still stands there OBEYS_S later, or cannot be told, a person is alerted.
 Who stands where is the fleet's word (FleetState's position), or the station's, if it reads receivers.
@@ -32,8 +32,8 @@ TRIES: Final = 2
 
 
 class Astray(NamedTuple):
-    """`who` stands at `station` since `since`. `expected`: the station that it has instead; None: it
-    has none, and `waiter` waits for this one. `tries`: how often it may be told to leave."""
+    """`who` has stood at `station` since `since`. `expected`: the station that it has; None if it has
+    none, and `waiter` waits for this one. `tries`: how often it may be told to leave."""
 
     who: Robot
     station: str
@@ -45,16 +45,16 @@ class Astray(NamedTuple):
 
 
 def found(memory: Memory, now: float, site: Site) -> dict[Robot, Astray]:
-    """Every robot that stands where it should not, as far as it matters to somebody. NEVER as `now`:
-    those too that will, if nobody moves."""
+    """Every robot that stands at the wrong station or in another robot's way. If `now` is NEVER, also
+    those that will count as such unless somebody moves."""
     astray: dict[Robot, Astray] = {}
     for one in (*_strayed(memory, now, site), *_blocking(memory, now, site)):
         astray.setdefault(one.who, one)
     return astray
 
 
-def told(memory: Memory, now: float, site: Site) -> Memory:
-    """Tell those who are to leave, and forget those who have left."""
+def nudged(memory: Memory, now: float, site: Site) -> Memory:
+    """Nudge the robots that are to leave, and forget those that have left."""
     astray = found(memory, now, site)
     nudges = {who: n for who, n in memory.nudges.items() if _matters(memory, who, n, astray)}
     for who, one in astray.items():
@@ -65,18 +65,18 @@ def told(memory: Memory, now: float, site: Site) -> Memory:
     return replace(memory, nudges=nudges)
 
 
-def is_told(memory: Memory, who: Robot, now: float) -> bool:
-    """Is its assignment the other one just now?"""
+def is_nudged(memory: Memory, who: Robot, now: float) -> bool:
+    """Is it being told to leave now, by an assignment that is not its own?"""
     return who in memory.nudges and now < memory.nudges[who].at + TOLD_S
 
 
 def alarming(memory: Memory, one: Astray, now: float) -> bool:
-    """Is it for a person to see to?"""
+    """Should a person be alerted?"""
     return now >= max(one.since, _alarm_at(memory, one))
 
 
 def due(memory: Memory, now: float, site: Site) -> Iterator[float]:
-    """When something of this changes by time alone."""
+    """When any of this changes without an event."""
     for nudge in memory.nudges.values():
         yield nudge.at + TOLD_S
     for one in found(memory, NEVER, site).values():
@@ -134,22 +134,23 @@ def _idle_at(memory: Memory, station: str, here: Here) -> Robot | None:
 
 
 def _matters(memory: Memory, who: Robot, nudge: Nudge, astray: Mapping[Robot, Astray]) -> bool:
-    """Does this count against the robot still? A stray's request remembers how often it was told."""
+    """Does this nudge still count? While a robot has a station, its nudges count until it gets another
+    request: a robot that goes astray twice is not told more often."""
     station = memory.station_of(who)
     if station is not None:
         return memory.grants[station].request_id == nudge.why
     return who in astray and astray[who].why == nudge.why
 
 
-def _can_be_told(memory: Memory, who: Robot) -> bool:
+def _can_be_nudged(memory: Memory, who: Robot) -> bool:
     standing = memory.robots.get(who)
     return memory.assigns and standing is not None and not standing.works
 
 
 def _next_at(memory: Memory, one: Astray) -> float:
-    """When it is told to leave, once more; NEVER: it was told, or cannot be."""
+    """When it is told to leave, or told again; NEVER if it was told often enough, or cannot be."""
     nudge = memory.nudges.get(one.who)
-    if not _can_be_told(memory, one.who):
+    if not _can_be_nudged(memory, one.who):
         return NEVER
     if nudge is None or nudge.why != one.why:
         return one.since
@@ -158,7 +159,7 @@ def _next_at(memory: Memory, one: Astray) -> float:
 
 def _alarm_at(memory: Memory, one: Astray) -> float:
     nudge = memory.nudges.get(one.who)
-    if not _can_be_told(memory, one.who):
+    if not _can_be_nudged(memory, one.who):
         return one.since
     if nudge is None or nudge.why != one.why or nudge.count < one.tries:
         return NEVER

@@ -53,7 +53,7 @@ def decide(memory: Memory, event: Event, now: float, site: Site) -> Decided:
     memory = stations.in_time(stations.adopted(memory, now, site), now, site)
     if memory.may_speak:
         memory = allot(_as_dedicated(memory, site), now, site)
-    memory = astray.told(memory, now, site)
+    memory = astray.nudged(memory, now, site)
     shown = report.report(memory, now, site)
     memory, publish = report.messages(memory, shown.faults, now, site)
     return Decision(memory, None, shown, _wake_at(memory, now, site), refused, publish)

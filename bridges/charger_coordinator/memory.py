@@ -20,9 +20,9 @@ V = TypeVar("V")
 
 NODE: Final = "charger_coordinator"
 STATION_SILENT_S: Final = 5.0
-"""After so long without a state a station is silent. States come at 1 Hz."""
+"""A station is silent after this long without a state. States come at 1 Hz."""
 STRIKES: Final = 2
-"""After so many failures, at a second station if it has one, a robot is not tried again."""
+"""A robot is not tried again after this many failures; at two stations, if two suit it."""
 
 IDLE: Final = ChargerStateValue.CHARGER_IDLE
 ASSIGNED: Final = ChargerStateValue.CHARGER_ASSIGNED
@@ -186,12 +186,12 @@ class Memory(msgspec.Struct, frozen=True):
     `wishes`: in the order in which they are served. `grants`: by station. `strikes`: robot -> the
     stations where it has failed. `served`: robot -> the task in which it was charged. `rested`: robots
     that the schedule need not charge again before it ends. `absent`: robot -> until when it is not
-    called again, because it did not leave its place. `over`: ids of
-    the last operators' requests that have ended, so that late repeats are refused. `count`: requests
-    made so far. `robots`, `stations`: as last heard, and when. `shunned`: station -> until when it is
-    passed over, because it took no request. `preferred`: robot -> the station that another node has
-    dedicated to it. `nudges`: robots told to leave a pad. `receivers`: robot -> the error of its own
-    receiver. `when`: the local time. `assigned`: the assignments last published, and when:
+    called again, because it did not leave its place. `over`: ids of the last operators' requests that
+    have ended, so that late repeats are refused. `count`: requests made so far. `robots`,
+    `stations`: as last heard, and when. `shunned`: station -> until when it is passed over, because
+    it took no request. `preferred`: robot -> the station that another node has dedicated to it.
+    `nudges`: robots told to leave a pad. `receivers`: robot -> the error of its own receiver.
+    `when`: the local time. `assigned`: the assignments last published, and when:
     `assigned_at`. `alerts`: the faults that a person has been told of.
     """
 

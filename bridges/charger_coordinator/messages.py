@@ -111,7 +111,7 @@ def accept_state(
     )
 
 
-def accept_wish(request: d.ChargerRequest, settings: Settings, wall: float) -> Wanted:
+def accept_request(request: d.ChargerRequest, settings: Settings, wall: float) -> Wanted:
     """An operator's request as an event. An empty charger_name means any suitable station."""
     check_length(charger_name=request.charger_name)
     asked = accept_charger_request(request, ChargerSettings())
@@ -123,7 +123,7 @@ def accept_wish(request: d.ChargerRequest, settings: Settings, wall: float) -> W
 def accept_withdrawal(cancel: d.ChargerCancel, settings: Settings, wall: float) -> Unwanted:
     """An operator's cancel as an event. Raises RequestRefused."""
     if not cancel.request_id:
-        raise RequestRefused("empty request_id", "which wish is withdrawn?")
+        raise RequestRefused("empty request_id", "which request is withdrawn?")
     check_length(request_id=cancel.request_id)
     return Unwanted(cancel.request_id)
 
@@ -166,18 +166,18 @@ def summary(report: SiteReport, now: float) -> Mapping[str, str]:
     }
 
 
-def answer(asked: object, reason: str) -> Answer | None:
-    """What is said when a request for any charger is refused; None for what is none."""
-    match asked:
+def answer(request: object, reason: str) -> Answer | None:
+    """What is published when a request for any charger is refused; None for anything else."""
+    match request:
         case d.ChargerRequest():
             who, station, request_id = (
-                Robot(asked.fleet_name, asked.robot_name),
-                asked.charger_name,
-                asked.request_id,
+                Robot(request.fleet_name, request.robot_name),
+                request.charger_name,
+                request.request_id,
             )
         case Wanted():
-            who, station, request_id = asked.robot, asked.station, asked.request_id
+            who, station, request_id = request.robot, request.station, request.request_id
         case _:
             return None
     refusal = refused(request_id, station or "any", who, reason)
-    return Answer(CHARGER_REFUSALS, refusal.message(), refusal.told())
+    return Answer(CHARGER_REFUSALS, refusal.message(), refusal.fields())

@@ -32,7 +32,7 @@ from bridges.charger_coordinator.memory import (
 )
 
 REMEMBERED_S: Final = 30.0
-"""How long a robot's last place counts, after its fleet has shown it."""
+"""How long a robot's last place counts after its fleet has shown it."""
 Here = Mapping[str, Sequence[Robot]]
 """Station -> the robots that stand there."""
 

@@ -1,7 +1,8 @@
 """The queue as it is shown: who waits, who wanted that, what for, and until when.
 
-A charge's end is known where the station tells it. Each robot is shown with the station that it will
-probably get: of those that suit it, the one that is free first and that no robot before it will get.
+A charge's end is known only if the station reports it. Each robot is shown with the station that it
+will probably get: of those that suit it, the one that is free first and that no robot before it
+will get.
 """
 
 from collections.abc import Iterator
@@ -20,7 +21,7 @@ from bridges.charger_coordinator.queue import Here, in_the_way, standing, suitin
 from bridges.core.durations import NEVER
 
 MOST: Final = 4
-"""Of so many stations a robot is shown why it does not have them."""
+"""For at most this many stations the queue says why the robot does not have them."""
 
 
 def queued(memory: Memory) -> list[Wish]:
@@ -62,7 +63,7 @@ def _obstacle(memory: Memory, station: str, robot: Robot, now: float, here: Here
     if now < memory.shunned.get(station, now):
         return f"{station} takes no request"
     if grant is not None and not grant.over:
-        does = "charges" if grant.started else "is kept for"
+        does = "charges" if grant.started else "is assigned to"
         return f"{station} {does} {grant.robot}"
     other = in_the_way(here, station, robot)
     if other is not None:

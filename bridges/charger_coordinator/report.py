@@ -75,7 +75,7 @@ class SiteReport(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...] = ()
 
     def news(self) -> object:
-        """What is worth a line in the log: not the time that passes."""
+        """What is worth a line in the log: everything but running times."""
         return self.stations, self.waiting, self.assigns, self.schedule, self.absent
 
 
@@ -121,7 +121,7 @@ def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
         if now >= memory.silent_since(name):
             yield Fault("STATION_SILENT", f"{name}: no ChargerState comes")
         elif name in memory.stations:
-            yield from _shown(memory, name, memory.stations[name], now, site)
+            yield from _faults_of(memory, name, memory.stations[name], now, site)
         if now < memory.shunned.get(name, now):
             yield Fault("REQUEST_NOT_TAKEN", f"{name}: its daemon's log says why")
     for one in astray.found(memory, now, site).values():
@@ -132,7 +132,7 @@ def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
             yield Fault("RECEIVER_ERROR", f"the receiver on {who}: {error}")
 
 
-def _shown(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Iterator[Fault]:
+def _faults_of(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Iterator[Fault]:
     """Faults that a station's state shows."""
     if seen.diagnosis in (Diagnosis.STATION, Diagnosis.LOST, Diagnosis.UNCLEAR):
         yield Fault("STATION_OUT_OF_SERVICE", f"{name}: {seen.error}")
@@ -142,12 +142,12 @@ def _shown(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Ite
     unasked = who is not None and memory.station_of(who) is None and now >= seen.since + ASKS_S
     if who is None or unasked:
         what = who or _stranger(seen.error)
-        yield Fault("WRONG_STATION", f"{what} stands at {name}, nobody asked for that")
+        yield Fault("WRONG_STATION", f"{what} stands at {name}, but nobody requested that")
 
 
 def _misplaced(one: astray.Astray) -> Fault:
     if one.expected:
-        text = f"{one.who} stands at {one.station}, it is expected at {one.expected}"
+        text = f"{one.who} stands at {one.station}, but is expected at {one.expected}"
         return Fault("WRONG_STATION", text)
     why = "RMF has no charging task that would send it away (finishing_request: charge has one)"
     return Fault(
@@ -231,7 +231,7 @@ def _assignments(memory: Memory, now: float, site: Site) -> Iterator[d.ChargingA
     for a moment another mode (`astray.py`)."""
     fleets: dict[str, list[d.ChargingAssignment]] = {}
     for who in sorted(site.robots):
-        station, told = memory.station_of(who), astray.is_told(memory, who, now)
+        station, told = memory.station_of(who), astray.is_nudged(memory, who, now)
         charges = (station is None) == told
         mode = d.ChargingMode.MODE_CHARGE if charges else d.ChargingMode.MODE_WAIT
         place = site.places[station][who.fleet] if station and not told else site.waits_at[who]

@@ -80,7 +80,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
 
     `stations`: the chargers, by the names under which their daemons publish.
     `fleets`: the fleets whose robots charge at them.
-    `start_timeout_s`: how long a station is kept for a robot that is on its way.
+    `start_timeout_s`: how long a station stays assigned to a robot that is on its way.
     `near_m`: a robot stands at the nearest waypoint, if that is no farther away than this.
     `full_percent`: the charge at which a robot gives up its station.
     `again_percent`: below this a robot without a task is charged. One that was charged comes back in
@@ -182,7 +182,10 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
             for key, thing in [*things, *([("rcu", robot.rcu)] if robot.rcu else [])]:
                 owner = taken.setdefault((key, thing), str(who))
                 if owner != str(who):
-                    yield (*path, key), f"'{thing}' is {owner}'s already: it can be one robot's"
+                    yield (
+                        (*path, key),
+                        f"'{thing}' already belongs to {owner}: only one robot can have it",
+                    )
 
     def _of_schedule(self) -> Iterator[tuple[tuple[str, ...], str]]:
         least, most = self.again_percent, self.full_percent
@@ -256,8 +259,11 @@ def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
     for who, robot in settings.robots().items():
         path = ("fleets", who.fleet, "robots", who.name)
         if len(set(robot.stations)) == 1:
-            only = f"{who} charges at '{robot.stations[0]}' alone"
-            yield path, f"{only}: when it fails there, nothing tells whose fault it is"
+            only = f"{who} charges only at '{robot.stations[0]}'"
+            yield (
+                path,
+                f"{only}: if a charge fails there, nothing shows whether robot or charger is at fault",
+            )
     yield from _near(settings)
 
 

@@ -17,13 +17,13 @@ Charge and a UUID (rmf_ros2 jazzy 7eef65a, Dispatcher.cpp; rmf_task jazzy, Charg
 
 
 def is_dispatched(task_id: str) -> bool:
-    """Did RMF's dispatcher give this task: a patrol, a delivery, but no charge?"""
+    """Did RMF's dispatcher give this task? Then it is a patrol or a delivery, never a charge."""
     return _DISPATCHED.match(task_id) is not None
 
 
 class Sighting(msgspec.Struct, frozen=True):
-    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING, and its task is none that
-    RMF's dispatcher gave it. `place`: which of our waypoints it stands at; None for none."""
+    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING, and its task is not one
+    that RMF's dispatcher gave it. `place`: which of our waypoints it stands at; None for none."""
 
     who: Robot
     charges: bool

@@ -2,16 +2,17 @@
 
 1. A station shows how a request ends. Released after charging: the wish is fulfilled. Released without
    charging: the robot did not come. Then a fleet's wish goes to the end of the queue if its robot
-   stands at one of our waypoints; any other wish is over. If the robot stands at that very station, it
+   stands at one of our waypoints. Any other wish is over. If the robot stands at that very station, it
    has failed there. A station that no longer shows a request, and has not released it, has forgotten
    it: its daemon was restarted. The wish stays, and the station is asked again (`_forgot`). The power
-   may have been switched off meanwhile: a charge that ends within PROVEN_S of that was not to its end.
-2. After an error of the station, the robot gets another station and keeps its place in the queue. An
-   error of the robot, or one of an unclear side, also counts as a failure of the robot. After its
-   second failure (at a second station if it has one) it is not tried again, and a technician is told.
-3. A failure no longer counts once the robot has been charged for PROVEN_S, or to its end; and once the
-   station where it failed is found faulty: its error names its own side, or it was mended when the
-   robot had been gone for PROVEN_S.
+   may have been switched off meanwhile: a charge that ends within PROVEN_S of that was cut short.
+2. After an error of the station, the robot gets another station and keeps its place in the queue. If
+   the robot is at fault, or it is unclear which side is, that also counts as a failure of the
+   robot. After its second failure (at a second station if it has one) it is not tried again, and a
+   technician is told.
+3. A failure no longer counts once the robot has been charged for PROVEN_S, or fully. Nor does it once
+   the station where it failed is found faulty: the error names the station, or it ended only after
+   the robot had been gone for PROVEN_S.
 4. If another robot is on the pad, the assigned one keeps the station for its start_timeout. A station
    that cannot be reached says nothing about the charge. A robot that was charging there keeps it; one
    that was on its way gets another station after LOST_S.
@@ -68,7 +69,7 @@ def heard(memory: Memory, state: StateHeard, now: float, site: Site) -> Memory:
         return memory
     if grant.shown and not _forgot(memory, name, grant, now, site):
         return _ended(memory.with_grant(name, None), name, grant, now, site)
-    return memory.with_grant(name, _asked_again(grant, seen, now))
+    return memory.with_grant(name, _repeated(grant, seen, now))
 
 
 def _forgot(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> bool:
@@ -82,8 +83,8 @@ def _forgot(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> 
     return now < grant.made_at + grant.start_timeout_s
 
 
-def _asked_again(grant: Grant, seen: Seen, now: float) -> Grant | None:
-    """The grant whose request the station does not show (yet). None: it will not take this one."""
+def _repeated(grant: Grant, seen: Seen, now: float) -> Grant | None:
+    """The grant while the station does not show its request yet; None if it will not take it."""
     before = seen.state is RELEASED or seen.request_id.startswith(UNREQUESTED)
     may_come = seen.state is IDLE or (before and seen.robot == grant.robot)
     if not may_come or not grant.request_id.startswith(f"{NODE}/"):
@@ -165,7 +166,7 @@ def _waits_at(memory: Memory, station: str, site: Site) -> Robot | None:
 
 
 def in_time(memory: Memory, now: float, site: Site) -> Memory:
-    """What changes by time alone."""
+    """What changes without an event."""
     for name, grant in list(memory.grants.items()):
         if grant.over or grant.started:
             continue
@@ -206,7 +207,7 @@ def absent_at(memory: Memory, name: str, grant: Grant, site: Site) -> float:
 
 
 def _acquitted(memory: Memory, name: str, before: Seen | None, now: float, site: Site) -> Memory:
-    """Forget the failures at this station that turn out to be its own."""
+    """Forget robots' failures at this station that turn out to be the station's fault."""
     for who, failed_at in memory.strikes.items():
         if name in failed_at and _was_the_stations(memory, who, name, before, now, site):
             left = tuple(station for station in failed_at if station != name)
@@ -218,7 +219,7 @@ def _acquitted(memory: Memory, name: str, before: Seen | None, now: float, site:
 def _was_the_stations(
     memory: Memory, who: Robot, name: str, before: Seen | None, now: float, site: Site
 ) -> bool:
-    """Does the station name its own side, or was it mended long after the robot had left?"""
+    """Does the error name the station, or did it end only long after the robot had left?"""
     seen, standing = memory.stations[name], memory.robots.get(who)
     if seen.state is ERROR:
         return diagnosis(seen.error.removeprefix(OUT_OF_SERVICE)) is Diagnosis.STATION

@@ -10,8 +10,8 @@ a robot that has stood at one of our waypoints for SETTLES_S:
    waypoints since, may be waiting for traffic on its pad: it is believed after LINGERS_S.
 3. Without a task, it wants to be charged where a schedule says so; after that, not again in the same
    time before it has worked.
-4. A wish lasts while the robot stands at one of our waypoints so, and while it drives there: in the
-   same task, or without one while a station is kept for it. A task that begins within COMES_S of
+4. A wish lasts while this is so, and while the robot drives to its station: in the same task, or
+   without one while a station is assigned to it. A task that begins within COMES_S of
    the call is that drive: RMF's automatic retreat, or its ChargeBattery started again. A dispatched
    task is not.
 5. RMF moves no robot without a task under `finishing_request: nothing`, until its battery is very low;
@@ -31,7 +31,7 @@ from bridges.charger_coordinator.signals import Sighting, Wanted, is_dispatched
 SETTLES_S: Final = 2.0
 """A robot that passes by on another task may still show the mode CHARGING."""
 LINGERS_S: Final = 300.0
-"""No traffic lasts so long: a robot that stands there still waits for its battery."""
+"""No traffic jam lasts this long: a robot that stands there even longer waits for its battery."""
 COMES_S: Final = 60.0
 """RMF acts on a charging assignment at once, or not at all."""
 ABSENT_S: Final = 600.0
@@ -81,7 +81,7 @@ def unwanted(memory: Memory, request_id: str) -> tuple[Memory, str]:
     granted = next((g.robot for g in grants if g.request_id == request_id and not g.over), None)
     who = wish.robot if wish else granted
     if who is None:
-        return memory, "" if request_id in memory.over else "no such wish"
+        return memory, "" if request_id in memory.over else "no such request"
     return memory.takes_back(who).without_wish(who), ""
 
 
@@ -125,7 +125,7 @@ def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standi
 
 
 def _served(memory: Memory, sighting: Sighting) -> Memory:
-    """A robot that has left in another task was served long ago."""
+    """Forget in which task a robot was charged, once it has left in another one."""
     who, task = sighting.who, sighting.task_id
     if sighting.place is None and task and memory.served.get(who, task) != task:
         return replace(memory, served=without(memory.served, who))
@@ -133,7 +133,8 @@ def _served(memory: Memory, sighting: Sighting) -> Memory:
 
 
 def _rested(memory: Memory, sighting: Sighting, site: Site) -> Memory:
-    """Full enough for the schedule's present time; until that is over, or the robot has worked."""
+    """Note whether the robot is full enough for the schedule now. That holds until the schedule's
+    time is over, or the robot has worked."""
     who = sighting.who
     aim = schedule.target(site.schedule, who, memory.when)
     worked = bool(sighting.task_id) and sighting.place is None
@@ -169,7 +170,7 @@ def _begun(memory: Memory, standing: Standing, now: float, site: Site) -> Memory
 
 
 def _asks(memory: Memory, standing: Standing, now: float, site: Site) -> By | None:
-    """Does what the fleet shows of it, and the schedule, say that this robot is to be charged?"""
+    """Who wants this robot charged, by its fleet's state and the schedule; None for nobody."""
     s = standing.sighting
     if s.place is None or s.battery_percent >= site.full_percent:
         return None
@@ -187,7 +188,7 @@ def _asks(memory: Memory, standing: Standing, now: float, site: Site) -> By | No
 
 
 def _believed(memory: Memory, standing: Standing, now: float) -> bool:
-    """Is the mode that of this task?"""
+    """Does the mode belong to its present task, and not to an earlier one?"""
     served = memory.served.get(standing.sighting.who)
     if served is None:
         return True
@@ -205,7 +206,7 @@ def _lasts(memory: Memory, wish: Wish, s: Sighting, site: Site) -> bool:
 
 
 def _goal(memory: Memory, wish: Wish, site: Site) -> float:
-    """How far it is to be charged (%)."""
+    """The battery charge (%) at which the wish is fulfilled."""
     if wish.by != "schedule" or not site.schedule:
         return site.full_percent
     aim = schedule.target(site.schedule, wish.robot, memory.when)
@@ -213,7 +214,7 @@ def _goal(memory: Memory, wish: Wish, site: Site) -> float:
 
 
 def _full(memory: Memory, wish: Wish, site: Site) -> bool:
-    """Its robot has been charged, and its fleet shows as much as it was to be charged."""
+    """Has its robot been charged, and does its fleet show that the goal is reached?"""
     grant = memory.grants.get(memory.station_of(wish.robot) or "")
     percent = memory.robots[wish.robot].sighting.battery_percent
     return grant is not None and grant.started and percent >= _goal(memory, wish, site)

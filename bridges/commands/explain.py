@@ -105,7 +105,7 @@ def _recorded(args: argparse.Namespace) -> int:
 
 def _all(site: Site, devices: list[tuple[Kind, str]], *, as_json: bool) -> int:
     """Each device in a line, or as JSON."""
-    told = [site.explain(kind, name, None, faults.told()) for kind, name in devices]
+    told = [site.explain(kind, name, None, faults.for_explain()) for kind, name in devices]
     if as_json:
         print(json.dumps([asdict(one) for one in told]))
         return 0
@@ -123,7 +123,7 @@ def _one(site: Site, args: argparse.Namespace) -> int:
         several = " and a ".join(kinds)
         complain("explain", f"'{name}' is a {several}: say which with --kind")
         return 2
-    found = site.explain(kinds[0], name, None, faults.told())
+    found = site.explain(kinds[0], name, None, faults.for_explain())
     _tell(found, as_json=args.json)
     return 0 if (kinds[0], name) in site.devices() else 1
 
@@ -167,7 +167,7 @@ def _follow(ear: Ear, site: Site, args: argparse.Namespace) -> None:
     _listen(ear, site, args.for_s)
     while True:
         kinds: list[Kind] = [args.kind] if args.kind else site.kinds(args.live) or ["lift"]
-        found = site.explain(kinds[0], args.live, None, faults.told())
+        found = site.explain(kinds[0], args.live, None, faults.for_explain())
         news = [SECONDS.sub("", text) for text in found.now], found.next
         if news != told:
             _tell(found, as_json=args.json)

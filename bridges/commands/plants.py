@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from bridges.commands.completion import Completer, completed_by, device_names
-from bridges.serve.places import as_told, by_hand
+from bridges.serve.places import as_given, by_hand
 
 ANSWER_S = 5.0
 
@@ -45,7 +45,7 @@ def _sockets(args: argparse.Namespace) -> list[Path]:
 
 
 def _folder(args: argparse.Namespace) -> Path:
-    return (as_told(args.runtime_dir) or by_hand(args.file.absolute())).runtime
+    return (as_given(args.runtime_dir) or by_hand(args.file.absolute())).runtime
 
 
 def tell(args: argparse.Namespace, verb: str) -> int:

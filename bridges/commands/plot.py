@@ -119,7 +119,7 @@ def _read(args: argparse.Namespace, name: str) -> tuple[Timeline, list[str]]:
         raise PlotError(f"'{name}' is a {' and a '.join(kinds)}: say which with --kind")
     for kind in kinds:
         site.story_from(span.begins_at)
-        words = lines(site.explain(kind, name, None, faults.told()))
+        words = lines(site.explain(kind, name, None, faults.for_explain()))
         return drawings[kind].timeline(span.begins_at), words
     raise PlotError(f"{args.file} holds no state of '{name}' in that time")
 

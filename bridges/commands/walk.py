@@ -141,7 +141,7 @@ def _on(
     def note(how: str) -> None:
         signed.write(
             path,
-            signed.told(
+            signed.record(
                 args.file,
                 device,
                 by,

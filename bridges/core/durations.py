@@ -7,12 +7,12 @@ NEVER: Final = math.inf
 AGES_AGO: Final = -math.inf
 
 RIVAL_QUIET_S: Final = 5.0
-"""When no other node has published a device's states for so long, it is ours again. States come at
+"""A device is ours again once no other node has published its states for this long. States come at
 1 Hz."""
 SILENT_S: Final = 3.0
-"""After so long without a state a lift or door is silent. States come at 1 Hz."""
+"""A lift or door is silent after this long without a state. States come at 1 Hz."""
 FORGOTTEN_S: Final = 60.0
-"""A device or requester that holds nothing, and that no message names, is forgotten after so long."""
+"""A device or requester that holds nothing is forgotten after this long without a message about it."""
 GAP_S: Final = 0.1
 """The least time between two requests that a supervisor sends for one device."""
 REPEAT_S: Final = 1.0

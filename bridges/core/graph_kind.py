@@ -56,8 +56,8 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
     `decide`: the core. Its messages have no stamps: `stamped(message, time)` adds them when they are
     sent. `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`:
     may this subject be forgotten?
-    `answer(asked, reason)`: what is said when a request is refused; None for nothing. `asked`: the
-    message if it was refused at once, else the event.
+    `answer(request, reason)`: what is published when a request is refused; None for nothing.
+    `request`: the message if it was refused at once, else the event.
     `on_map(settings)`: which settings name a place on RMF's map (`bridges/core/kind.py`).
 
     For a kind with one message about all its subjects: `together(memories)`, sent each second and
@@ -96,7 +96,7 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
     yields: tuple[Topic[Message], ...] = ()
     shown_by: Topic[Message] | None = None
     reserved: Callable[[S], Collection[str]] = lambda settings: ()
-    answer: Callable[[object, str], Answer | None] = lambda asked, reason: None
+    answer: Callable[[object, str], Answer | None] = lambda request, reason: None
     requester: Callable[[E], str] = lambda event: ""
     requesters: Callable[[M], Collection[str]] = lambda memory: ()
 

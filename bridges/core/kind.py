@@ -41,11 +41,11 @@ Place = tuple[tuple[str, ...], str, str]
 
 
 class Answer(NamedTuple):
-    """What is said of a refused request: a message, where it goes, and the same for the status file."""
+    """The answer to a refused request: its topic, the message, and the same for the status file."""
 
     topic: Topic[Message]
     message: Message
-    told: Mapping[str, str]
+    status: Mapping[str, str]
 
 
 class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
@@ -55,15 +55,15 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
     RequestRefused for a message that is malformed or cannot be asked of this device.
     `device_name`: which device a message (request or state) is about. `sender`: for whom a request
-    was sent; if several wait for the next scan, only the last of each sender counts.
+    was sent. If several requests wait for the next scan, only the last of each sender counts.
     `limits(settings, debounce_s)`: the core's durations, from the device's settings and the wiring
     table's per-signal debounce. `initial(limits, now)`: the core's memory at start.
     `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
     `summary(report)`: key -> value for the log line, the status file and `watch`.
     `published(memory, report)`: the memory after this report has gone out to RMF.
     `publishes(settings)`: what a device publishes beside its states.
-    `answer(name, asked, reason, report)`: what is said when a request is refused; None for nothing.
-    `asked`: the message if it is malformed, else the event.
+    `answer(name, request, reason, report)`: what is published when a request is refused; None for
+    nothing. `request`: the message if it is malformed, else the event.
     `on_map(settings)`: which of its settings name a place on RMF's map, as (path, what it is, name).
     The device's own name is checked for every kind.
     `attended_by`: the topic of requests whose publishers the core is told of (`Attended`), if any.
@@ -82,7 +82,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     summary: Callable[[R], Mapping[str, str]]
     published: Callable[[M, R], M] = lambda memory, report: memory
     publishes: Callable[[S], tuple[Topic[Message], ...]] = lambda settings: ()
-    answer: Callable[[str, object, str, R], Answer | None] = lambda name, asked, reason, report: (
+    answer: Callable[[str, object, str, R], Answer | None] = lambda name, request, reason, report: (
         None
     )
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()

@@ -26,4 +26,4 @@ def check_listed(what: str, name: str, listed: Collection[str] | None) -> None:
         raise RequestRefused(f"empty {what}_name", f"a {what} needs a name")
     check_length(**{f"{what}_name": name})
     if listed is not None and name not in listed:
-        raise RequestRefused("not ours", f"{name!r} is none of {', '.join(listed)}")
+        raise RequestRefused("not ours", f"{name!r} is not one of {', '.join(listed)}")

@@ -1,4 +1,4 @@
-"""How messages speak of names: shortened, listed, and with the known one that was probably meant."""
+"""How error texts show names: shortened, listed, and with the known name that was probably meant."""
 
 from collections.abc import Iterable
 

@@ -61,8 +61,8 @@ class Memory(msgspec.Struct, frozen=True):
     `latched_at`: since when RMF wants the door open. `close_at`: when a CLOSE releases the hold.
     `held`: the hold is on; `held_since`: when it was last switched on or off. `closing`: the hold has
     ended, and the door has not been seen closed since. `between_since`: since when the door is at
-    neither limit. `shut_since`: since when it is not fully open. `unattended_since`: since when no node
-    publishes door requests.
+    neither end position. `shut_since`: since when it is not fully open. `unattended_since`: since when
+    no node publishes door requests.
     """
 
     latched_at: float | None = None
@@ -84,7 +84,8 @@ def rivalled(memory: Memory, now: float) -> bool:
 
 
 def travel_ends_at(memory: Memory, limits: DoorLimits) -> float:
-    """When a door at neither limit has taken too long; a change of the hold starts the time again."""
+    """When a door at neither end position has taken too long; a change of the hold restarts the
+    time."""
     if memory.between_since is None:
         return NEVER
     return max(memory.between_since, memory.held_since) + limits.t.travel_s

@@ -106,10 +106,10 @@ def _hazards(memory: Memory, view: View, limits: DoorLimits) -> Iterator[Fault]:
 
 def _contradictions(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterator[Fault]:
     if view.seen and view.opened and view.closed:
-        yield Fault("DOOR_CONTACTS_CONTRADICT", "the door reads opened and closed")
+        yield Fault("DOOR_CONTACTS_CONTRADICT", "the door reads open and closed")
     if view.lost:
         yield Fault("DOOR_POSITION_UNKNOWN", view.lost)
     if now >= travel_ends_at(memory, limits):
-        yield Fault("DOOR_TRAVEL_TIMEOUT", f"at neither limit for {limits.t.travel_s} s")
+        yield Fault("DOOR_TRAVEL_TIMEOUT", f"at neither end position for {limits.t.travel_s} s")
     if now >= opening_ends_at(memory, limits):
         yield Fault("DOOR_OPENING_FAULT", f"held, but not open after {limits.t.open_timeout_s} s")

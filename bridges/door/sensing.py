@@ -28,8 +28,8 @@ class View(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
     `fresh`: they were read within `stale_after_s`. `seen`: and each has settled, so the door's position
-    can be told. `estimated`: the limits that no contact proves. `changes_at`: when the view may change
-    without a new reading (s). `lost`, `errors`: see DoorSample.
+    can be told. `estimated`: the end positions that no contact proves. `changes_at`: when the view
+    may change without a new reading (s). `lost`, `errors`: see DoorSample.
     """
 
     fresh: bool

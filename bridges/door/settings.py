@@ -17,7 +17,7 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     `stale_after_s`: after so long without a good reading the door is OFFLINE and its hold is off.
     `close_grace_s`: how long after a CLOSE the hold is released; an OPEN before then cancels the CLOSE.
-    `travel_s`: how long the door may be between its limits; after that its state is UNKNOWN.
+    `travel_s`: how long the door may be between its end positions; after that its state is UNKNOWN.
     `open_timeout_s`: how long a held door may take to open; after that a fault is shown.
     `hazard_clear_s`: how long a fire alarm or an obstruction must be clear before it counts as over.
     `open_delay_s`: with estimated feedback, how long the door takes to open.

@@ -54,8 +54,8 @@ class Memory(msgspec.Struct, frozen=True):
 
     `holders`: in the order in which they came. `requesters`: what was lately heard of each. `mode`:
     the door's last mode, heard at `shown_at`. `at_once`: what was restored need not wait until we may
-    publish. `sent`: the last request to the door's node since we may
-    publish. `prompted`: something calls for a repeat of it.
+    publish. `sent`: the last request to the door's node since we may publish. `prompted`: something
+    calls for a repeat of it.
     """
 
     door: str
@@ -76,8 +76,8 @@ class Memory(msgspec.Struct, frozen=True):
 
     @property
     def may_send(self) -> bool:
-        """May the door's node be asked now? During the quiet start only for restored holders, and only
-        if the door is not closed: a robot may stand in its doorway."""
+        """May we send to the door's node now? During the quiet start only for restored holders, and
+        only if the door is not closed: a robot may stand in its doorway."""
         stands_open = self.mode not in (None, CLOSED)
         return self.may_speak or (self.at_once and stands_open and self.holds_restored)
 
@@ -88,7 +88,7 @@ class Memory(msgspec.Struct, frozen=True):
 
     @property
     def owed(self) -> bool:
-        """Is a new request to be sent? A CLOSE is only if the last request was OPEN."""
+        """Is a new request due? A CLOSE is due only if the last request was OPEN."""
         return self.wanted != self.sent and (self.wanted == OPEN or self.sent == OPEN)
 
     @property

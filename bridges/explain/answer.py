@@ -1,4 +1,4 @@
-"""What answers share: the parts of an answer, and the questions that every sort of device has."""
+"""The parts of an answer, and what the answers about every kind of device share."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ Remedies = Mapping[str, tuple[str, str]]
 """A fault's code -> its likely cause, and what to do."""
 MOST_NAMES: Final = 8
 LISTENS_S: Final = 2.5
-"""Who has listened for less than this cannot say that something does not come."""
+"""Whoever has listened for less time than this cannot say that something is missing."""
 
 
 @dataclass(slots=True)
@@ -37,7 +37,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What else was heard: the names of each kind, and of how many messages."""
+    """What else was heard: the names of each kind, and the number of messages."""
 
     names: Mapping[str, tuple[str, ...]]
     messages: int
@@ -58,8 +58,8 @@ def unheard(device: Device, around: Heard, clock: Clock) -> Answer:
         return answer
     answer.say(f"Nobody publishes a state of {device.name}: {_others(around)}.")
     near = get_close_matches(device.name.lower(), {n.lower(): n for n in others}, 1)
-    mean = next((f" (is it {name}?)" for name in others if [name.lower()] == near), "")
-    what = f"start the daemon of {device.name}, or mend the spelling of its name{mean}"
+    mean = next((f" (did you mean {name}?)" for name in others if [name.lower()] == near), "")
+    what = f"start the daemon of {device.name}, or correct the spelling of its name{mean}"
     return answer.say(
         "RMF waits for ever for a device that is silent: its fleet adapters ask again only when a"
         " state comes.",
@@ -68,7 +68,7 @@ def unheard(device: Device, around: Heard, clock: Clock) -> Answer:
 
 
 def _others(around: Heard) -> str:
-    """`heard are: lifts Lift2; doors ward`."""
+    """`heard were lifts Lift2; doors ward`."""
     parts = [
         f"{kind}s {', '.join(names[:MOST_NAMES])}" for kind, names in around.names.items() if names
     ]
@@ -76,7 +76,7 @@ def _others(around: Heard) -> str:
 
 
 def silent(device: Device, clock: Clock) -> Answer | None:
-    """Its states came, and come no more."""
+    """Its states have stopped."""
     last = device.last_state
     if last is None or device.silent_s(clock.now) <= SILENT_S:
         return None
@@ -87,7 +87,7 @@ def silent(device: Device, clock: Clock) -> Answer | None:
         " said what it does."
     )
     return answer.say(
-        "RMF stands still with it: fleet adapters and supervisor repeat themselves only when a state"
+        "RMF is stuck too: fleet adapters and supervisor repeat their requests only when a state"
         " comes.",
         Step(
             "a person",
@@ -103,14 +103,14 @@ def old_reading(device: Device, clock: Clock) -> str:
         return f"States of {device.name} come, but its inputs were never read."
     if device.stamp_age_s > OLD_S:
         return (
-            f"States of {device.name} come, but what they say was read {lasted(device.stamp_age_s)}"
-            " before, by their stamp: the device cannot be read, or the clocks differ."
+            f"States of {device.name} come, but by their stamps the inputs were read"
+            f" {lasted(device.stamp_age_s)} earlier: the device cannot be read, or the clocks differ."
         )
     return ""
 
 
 def notes(device: Device, clock: Clock) -> tuple[str, ...]:
-    """What may mislead who reads this."""
+    """What may mislead the reader."""
     found = []
     if device.stamp_age_s < -CLOCKS_DIFFER_S and device.stamped:
         ahead = lasted(-device.stamp_age_s)
@@ -132,7 +132,7 @@ def notes(device: Device, clock: Clock) -> tuple[str, ...]:
 
 
 def clock_of(claim: Claim) -> tuple[str, ...]:
-    """A stamp from another clock makes a request look old or new."""
+    """Note that a requester's clock differs, which makes its requests look old or new."""
     age_s = claim.stamp_age_s
     if abs(age_s) < CLOCKS_DIFFER_S or not claim.stamped:
         return ()
@@ -144,7 +144,7 @@ def clock_of(claim: Claim) -> tuple[str, ...]:
 
 
 def faults(device: Device, clock: Clock, remedies: Remedies) -> tuple[FaultTold, ...]:
-    """The faults that are there, with their remedies."""
+    """The present faults, with their remedies."""
     return tuple(
         FaultTold(code, detail, clock.since(moment), *remedies.get(code, ()))
         for code, (detail, moment) in device.faults(clock.now).items()
@@ -152,7 +152,7 @@ def faults(device: Device, clock: Clock, remedies: Remedies) -> tuple[FaultTold,
 
 
 def relays(device: Device, clock: Clock) -> str:
-    """`; its daemon has on: agv_request, call L3`, or "" if that is not known."""
+    """`; its daemon has these on: agv_request, call L3`, or "" if that is not known."""
     own = device.own(clock.now)
     told = own.values.get("outputs") if own else None
     if told is None:
@@ -160,4 +160,8 @@ def relays(device: Device, clock: Clock) -> str:
     if told == "-":
         return "; its daemon has every relay off"
     shown = [part.removesuffix(" yes") for part in told.split(", ") if not part.endswith(" 0")]
-    return f"; its daemon has on: {listed(shown)}" if shown else "; its daemon has every relay off"
+    return (
+        f"; its daemon has these on: {listed(shown)}"
+        if shown
+        else "; its daemon has every relay off"
+    )

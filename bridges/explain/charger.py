@@ -1,7 +1,7 @@
-"""Whose a charger is, and why a robot is not charged at it: sentences, from what was heard of it.
+"""Who has a charger, and why a robot is not charged at it: sentences, from what was heard of it.
 
 RMF itself asks no charger for anything; requests come from the charger coordinator, another node or an
-operator, and a refusal is told on `charger_refusals` (`bridges/charger/refusals.py`).
+operator, and a refusal is published on `charger_refusals` (`bridges/charger/refusals.py`).
 """
 
 from collections.abc import Mapping
@@ -45,10 +45,11 @@ def answer(
 
 def _state(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
     who, request = charger.robot.value, charger.request.value
-    whose = "" if who == NOBODY else f" for {who}"
+    assigned = charger.state.value == "assigned"
+    whose = "" if who == NOBODY else f" {'to' if assigned else 'for'} {who}"
     asked = f" (request {request})" if request else ""
-    state = {"error": "in error", "assigned": "kept"}.get(charger.state.value, charger.state.value)
-    found.say(f"{charger.name} is {state}{whose}{asked} {clock.since(charger.state.since)}.")
+    state = {"error": "in error"}.get(charger.state.value, charger.state.value)
+    found.say(f"{charger.name} has been {state}{whose}{asked} {clock.since(charger.state.since)}.")
 
 
 def _next(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
@@ -59,7 +60,7 @@ def _next(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
         case "assigned":
             found.say(
                 f"It does not see {who} on its pad yet, or cannot charge it yet.",
-                Step("the robot", f"{who} has to come to {charger.name} and stand there exactly"),
+                Step("the robot", f"{who} has to come to {charger.name} and park exactly"),
             )
         case "charging":
             left = f"in {lasted(charger.full_in_s)}" if charger.full_in_s > 0 else "when it is full"
@@ -88,13 +89,13 @@ def _idle(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
         if one.ended is None and one.granted is None and one.asks(clock.now)
     ]
     if not asking:
-        found.say("Nobody asks for it.", Step("nobody", "nothing is waited for"))
+        found.say("Nobody asks for it.", Step("nobody", "there is nothing to do"))
         return
     first = asking[0]
     found.say(
-        f"It is asked to charge {first.wants} {clock.since(first.first)} (request {first.who}), and has"
-        " not taken the request.",
-        Step("the device's node", "take the request; a refusal is told below, or in its log"),
+        f"It has been asked to charge {first.wants} {clock.since(first.first)} (request {first.who}),"
+        " and has not taken the request.",
+        Step("the device's node", "take the request; a refusal is explained below, or in its log"),
     )
 
 
@@ -106,7 +107,7 @@ def _error(found: Answer, charger: ChargerFacts) -> None:
         who = label(str(misplaced.robot))
         wanted = misplaced.expected
         instead = (
-            f"; it is meant for {label(str(wanted))}" if wanted else ", which nobody asked for"
+            f"; it is meant for {label(str(wanted))}" if wanted else ", which nobody requested"
         )
         found.say(
             f"Wrong station: {who} stands at {charger.name}{instead}.",
@@ -114,22 +115,22 @@ def _error(found: Answer, charger: ChargerFacts) -> None:
         )
         return
     says = {
-        Diagnosis.ROBOT: ("The robot is at fault", "see to the robot's receiver"),
+        Diagnosis.ROBOT: ("The robot is at fault", "check the robot's receiver"),
         Diagnosis.STATION: ("The station is at fault", "repair it, then `rmf-bridge reset FILE`"),
         Diagnosis.PAD: (
             "What stands on the pad should not be there",
-            "clear the pad; a new receiver belongs into `receivers:`",
+            "clear the pad; add a new receiver to `receivers:`",
         ),
         Diagnosis.LOST: (
             "The station cannot be reached or commanded",
-            "see to its power and network",
+            "check its power and network",
         ),
     }
     side, do = says.get(
         diagnosis(text),
-        ("Its text does not say whether robot or station is at fault", "see to both"),
+        ("Its text does not say whether robot or station is at fault", "check both"),
     )
-    found.say(f"{side}: {text or 'no text is given'}.", Step("a person", do))
+    found.say(f"{side}: {text or 'no text was given'}.", Step("a person", do))
 
 
 def _refusal(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
@@ -146,7 +147,7 @@ def _coordinated(found: Answer, charger: ChargerFacts, coordinator: Coordinator)
     """What the coordinator says of this charger, of the queue and of the schedule."""
     of_it = coordinator.get(charger.id, "")
     if of_it:
-        found.say(f"The coordinator has it as {label(of_it)}.")
+        found.say(f"The coordinator lists it as {label(of_it)}.")
     for key, text in (("queue", "Its queue: "), ("schedule", "Its schedule: ")):
         told = coordinator.get(key, "-")
         if told not in ("-", ""):

@@ -28,7 +28,8 @@ class Refusal:
 
 
 class ChargerFacts(Device):
-    """`robot`: whose it is; `request`: the id that it serves. `full_in_s`: as it last said."""
+    """`robot`: the robot that has it. `request`: the id that it serves. `full_in_s`: as it last
+    said."""
 
     kind: Kind = "charger"
 

@@ -9,18 +9,20 @@ from bridges.explain.phrases import Moment
 
 MOST_CLAIMS: Final = 64
 ASKS_WITHIN_S: Final = 3.5
-"""Who waits asks at each state or each second; after three that were missed it has stopped."""
+"""A waiting requester repeats itself at each state or each second. After three missed repeats it has
+stopped."""
 REPEATS_S: Final = 1.5
-"""Before we have listened so long, the first request heard of somebody may be one that it repeats."""
+"""Until we have listened this long, the first request that we hear of somebody may be a repeat."""
 
 
 @dataclass(slots=True)
 class Claim:
-    """One requester's wish. `wants`: a floor, or what else is asked. `first`: of the whole visit;
-    `since`: of this wish. `times`: how often it asked. `passed_on`: when the supervisor last asked for
-    it. `own`: it was heard itself, not only through the supervisor. `met`: RMF saw what this wish waits
-    for. `granted`: the device was its. `end_passed_on`: by the supervisor. `stamp_age_s`: of its last
-    request, if that was `stamped`, by our clock.
+    """What one requester asks for. `wants`: a floor, or whatever else. `first`: when its visit began;
+    `since`: when it began to ask for this. `times`: how often it asked. `passed_on`: when the
+    supervisor last asked for it. `own`: it was heard itself, not only through the supervisor. `met`:
+    when RMF saw what it waits for. `granted`: when it had the device. `end_passed_on`: when the
+    supervisor passed on its END. `stamp_age_s`: the age by our clock of its last request, if that was
+    `stamped`.
     """
 
     who: str
@@ -45,7 +47,7 @@ class Claim:
 
 
 class Claims:
-    """All requesters of one device; a flood of names pushes out who has been silent longest.
+    """All requesters of one device. A flood of names pushes out the one that was silent the longest.
 
     `began`: when we began to listen.
     """
@@ -62,7 +64,8 @@ class Claims:
         return self._all.get(who)
 
     def ask(self, who: str, wants: str, moment: Moment, keep: str = "") -> tuple[Claim, bool]:
-        """It asks for this. Returns its claim, and if that is a new wish. `keep`: who must stay."""
+        """It asks for this. Returns its claim, and whether it asks for something new. `keep`: who must
+        stay."""
         claim = self._all.get(who)
         if claim is None or claim.ended is not None:
             if claim is None and len(self._all) >= MOST_CLAIMS:

@@ -1,4 +1,4 @@
-"""What is told of every sort of device: its states' coming and age, its daemons' faults, the story."""
+"""What is known of every kind of device: its states and their age, its daemons' faults, its story."""
 
 import sys
 from collections import deque
@@ -18,16 +18,16 @@ MOST_LINES: Final = 600
 MOST_NODES: Final = 8
 MOST_CODES: Final = 20
 SILENT_S: Final = 3.0
-"""States and diagnostics come at 1 Hz: three missed ones are a silence."""
+"""States and diagnostics come at 1 Hz: after three missed ones a node is silent."""
 OLD_S: Final = 3.0
 CLOCKS_DIFFER_S: Final = 5.0
 BACK_S: Final = 0.2
 BACK_TIMES: Final = 3
 BACK_WITHIN_S: Final = 15.0
-"""Stamps that go back so far, so often in so short a time are of two nodes."""
+"""Stamps that go back this far, this often within this time come from two nodes."""
 REFUSED: Final = "refused "
 QUIET_S: Final = 60.0
-"""A refusal that comes again within this time is no news."""
+"""A refusal that comes again within this time is not reported again."""
 
 
 @dataclass(slots=True)
@@ -38,7 +38,7 @@ class Fact:
     since: Moment
 
     def say(self, value: str, moment: Moment) -> bool:
-        """It is this now. True if that is a change."""
+        """Set its present value. True if that is a change."""
         if value == self.value:
             return False
         self.value, self.since = value, moment
@@ -98,7 +98,7 @@ class Device:
         return tuple(line for line in self.lines if line.at >= at)
 
     def state_came(self, moment: Moment, stamped_at: float) -> Moment:
-        """A state of it. Returns since when what it says is known to be so."""
+        """A state of it has come. Returns since when its content is known."""
         last = self.last_state
         if last is None:
             self.first_state = moment
@@ -124,7 +124,7 @@ class Device:
         return len(back) == BACK_TIMES and now.at - back[0] < BACK_WITHIN_S
 
     def silent_s(self, now: Moment) -> float:
-        """How long no state has come (s)."""
+        """How long ago its last state came (s)."""
         return 0.0 if self.last_state is None else now.at - self.last_state.at
 
     def diagnose(self, moment: Moment, status: d.DiagnosticStatus, kind: str) -> None:
@@ -200,14 +200,14 @@ class Device:
         return [reason for _, reason in sorted(found, reverse=True)]
 
     def _age(self, moment: Moment) -> None:
-        """Tell when the readings behind the states get old."""
+        """Add to the story when the readings behind the states get old."""
         text = ""
         if not self.stamped:
             text = "was never read"
         elif self.stamp_age_s > OLD_S:
             text = "is old"
         elif self.stamp_age_s < -CLOCKS_DIFFER_S:
-            text = "is of the future"
+            text = "is from the future"
         if self.old.say(text, moment):
             told = (
                 f"the reading behind the states {text}" if text else "the readings are fresh again"
@@ -228,7 +228,7 @@ class Device:
         yield from (one for one in self.diagnoses.values() if one.kind == self.kind)
 
     def _set_faults(self, found: Diagnosis, moment: Moment, codes: Mapping[str, str]) -> None:
-        """Take its faults. A daemon notes a fault, and says it on the graph later: it is told once."""
+        """Take its faults. A daemon notes a fault, and publishes it later: the story has it once."""
         repeated = self.notes_faults and found is not self.noted and found.kind == self.kind
         told = {code for one in self._of_its_own() for code in one.faults}
         for code in [code for code in found.faults if code not in codes]:

@@ -17,12 +17,13 @@ from bridges.explain.phrases import Clock, Moment
 
 SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
-"""Nobody drives through a doorway for longer."""
+"""No robot takes longer than this to drive through a doorway."""
 AWAY: Final = ("offline", "unknown")
 
 
 def answer(door: DoorFacts, clock: Clock, around: common.Heard, focus: str = "") -> Answer:
-    """The door at the end of what was heard. `focus`: whose question it is; "" for who waits."""
+    """The door at the end of what was heard. `focus`: the requester in question; "" for whoever
+    waits."""
     if door.last_state is None:
         return _with_askers(common.unheard(door, around, clock), door, clock)
     stopped = common.silent(door, clock)
@@ -32,12 +33,14 @@ def answer(door: DoorFacts, clock: Clock, around: common.Heard, focus: str = "")
     found = Answer(since=_begins(door, claim))
     if claim is not None:
         wants = "open" if claim.wants == OPEN else "released"
-        found.say(f"{claim.who} waits for {door.name} to be {wants} {clock.since(claim.since)}.")
+        found.say(
+            f"{claim.who} has waited for {door.name} to be {wants} {clock.since(claim.since)}."
+        )
     holders = [f"{who} {clock.since(since)}" for who, since in [*door.holders.items()][:4]]
-    held = f"It is held by {', '.join(holders)}." if holders else "Nobody holds it."
+    held = f"It has been held by {', '.join(holders)}." if holders else "Nobody holds it."
     if door.last_heartbeat is None:
-        held = "Who holds it was not heard."
-    found.say(f"{door.name} is {door.mode.value} {clock.since(door.mode.since)}. {held}")
+        held = "Who holds it is not known."
+    found.say(f"{door.name} has been {door.mode.value} {clock.since(door.mode.since)}. {held}")
     if old := common.old_reading(door, clock):
         found.say(old)
     if claim is None:
@@ -55,7 +58,7 @@ def answer(door: DoorFacts, clock: Clock, around: common.Heard, focus: str = "")
 
 
 def waiters(door: DoorFacts, clock: Clock) -> list[Claim]:
-    """Who repeats its request now, and has not got what it waits for; the first first."""
+    """Those who repeat their request now and still wait; the earliest first."""
     asks = [one for one in door.claims if one.asks(clock.now) and not _met(door, one)]
     return sorted(asks, key=lambda one: one.since.at)
 
@@ -80,13 +83,13 @@ def _begins(door: DoorFacts, claim: Claim | None) -> float:
 
 def _with_askers(found: Answer, door: DoorFacts, clock: Clock) -> Answer:
     for claim in [one for one in door.claims if one.wants == OPEN and one.asks(clock.now)][:3]:
-        found.say(f"{claim.who} waits for it to be open {clock.since(claim.since)}.")
+        found.say(f"{claim.who} has waited for it to be open {clock.since(claim.since)}.")
         found.since = min(found.since, claim.since.at)
     return found
 
 
 def _fields(door: DoorFacts, claim: Claim, clock: Clock) -> tuple[Field, ...]:
-    """What DoorOpen or DoorClose looks at, as this requester's fleet adapter sees it."""
+    """What DoorOpen or DoorClose checks, as this requester's fleet adapter sees it."""
     held = door.holders.get(claim.who)
     listed = "lists it" if held else "does not list it"
     if door.last_heartbeat is None:
@@ -108,8 +111,8 @@ def _away(found: Answer, door: DoorFacts, clock: Clock) -> None:
     own = door.own(clock.now)
     why = "its fault says why" if own and own.faults else "its daemon's log says why"
     found.say(
-        f"The door is shown {door.mode.value}: it cannot be read or believed, so nobody can pass.",
-        Step("a person", f"see to the door's wires, bus or power: {why}"),
+        f"The door is shown as {door.mode.value}: it cannot be read or believed, so nobody can pass.",
+        Step("a person", f"check the door's wires, bus and power: {why}"),
     )
 
 
@@ -129,7 +132,7 @@ def _opens(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> None:
         return
     on = common.relays(door, clock)
     found.say(
-        f"The supervisor asks for OPEN, and the door is {door.mode.value}"
+        f"The supervisor asks for OPEN, and the door has been {door.mode.value}"
         f" {clock.since(door.mode.since)}{on}.",
         Step("the controller", f"open {door.name} fully, and show it by its contact"),
     )
@@ -147,8 +150,8 @@ def _not_listed(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> N
         )
     else:
         found.say(
-            f"The door supervisor does not list {claim.who}: it takes its requests for old ones, or"
-            " has too many.",
+            f"The door supervisor does not list {claim.who}: it takes its requests for replays, or"
+            " has too many requesters.",
             Step(
                 "the supervisor", f"take the request of {claim.who}; its log says why it does not"
             ),
@@ -157,9 +160,9 @@ def _not_listed(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> N
 
 def _not_let_go(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> None:
     found.say(
-        f"It asks for CLOSE, and the supervisor's heartbeat still lists it"
+        f"It asks for CLOSE, and the supervisor's heartbeat has listed it"
         f" {clock.since(door.holders[claim.who])}.",
-        Step("the supervisor", f"list {claim.who} no more"),
+        Step("the supervisor", f"remove {claim.who} from its list"),
     )
 
 
@@ -173,13 +176,13 @@ def _nobody_asks(found: Answer, door: DoorFacts, clock: Clock) -> None:
     elif door.last_heartbeat is None and asked == OPEN and door.mode.value not in AWAY:
         _asked_open(found, door, clock)
     elif door.mode.value == CLOSED:
-        found.say("Nobody waits for it.", Step("nobody", "nothing is waited for"))
+        found.say("Nobody waits for it.", Step("nobody", "there is nothing to do"))
     elif door.mode.value in AWAY:
         _away(found, door, clock)
     else:
         found.say(
-            "No robot keeps it open: a person or the door's own controller does. RMF's supervisor asks"
-            " for CLOSE at each of its states meanwhile; that releases a hold and shuts nothing.",
+            "No robot keeps it open: a person or the door's own controller does. RMF's supervisor sends"
+            " CLOSE at each of its states meanwhile; that releases a hold and shuts nothing.",
             Step("the controller", f"close {door.name} when nobody is in the doorway"),
         )
 
@@ -188,14 +191,15 @@ def _asked_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
     """Only the supervisor was heard, or a person with `send --direct`, as the door's own daemon hears
     them."""
     assert door.asked is not None
-    found.say(f"On door_requests {door.sender} asks for OPEN {clock.since(door.asked.since)}.")
+    found.say(f"On door_requests {door.sender} has asked for OPEN {clock.since(door.asked.since)}.")
     opened = Step("the robot", "drive through; then its fleet adapter sends CLOSE")
     opens = Step("the controller", f"open {door.name} fully, and show it by its contact")
     found.next.append(opened if door.mode.value == OPEN else opens)
 
 
 def _held_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
-    """Who holds it, and whether they live. In a doorway a robot says nothing, so silence is usual."""
+    """Who holds it, and whether they are alive. A robot in a doorway is silent, so silence is
+    normal."""
     who, since = min(door.holders.items(), key=lambda one: one[1].at)
     claim = door.claims.get(who)
     last: Moment | None = claim.last if claim else None

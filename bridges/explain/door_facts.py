@@ -65,12 +65,12 @@ class DoorFacts(Device):
         for who in [who for who in self.holders if who not in found]:
             held_s = moment.at - self.holders.pop(who).at
             self.passages += 1
-            self.tell(moment, f"the supervisor lists {who} no more, after {lasted(held_s)}")
+            self.tell(moment, f"the supervisor no longer lists {who}, after {lasted(held_s)}")
         for who in found:
             if who not in self.holders:
                 self.holders[who] = since
                 if seen:
-                    self.tell(moment, f"the supervisor lists {who} as one who holds the door")
+                    self.tell(moment, f"the supervisor lists {who} as holding the door")
 
     def stated(self, moment: Moment, state: d.DoorState) -> None:
         """A state of the door."""

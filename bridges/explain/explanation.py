@@ -1,4 +1,4 @@
-"""An explanation as values: what is asked on one screen, and JSON by `dataclasses.asdict`.
+"""An explanation as values: for one screen of text, and for JSON by `dataclasses.asdict`.
 
 Every text is one printable line; what comes from the network in it is escaped.
 """
@@ -18,14 +18,14 @@ Who = Literal[
     "the controller",
     "a person",
 ]
-"""Who has to do the next thing. the device's node: its own daemon, ours or another maker's. the
-controller: the lift's, door's or charger's own."""
+"""Who has to act next. `the device's node`: its daemon, ours or another maker's. `the controller`: that
+of the lift, door or charger itself."""
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One of the things that RMF looks at. `wanted`: by who waits. `met`: it is so. `since`: when it
-    became what it is, in words.
+    """One of the things that RMF checks. `wanted`: what the requester waits for. `met`: it is so.
+    `since`: when it became what it is, in words.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The next thing that has to happen, and who has to do it."""
+    """What has to happen next, and who has to do it."""
 
     who: Who
     what: str
@@ -54,7 +54,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class FaultTold:
-    """A fault that is there, with its remedy where our table knows it."""
+    """A present fault, with its remedy where our table has one."""
 
     code: str
     detail: str
@@ -67,8 +67,8 @@ class FaultTold:
 class Explanation:
     """One device, at the end of what was heard.
 
-    `now`: sentences, the most important first. `asks`: whose eyes `fields` are seen with. `story`: the
-    ride in question; `left_out`: so many of its lines are not in it. `before`: what came before it.
+    `now`: sentences, the most important first. `asks`: the requester that `fields` are about. `story`:
+    the ride in question; `left_out`: how many of its lines are missing. `before`: what came before it.
     """
 
     kind: Kind

@@ -1,8 +1,8 @@
 """The timeline of one device as lanes: what `plot` and the web page draw.
 
 A lane has one or more rows, such as one for each relay; the spans of a row never overlap. Times are on
-`Heard.at`'s clock. Everything is bounded: the newest spans of a row and the rows that were spoken of
-last are kept, and `left_out` says how many were not.
+`Heard.at`'s clock. Everything is bounded: the newest spans of a row and the rows with the latest
+news are kept, and `left_out` says how many were dropped.
 
 `Drawing` grows message by message, for a page that is live; `lanes` draws a whole recording. Both
 give a `Timeline` of plain values: `dataclasses.asdict` makes JSON of it.
@@ -22,15 +22,16 @@ from bridges.rmf import words
 from bridges.serve import diagnostics
 
 MOST_ROWS: Final = 12
-"""Of a lane; a flood of made-up requesters or faults fills no page."""
+"""The most rows of a lane: a flood of made-up requesters or faults must not fill a page."""
 STATES_LAST_S: Final = 3.5
-"""States, requests, heartbeats and diagnostics come at 1 Hz: three missed ones, and nobody knows."""
+"""States, requests, heartbeats and diagnostics come at 1 Hz: after three missed ones nothing is
+known."""
 STAMP: Final = "stamp"
-"""The row of `faults` for what is wrong with the age of the device's states."""
+"""The row of `faults` for states that are too old."""
 SUPERVISOR: Final = "supervisor"
 """The row of `requests` for what the supervisor passes on to the device's own daemon."""
 STEP_S: Final = 2.0
-"""A wall clock that moves so much against the steady one was stepped."""
+"""A wall clock that moves this much against the steady one was stepped."""
 
 
 def lanes(
@@ -68,7 +69,7 @@ class Drawing:
         self._faulty: dict[str, frozenset[str]] = {}
 
     def take(self, heard: Heard | Level | Own) -> None:
-        """The next one. One that is late, by a recording's disorder, counts as of now."""
+        """Take the next one. One that a recording has in the wrong order counts as of now."""
         if isinstance(heard, Own):
             note = noted(heard.topic.rpartition("/")[2], heard.text)
             if note is not None and note.subject == self._device:
@@ -115,7 +116,7 @@ class Drawing:
     def _row(
         self, lane: LaneName, part: str = "", keeps_s: float = STATES_LAST_S, *, fills: bool = False
     ) -> Row:
-        """The row of this name; if there is no room, the most silent one goes."""
+        """The row of this name. If there is no room, the row that was silent the longest goes."""
         rows, part = self._rows[lane], label(part)
         if part not in rows:
             if len(rows) >= MOST_ROWS:
@@ -131,7 +132,7 @@ class Drawing:
     # ---- what our daemon noted
 
     def _note(self, level: Level) -> None:
-        if level.lane not in self._noted:  # better than what diagnostics say once a second
+        if level.lane not in self._noted:  # more exact than diagnostics, which come once a second
             self._noted.add(level.lane)
             self._rows[level.lane].clear()
         tone: Tone = "wrong" if level.lane == "faults" else "works"
@@ -180,7 +181,7 @@ class Drawing:
         if stamped_at and wall - stamped_at > STATES_LAST_S:
             text = "the reading is old"
         elif wall - stamped_at < -STATES_LAST_S:
-            text = "the stamp is of the future"
+            text = "the stamp is in the future"
         if text or STAMP in self._rows["faults"]:
             self._row("faults", STAMP).say(self._now, text, "wrong")
 
@@ -199,7 +200,7 @@ class Drawing:
         self._destination = state.destination_floor
 
     def _request(self, topic: str, message: words.Requested) -> None:
-        """One row for each who asks, and one for the supervisor, which repeats it to the device."""
+        """One row for each requester, and one for the supervisor, which passes requests on."""
         match message:
             case d.LiftRequest():
                 ends = message.request_type == d.LiftRequestType.REQUEST_END_SESSION
@@ -252,7 +253,7 @@ class Drawing:
             self._levels("relays", on, self._rows["relays"].keys() - on.keys())
 
     def _faults(self, status: d.DiagnosticStatus, values: Mapping[str, str]) -> None:
-        """A device and its supervisor tell of the same one; a fault lasts while either has it."""
+        """A device and its supervisor may report the same fault; it lasts while either has it."""
         found = {code: values.get(code) or code for code in diagnostics.faults(status)}
         before = self._faulty.get(status.name, frozenset())
         if status.name in self._faulty or len(self._faulty) < MOST_ROWS:

@@ -23,12 +23,12 @@ LONG_S: Final = 60.0
 HAZARDS: Final = {
     "FIRE": "the fire alarm has to end, and be reset where its settings ask for that",
     "EMERGENCY": "the emergency (stop, code blue, earthquake) has to end",
-    "OFFLINE": "see why it is out of service, or cannot be read",
+    "OFFLINE": "find out why it is out of service, or cannot be read",
 }
 
 
 def answer(lift: LiftFacts, clock: Clock, around: common.Heard, focus: str = "") -> Answer:
-    """The lift at the end of what was heard. `focus`: whose question it is; "" for who waits."""
+    """The lift at the end of what was heard. `focus`: the session in question; "" for whoever waits."""
     if lift.last_state is None:
         return _with_askers(common.unheard(lift, around, clock), lift, clock)
     stopped = common.silent(lift, clock)
@@ -38,11 +38,11 @@ def answer(lift: LiftFacts, clock: Clock, around: common.Heard, focus: str = "")
     claim = _in_question(lift, clock, focus)
     found = Answer(since=_begins(lift, claim))
     if focus and claim is None:
-        told = "its last ride is told below" if lift.kept else "it was not heard asking"
+        told = "its last ride is shown below" if lift.kept else "it was never heard asking"
         found.say(f"{label(focus)} neither has {lift.name} nor asks for it now: {told}.")
     if claim is not None and claim.ended is None and not lift.matches(claim):
         where = claim.wants or "no floor"
-        found.say(f"{claim.who} waits for {lift.name} at {where} {clock.since(claim.since)}.")
+        found.say(f"{claim.who} has waited for {lift.name} at {where} {clock.since(claim.since)}.")
     _hold(found, lift, clock)
     if old := common.old_reading(lift, clock):
         found.say(old)
@@ -59,7 +59,7 @@ def answer(lift: LiftFacts, clock: Clock, around: common.Heard, focus: str = "")
 
 
 def _in_question(lift: LiftFacts, clock: Clock, focus: str) -> Claim | None:
-    """The claim that the question is about: of `focus`, or of who waits longest, else the holder's."""
+    """The claim in question: that of `focus`, or of whoever waits longest, else the holder's."""
     if focus:
         return lift.claims.get(focus)
     waiting = [one for one in waiters(lift, clock) if not lift.matches(one)]
@@ -69,7 +69,8 @@ def _in_question(lift: LiftFacts, clock: Clock, focus: str) -> Claim | None:
 
 
 def waiters(lift: LiftFacts, clock: Clock) -> list[Claim]:
-    """Who asks now, the first first. While no state comes nobody repeats itself, and all still wait."""
+    """Those who ask now, the earliest first. While no state comes nobody repeats itself, and all
+    wait."""
     stands = lift.last_state is None or lift.silent_s(clock.now) > SILENT_S
     asks = [
         one
@@ -80,7 +81,7 @@ def waiters(lift: LiftFacts, clock: Clock) -> list[Claim]:
 
 
 def _begins(lift: LiftFacts, claim: Claim | None) -> float:
-    """Where the story of the question begins (s): when who waits asked, or who has it got it."""
+    """When the story in question begins (s): when the one that waits asked, or the holder got it."""
     holder = lift.claims.get(lift.session.value)
     starts = [claim.first.at] if claim else []
     if holder is not None:
@@ -95,13 +96,13 @@ def _begins(lift: LiftFacts, claim: Claim | None) -> float:
 def _with_askers(found: Answer, lift: LiftFacts, clock: Clock) -> Answer:
     for claim in [one for one in waiters(lift, clock) if one.met is None][:3]:
         since = clock.since(claim.since)
-        found.say(f"{claim.who} waits for it at {claim.wants or 'no floor'} {since}.")
+        found.say(f"{claim.who} has waited for it at {claim.wants or 'no floor'} {since}.")
         found.since = min(found.since, claim.first.at)
     return found
 
 
 def _hold(found: Answer, lift: LiftFacts, clock: Clock, *, then: bool = False) -> None:
-    """Who has it, and where the car is; or `then`, when the last state came."""
+    """Who has it, and where the car is. `then`: in the past tense, as of the last state."""
     holder = "nobody" if lift.session.value == NOBODY else lift.session.value
     motion = "" if lift.motion.value == "unknown" else f", {_motion(lift.motion.value)}"
     car = f"at {lift.floor.value}, door {lift.door.value}{motion}, mode {lift.mode.value}"
@@ -109,7 +110,7 @@ def _hold(found: Answer, lift: LiftFacts, clock: Clock, *, then: bool = False) -
         found.say(f"Then {holder} had it, and the car was {car}.")
         return
     has = f"{holder[:1].upper()}{holder[1:]}" if holder == "nobody" else holder
-    found.say(f"{has} has it {clock.since(lift.session.since)}. The car is {car}.")
+    found.say(f"{has} has had it {clock.since(lift.session.since)}. The car is {car}.")
 
 
 def _motion(motion: str) -> str:
@@ -132,7 +133,7 @@ def _fields(lift: LiftFacts, claim: Claim, clock: Clock) -> tuple[Field, ...]:
 def _nobody_asks(found: Answer, lift: LiftFacts, clock: Clock) -> None:
     holder = lift.session.value
     if holder == NOBODY:
-        found.say("Nobody asks for it.", Step("nobody", "nothing is waited for"))
+        found.say("Nobody asks for it.", Step("nobody", "there is nothing to do"))
     else:
         _without_word(found, lift, holder, clock)
 
@@ -153,7 +154,7 @@ def _others_wait(found: Answer, lift: LiftFacts, claim: Claim | None, clock: Clo
 
 
 def _why(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
-    """Why this claim is not met, or who goes on if it is."""
+    """Why this claim is not met; if it is, who has to act next."""
     holder = lift.session.value
     if lift.matches(claim) and claim.asks(clock.now):
         _drives(found, lift, claim, clock)
@@ -173,8 +174,8 @@ def _hazard(found: Answer, lift: LiftFacts, clock: Clock) -> None:
     mode = lift.mode.value
     who: Who = "a person" if mode == "OFFLINE" else "the controller"
     found.say(
-        f"The lift is in {mode} mode {clock.since(lift.mode.since)}: it takes no robot until that"
-        " ends. RMF does not look at the mode, so it only sees that the lift does not come.",
+        f"The lift has been in {mode} mode {clock.since(lift.mode.since)}: it takes no robot until that"
+        " ends. RMF does not look at the mode, and only sees that the lift does not come.",
         Step(who, HAZARDS[mode]),
     )
     holder = lift.session.value
@@ -183,8 +184,8 @@ def _hazard(found: Answer, lift: LiftFacts, clock: Clock) -> None:
     own = lift.own(clock.now)
     inside = own.values.get("boarded") if own else None
     door = {
-        "yes": " It may be in the car, so it is shown the true door and can leave.",
-        "no": " It was not let into the car, so it is shown no open door.",
+        "yes": " Its robot may be in the car, so it is shown the true door and can leave.",
+        "no": " Its robot was not let into the car, so it is shown no open door.",
     }.get(inside or "", "")
     found.say(f"{holder} keeps the session meanwhile: only its END ends one.{door}")
 
@@ -200,7 +201,7 @@ def _held(found: Answer, lift: LiftFacts, claim: Claim, holder: str, clock: Cloc
         _drives(found, lift, theirs, clock)
     else:
         where = theirs.wants or "no floor"
-        found.say(f"{holder} itself waits for it at {where} {clock.since(theirs.since)}.")
+        found.say(f"{holder} itself has waited for it at {where} {clock.since(theirs.since)}.")
         _missing(found, lift, theirs, clock)
     _forgotten(found, lift, holder, clock)
 
@@ -215,19 +216,19 @@ def _forgotten(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> Non
     sender = lift.sender(asks.value)
     it = "a supervisor that does so" if sender == DIRECT else "it"
     found.say(
-        f"{sender.capitalize()} asks for {asks.value} {clock.since(asks.since)}, though {holder} has"
+        f"{sender.capitalize()} has asked for {asks.value} {clock.since(asks.since)}, though {holder} has"
         f" the lift: {it} has forgotten {holder}, by a restart or a lost END, and passes on nothing"
         " more of it. Our node then hears that robot's own requests and its END; other nodes do not."
     )
 
 
 def _without_word(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> None:
-    """Who has the lift says nothing."""
+    """The holder of the lift is silent."""
     theirs = lift.claims.get(holder)
     heard_s = clock.now.at - max(lift.began.at, lift.session.since.at)
     if theirs is None and heard_s < common.LISTENS_S:
         found.say(
-            f"{holder} was not heard asking yet; that takes a few seconds.",
+            f"{holder} has not been heard yet; that takes a few seconds.",
             Step("nobody", "listen for longer"),
         )
         return
@@ -260,7 +261,7 @@ def _end_not_obeyed(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) 
     if clock.now.at - claim.ended.at < SETTLES_S:
         found.say(
             f"{claim.who} has just sent END.",
-            Step("the device's node", "the next state shows no session"),
+            Step("the device's node", "show no session in its next state"),
         )
         return
     if claim.own and not claim.end_passed_on and lift.supervisor_last is not None:
@@ -287,7 +288,7 @@ def _drives(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
     """It has what it waits for."""
     met = claim.met or claim.since
     found.say(
-        f"{claim.who} sees its lift at {claim.wants} with the door open {clock.since(met)}.",
+        f"{claim.who} has seen its lift at {claim.wants} with the door open {clock.since(met)}.",
         Step(
             "the robot",
             f"{claim.who} has to drive in or out; then its fleet adapter asks for the next floor, or"
@@ -305,15 +306,14 @@ def _missing(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None
         _hazard(found, lift, clock)
     elif lift.floor.value == NO_FLOOR and lift.door.value == "open":
         found.say(
-            f"The door is shown open {clock.since(lift.door.since)}, but the car is at no known floor,"
-            f" so RMF does not let the robot go{on}.",
-            Step(
-                "the controller", f"show its floor ({claim.wants}): see to the floor code's wires"
-            ),
+            f"The door has been open {clock.since(lift.door.since)}, but the car is at no known floor,"
+            f" so RMF does not let the robot drive{on}.",
+            Step("the controller", f"show its floor ({claim.wants}): check the floor code's wires"),
         )
     elif lift.mode.value == "HUMAN":
         found.say(
-            f"It has the session, but the lift is in HUMAN mode {clock.since(lift.mode.since)}{on}.",
+            "It has the session, but the lift has been in HUMAN mode"
+            f" {clock.since(lift.mode.since)}{on}.",
             Step(
                 "the controller",
                 "confirm AGV mode: a key switch, people's calls that it serves first, or the contact",
@@ -321,20 +321,20 @@ def _missing(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None
         )
     elif lift.floor.value == NO_FLOOR and lift.motion.value == "stopped":
         found.say(
-            f"The car stands, and at no known floor, {clock.since(lift.floor.since)}{on}.",
+            f"The car has stood at no known floor {clock.since(lift.floor.since)}{on}.",
             Step(
                 "the controller", "show its floor: a wire of the floor code, or a stop on the way"
             ),
         )
     elif lift.floor.value != claim.wants:
         found.say(
-            f"The car has not come to {claim.wants}: it is at {lift.floor.value}"
+            f"The car has not come to {claim.wants}: it has been at {lift.floor.value}"
             f" {clock.since(lift.floor.since)}{on}.",
             Step("the controller", f"bring the car to {claim.wants}"),
         )
     else:
         found.say(
-            f"The car is there, but its door is not shown open: {lift.door.value}"
+            f"The car is there, but its door has been {lift.door.value}"
             f" {clock.since(lift.door.since)}{on}.",
             Step("the controller", f"open the door at {claim.wants}"),
         )

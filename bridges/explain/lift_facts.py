@@ -23,7 +23,8 @@ DIRECT: Final = "the supervisor, or a person with `send --direct`,"
 
 @dataclass(slots=True)
 class Rides:
-    """Of all rides: how many ended, the longest wait for the car, and when the last one began."""
+    """Totals of all rides: how many ended, the longest wait for the car, and when the last one
+    began."""
 
     ended: int = 0
     longest_s: float = 0.0
@@ -33,7 +34,7 @@ class Rides:
 
 
 class LiftFacts(Device):
-    """`focus`: a session whose last ride's story is kept whole, though others come after it."""
+    """`focus`: a session whose last ride's story is kept whole, even if others ride after it."""
 
     kind: Kind = "lift"
 

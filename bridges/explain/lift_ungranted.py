@@ -9,16 +9,16 @@ from bridges.explain.lift_facts import LiftFacts
 from bridges.explain.phrases import Clock
 
 SETTLES_S: Final = 2.0
-"""Between a request and its grant, or a supervisor's change of mind, so much time is usual."""
+"""This much time between a request and its grant, or a supervisor's change of mind, is normal."""
 
 
 def not_granted(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
-    """The lift is free, and yet it is not given to who asks."""
+    """The lift is free, and yet it is not given to the requester."""
     if lift.floors and claim.wants not in lift.floors:
         found.say(
             f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"
             " the request is refused.",
-            Step("a person", "one name for the floor in RMF's map and in the lift's settings"),
+            Step("a person", "give the floor one name, on RMF's map and in the lift's settings"),
         )
         return
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
@@ -36,7 +36,7 @@ def not_granted(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> N
         )
     else:
         found.say(
-            "The request is passed on to the lift's node, which does not grant it and says no reason"
+            "The request is passed on to the lift's node, which does not grant it and gives no reason"
             " on the graph.",
             Step("the device's node", "grant the session; its log says why it does not"),
         )

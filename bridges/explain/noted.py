@@ -1,7 +1,7 @@
 """What one of our daemons noted of its own device: inputs, outputs, faults and refusals.
 
 In an incident file the texts are JSON under `/rmf_bridge/` (`bridges/recording/incident.py`,
-`readable`). A file may come from anywhere, so a text of another shape is nothing.
+`readable`). A file may come from anywhere, so a text of another shape is ignored.
 """
 
 import json
@@ -14,13 +14,13 @@ from bridges.explain.timeline import Level
 OWN_TOPICS: Final = "rmf_bridge/"
 TOPICS: Final = ("samples", "outputs", "faults", "decisions")
 MOST: Final = 40
-"""So many inputs, outputs or faults of one device are looked at."""
+"""At most this many inputs, outputs or faults of one device are read."""
 
 
 @dataclass(frozen=True, slots=True)
 class Noted:
     """One note about `subject`. `inputs`, `outputs`, `faults`: all of them, as name -> value ("": off),
-    or None where the note is of something else. `refused`: why a request was.
+    or None where the note is about something else. `refused`: why a request was refused.
     """
 
     subject: str
@@ -31,7 +31,7 @@ class Noted:
 
 
 def noted(topic: str, text: str) -> Noted | None:
-    """The note in a text of this topic (its last part); None if it is none."""
+    """The note in a text of this topic (its last part); None if it is not a note."""
     try:
         told = json.loads(text)
     except (ValueError, RecursionError):

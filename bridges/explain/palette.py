@@ -1,7 +1,7 @@
 """How each tone looks, by day and by night: colours that colour-blind people tell apart, and patterns.
 
-The colours are Okabe's and Ito's (https://jfly.uni-koeln.de/color/). No tone differs from another by
-colour alone: a label says what it is, and what is wrong, unknown or only wanted has a pattern.
+The colours are Okabe's and Ito's (https://jfly.uni-koeln.de/color/). No tone differs from another
+only by colour: a label says what it is, and what is wrong, unknown or only wanted has a pattern.
 """
 
 from dataclasses import dataclass

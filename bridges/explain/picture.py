@@ -1,4 +1,4 @@
-"""A timeline as SVG: lanes from left to right, a label in each span, and more of it under the pointer.
+"""A timeline as SVG: lanes from left to right, a label in each span, and details under the pointer.
 
 Every text becomes a text node of an XML tree, so no name from the network can be markup. The picture
 needs no script, font or network.
@@ -210,7 +210,7 @@ class Picture:
         SubElement(element, "title").text = text
 
     def _steps(self) -> None:
-        """Where the clock of who listened was stepped."""
+        """Where the listener's clock was stepped."""
         for mark in self._timeline.steps:
             line = self._line(self._x(mark.at_s), TOP - 8, self._foot + 4, "step")
             self._hint(line, mark.label)
@@ -246,7 +246,7 @@ def _wide(text: str) -> float:
 
 
 def _fitted(text: str, room: float) -> str:
-    """The text, cut where it does not fit; "" if nearly nothing does."""
+    """The text, cut to fit; "" if almost nothing of it fits."""
     if _wide(text) <= room:
         return text
     kept = text
@@ -256,7 +256,7 @@ def _fitted(text: str, room: float) -> str:
 
 
 def _round_times(begin: float, end: float, step: int, zone: tzinfo | None) -> Iterator[float]:
-    """Each round time between them: by the clock on the wall there, so noon is noon."""
+    """Each round time between them, by the local clock of that zone."""
     try:
         offset = datetime.fromtimestamp(begin, zone).astimezone(zone).utcoffset()
     except (OverflowError, ValueError, OSError):
@@ -273,7 +273,7 @@ WORST: Final[dict[Tone, int]] = {"wrong": 2, "unknown": 1}
 
 
 def _drawable(spans: Iterable[Span], x: Callable[[float], float]) -> Iterator[tuple[Span, int]]:
-    """The spans, those that are too narrow to be seen joined: each with how many it stands for."""
+    """The spans, with those too narrow to be seen joined: each with the number that it stands for."""
     joined: list[Span] = []
     for span in spans:
         gap = joined and x(span.from_s) - x(joined[-1].to_s) > NARROW
@@ -290,7 +290,7 @@ def _drawable(spans: Iterable[Span], x: Callable[[float], float]) -> Iterator[tu
 
 
 def _one(spans: list[Span]) -> Span:
-    """Several narrow spans as one; what is wrong among them shows."""
+    """Several narrow spans as one, with the tone of the one that is wrong, if any is."""
     tone = max(spans, key=lambda span: (WORST.get(span.tone, 0), span.to_s - span.from_s)).tone
     label = spans[0].label if len(spans) == 1 else ""
     return Span(spans[0].from_s, spans[-1].to_s, label, tone)

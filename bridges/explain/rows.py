@@ -1,4 +1,4 @@
-"""Rows of a timeline while they grow: what holds until something else is said, or nothing more is."""
+"""Rows of a timeline while they grow: a value holds until the next one, or until it has expired."""
 
 import sys
 from collections import deque
@@ -10,7 +10,7 @@ from bridges.rmf import words
 
 LONGEST_LABEL: Final = 120
 MOST_SPANS: Final = 2000
-"""So many spans and marks are kept of a row: the newest."""
+"""A row keeps this many spans and marks: the newest."""
 NOT_HEARD: Final = "not heard"
 
 
@@ -23,8 +23,8 @@ def label(text: str, longest: int = LONGEST_LABEL) -> str:
 class Row:
     """Spans that never overlap, and marks.
 
-    What was said holds for `keeps_s` (s) and no longer; `fills`: then a span says NOT_HEARD. What was
-    over `past_s` (s) before the newest is forgotten.
+    A value holds for `keeps_s` (s) at most; with `fills` a span then says NOT_HEARD. What ended
+    `past_s` (s) before the newest is forgotten.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Row:
         self._open: tuple[float, str, Tone] | None = None
 
     def say(self, at: float, text: str, tone: Tone) -> None:
-        """From now on it is this; "" is nothing."""
+        """Set its value from now on; "" for nothing."""
         self._expire(at)
         if self._open is not None and self._open[1:] != (text, tone):
             self._close(at)
@@ -53,7 +53,7 @@ class Row:
         self.heard_at = at
 
     def mark(self, at: float, text: str, tone: Tone) -> None:
-        """This happened now."""
+        """Mark an event."""
         self.left_out += len(self._marks) == MOST_SPANS
         self._marks.append(Mark(at, text, tone))
         while self._marks[0].at_s < at - self._past_s:

@@ -28,7 +28,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf import words
 
 MOST_DEVICES: Final = 100
-"""Of each kind; who shows itself first stays."""
+"""The most devices of each kind; those heard first stay."""
 STORY_LINES: Final = 40
 STEP_S: Final = 2.0
 MAKES: Final[Mapping[Kind, type[LiftFacts] | type[DoorFacts] | type[ChargerFacts]]] = {
@@ -41,7 +41,7 @@ MAKES: Final[Mapping[Kind, type[LiftFacts] | type[DoorFacts] | type[ChargerFacts
 class Site:
     """All devices that were heard, or only those of this `name`.
 
-    `session`: whose last ride's story is kept, though others come after it.
+    `session`: whose last ride's story is kept, even if others ride after it.
     """
 
     def __init__(
@@ -99,21 +99,21 @@ class Site:
                     self._diagnose(moment, status)
 
     def story_from(self, at: float) -> None:
-        """Leave out of the stories what was before this time (s)."""
+        """Leave everything before this time (s) out of the stories."""
         self._story_from = at
 
     def passed(self, at: float, wall: float) -> None:
-        """Time passes, and nothing is heard."""
+        """Note that time has passed and nothing was heard."""
         self._now = Moment(max(at, self._now.at), wall)
         self._began = self._began or Moment(at, wall, seen=False)
 
     def devices(self) -> list[tuple[Kind, str]]:
-        """What has shown a state, in the order of kinds and names."""
+        """The devices that have published a state, in the order of kinds and names."""
         shown = [key for key, one in self._devices.items() if one.last_state is not None]
         return sorted(shown, key=lambda key: (list(MAKES).index(key[0]), key[1]))
 
     def kinds(self, name: str) -> list[Kind]:
-        """What a device of this name is: those that have shown a state first, else who is asked for."""
+        """The kinds of a device of this name: by its states, or else by the requests for it."""
         found = [one for one in self._devices.values() if one.id == name]
         shown = [one.kind for one in found if one.last_state is not None]
         return shown or [one.kind for one in found]
@@ -256,13 +256,13 @@ class Site:
 
     def _stepped(self, clock: Clock) -> tuple[str, ...]:
         return tuple(
-            f"At {clock.time(moment.wall)} the clock of who listened was stepped by {by_s:+.0f} s."
+            f"At {clock.time(moment.wall)} the listener's clock was stepped by {by_s:+.0f} s."
             for moment, by_s in self._steps
         )
 
 
 def _before(device: Device, clock: Clock) -> str:
-    """What came before, in one sentence; "" if that is nothing."""
+    """What came before, in one sentence; "" if nothing did."""
     match device:
         case LiftFacts() if device.rides.ended:
             rides = device.rides

@@ -14,7 +14,7 @@ MOST_WIDE: Final = 100
 SCREEN_LINES: Final = 40
 LEAST_STORY: Final = 6
 FIRST: Final = 2
-"""So many lines of a story's beginning are shown, however long it is."""
+"""This many lines of a story's beginning are shown, however long it is."""
 MOST_FAULTS: Final = 4
 
 
@@ -37,7 +37,7 @@ def _answer(one: Explanation, width: int) -> Iterator[str]:
         yield from _wrapped(sentence, width)
     if one.fields:
         yield ""
-        yield f"What RMF looks at for {one.asks}:"
+        yield f"What RMF checks for {one.asks}:"
         yield from _table(one.fields)
     yield ""
     for step in one.next:

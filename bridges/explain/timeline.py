@@ -26,8 +26,8 @@ LANES: Final[tuple[LaneName, ...]] = (
 """In the order in which they are drawn."""
 Tone = Literal["calm", "works", "open", "held", "asks", "wrong", "unknown"]
 """How a span looks, beside its label. calm: at rest. works: moves, charges, is on. open: a robot may
-pass. held: somebody's session. asks: somebody wants something. wrong: a fault or hazard. unknown:
-nobody said."""
+pass. held: somebody's session. asks: somebody requests something. wrong: a fault or hazard.
+unknown: not heard."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +66,9 @@ class Lane:
 class Timeline:
     """One device between two times.
 
-    `wall`: s since the epoch at `from_s`, by the clock of who listened. `steps`: where that clock was
-    stepped. `lanes`: in the order of LANES, only those of which something was heard. `left_out`: rows
-    that were dropped.
+    `wall`: s since the epoch at `from_s`, by the listener's clock. `steps`: where that clock was
+    stepped. `lanes`: in the order of LANES, only those of which something was heard. `left_out`:
+    rows that were dropped.
     """
 
     kind: Kind

@@ -7,8 +7,8 @@ Rules, in the order in which they are applied:
 2. END ends the session at once. AGV mode and the door's hold may stay on for `release_grace_s`. During
    that time only the same session is granted, even in a fire. The reason: a supervisor that restarts
    sends END for a robot that is still inside, and that robot must get out.
-   If RMF's supervisor asks for another session than the one that has the lift, its robot's own
-   requests and END count as well (`bridges/lift/forgotten.py`).
+   If RMF's supervisor asks for a session other than the one that has the lift, the requests and END
+   of the holder's own robot count as well (`bridges/lift/forgotten.py`).
 3. A request sets the destination and the mode. While the door is held, another destination may have
    to wait (`bridges/lift/replayed.py`). `bridges/lift/drive.py` says what may be energised.
 4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and its
@@ -22,9 +22,9 @@ Rules, in the order in which they are applied:
    - After that a robot may be inside. The true door is shown in any mode, so that it can get out.
    - A door is not shown OPEN while its hold is wanted but the relay must rest first: such a door may
      close by itself while a robot drives through.
-   - Nor is a door that nobody holds, at the floor that the robot itself asks for, while the session is
-     served and the car is to leave: RMF's supervisor may be passing on an earlier ride, and the robot
-     would go in.
+   - A door that nobody holds is not shown OPEN either, if it is at the floor that the robot itself asks
+     for and the car is about to leave for the session: RMF's supervisor may be passing on an earlier
+     ride, and the robot would drive in.
 """
 
 from msgspec.structs import replace
@@ -218,7 +218,7 @@ def _hear_adapter(memory: Memory, event: FromAdapter, now: float, limits: LiftLi
 
 
 def _refresh(session: Session, request: Requested, now: float) -> Session:
-    """A repeat only shows that RMF is alive; another destination or mode is a new request."""
+    """A repeat only shows that RMF is alive. A different destination or mode is a new request."""
     if (request.agv, request.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
     fresh = replace(_anew(session, now), agv=request.agv, destination=request.destination)

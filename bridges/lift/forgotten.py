@@ -1,13 +1,13 @@
 """The holder that RMF's lift supervisor has forgotten: its own requests still reach its lift.
 
-A supervisor that restarts, or that has missed an END, may take up another robot than the one in the
+A supervisor that restarts, or that has missed an END, may take up a robot other than the one in the
 car. From then on it drops the holder's requests and its END (rmf_ros2, lift_supervisor/Node.cpp), and
 this node refuses the other robot's: nobody would ever leave the car. Rules:
-1. A session is forgotten while the last request on `lift_requests` was for another one. A request for
-   it there, or the other one's END, ends that.
-2. Only while it is forgotten, what its own robot asks on `adapter_lift_requests` counts as if the
-   supervisor had passed it on: mode, destination, and that RMF is alive. Nobody is ever granted a
-   session by that topic.
+1. A session is forgotten while the last request on `lift_requests` was for another session. It is no
+   longer forgotten once `lift_requests` has a request for it, or the END of that other session.
+2. Only while a session is forgotten, its own robot's requests on `adapter_lift_requests` count as if
+   the supervisor had passed them on: mode, destination, and that RMF is alive. That topic never grants
+   a session.
 3. A request counts if its stamp is newer than the requester's last one. An END counts only when it is
    heard twice, with no newer request between. An END without a stamp, as Jazzy's fleet adapters send
    it, is not older than anything.
@@ -61,7 +61,7 @@ def named_at(session: Session) -> float:
 
 
 def fault(session: Session, now: float) -> Fault | None:
-    """Whom the supervisor asks for instead, once that is no mere handover."""
+    """The session that the supervisor asks for instead, once it is too late for a handover."""
     if session.forgotten is None or now < named_at(session):
         return None
     other = session.forgotten.by

@@ -22,8 +22,8 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """What the core needs of a lift's settings.
 
     `stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations.
-    `debounce`: signal -> s. `alarm_on`: the hazards that are told on the topic `alarm`. `by_call`: a
-    call brings AGV mode.
+    `debounce`: signal -> s. `alarm_on`: the hazards that are published on the topic `alarm`.
+    `by_call`: a call brings AGV mode.
     """
 
     stops: Mapping[str, Stop]
@@ -152,7 +152,7 @@ class Grace(msgspec.Struct, frozen=True):
 class Channel(msgspec.Struct, Generic[T], frozen=True):
     """One output, or a group of which one at a time may be on.
 
-    `on`: what is on now. `off_at`: when it last went off. `ons`: when it was lately switched on.
+    `on`: what is on now. `off_at`: when it last went off. `ons`: the latest times it was switched on.
     """
 
     on: T | None = None

@@ -20,7 +20,7 @@ from bridges.rmf.definitions import (
 from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
 
 OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
-"""What fleet adapters send to RMF's supervisor, heard for the robot that has the lift."""
+"""What fleet adapters send to RMF's supervisor. We listen to it for the robot that has the lift."""
 AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
 
 
@@ -44,7 +44,7 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
     floors = settings.stops()
     if request.destination_floor not in floors:
         raise RequestRefused(
-            "floor not served", f"{request.destination_floor!r} is none of {', '.join(floors)}"
+            "floor not served", f"{request.destination_floor!r} is not one of {', '.join(floors)}"
         )
     return Requested(request.session_id, agv, request.destination_floor)
 

@@ -3,10 +3,11 @@
 A fleet adapter retains its last 100 requests. When RMF's supervisor restarts, or finds an adapter again
 that was cut off, it hears them all once more and passes each on with a new stamp (rmf_ros2,
 lift_supervisor/Node.cpp). Some are of earlier rides: the door would be let go before the last one is
-heard. What the robot itself asks on `adapter_lift_requests` is heard here as it is said, and never
-again. Rules:
+heard. The robot's own requests on `adapter_lift_requests` are heard here once, when they are sent.
+Rules:
 1. While the door is held, a request for another destination is doubted if the robot's own last request
-   was for the present one; also if that was before it got the lift, as of a robot that was cut off.
+   was for the present one. It does not matter if that request came before the robot got the lift: the
+   robot may have been cut off since.
 2. It counts when the robot itself asks for that destination too, or when nothing else has been asked
    for during LASTS_S.
 3. An END counts as always. A request within the grace resumes the session as it was; then rule 1
@@ -20,9 +21,9 @@ from bridges.lift.memory import Doubted, Session
 from bridges.lift.signals import Ended, Requested
 
 LASTS_S: Final = 3.0
-"""What is heard again comes within a second, and the robot's own repeats come at 1 Hz."""
+"""A replay is over within a second, and the robot's own repeats come at 1 Hz."""
 MOST: Final = 100
-"""More robots than any site has: of more, those are forgotten that were heard first."""
+"""More robots than any site has. Beyond this number the one that was heard first is forgotten."""
 
 
 def noted(own: Mapping[str, str], asked: Requested | Ended) -> Mapping[str, str]:

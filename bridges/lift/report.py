@@ -83,9 +83,9 @@ def _may_enter(
 
     Not while the hold is wanted and its relay must rest: the door stands open only for its own dwell
     time, and would then close on the robot. Nor, while the session is served, at the floor that the
-    robot itself asks for, if the car is to leave it: RMF's supervisor may be passing on an earlier
-    ride. For a session that has not boarded, only in AGV mode, while it is served, and without a fault
-    other than that RMF's supervisor has forgotten it.
+    robot itself asks for, if the car is about to leave it: RMF's supervisor may be passing on an
+    earlier ride. A session that has not boarded must also be served, in AGV mode, and without a fault;
+    being forgotten by RMF's supervisor does not count as one.
     """
     session, held = memory.session, memory.relays.hold.on is not None
     if wanted.hold_door is not None and not held:

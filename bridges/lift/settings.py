@@ -72,7 +72,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     `limits`: durations and counts that differ from the defaults.
     `fire_reset`: RMF may use the lift again when the alarm clears (`auto`), or only after
     `rmf-bridge reset` (`manual`).
-    `alarm`: the topic on which the fleets are told of an alarm. `none` unless the site wants that.
+    `alarm`: the topic that tells the fleets of an alarm; `none` if the site does not want that.
     `alarm_on`: the hazards that are such an alarm. All robots then leave the lifts and stop elsewhere,
     until `rmf-bridge reset`.
     """

@@ -10,7 +10,7 @@ from bridges.core.durations import SILENT_S
 from bridges.lift_supervisor.memory import Limits, Memory
 
 OVERDUE_S: Final = 30.0
-"""After so long without obeying, a lift is at fault."""
+"""A lift that has not obeyed for this long is at fault."""
 
 
 class SupervisorReport(msgspec.Struct, frozen=True):

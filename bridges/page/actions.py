@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Final
 
 from bridges.log import pairs
-from bridges.page.site import Shown
+from bridges.page.site import DeviceView
 from bridges.rmf import definitions as d
 from bridges.rmf.words import printable
 
@@ -72,9 +72,9 @@ class Done:
         return self.said.strip() or ("done" if self.code == 0 else f"exit code {self.code}")
 
 
-def actions(shown: Shown, local: Local | None, graph: Sequence[str]) -> list[Action]:
+def actions(view: DeviceView, local: Local | None, graph: Sequence[str]) -> list[Action]:
     """What can be done to this device. `graph`: the options that name the page's graph."""
-    found = [*_on_graph(shown, graph)]
+    found = [*_on_graph(view, graph)]
     if local is not None:
         words = ("reset", *_runtime(local), "--", local.file)
         found.append(
@@ -83,8 +83,8 @@ def actions(shown: Shown, local: Local | None, graph: Sequence[str]) -> list[Act
     return found
 
 
-def _on_graph(shown: Shown, graph: Sequence[str]) -> list[Action]:
-    match shown.state:
+def _on_graph(view: DeviceView, graph: Sequence[str]) -> list[Action]:
+    match view.state:
         case d.LiftState(lift_name=name, session_id=session) if session:
             who = printable(session)
             return [

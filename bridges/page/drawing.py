@@ -9,7 +9,7 @@ from html import escape
 from typing import Final
 from urllib.parse import quote
 
-from bridges.page.site import Robot, Shown, Stands
+from bridges.page.site import DeviceView, Robot, Stands
 from bridges.rmf import definitions as d
 from bridges.rmf import words
 
@@ -22,21 +22,21 @@ LEAVES: Final = {"open": 0.12, "moving": 0.3, "closed": 0.5}
 """The share of the doorway that each leaf covers."""
 
 
-def card(shown: Shown, *, before: Shown | None = None) -> str:
+def card(view: DeviceView, *, before: DeviceView | None = None) -> str:
     """One device, as a box that says what it is, how it stands and what is wrong.
 
     `before`: as it was drawn the last time, so that its car is seen to move.
     """
-    row = shown.row
+    row = view.row
     name = f"<h3>{escape(row.name)}</h3>"
     old = bool(row.mark)
     classes = " ".join(
         filter(None, ("card", row.kind, "old" if old else "", "faulty" if row.faults else ""))
     )
-    marks = "".join(_chip(text, kind) for text, kind in _marks(shown))
+    marks = "".join(_chip(text, kind) for text, kind in _marks(view))
     return (
         f'<article class="{classes}">{name}{marks}'
-        f'<div class="body">{_picture(shown, before)}<dl>{"".join(_facts(shown))}</dl></div></article>'
+        f'<div class="body">{_picture(view, before)}<dl>{"".join(_facts(view))}</dl></div></article>'
     )
 
 
@@ -45,8 +45,8 @@ def path_of(kind: str, name: str) -> str:
     return f"/{kind}/{quote(name, safe='')}"
 
 
-def _marks(shown: Shown) -> Iterable[tuple[str, str]]:
-    row = shown.row
+def _marks(view: DeviceView) -> Iterable[tuple[str, str]]:
+    row = view.row
     if row.simulated:
         yield "SIMULATED", "simulated"
     if row.mark:
@@ -60,13 +60,13 @@ def _chip(text: str, kind: str) -> str:
     return f'<p class="chip {kind}">{sign}{escape(text)}</p>'
 
 
-def _facts(shown: Shown) -> Iterable[str]:
-    row = shown.row
+def _facts(view: DeviceView) -> Iterable[str]:
+    row = view.row
     yield _fact("now" if not row.mark else "was", row.state)
     if row.held_by not in ("-", ""):
         yield _fact("for" if row.kind == "charger" else "held by", row.held_by)
-    if shown.stands is not None:
-        yield _fact("has it for", had(shown.stands))
+    if view.stands is not None:
+        yield _fact("has it for", had(view.stands))
     if row.waiting:
         yield _fact("waiting", row.waiting)
 
@@ -83,11 +83,11 @@ def _fact(name: str, value: str) -> str:
     return f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>"
 
 
-def _picture(shown: Shown, before: Shown | None) -> str:
-    match shown.state:
+def _picture(view: DeviceView, before: DeviceView | None) -> str:
+    match view.state:
         case d.LiftState() as lift:
             left = before.state if before and isinstance(before.state, d.LiftState) else lift
-            return shaft(lift, left.current_floor, old=bool(shown.row.mark))
+            return shaft(lift, left.current_floor, old=bool(view.row.mark))
         case d.DoorState() as door:
             word = words.plain(d.DoorModeValue, door.current_mode.value)
             return _svg(44, 44, f"door {word}", _leaves(2, 4, 40, 36, word))

@@ -12,7 +12,7 @@ from typing import Final, Protocol
 
 from bridges.page import drawing
 from bridges.page.listener import Listener
-from bridges.page.site import MOST_DEVICES, Shown, Site
+from bridges.page.site import MOST_DEVICES, DeviceView, Site
 
 AGES_S: Final = 1.0
 """How often what changes by itself is drawn again: ages, silence."""
@@ -55,7 +55,7 @@ class Gallery:
         self, site: Site, listener: Listener, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self.cards: dict[Key, str] = {}
-        self.shown: dict[Key, Shown] = {}
+        self.shown: dict[Key, DeviceView] = {}
         self.walls: list[Wall] = []
         self._site = site
         self._listener = listener
@@ -104,7 +104,7 @@ class Gallery:
         if self._listener.lost:
             yield f"{self._listener.lost} messages came too fast, and were lost"
 
-    def _draw(self, every: Iterable[Shown]) -> dict[str, str]:
+    def _draw(self, every: Iterable[DeviceView]) -> dict[str, str]:
         """The cards that are others now, by their places."""
         changed, added = {}, False
         for shown in every:

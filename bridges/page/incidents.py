@@ -100,7 +100,7 @@ def main(path: Path) -> int:
     """Read, and write the recording to standard output, or why it cannot be read."""
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
     try:
-        code, told = 0, msgspec.msgpack.encode(read(path, faults.told()))
+        code, told = 0, msgspec.msgpack.encode(read(path, faults.for_explain()))
     except BagError as error:
         code, told = 1, str(error).encode()
     except MemoryError:

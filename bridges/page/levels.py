@@ -67,10 +67,10 @@ def _fields(tree: Tree) -> Iterator[tuple[str, str]]:
     if isinstance(tree, dict):
         for name, value in tree.items():
             if name != TYPE:
-                yield name.replace("_", " "), shown(value)
+                yield name.replace("_", " "), in_words(value)
 
 
-def shown(value: Tree) -> str:
+def in_words(value: Tree) -> str:
     """A value in a word or a few."""
     match value:
         case None | "":
@@ -80,10 +80,10 @@ def shown(value: Tree) -> str:
         case float():
             return f"{value:g}"
         case list():
-            return ", ".join(map(shown, value)) or "none"
+            return ", ".join(map(in_words, value)) or "none"
         case dict() if HOLDS in value:
             held = value[HOLDS]
-            return held.lower().replace("_", " ") if isinstance(held, str) else shown(held)
+            return held.lower().replace("_", " ") if isinstance(held, str) else in_words(held)
         case dict():
             return ", ".join(f"{name} {told}" for name, told in _fields(value)) or "-"
         case _:

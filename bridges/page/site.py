@@ -75,7 +75,7 @@ class Stands:
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class DeviceView:
     """A device as the page draws it: its row, as `watch` has it, and its last state if it has one.
 
     `stands`: how long its robot has had a charger.
@@ -122,21 +122,21 @@ class Site:
             self._heartbeat(heard)
             self._board.take(heard)
 
-    def devices(self, now: float, wall: float) -> list[Shown]:
+    def devices(self, now: float, wall: float) -> list[DeviceView]:
         """All devices, coordinators and scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
         states = {(kind, words.printable(name)): s for (kind, name), s in self._states.items()}
         rows = self._board.rows(now, wall)
         stands = {("charger", words.printable(name)): self._standing(name) for name in self._since}
         keys = ((row, (row.kind, row.name)) for row in rows)
-        return [Shown(row, states.get(key), stands.get(key)) for row, key in keys]
+        return [DeviceView(row, states.get(key), stands.get(key)) for row, key in keys]
 
-    def changed(self, now: float, wall: float) -> list[Shown]:
+    def changed(self, now: float, wall: float) -> list[DeviceView]:
         """The devices that were heard of since this was asked last."""
         changed, self._changed = self._changed, set()
         known = [device for device in sorted(changed) if device in self._states]
         rows = self._board.rows_of(known, now, wall)
         return [
-            Shown(row, self._states[device], self._standing(device[1]))
+            DeviceView(row, self._states[device], self._standing(device[1]))
             for device, row in zip(known, rows, strict=True)
         ]
 

@@ -101,7 +101,7 @@ class SiteViews:
         self._here = here
         self._login = login
         self._buttons = Buttons(gallery, here, login, deeds, graph)
-        self._remedies = faults.told()
+        self._remedies = faults.for_explain()
 
     def install(self) -> None:
         """Put the views at their addresses."""

@@ -9,7 +9,7 @@ from bridges.page.tables import table
 
 
 def explanation(found: Explanation) -> str:
-    """The sentences, what RMF looks at, who is next, and the faults with what to do."""
+    """The sentences, what RMF checks, who has to act next, and the faults with what to do."""
     return "".join(_parts(found))
 
 
@@ -26,7 +26,7 @@ def _parts(found: Explanation) -> Iterator[str]:
             for one in found.fields
         ]
         headings = ("field", "shows", "wanted", "met", "since")
-        yield table(headings, rows, f"What RMF looks at for {found.asks}")
+        yield table(headings, rows, f"What RMF checks for {found.asks}")
     if found.next:
         steps = "".join(f"<li>{escape(f'{step.who}: {step.what}')}</li>" for step in found.next)
         yield f"<p>Next:</p><ul>{steps}</ul>"

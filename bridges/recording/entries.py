@@ -86,7 +86,7 @@ class Same(Entry, frozen=True, tag_field="is", tag=4):
     times: bytes
 
 
-class Told(Entry, frozen=True, tag_field="is", tag=5):
+class Published(Entry, frozen=True, tag_field="is", tag=5):
     """The subject's report went out, and its memory took note of that."""
 
     subject: str
@@ -116,7 +116,7 @@ class Ended(Entry, frozen=True, tag_field="is", tag=9):
     safe: bool
 
 
-AnyEntry = Clocks | Spoken | Known | Step | Same | Told | Forgotten | Died | Lost | Ended
+AnyEntry = Clocks | Spoken | Known | Step | Same | Published | Forgotten | Died | Lost | Ended
 
 _ENCODER: Final = msgspec.msgpack.Encoder()
 _DECODER: Final[msgspec.msgpack.Decoder[AnyEntry]] = msgspec.msgpack.Decoder(AnyEntry)

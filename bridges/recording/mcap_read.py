@@ -63,10 +63,10 @@ def records(path: Path) -> Iterator[McapRecord]:
     with path.open("rb") as source:
         if source.read(len(MAGIC)) != MAGIC:
             raise Damaged("it does not begin as an MCAP file")
-        yield from _Limits(size).records(source, size)
+        yield from _Allowances(size).records(source, size)
 
 
-class _Limits:
+class _Allowances:
     """What is left of a file's allowances."""
 
     def __init__(self, size: int) -> None:

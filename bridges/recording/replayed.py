@@ -14,7 +14,16 @@ from typing import Any, Final
 from bridges.core.decision import Decision, IoFailed, Sampled
 from bridges.core.graph_kind import GraphKind
 from bridges.log import plain
-from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Head, Known, Same, Step, Told
+from bridges.recording.entries import (
+    AnyEntry,
+    Clocks,
+    Forgotten,
+    Head,
+    Known,
+    Published,
+    Same,
+    Step,
+)
 from bridges.recording.trees import Tree, UnknownValue, first_difference, tree, value
 from bridges.settings.config import Config
 from bridges.settings.load import understood
@@ -126,7 +135,7 @@ class _Subject:
         """What is remembered now."""
         return tree(self._memory)
 
-    def told(self) -> None:
+    def published(self) -> None:
         """The report has gone out."""
         self._memory = self._core.published(self._memory, self._report)
 
@@ -232,7 +241,7 @@ class Replay:
             yield from self._known(entry, strict=strict)
         elif isinstance(entry, Forgotten):
             self._subjects.pop(entry.subject, None)
-        elif isinstance(entry, Step | Same | Told):
+        elif isinstance(entry, Step | Same | Published):
             subject = self._subjects.get(entry.subject)
             if subject is not None:
                 yield from self._decided(subject, entry)
@@ -240,10 +249,10 @@ class Replay:
                 self.course.unusable += entry.subject not in self._subjects
 
     def _decided(
-        self, subject: _Subject, entry: Step | Same | Told
+        self, subject: _Subject, entry: Step | Same | Published
     ) -> Iterator[tuple[float, list[Parts]]]:
-        if isinstance(entry, Told):
-            subject.told()
+        if isinstance(entry, Published):
+            subject.published()
         elif isinstance(entry, Step):
             self.course.decisions += 1
             yield entry.at, subject.step(entry)

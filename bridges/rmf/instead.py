@@ -28,7 +28,7 @@ def converted(message: Message) -> Message | None:
     return None
 
 
-def told(topic: AnyTopic, wanted: str) -> list[str]:
+def remarks(topic: AnyTopic, wanted: str) -> list[str]:
     """What a person is told of a topic that is sent on; `wanted`: the YAML's `release`."""
     names = RELEASES if wanted == "auto" else [wanted]
     way = (

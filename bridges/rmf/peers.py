@@ -97,7 +97,7 @@ class Peers:
 
     def differs(self, topic: AnyTopic, before: Release) -> bool:
         """Is this topic's message another one in the present release than in that one?"""
-        return _shown(topic, self.release) != _shown(topic, before)
+        return _hash_of(topic, self.release) != _hash_of(topic, before)
 
     def faults(self) -> list[tuple[str, str]]:
         """(code, detail) of what keeps nodes apart now."""
@@ -130,7 +130,7 @@ class Peers:
         self._mixed = len(heard) > 1
 
 
-def _shown(topic: AnyTopic, release: Release) -> str:
+def _hash_of(topic: AnyTopic, release: Release) -> str:
     return type_hash(topic.type, release) if release.has(topic.type) else ""
 
 

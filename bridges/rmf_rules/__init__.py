@@ -1,10 +1,10 @@
-"""RMF by its rules: how its supervisors and fleet adapters talk to nodes. `judge` and tests play it.
+"""RMF's supervisors and fleet adapters as rules, so that `judge` and the tests can play them.
 
-Read in rmf_ros2 9dedd0f (2026-05). Its habits are kept, the awkward ones too: nothing here times
-out, retries or looks at a lift's mode.
+Taken from rmf_ros2 9dedd0f (2026-05), with its quirks: nothing here times out, retries or looks at a
+lift's mode.
 
 No I/O and no clock: each party hears a message or is ticked at its `wake_at`, and returns what it
-publishes. `now` is RMF's clock in seconds (since the epoch where stamps are to be believed). A
+publishes. `now` is RMF's clock in seconds (since the epoch, where stamps matter). A
 restarted party is a new object.
 """
 

@@ -28,14 +28,15 @@ class RequestLift(Phase):
         self.wanted = LiftDestination(lift, floor, inside)
 
     def begin(self, robot: Robot, now: float) -> list[Said]:
-        """Asks; from outside, a lift that has already arrived is taken at its word."""
+        """Sends the request. If the robot is outside and the lift has come, the phase is done at
+        once."""
         if not self.wanted.inside and robot.has_lift_arrived(self.wanted.lift, self.wanted.floor):
             self.done = True
             return robot.set_lift_destination(replace(self.wanted, inside=True), now)
         return robot.set_lift_destination(self.wanted, now)
 
     def hear(self, robot: Robot, message: d.Message, now: float) -> list[Said]:
-        """RequestLift.cpp:322-326, _finish: arrived from outside, it asks as if from inside."""
+        """RequestLift.cpp:322-326, _finish: once the lift has come, it requests as from inside."""
         match message:
             case d.LiftState(
                 lift_name=self.wanted.lift,
@@ -52,7 +53,7 @@ class RequestLift(Phase):
 
 
 class EndLiftSession(Phase):
-    """Releases, and is done when a state of the lift shows another session than ours."""
+    """Releases the lift. Done when a state of the lift shows a session other than ours."""
 
     def __init__(self, lift: str) -> None:
         self.lift = lift
@@ -71,7 +72,7 @@ class EndLiftSession(Phase):
 class DoorOpen(Phase):
     """OPEN at the start and every second, until the door is OPEN *and* the heartbeat lists us.
 
-    Judged are the latest state (of whichever door) and the latest heartbeat since the start.
+    Only the latest state (of whichever door) and the latest heartbeat since the start count.
     """
 
     def __init__(self, door: str) -> None:
@@ -80,7 +81,7 @@ class DoorOpen(Phase):
         self._heartbeat: d.SupervisorHeartbeat | None = None
 
     def begin(self, robot: Robot, now: float) -> list[Said]:
-        """Holds the door, and asks."""
+        """Begins to hold the door, and sends OPEN."""
         robot.holding_door = self.door
         return self.tick(robot, now)
 
@@ -101,13 +102,13 @@ class DoorOpen(Phase):
         return []
 
     def tick(self, robot: Robot, now: float) -> list[Said]:
-        """Asks again."""
+        """Sends OPEN again."""
         self.due_at = now + REPEAT_S
         return [robot.ask_door(self.door, d.DoorModeValue.MODE_OPEN, now)]
 
 
 class DoorClose(Phase):
-    """CLOSE at the start and every second, until a heartbeat lists us no more.
+    """CLOSE at the start and every second, until a heartbeat no longer lists us.
 
     It does not wait for the door.
     """
@@ -116,7 +117,7 @@ class DoorClose(Phase):
         self.door = door
 
     def begin(self, robot: Robot, now: float) -> list[Said]:
-        """Lets go of the door, and asks."""
+        """Stops holding the door, and sends CLOSE."""
         if robot.holding_door == self.door:
             robot.holding_door = None
         return self.tick(robot, now)
@@ -128,6 +129,6 @@ class DoorClose(Phase):
         return []
 
     def tick(self, robot: Robot, now: float) -> list[Said]:
-        """Asks again."""
+        """Sends CLOSE again."""
         self.due_at = now + REPEAT_S
         return [robot.ask_door(self.door, d.DoorModeValue.MODE_CLOSED, now)]

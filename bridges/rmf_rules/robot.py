@@ -36,21 +36,21 @@ class Phase(ABC):
 
     @abstractmethod
     def begin(self, robot: "Robot", now: float) -> list[Said]:
-        """It starts."""
+        """Start."""
 
     @abstractmethod
     def hear(self, robot: "Robot", message: d.Message, now: float) -> list[Said]:
-        """A message, after the context's own rules have seen it."""
+        """Take a message, after the context's own rules have."""
 
     def tick(self, robot: "Robot", now: float) -> list[Said]:
-        """Its wall timer fires."""
+        """The phase's wall timer fires."""
         return []
 
 
 class Robot(Party):
     """A fleet adapter's RobotContext (`requester_id` is fleet/robot) and its one running phase.
 
-    `on_task`: it has a task. `in_car`: its position is inside the lift. Both belong to the story.
+    `on_task`: it has a task. `in_car`: its position is inside the lift. The caller sets both.
     A cancelled phase is `robot.phase = None`.
     """
 

@@ -21,9 +21,9 @@ class Answers:
         self._waiting: deque[tuple[object, str]] = deque(maxlen=MOST)
         self._said_at = AGES_AGO
 
-    def add(self, asked: object, reason: str) -> None:
+    def add(self, request: object, reason: str) -> None:
         """A request was refused: the message or the event, and why. From any thread."""
-        self._waiting.append((asked, reason))
+        self._waiting.append((request, reason))
 
     @property
     def due_at(self) -> float:
@@ -38,9 +38,9 @@ class Answers:
         for _ in range(len(self._waiting)):
             found = answer(*self._waiting.popleft())
             if found is not None:
-                self.last = found.told
+                self.last = found.status
                 say(found.topic, found.message)
 
-    def shown(self) -> Mapping[str, Mapping[str, str]]:
+    def status(self) -> Mapping[str, Mapping[str, str]]:
         """For the status file; nothing before the first."""
         return {"last_refusal": self.last} if self.last else {}

@@ -47,6 +47,6 @@ class Pace:
         """When this is to be published (monotonic s)."""
         return self.told_at + (TELL_EVERY_S if news == self._told else TELL_GAP_S)
 
-    def told(self, news: object, now: float) -> None:
+    def published(self, news: object, now: float) -> None:
         """Note that it has been published."""
         self._told, self.told_at = news, now

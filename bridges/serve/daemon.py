@@ -25,7 +25,7 @@ from bridges.rmf.topics import DIAGNOSTICS
 from bridges.rmf.transport import Publisher, TransportError
 from bridges.serve import guard, last_mark, record, signals
 from bridges.serve.diagnostics import diagnosis
-from bridges.serve.directory import KEPT, KeptFile, Once, RuntimeDirectory, state_file
+from bridges.serve.directory import KEPT, MemoryFile, Once, RuntimeDirectory, state_file
 from bridges.serve.guard import Guard
 from bridges.serve.notify import notify, watchdog_s
 from bridges.serve.predecessor import Predecessor
@@ -77,7 +77,7 @@ class Daemon:
         self._transport = open_transport(
             config.rmf, node_name, localhost=localhost, ros_args=ros_args
         )
-        kept = None if simulated else KeptFile(state_file(config.path), runtime.path / KEPT)
+        kept = None if simulated else MemoryFile(state_file(config.path), runtime.path / KEPT)
         open_bus = open_bus or config.open_bus
         self._witness = self._witness_of(ours)
         self._service = service(config, self._transport, open_bus, kept, unsafe, self._witness)

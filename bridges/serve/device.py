@@ -146,7 +146,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         outputs = plain(decision.outputs)
         shown = {**self.subject.status(), "outputs": outputs, "refused": self.refused}
         contacts = {diagnostics.CONTACTS: self._contacts} if self._contacts else {}
-        return {**shown, **contacts, **self._answers.shown()}
+        return {**shown, **contacts, **self._answers.status()}
 
     def _read(self) -> Sampled[X] | IoFailed:
         try:
@@ -183,19 +183,19 @@ class Node(Generic[S, L, M, X, E, O, R]):
         news = report.news()
         if now >= self._pace.due_at(news):
             self._send(report)
-            self._pace.told(news, now)
-            subject.told(self._kind.published(subject.memory, report))
+            self._pace.published(news, now)
+            subject.published(self._kind.published(subject.memory, report))
         self.wake_at = min(subject.wake_at, self._pace.due_at(news))
 
     def _answer(self) -> None:
-        """Tell who asked in vain why, and who has the device."""
+        """Publish why requests were refused, and who has the device."""
         self._answers.say(self._clock.monotonic(), self._answered, self._publish)
         self.wake_at = min(self.wake_at, self._answers.due_at)
 
-    def _answered(self, asked: object, reason: str) -> Answer | None:
+    def _answered(self, request: object, reason: str) -> Answer | None:
         decision = self.subject.decision
         assert decision is not None
-        return self._kind.answer(self.name, asked, reason, decision.report)
+        return self._kind.answer(self.name, request, reason, decision.report)
 
     def _send(self, report: R) -> None:
         try:

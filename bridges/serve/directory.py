@@ -24,7 +24,7 @@ from bridges.serve.places import (
     SERVICE_RUN,
     SERVICE_STATE,
     Places,
-    as_told,
+    as_given,
     by_hand,
     everywhere,
     named,
@@ -72,7 +72,7 @@ def find(file: Path, given: str | None) -> Places:
 
     Raises Unknown if the service's directory cannot be read.
     """
-    told = as_told(given)
+    told = as_given(given)
     if told:
         return told
     return next((p for p in everywhere(file) if _is_about(p, file)), by_hand(file))
@@ -158,7 +158,7 @@ def state_file(file: Path) -> Path:
     return Path(given or state_base() / file.stem).absolute() / KEPT
 
 
-class KeptFile:
+class MemoryFile:
     """A file that is replaced as a whole and is on disk when `write` returns.
 
     `instead`: the path to use while the first cannot be written; a file there is the newer one.
@@ -335,6 +335,6 @@ def held(
     Raises AlreadyRunning, Unknown or PermissionError.
     """
     file = file.absolute()
-    found = (as_told(given) or by_hand(file)) if simulated else find(file, given)
+    found = (as_given(given) or by_hand(file)) if simulated else find(file, given)
     own(found)
     return RuntimeDirectory(found, file, serves=serves)

@@ -21,7 +21,7 @@ from bridges.rmf.transport import Subscription, Transport
 from bridges.serve.answers import Answers
 from bridges.serve.clock import Clock
 from bridges.serve.inbox import Inbox
-from bridges.serve.keeper import Keeper, Kept
+from bridges.serve.keeper import Keeper, MemoryStore
 from bridges.serve.outlet import Named, Outlet
 from bridges.serve.presence import Presence
 from bridges.serve.refusals import Refusals
@@ -69,7 +69,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         transport: Transport,
         clock: Clock,
         named: Named = _same,
-        kept: Kept | None = None,
+        kept: MemoryStore | None = None,
         witness: Nobody = NOBODY,
     ) -> None:
         self.name = f"graph-{kind.name}"
@@ -169,7 +169,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
             "refused": self.refused,
-            **self._answers.shown(),
+            **self._answers.status(),
             "faults": [{"code": f.code, "detail": f.detail} for f in self._keeper.faults],
             "heard_by": self._heard_by(),
             "hears": {name: end.matched() for name, end in self._hears.items()},

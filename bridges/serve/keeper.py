@@ -22,7 +22,7 @@ AGAIN_S: Final = 1.0
 NOT_KEPT: Final = "NOT_KEPT"
 
 
-class Kept(Protocol):
+class MemoryStore(Protocol):
     """The file that outlives the daemon; None before the first `write`, which replaces it as a whole.
     Both may raise OSError."""
 
@@ -34,7 +34,9 @@ class Kept(Protocol):
 class Keeper(Generic[S, L, M, E, R]):
     """The keeper of one node. `kept`: None to keep nothing. `tell_at`: when to publish next."""
 
-    def __init__(self, kind: GraphKind[S, L, M, E, R], kept: Kept | None, publish: Publish) -> None:
+    def __init__(
+        self, kind: GraphKind[S, L, M, E, R], kept: MemoryStore | None, publish: Publish
+    ) -> None:
         self.tell_at = NEVER
         self._kind = kind
         self._kept = kept
@@ -106,5 +108,5 @@ class Keeper(Generic[S, L, M, E, R]):
         topic, message = self._kind.together(memories)
         if now >= self._pace.due_at(message):
             self._publish(topic, message)
-            self._pace.told(message, now)
+            self._pace.published(message, now)
         self.tell_at = self._pace.due_at(message)

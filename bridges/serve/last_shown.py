@@ -15,7 +15,7 @@ class _Device(msgspec.Struct):
     input_age_s: float | None = None
 
 
-class _Shown(msgspec.Struct):
+class _StatusFile(msgspec.Struct):
     devices: dict[str, _Device] = {}
 
 
@@ -24,7 +24,7 @@ def ages(places: Places) -> Mapping[str, float]:
     path = places.runtime / STATUS
     try:
         with open(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as source:
-            shown = msgspec.json.decode(source.read(SIZE_MAX), type=_Shown)
+            shown = msgspec.json.decode(source.read(SIZE_MAX), type=_StatusFile)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return {}
     found = {name: device.input_age_s for name, device in shown.devices.items()}

@@ -43,7 +43,7 @@ def named(file: Path) -> str:
     return os.path.realpath(file)
 
 
-def as_told(given: str | None) -> Places | None:
+def as_given(given: str | None) -> Places | None:
     """The directories that the command line or systemd's unit gives; None if neither does."""
     if given:
         return Places(Path(given).absolute(), Path(given).absolute())

@@ -20,7 +20,7 @@ from bridges.rmf.transport import Subscription, Transport
 from bridges.serve.clock import Clock, machine_s
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
-from bridges.serve.keeper import Kept
+from bridges.serve.keeper import MemoryStore
 from bridges.serve.loop import Loop
 from bridges.serve.outlet import Named, Outlet
 from bridges.serve.predecessor import SafeFirst
@@ -73,7 +73,7 @@ def service(
     config: Config,
     transport: Transport,
     open_bus: OpenBus,
-    kept: Kept | None = None,
+    kept: MemoryStore | None = None,
     unsafe: Collection[str] = (),
     witness: Nobody = NOBODY,
 ) -> Service:

@@ -83,11 +83,11 @@ class Subject(Generic[M, V, O, R]):
             self._refusals.add(kind, f"{detail}; {asked}" if detail else asked, **self._whose)
         return decision
 
-    def told(self, memory: M) -> None:
+    def published(self, memory: M) -> None:
         """Its report has gone out; `memory` with what the core notes of that."""
         if memory is not self.memory:
             self.memory = memory
-            self._witness.told(self.name, memory, self._clock.monotonic())
+            self._witness.published(self.name, memory, self._clock.monotonic())
 
     def log(self, report: R) -> None:
         """Log what has changed since the last report."""

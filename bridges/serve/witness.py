@@ -15,7 +15,7 @@ from typing import Any, Final
 from bridges.core.decision import IoFailed, Sampled
 from bridges.core.durations import AGES_AGO, NEVER
 from bridges.recording import entries
-from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Same, Spoken, Told
+from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Published, Same, Spoken
 from bridges.recording.ring import FRAME, Ring
 from bridges.recording.seen import AnyDecision, Seen, known, step
 from bridges.rmf import cdr
@@ -47,7 +47,7 @@ class Nobody:
     ) -> None:
         """A core has decided. `before`: the subject's memory until then."""
 
-    def told(self, subject: str, memory: object, now: float) -> None:
+    def published(self, subject: str, memory: object, now: float) -> None:
         """A report has gone out; `memory`: with what the core notes of that."""
 
     def forgotten(self, subject: str, now: float) -> None:
@@ -96,8 +96,8 @@ class Witness(Nobody):
     ) -> None:
         self._waiting.append((self._step, subject, before, event, now, decision))
 
-    def told(self, subject: str, memory: object, now: float) -> None:
-        self._waiting.append((self._told, subject, memory, now))
+    def published(self, subject: str, memory: object, now: float) -> None:
+        self._waiting.append((self._published, subject, memory, now))
 
     def forgotten(self, subject: str, now: float) -> None:
         self._waiting.append((self._forgotten, subject, now))
@@ -225,11 +225,11 @@ class Witness(Nobody):
             times, subject.times = subject.times, []
             self._append(Same(times[-1], name, struct.pack(f"<{len(times)}d", *times)))
 
-    def _told(self, name: str, memory: object, now: float) -> None:
+    def _published(self, name: str, memory: object, now: float) -> None:
         subject = self._subjects.get(name)
         if subject is not None:
             self._say_same(name)
-            self._put(Told(now, name))
+            self._put(Published(now, name))
             subject.memory = memory
 
     def _forgotten(self, name: str, now: float) -> None:

@@ -55,7 +55,7 @@ def example(struct: type, field: mi.Field) -> str:
     if is_section(field.type):
         return ""
     shown = next(
-        (_shown()[c, field.name] for c in struct.__mro__ if (c, field.name) in _shown()), ""
+        (_shipped()[c, field.name] for c in struct.__mro__ if (c, field.name) in _shipped()), ""
     )
     if not shown:
         written = field.name in WRITTEN and not _is_numbered(field.type)
@@ -69,7 +69,7 @@ def device_yamls() -> list[Path]:
 
 
 @functools.cache
-def _shown() -> Found:
+def _shipped() -> Found:
     """The shortest value of each struct's field in the shipped files that is not its default."""
     found: Found = {}
     for file in device_yamls():

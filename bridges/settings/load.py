@@ -135,7 +135,7 @@ class _Reading:
         elif self._kind and self._kind.devices_key in sections:
             self._read_devices(sections[self._kind.devices_key].spot())
         note_conflicts(self._page, self._uses)
-        self._collect_kept()
+        self._collect_unwatched()
 
     def _read_kind(self, entry: Entry | None) -> None:
         name = word(self._values, entry, named.kind_names())
@@ -304,14 +304,14 @@ class _Reading:
             node = locate(spot, path).where()
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
-    def _collect_kept(self) -> None:
+    def _collect_unwatched(self) -> None:
         """Collect what is to be said of outputs that outlive this machine, once for each bus."""
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
-            kept = bus.hal.kept(bus.settings, self._written.get(name, ()))
-            for path, text in kept.warnings:
+            unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))
+            for path, text in unwatched.warnings:
                 self._warn(locate(bus.entry.spot(), path).where(), f"bus '{name}': {text}")
-            for path, text in kept.notes:
+            for path, text in unwatched.notes:
                 node = locate(bus.entry.spot(), path).where()
                 self._notes.append(self._page.problem(node, f"note: bus '{name}': {text}"))
 

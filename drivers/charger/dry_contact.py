@@ -149,7 +149,7 @@ class DryContactCharger:
 
     def contacts(self) -> Mapping[str, bool]:
         """Each contact and relay as it was read or written last."""
-        return self._points.shown()
+        return self._points.last_known()
 
     def make_safe(self) -> None:
         """Switch the relay off and verify it."""

@@ -30,7 +30,7 @@ from drivers.charger.rules import Errors, Rule, judged
 from drivers.charger.state_codes import Code, Codes
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, Calls, claim, send, timer_unseen, told
+from drivers.http_call import Call, Calls, claim, described, send, timer_unseen
 from drivers.unsafe import unaccepted
 
 POWER: Final = "power"
@@ -133,7 +133,7 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
     rows = [("state", f"GET {api.url(settings.state_path)} every {bus_settings.scan_s:g} s")]
     for what in ("start", "stop", "range_check"):
         if call := getattr(settings, what):
-            rows.append((what.replace("_", " "), told(call, api)))
+            rows.append((what.replace("_", " "), described(call, api)))
     if settings.switches_off_after_s:
         after = f"{settings.switches_off_after_s:g} s without a new start"
         rows.append(("power off", f"by itself after {after}, sent every {bus_settings.scan_s:g} s"))

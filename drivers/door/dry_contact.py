@@ -183,7 +183,7 @@ class DryContactDoor:
 
     def contacts(self) -> Mapping[str, bool]:
         """Each contact and relay as it was read or written last."""
-        return self._points.shown()
+        return self._points.last_known()
 
     def make_safe(self) -> None:
         """Switch the hold relay off and verify it."""

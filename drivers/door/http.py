@@ -17,7 +17,7 @@ from drivers import DriverError, json_fields
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal import http
-from drivers.http_call import Call, InsistentCalls, claim, send, timer_unseen, told
+from drivers.http_call import Call, InsistentCalls, claim, described, send, timer_unseen
 from drivers.json_fields import Flag
 from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted
 
@@ -26,7 +26,7 @@ Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The fields of the answer. With `feedback: estimated` a limit may be missing.
+    """The fields of the answer. With `feedback: estimated` `opened` or `closed` may be missing.
 
     `opened`: the door is fully open.
     `closed`: the door is closed.
@@ -108,8 +108,8 @@ def describe(settings: Settings, bus: http.Settings) -> Iterator[tuple[str, str]
             yield signal, json_fields.place_text(place)
     if settings.held:
         yield "held", json_fields.place_text(settings.held)
-    yield "hold", told(settings.hold, api) + _renewed(settings, bus)
-    yield "release", told(settings.release, api)
+    yield "hold", described(settings.hold, api) + _renewed(settings, bus)
+    yield "release", described(settings.release, api)
     yield CLOSING
 
 

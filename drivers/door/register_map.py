@@ -19,7 +19,7 @@ class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     `at`: `input register N` or `holding register N`.
     `open`: the numbers of a fully open door.
     `closed`: the numbers of a closed door.
-    `moving`: the numbers of a door that is between its limits and has no fault.
+    `moving`: the numbers of a door that is between its end positions and has no fault.
     `faults`: number -> what is wrong.
     """
 
@@ -56,7 +56,7 @@ class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     closed_to: Percent = 5
 
     def problems(self) -> Problems:
-        """A place that is not a register; limits that overlap; `unknown` within 0 to 100."""
+        """A place that is not a register; thresholds that overlap; `unknown` within 0 to 100."""
         yield from _place_problems(self.at, REGISTERS)
         if self.unknown is not None and self.unknown <= 100:
             yield ("unknown",), "0 to 100 are positions"

@@ -13,7 +13,7 @@ import msgspec
 
 from drivers.hal.points import HalError, Wire
 
-__all__ = ["AnyBus", "Bus", "BusType", "HalError", "KeptOutputs", "Needs", "Remark", "Where"]
+__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Needs", "Remark", "UnwatchedOutputs", "Where"]
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
@@ -48,7 +48,7 @@ class Needs(NamedTuple):
     host: str = ""
 
 
-class KeptOutputs(NamedTuple):
+class UnwatchedOutputs(NamedTuple):
     """Remarks on outputs that keep their value when the daemon's machine or the network dies."""
 
     warnings: Sequence[Remark] = ()
@@ -88,8 +88,8 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
     far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it
     cannot leave the daemon's process, as pins cannot.
-    `kept(settings, places)`: which of these places, which the daemon writes, keep their value when its
-    machine or the network dies.
+    `unwatched(settings, places)`: which of these places, which the daemon writes, keep their value when
+    its machine or the network dies.
 
     A bus with points also has
     `canonical(point)`: the one spelling of a point; ValueError says what to write instead;
@@ -105,7 +105,9 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     where: Callable[[Settings], Where | None] = lambda settings: None
     needs: Callable[[Settings], Needs] = lambda settings: Needs()
     warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
-    kept: Callable[[Settings, Iterable[str]], KeptOutputs] = lambda settings, places: KeptOutputs()
+    unwatched: Callable[[Settings, Iterable[str]], UnwatchedOutputs] = lambda settings, places: (
+        UnwatchedOutputs()
+    )
     fake: str = ""
     fake_inside: bool = False
     canonical: Callable[[str], str] = str

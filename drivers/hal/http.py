@@ -21,7 +21,7 @@ from drivers.hal import Bus, BusType, HalError, Needs, Where
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
-from drivers.hal.http_json import json_object, shown
+from drivers.hal.http_json import excerpt, json_object
 
 __all__ = ["Base", "HttpBus", "Method", "Path", "Settings", "base"]
 
@@ -281,7 +281,7 @@ def _tls_failure(error: BaseException | None, ca_file: str | None) -> str:
         return f"{ca_file} is no file"
     while error is not None and not isinstance(error, ssl.SSLError):
         error = error.__cause__ or error.__context__
-    return shown(getattr(error, "verify_message", None) or str(error)) if error else ""
+    return excerpt(getattr(error, "verify_message", None) or str(error)) if error else ""
 
 
 def _check_status(url: str, reads: bool, status: int) -> None:
@@ -305,7 +305,7 @@ def _cause(error: BaseException) -> str:
     """The root cause below the exceptions that requests and urllib3 wrap around it."""
     while (below := error.__cause__ or error.__context__) is not None:
         error = below
-    return shown(str(error) or type(error).__name__)
+    return excerpt(str(error) or type(error).__name__)
 
 
 BUS = BusType(

@@ -6,7 +6,7 @@ from typing import NoReturn
 from drivers.hal import HalError
 
 
-def shown(text: str) -> str:
+def excerpt(text: str) -> str:
     """The beginning of a text, printable."""
     return "".join(c if c.isprintable() else "?" for c in text[:80])
 
@@ -15,16 +15,16 @@ def json_object(url: str, content_type: str, body: bytes) -> dict[str, object]:
     """The answer's JSON object. Raises HalError if it is anything else."""
     sort = content_type.partition(";")[0].strip().lower()
     if sort != "application/json" and not sort.endswith("+json"):
-        what = shown(sort) or "no content type"
+        what = excerpt(sort) or "no content type"
         raise HalError(f"{url} answered {what} instead of JSON: is api_base the API's address?")
     try:
         found = json.loads(
             body.decode(), parse_constant=_no_number, object_pairs_hook=_without_doubles
         )
     except (ValueError, RecursionError) as error:
-        raise HalError(f"{url} answered invalid JSON: {shown(str(error))}") from None
+        raise HalError(f"{url} answered invalid JSON: {excerpt(str(error))}") from None
     if not isinstance(found, dict):
-        raise HalError(f"{url} answered JSON that is not an object: {shown(repr(found))}")
+        raise HalError(f"{url} answered JSON that is not an object: {excerpt(repr(found))}")
     return found
 
 

@@ -173,7 +173,7 @@ class Points:
         self._read = {s: w.asserted(levels[point]) for s, (w, point) in self._in.items()}
         return self._read
 
-    def shown(self) -> dict[str, bool]:
+    def last_known(self) -> dict[str, bool]:
         """Each input as it was read last, and each output as it was written, if that is known."""
         return {**self._read, **(self._written or {})}
 

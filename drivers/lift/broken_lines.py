@@ -50,7 +50,7 @@ def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsa
         worse = [m for m in found if _danger(m.reads) < _danger(m.shown)]
         for line in sorted({m.line for m in worse}):
             number = line.removeprefix(f"{name}_bit")
-            text = told(m for m in worse if m.line == line)
+            text = sentence(m for m in worse if m.line == line)
             yield line, ("inputs", name, "bits", number), text
 
 
@@ -60,10 +60,10 @@ def floor_warnings(code: FloorCode, table: Mapping[str, Wire]) -> str:
     for _, level, lines in code.shows():
         if level is not None:
             shown.setdefault(level, []).append(lines)
-    return told(misread(shown, lambda lines: code.read(lines)[0], table))
+    return sentence(misread(shown, lambda lines: code.read(lines)[0], table))
 
 
-def told(found: Iterator[Misread]) -> str:
+def sentence(found: Iterator[Misread]) -> str:
     """The misreadings as one sentence, grouped by broken line."""
     broken: dict[str, list[str]] = {}
     for line, how, shown, reads in sorted(found):

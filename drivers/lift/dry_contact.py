@@ -86,7 +86,7 @@ class LiftDryContact:
 
     def contacts(self) -> Mapping[str, bool]:
         """Each contact and relay as it was read or written last."""
-        return self._points.shown()
+        return self._points.last_known()
 
     def make_safe(self) -> None:
         """Switch every output off and verify it where possible."""

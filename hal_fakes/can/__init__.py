@@ -7,14 +7,14 @@ charger with frames of its own in `frame_charger.py`.
 from collections.abc import Sequence
 
 from drivers.hal.can import Settings
-from hal_fakes.can.side import CanSide, Station, slow_s
+from hal_fakes.can.side import CanFarSide, Station, slow_s
 from hal_fakes.can.slcan_port import SlcanPort
 from hal_fakes.fake import Outside
 
 
-def serve(settings: Settings, stations: Sequence[Station]) -> CanSide:
+def serve(settings: Settings, stations: Sequence[Station]) -> CanFarSide:
     """Serve the chargers of this bus on a pseudo-terminal."""
-    return CanSide(SlcanPort(settings.slcan), stations, slow_s(settings))
+    return CanFarSide(SlcanPort(settings.slcan), stations, slow_s(settings))
 
 
 FAKE = Outside(serve)

@@ -119,7 +119,7 @@ def any_frame(noise: random.Random) -> can.Message:
     )
 
 
-class CanSide:
+class CanFarSide:
     """A running far side. `replace`: what to write into the bus's settings instead.
 
     `slow_s`: how late a frame comes that is sent late, or on a slow bus.

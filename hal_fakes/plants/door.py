@@ -1,10 +1,10 @@
 """A pedestrian door with an operator: it opens while it is held or pushed, and closes by itself.
 
-Contacts: `opened` and `closed` at its limits, `obstruction` (light curtain), `fire` (the building's).
-Relay: `hold_open`. To press: `push` (a person's button or hand), `obstruction`, `fire`.
-Failing part `operator`: `off` and `stuck` stand still, `slow` takes five times as long, `wrong` turns
-each command round, `garbage` stops half-way. At a Modbus module `unit` and `server` fail as well
-(`hal_fakes/modbus/`).
+Contacts: `opened` and `closed` at its end positions, `obstruction` (light curtain), `fire` (the
+building's). Relay: `hold_open`. To press: `push` (a person's button or hand), `obstruction`,
+`fire`. Failing part `operator`: `off` and `stuck` stand still, `slow` takes five times as long,
+`wrong` turns each command round, `garbage` stops halfway. At a Modbus module `unit` and `server`
+fail as well (`hal_fakes/modbus/`).
 """
 
 from collections.abc import Iterable
@@ -59,7 +59,7 @@ class DoorPlant(Machine):
         self._arrives_at = float("inf")
 
     def contact(self, signal: str) -> bool:
-        """Is this contact asserted, in truth? A limit lets go as soon as the door leaves it."""
+        """Is this contact really asserted? A limit contact opens as soon as the door leaves it."""
         direction, _ = self._course
         if signal == "opened":
             return self.position == 1.0 and direction == 0
@@ -82,7 +82,7 @@ class DoorPlant(Machine):
         self._steer(1 if wanted or self.now < self._close_at else -1)
 
     def event_at(self) -> float:
-        """When it arrives at a limit, or begins to close."""
+        """When it arrives at an end position, or begins to close."""
         waits = not self._wanted and self.now < self._close_at
         return min(self._arrives_at, self._close_at if waits else float("inf"))
 

@@ -449,7 +449,7 @@ def test_a_restart_while_charging_adopts_the_charge_and_leaves_the_power_alone()
     assert story.report == ChargerReport(
         read_at=2.0,
         state=State.CHARGER_CHARGING,
-        faults=(Fault("UNREQUESTED_CHARGING", "nobody asked for it: the robot is not known"),),
+        faults=(Fault("UNREQUESTED_CHARGING", "nobody requested it: the robot is not known"),),
     )
     assert story.outputs == ChargerOutputs(power=None)
     story.polls("stopping 1, released 2, idle 1")

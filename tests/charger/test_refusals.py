@@ -163,7 +163,7 @@ def test_the_last_refusal_is_in_the_status_and_in_diagnostics() -> None:
     assert "last_refusal" not in it.node.status()
     it.hears(SECOND)
     status = it.node.status()
-    assert status["last_refusal"] == REFUSED.told()
+    assert status["last_refusal"] == REFUSED.fields()
     (_, shown) = diagnosis("a_daemon", "charger", {}, {"a": status}, Time(1)).status
     values = {pair.key: pair.value for pair in shown.values}
     assert values["last_refusal reason"] == "charger occupied"

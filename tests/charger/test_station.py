@@ -298,7 +298,7 @@ def test_a_station_that_does_not_say_whom_it_sees_charges_nobody_where_receivers
 ):
     it = Story(FULL).polls("idle 1").event(AMR1).polls("charging 1")
     assert it.told == [
-        (0.0, "ERROR", "receivers are given, and the charger does not say which one it sees")
+        (0.0, "ERROR", "the YAML has receivers, but the charger does not say which one it sees")
     ]
     assert it.outputs.power is False
 
@@ -480,7 +480,7 @@ def test_a_restart_while_charging_adopts_the_charge_and_its_robot_and_leaves_the
         fleet="tiny",
         robot="AMR01",
         verified=True,
-        faults=(Fault("UNREQUESTED_CHARGING", "nobody asked for it: tiny/AMR01"),),
+        faults=(Fault("UNREQUESTED_CHARGING", "nobody requested it: tiny/AMR01"),),
         measured=Measured(receiver_id=ONE),
     )
     it.event(AMR2).event(AMR1).sees((A.CHARGING, ONE, 1))

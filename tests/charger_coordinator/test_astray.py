@@ -101,11 +101,11 @@ def history(memory: Memory, *times: float) -> list[tuple[float, dict[Robot, Nudg
     """(s, who was told so far, whether ONE is told now, whether a person must come), as time passes."""
     lines = []
     for now in times:
-        memory = astray.told(memory, now, SITE)
+        memory = astray.nudged(memory, now, SITE)
         alarms = any(
             astray.alarming(memory, a, now) for [*all_] in found(memory, now) for a in all_
         )
-        lines.append((now, dict(memory.nudges), astray.is_told(memory, ONE, now), alarms))
+        lines.append((now, dict(memory.nudges), astray.is_nudged(memory, ONE, now), alarms))
     return lines
 
 
@@ -129,9 +129,9 @@ def test_a_stray_is_told_twice_for_one_request_and_then_a_person_is() -> None:
 
 def test_a_stray_is_told_again_for_a_new_request_and_the_count_lasts_on_its_way() -> None:
     memory = site(at(ONE, AT[B], 20.0), grants=EXPECTED, nudges={ONE: Nudge("r0", 2, 21.0)})
-    assert astray.told(memory, 22.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
+    assert astray.nudged(memory, 22.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
     left = site(at(ONE, None, 50.0), grants=EXPECTED, nudges={ONE: Nudge("r1", 1, 22.0)})
-    assert astray.told(left, 60.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
+    assert astray.nudged(left, 60.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
 
 
 @pytest.mark.parametrize("why", ["it works", "another node assigns", "we may not speak"])
@@ -149,7 +149,7 @@ def test_the_core_wakes_for_every_step_with_a_robot_astray() -> None:
     memory = site(at(ONE, AT[B], 20.0), grants=EXPECTED)
     dues = []
     for now in (21.0, 22.0, 37.0):
-        memory = astray.told(memory, now, SITE)
+        memory = astray.nudged(memory, now, SITE)
         dues.append(sorted(astray.due(memory, now, SITE)))
     assert dues == [[22.0, 22.0, NEVER], [22.0, 23.0, 37.0, NEVER], [22.0, 38.0, 52.0, NEVER]]
 
@@ -231,10 +231,10 @@ def test_a_blocking_robot_is_told_once_then_a_person_is_and_all_is_forgotten_whe
         (105.0, told, False, True),
         (110.0, told, False, True),
     ]
-    memory = astray.told(memory, 90.0, SITE)
+    memory = astray.nudged(memory, 90.0, SITE)
     assert sorted(astray.due(memory, 90.0, SITE)) == [90.0, 91.0, 105.0, NEVER]
     for place in (None, "wait_2"):
         gone = replace(memory, robots={TWO: at(TWO, place, 95.0)})
-        assert astray.told(gone, 96.0, SITE).nudges == {}
+        assert astray.nudged(gone, 96.0, SITE).nudges == {}
     elsewhere = replace(memory, robots={TWO: at(TWO, AT[B], 30.0)})
-    assert astray.told(elsewhere, 96.0, SITE).nudges == {TWO: Nudge(B, 1, 96.0)}
+    assert astray.nudged(elsewhere, 96.0, SITE).nudges == {TWO: Nudge(B, 1, 96.0)}

@@ -279,7 +279,7 @@ def test_a_strayed_robot_in_a_task_cannot_be_told_so_a_person_is_at_once() -> No
     assert site_.faults == []
     site_.run(1)
     assert site_.faults == [
-        "WRONG_STATION: tiny/AMR01 stands at charger_b, it is expected at charger_a"
+        "WRONG_STATION: tiny/AMR01 stands at charger_b, but is expected at charger_a"
     ]
     assert site_.memory.nudges == {}
 
@@ -413,7 +413,9 @@ def test_a_station_whose_pad_another_robot_does_not_leave_is_given_up_after_the_
     site_.run(1)
     site_.does(A, ERROR, "wrong docking: tiny/AMR02 stands here, tiny/AMR01 is expected")
     assert site_.run(60) == []
-    assert site_.faults == ["WRONG_STATION: tiny/AMR02 stands at charger_a, nobody asked for that"]
+    assert site_.faults == [
+        "WRONG_STATION: tiny/AMR02 stands at charger_a, but nobody requested that"
+    ]
     assert site_.run(1) == [(62.0, "charger_a: cancel"), (62.0, "charger_b: AMR01")]
     assert site_.memory.strikes == {}
 

@@ -86,12 +86,12 @@ def test_assignments_by_others_count_if_they_are_to_one_of_our_chargers() -> Non
         (messages.accept_state, d.ChargerState(charger_name="x", state=1), "station not ours"),
         (messages.accept_state, d.ChargerState(charger_name="charger_a"), "unknown state"),
         (
-            messages.accept_wish,
+            messages.accept_request,
             d.ChargerRequest("", "tiny", "AMR09", d.Duration(), "op"),
             "robot not ours",
         ),
         (
-            messages.accept_wish,
+            messages.accept_request,
             d.ChargerRequest("", "tiny", "AMR01", d.Duration(), ""),
             "empty request_id",
         ),
@@ -136,12 +136,12 @@ def test_an_alert_is_sent_once_under_its_id_and_its_time() -> None:
     ("old", "new", "problem"),
     [
         ("waits_at: wait_1", "waits_at: wait_9", "no waypoint 'wait_9' in this fleet's list"),
-        ("waits_at: wait_1", "waits_at: wait_2", "'wait_2' is tiny/AMR01's already"),
+        ("waits_at: wait_1", "waits_at: wait_2", "'wait_2' already belongs to tiny/AMR01"),
         ("waits_at: wait_1", "waits_at: dock_b", "'dock_b' is a charger's place"),
         ("waypoint: dock_b", "waypoint: dock_x", "stands at 'dock_x', which is in no fleet's"),
         ("waypoint: dock_b", "waypoint: charger_a", "stands at 'charger_a', as 'charger_a' does"),
         ("[charger_b], waits", "[charger_c], waits", "no station 'charger_c'; there are"),
-        ("[RX-0002]", "[RX-0001]", "'RX-0001' is tiny/AMR01's already"),
+        ("[RX-0002]", "[RX-0001]", "'RX-0001' already belongs to tiny/AMR01"),
         ("full_percent: 100", "full_percent: 80", "is above full_percent"),
         ("coordinator:\n", "coordinator:\n  speed: 1\n", "speed"),
         (
@@ -157,7 +157,7 @@ def test_an_alert_is_sent_once_under_its_id_and_its_time() -> None:
         (
             "[RX-0002]",
             "[RX-0002], rcu: charger_a",
-            "'charger_a' is the station 'charger_a''s already",
+            "'charger_a' already belongs to the station 'charger_a'",
         ),
     ],
 )
@@ -197,7 +197,8 @@ def test_a_file_without_its_section_says_what_is_missing(tmp_path: Path) -> None
 def test_a_setting_that_works_but_not_well_is_warned_of() -> None:
     warnings = "\n".join(map(str, load(CONFIG).warnings))
     assert warnings.endswith(
-        "tiny/AMR03 charges at 'charger_b' alone: when it fails there, nothing tells whose fault it is"
+        "tiny/AMR03 charges only at 'charger_b': if a charge fails there, nothing shows whether robot or"
+        " charger is at fault"
     )
     assert KIND.warnings is not None
     near = [text for _, text in KIND.warnings(settings(near_m=5.0))]

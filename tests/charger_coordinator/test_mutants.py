@@ -98,8 +98,8 @@ def test_a_withdrawal_is_refused_unless_the_request_is_known_or_over() -> None:
     assert [answer(site_, Unwanted("op-1")) for _ in range(2)] == ["", ""]
     site_.wants(TWO)
     site_.run(1)
-    assert answer(site_, Unwanted("op-9")) == "no such wish"
-    assert answer(site_, Unwanted("")) == "no such wish"
+    assert answer(site_, Unwanted("op-9")) == "no such request"
+    assert answer(site_, Unwanted("")) == "no such request"
 
 
 def test_an_operators_reset_tries_faulty_robots_and_stations_that_were_passed_over() -> None:
@@ -397,7 +397,7 @@ def test_a_stranger_on_a_pad_is_named_as_far_as_it_is_known(error: str, who: str
     site_ = Alone()
     site_.shows[A] = StateHeard(A, ERROR, "unrequested/charger_a", None, error)
     site_.run(1)
-    assert site_.faults == [f"WRONG_STATION: {who} stands at charger_a, nobody asked for that"]
+    assert site_.faults == [f"WRONG_STATION: {who} stands at charger_a, but nobody requested that"]
 
 
 def test_a_fault_is_an_alert_with_its_title_its_reason_and_its_rank() -> None:
@@ -410,7 +410,7 @@ def test_a_fault_is_an_alert_with_its_title_its_reason_and_its_rank() -> None:
         site_.memory = decided.memory
         alerts += [message for _, message in decided.publish]
     detail = "charger_a: station: fan"
-    stranger = "unknown receiver RX-99 stands at charger_b, nobody asked for that"
+    stranger = "unknown receiver RX-99 stands at charger_b, but nobody requested that"
     assert alerts == [
         d.Alert(
             id=f"charger_coordinator/STATION_OUT_OF_SERVICE/{detail}",

@@ -55,7 +55,7 @@ BUSY = Memory(
 
 def test_each_waiting_robot_is_told_what_is_in_its_way_and_which_station_it_will_get() -> None:
     assert [wish.robot for wish in queued(BUSY)] == [ONE, TWO]
-    why = "s1 charges big/X, s2 charges big/Y, s3 is silent, s4 is kept for tiny/AMR03"
+    why = "s1 charges big/X, s2 charges big/Y, s3 is silent, s4 is assigned to tiny/AMR03"
     assert list(reasons(BUSY, 12.0, site(6))) == [
         f"tiny/AMR01 by the robot: {why}, and 2 more, s2 is free in 88 s",
         f"tiny/AMR02 by the robot: {why}, and 2 more, s1 is free in 10 min",

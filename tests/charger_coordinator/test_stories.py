@@ -107,7 +107,7 @@ def test_a_robot_that_does_not_leave_the_wrong_station_is_told_twice_and_then_a_
         (27.25, "AMR01 -> CHARGE charger_a"),
         (
             41.25,
-            "ALERT WRONG_STATION: tiny/AMR01 stands at charger_b, it is expected at charger_a",
+            "ALERT WRONG_STATION: tiny/AMR01 stands at charger_b, but is expected at charger_a",
         ),
     ]
     assert site.mode("charger_a") == "ASSIGNED"
@@ -489,5 +489,5 @@ def test_a_request_sent_directly_to_a_charger_gives_that_robot_its_place() -> No
     queue = site.node.devices()["site"]["queue"]
     assert (site.node.status()["passive"], queue) == (
         False,
-        "tiny/AMR03 by the robot: charger_b is kept for tiny/AMR02",
+        "tiny/AMR03 by the robot: charger_b is assigned to tiny/AMR02",
     )

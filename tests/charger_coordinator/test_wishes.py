@@ -68,9 +68,9 @@ def test_a_withdrawal_is_by_the_operators_id_or_by_the_one_that_the_station_show
     assert wishes.unwanted(memory, "op-1") == (withdrawn, "")
     assert wishes.unwanted(memory, "r1") == (withdrawn, "")
     assert wishes.unwanted(memory, "op-0") == (memory, "")
-    assert wishes.unwanted(memory, "op-9") == (memory, "no such wish")
-    assert wishes.unwanted(memory, "") == (memory, "no such wish")
-    assert wishes.unwanted(left, "r1") == (left, "no such wish")
+    assert wishes.unwanted(memory, "op-9") == (memory, "no such request")
+    assert wishes.unwanted(memory, "") == (memory, "no such request")
+    assert wishes.unwanted(left, "r1") == (left, "no such request")
 
 
 # ---- it came when it was called, or not

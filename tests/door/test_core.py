@@ -148,7 +148,7 @@ def test_an_obstruction_at_an_idle_door_does_not_open_it() -> None:
 def test_open_and_closed_at_once_is_unknown_and_a_fault_while_it_lasts() -> None:
     core = CoreAlone()
     core.sees(BOTH, until=1.0)
-    assert core.faults() == ("DOOR_CONTACTS_CONTRADICT: the door reads opened and closed",)
+    assert core.faults() == ("DOOR_CONTACTS_CONTRADICT: the door reads open and closed",)
     core.sees(CLOSED, until=2.0)
     assert core.told == [(0.0, "UNKNOWN", False), (1.0625, "CLOSED", False)]
     assert core.faults() == ()
@@ -163,7 +163,7 @@ def test_a_door_between_its_limits_for_too_long_is_unknown() -> None:
         (1.0625, "MOVING", False),
         (6.0625, "UNKNOWN", False),
     ]
-    assert core.faults() == ("DOOR_TRAVEL_TIMEOUT: at neither limit for 5.0 s",)
+    assert core.faults() == ("DOOR_TRAVEL_TIMEOUT: at neither end position for 5.0 s",)
     core.sees(OPEN, until=11.0)
     assert (core.told[-1], core.faults()) == ((10.0625, "OPEN", False), ())
 

@@ -66,7 +66,7 @@ def test_half_filled_and_impossible_requests_are_refused(message: d.DoorRequest,
 
 def test_a_list_of_doors_keeps_the_others_out() -> None:
     mine = Settings(doors=["ward", "lab"])
-    assert refused(request(door="gate"), mine) == "not ours: 'gate' is none of ward, lab"
+    assert refused(request(door="gate"), mine) == "not ours: 'gate' is not one of ward, lab"
     assert messages.accept_request(request(door="lab"), mine, 0.0) == OpenRequested(
         "fleet/a", 5_000_000_007
     )

@@ -34,7 +34,7 @@ def test_a_flood_of_requesters_displaces_no_holder() -> None:
         made = replace(ask, session_id=f"made/up{n}")
         site.take(heard(n / 100, "adapter_lift_requests", made))
     told = site.explain("lift", "Lift1", None)
-    assert any("fleet/red has it" in sentence for sentence in told.now)
+    assert any("fleet/red has had it" in sentence for sentence in told.now)
     lift = site._devices["lift", "Lift1"]
     assert isinstance(lift, LiftFacts)
     assert len([*lift.claims]) == MOST_CLAIMS

@@ -173,7 +173,7 @@ def test_an_old_reading_and_a_stamp_of_the_future_are_faults() -> None:
     drawn = lanes(said, "lift", "Lift1")
     assert told(lane(drawn, "faults", "stamp").spans) == [
         (0, 1, "the reading is old"),
-        (1, 2, "the stamp is of the future"),
+        (1, 2, "the stamp is in the future"),
         (3, 4, "never read"),
     ]
 

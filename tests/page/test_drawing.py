@@ -6,7 +6,7 @@ import pytest
 
 from bridges.commands.board import Row
 from bridges.page import drawing
-from bridges.page.site import Robot, Shown, Stands
+from bridges.page.site import DeviceView, Robot, Stands
 from bridges.rmf import definitions as d
 from bridges.rmf.words import Stated
 
@@ -53,7 +53,7 @@ def test_a_name_is_shown_as_text_and_never_as_markup(kind: str) -> None:
         "door": d.DoorState(door_name=HOSTILE),
         "charger": d.ChargerState(charger_name=HOSTILE, error_message=HOSTILE),
     }
-    root = well_formed(drawing.card(Shown(row, states.get(kind))))
+    root = well_formed(drawing.card(DeviceView(row, states.get(kind))))
     assert not list(root.iter("script"))
     assert HOSTILE in "".join(root.itertext())
 
@@ -63,7 +63,7 @@ def test_a_device_has_a_page_of_its_own_whatever_its_name() -> None:
 
 
 def test_an_old_state_says_that_it_is_old_and_how_old() -> None:
-    html = drawing.card(Shown(Row("door", "ward", "open", age="12.0 s", mark="SILENT 12 s")))
+    html = drawing.card(DeviceView(Row("door", "ward", "open", age="12.0 s", mark="SILENT 12 s")))
     text = "".join(well_formed(html).itertext())
     assert "OLD: silent 12 s, last reading 12.0 s old" in text
     assert "was" in text
@@ -80,7 +80,7 @@ def test_an_old_state_says_that_it_is_old_and_how_old() -> None:
     ],
 )
 def test_a_charger_says_how_long_its_robot_has_it(stands: Stands, told: str) -> None:
-    html = drawing.card(Shown(Row("charger", "pad", "charging", "fleet/R1"), stands=stands))
+    html = drawing.card(DeviceView(Row("charger", "pad", "charging", "fleet/R1"), stands=stands))
     texts = [one.text for one in well_formed(html).iter("dd")]
     assert texts == ["charging", "fleet/R1", told]
 

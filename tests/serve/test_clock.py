@@ -25,5 +25,5 @@ def test_a_state_is_due_each_second_and_at_once_when_it_changes_but_10_times_a_s
 ):
     pace = Pace()
     assert pace.due_at("IDLE") < 0.0
-    pace.told("IDLE", 5.0)
+    pace.published("IDLE", 5.0)
     assert (pace.due_at("IDLE"), pace.due_at("CHARGING")) == (6.0, 5.1)

@@ -12,8 +12,8 @@ import pytest
 from bridges.serve import directory, places
 from bridges.serve.directory import (
     AlreadyRunning,
-    KeptFile,
     LockHolder,
+    MemoryFile,
     RuntimeDirectory,
     Unknown,
     find,
@@ -280,7 +280,7 @@ def test_a_file_that_must_outlive_the_daemon_is_replaced_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("STATE_DIRECTORY", str(tmp_path / "var" / "doors"))
-    kept = KeptFile(state_file(Path("/etc/rmf-bridges/doors.yaml")))
+    kept = MemoryFile(state_file(Path("/etc/rmf-bridges/doors.yaml")))
     assert kept.read() is None
     kept.write(b"one")
     kept.write(b"two")
@@ -295,7 +295,7 @@ def test_a_record_that_the_state_directory_cannot_take_goes_to_the_runtime_direc
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
-    kept = KeptFile(state, runtime)
+    kept = MemoryFile(state, runtime)
     kept.write(b"one")
     state.unlink()
     state.mkdir()  # nothing can be put in its place
@@ -305,14 +305,14 @@ def test_a_record_that_the_state_directory_cannot_take_goes_to_the_runtime_direc
     assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_written"]
     state.rmdir()
     state.write_bytes(b"one")  # as a disk that has come back has it
-    assert KeptFile(state, runtime).read() == b"three"
+    assert MemoryFile(state, runtime).read() == b"three"
     kept.write(b"four")
-    assert (KeptFile(state, runtime).read(), runtime.exists()) == (b"four", False)
+    assert (MemoryFile(state, runtime).read(), runtime.exists()) == (b"four", False)
 
 
 def test_where_neither_directory_can_be_written_the_old_record_stands(tmp_path: Path) -> None:
     state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
-    kept = KeptFile(state, runtime)
+    kept = MemoryFile(state, runtime)
     kept.write(b"one")
     for folder in (state.parent, runtime.parent):
         folder.mkdir(exist_ok=True)

@@ -45,7 +45,7 @@ class Options:
 
 
 def examined(
-    config: Config, building: "BuildingMap | None", machine: Machine, asked: Options
+    config: Config, building: "BuildingMap | None", machine: Machine, options: Options
 ) -> Iterator[Finding]:
     """Every finding, as it is made."""
     file, who = config.path.absolute(), user(machine)
@@ -54,7 +54,7 @@ def examined(
     yield from health.clock(machine)
     yield from health.watchdog(machine)
     try:
-        places = directory.find(file, asked.runtime_dir)
+        places = directory.find(file, options.runtime_dir)
     except (directory.Unknown, PermissionError) as error:
         places, now = kept.of_service(file), unseen(str(error))
     else:
@@ -63,17 +63,17 @@ def examined(
     yield from now.findings
     for name in config.buses:
         yield from _way(config, name, machine, who, now)
-    yield from _asked_of_buses(config, places, now, asked)
-    if asked.listen_s:
+    yield from _answering(config, places, now, options)
+    if options.listen_s:
         from bridges.commands.doctoring.graph import Look, graph
 
-        loopback = asked.localhost or now.simulated
-        simulated = ["--localhost"] if loopback and not asked.localhost else []
-        watch = asked.line.other("watch", *simulated)
-        look = Look(loopback, asked.listen_s, now.serving, watch, asked.ros_args)
+        loopback = options.localhost or now.simulated
+        simulated = ["--localhost"] if loopback and not options.localhost else []
+        watch = options.line.other("watch", *simulated)
+        look = Look(loopback, options.listen_s, now.serving, watch, options.ros_args)
         yield from graph(config, look)
-    if asked.kill_test:
-        yield from _killed(config, machine, places, now, asked)
+    if options.kill_test:
+        yield from _killed(config, machine, places, now, options)
 
 
 def _file(config: Config, building: "BuildingMap | None") -> Iterator[Finding]:
@@ -117,9 +117,7 @@ def _gpio(config: Config, name: str, machine: Machine, who: User, now: Served) -
     yield from gpio.death(machine)
 
 
-def _asked_of_buses(
-    config: Config, places: Places, now: Served, asked: Options
-) -> Iterator[Finding]:
+def _answering(config: Config, places: Places, now: Served, options: Options) -> Iterator[Finding]:
     """Who answers, while nobody else can open the buses."""
     names = [name for name, kind in config.bus_types.items() if kind != "gpio"]
     if now.busy or not names:
@@ -132,13 +130,13 @@ def _asked_of_buses(
         return
     try:
         for name in names:
-            yield from answers(config, name, asked.whole_scan)
+            yield from answers(config, name, options.whole_scan)
     finally:
         held.close()
 
 
 def _killed(
-    config: Config, machine: Machine, places: Places, now: Served, asked: Options
+    config: Config, machine: Machine, places: Places, now: Served, options: Options
 ) -> Iterator[Finding]:
     from bridges.commands.doctoring.kill_test import KILL_TEST, kill_test
     from bridges.commands.doctoring.victim import step_called
@@ -148,8 +146,8 @@ def _killed(
             KILL_TEST, now.busy, "a device has one master: nothing was switched", "stop it first"
         )
         return
-    assert asked.kill_test is not None
-    device, output = asked.kill_test
+    assert options.kill_test is not None
+    device, output = options.kill_test
     step = step_called(config, device, output)
     assert step is not None  # or the command would have ended
 
@@ -164,7 +162,7 @@ def _killed(
         return any(line(machine, chip, _bcm(wire.point)).output for wire in outputs)
 
     file = Path(config.path).absolute()
-    yield from kill_test(file, device, step, places, asked.runtime_dir, still_driven)
+    yield from kill_test(file, device, step, places, options.runtime_dir, still_driven)
 
 
 def _bcm(point: str) -> int:

@@ -86,7 +86,7 @@ def _lacking(config: Config) -> list[str]:
         topics = [*kind.publishes]
     else:
         topics = [t for device in config.devices.values() for t in kind.publishes(device)]
-    lines = [line for topic in topics for line in instead.told(topic, config.rmf.release)]
+    lines = [line for topic in topics for line in instead.remarks(topic, config.rmf.release)]
     return list(dict.fromkeys(lines))
 
 

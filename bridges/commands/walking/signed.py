@@ -15,7 +15,7 @@ from bridges.serve.files import replace
 NOT_TRIED = "not tried"
 
 
-def told(
+def record(
     file: Path,
     device: str,
     by: str,

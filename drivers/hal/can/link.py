@@ -149,7 +149,7 @@ class Link:
 
     def _explained(self, error: BaseException) -> str:
         code = _code(error)
-        hint = _HINTS.get(code, os.strerror(code) if code else _shown(str(error)))
+        hint = _HINTS.get(code, os.strerror(code) if code else _printable(str(error)))
         return f"CAN {self._where}: {hint.format(where=self._where)}"
 
 
@@ -201,5 +201,5 @@ def _code(error: BaseException | None) -> int:
     return 0
 
 
-def _shown(text: str) -> str:
+def _printable(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text[:120])

@@ -15,7 +15,7 @@ from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.points import canonical, describe, wire_problems
-from drivers.hal.modbus.settings import Settings, kept, needs, unreachable, warnings, where
+from drivers.hal.modbus.settings import Settings, needs, unreachable, unwatched, warnings, where
 
 __all__ = [
     "BUS",
@@ -41,5 +41,5 @@ BUS = BusType(
     describe=describe,
     wire_problems=wire_problems,
     unreachable=unreachable,
-    kept=kept,
+    unwatched=unwatched,
 )

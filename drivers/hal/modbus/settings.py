@@ -6,7 +6,7 @@ from typing import Annotated
 import msgspec
 
 from bridges.core.fields import Name, Period
-from drivers.hal import KeptOutputs, Needs, Where, serial_port
+from drivers.hal import Needs, UnwatchedOutputs, Where, serial_port
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.registers import Unit
 from drivers.hal.modbus.watchdog import Watchdog
@@ -68,7 +68,7 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
         yield ("module_watchdog", *path), text
 
 
-def kept(settings: Settings, places: Iterable[str]) -> KeptOutputs:
+def unwatched(settings: Settings, places: Iterable[str]) -> UnwatchedOutputs:
     """The written units whose outputs nothing drops but this daemon."""
     written = {int(place.split()[1]) for place in places}
     bare = sorted(written.difference(settings.watched(), settings.without_watchdog))
@@ -80,7 +80,7 @@ def kept(settings: Settings, places: Iterable[str]) -> KeptOutputs:
             accepted.append((path, f"unit {unit} has no module_watchdog: {why}"))
         else:
             idle.append((path, f"nothing is written to unit {unit}: delete this"))
-    return KeptOutputs([*warned, *idle], accepted)
+    return UnwatchedOutputs([*warned, *idle], accepted)
 
 
 def _bare(units: Sequence[int]) -> str:

@@ -13,7 +13,7 @@ from drivers import DriverError
 from drivers.charger import can_frames as charger_can_frames
 from drivers.charger import canopen as charger_canopen
 from drivers.hal.can import CanBus, Settings, Slcan
-from hal_fakes.can.side import CanSide, Medium, VirtualBus
+from hal_fakes.can.side import CanFarSide, Medium, VirtualBus
 from hal_fakes.can.slcan_port import SlcanPort
 from tests.drivers.charger.contract import (
     OFF,
@@ -77,7 +77,7 @@ def on_a_bus(driver: Any, plain: dict[str, Any], medium: Medium, bus: CanBus) ->
     """A bench whose station is on this medium."""
     settings = msgspec.convert(plain, driver.Settings)
     world, station = behind(driver, settings)
-    side = CanSide(medium, [station], slow_s=2 * TIMEOUT_S)
+    side = CanFarSide(medium, [station], slow_s=2 * TIMEOUT_S)
 
     assert isinstance(bus.now, Clock)
     try:

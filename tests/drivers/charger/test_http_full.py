@@ -273,7 +273,7 @@ def test_the_daemons_end_stops_or_keeps_as_the_yaml_says() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("tiny/AMR01", "AMR01", "'AMR01' is no robot: write FLEET/ROBOT, as RMF names them"),
+        ("tiny/AMR01", "AMR01", "'AMR01' is not a robot: write FLEET/ROBOT, as RMF names them"),
         ("      receiver_id: pad.receiver", "      #", "receivers needs it"),
         ("    stop: {path: /output/off}", "", "needs stop as well"),
         ("      in_range:", "      #", "range_check needs it"),

@@ -16,7 +16,7 @@ from pathlib import Path
 from bridges.settings.load import Config, load
 from drivers.hal.can import Settings as CanSettings
 from drivers.hal.modbus import Settings as ModbusSettings
-from hal_fakes.can.side import CanSide, VirtualBus, slow_s
+from hal_fakes.can.side import CanFarSide, VirtualBus, slow_s
 from hal_fakes.control import Control
 from hal_fakes.fake import plants_on, stations_on
 from hal_fakes.modbus.rtu import RtuLine
@@ -45,7 +45,7 @@ def _serve(config: Config, bus: str, stations: Sequence[object]) -> None:
     settings = config.buses[bus]
     if isinstance(settings, CanSettings):
         medium = VirtualBus(str(settings.socketcan), interface="socketcan")
-        CanSide(medium, stations, slow_s(settings))  # type: ignore[arg-type]
+        CanFarSide(medium, stations, slow_s(settings))  # type: ignore[arg-type]
         _ready()
         threading.Event().wait()
     elif isinstance(settings, ModbusSettings):

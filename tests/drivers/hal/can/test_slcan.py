@@ -8,7 +8,7 @@ import can
 import pytest
 
 from drivers.hal.can import EXTENDED, CanBus, Frame, Settings, Slcan, Wanted
-from hal_fakes.can.side import CanSide, Send
+from hal_fakes.can.side import CanFarSide, Send
 from hal_fakes.can.slcan_port import SlcanPort, decoded, encoded
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.plant import Plant
@@ -39,7 +39,7 @@ class Desk:
     def __init__(self) -> None:
         self.echo = Echo()
         self.port = SlcanPort()
-        self.side = CanSide(self.port, [self.echo], slow_s=0.2)
+        self.side = CanFarSide(self.port, [self.echo], slow_s=0.2)
         self.clock = Clock()
         self.bus = self.opened()
         self.heard: list[Frame] = []
