@@ -103,7 +103,7 @@ def _starts_in_time(scene: ChargerScene) -> Finding:
     if kept_s <= limit_s + LATE_S:
         return KEPT
     who = shown(state.robot_name)
-    return f"kept for {who} for {kept_s:.0f} s; its start_timeout is {limit_s:.0f} s"
+    return f"assigned to {who} for {kept_s:.0f} s; its start_timeout is {limit_s:.0f} s"
 
 
 def _cancels(scene: ChargerScene) -> Finding:
@@ -146,7 +146,7 @@ LAWS: Final[tuple[Law[ChargerScene], ...]] = (
     named(
         RATE,
         "C4.rate",
-        reason="A coordinator sends robots by the latest state; a silent station is a lost one",
+        reason="A coordinator sends robots by the latest states; it cannot use a silent station",
         source="ChargerState.msg, charger_time",
     ),
     named(
@@ -166,8 +166,8 @@ LAWS: Final[tuple[Law[ChargerScene], ...]] = (
     ),
     Law(
         "C5.id",
-        "request_id is filled in every state but IDLE",
-        "It says whose the station is",
+        "request_id is set in every state but IDLE",
+        "It says who has the station",
         CHARGER_STATE,
         _has_id,
     ),
@@ -181,7 +181,7 @@ LAWS: Final[tuple[Law[ChargerScene], ...]] = (
     Law(
         "C5.text",
         "error_message says what is wrong in ERROR, and is blank otherwise",
-        "A technician reads nothing else",
+        "It is all that a technician reads",
         CHARGER_STATE,
         _has_text,
     ),
@@ -217,8 +217,8 @@ LAWS: Final[tuple[Law[ChargerScene], ...]] = (
     ),
     Law(
         "C4.fresh",
-        "A station that cannot be reached shows ERROR; in any other state charger_time advances",
-        "IDLE from memory sends a robot to a station that may be on fire",
+        "A station that cannot be reached is shown as ERROR; in other states charger_time advances",
+        "A remembered IDLE sends a robot to a station that may be on fire",
         "ChargerState.msg, charger_time",
         fresh(_claims, UNREACHED_S),
         sensed=True,

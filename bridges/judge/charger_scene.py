@@ -1,4 +1,4 @@
-"""What is remembered of a charger: who was promised it, and what it has shown of that."""
+"""What is remembered of a charger: who requested it, and what its states have shown."""
 
 from typing import Final
 
@@ -42,12 +42,12 @@ class ChargerScene(Scene[d.ChargerState]):
         return True
 
     def forget(self) -> None:
-        """A silence is over."""
+        """Forget what a silence may have ended."""
         self.same_since = self.now
         self.cancels.pop(UNREQUESTED + self.name, None)
 
     def settle(self, state: d.ChargerState) -> None:
-        """Since when it shows this."""
+        """Note since when it has shown this."""
         before = self.before
         if before is None or (before.state, before.request_id) != (state.state, state.request_id):
             self.same_since = self.now

@@ -16,7 +16,7 @@ REOPENED: Final = 3
 REOPENED_WITHIN_S: Final = 30.0
 BYPASS_S: Final = 5.0
 FLICKERS_S: Final = 0.9
-"""No door closes and opens again in so short a time."""
+"""No door can close and open again in this time."""
 
 
 def _numbers(scene: DoorScene) -> Finding:
@@ -34,11 +34,11 @@ def _opens(scene: DoorScene) -> Finding:
     closed_s = scene.now - max(scene.asked_at, scene.not_closed_at)
     if closed_s < OPENS_WITHIN_S or scene.openings < ASKED:
         return None
-    return f"closed, though OPEN was asked {scene.openings} times in {closed_s:.0f} s"
+    return f"closed, though OPEN was requested {scene.openings} times in {closed_s:.0f} s"
 
 
 def _left_open(scene: DoorScene) -> bool:
-    """It was open for who asked, and has just ceased to be."""
+    """Was it open for a requester, and has it just ceased to be?"""
     moves = scene.mode in (CLOSED, d.DoorModeValue.MODE_MOVING)
     return scene.latched and scene.was_open and moves and scene.mode_before == OPEN
 
@@ -48,16 +48,16 @@ def _bypass(scene: DoorScene) -> bool:
 
 
 def _stays(scene: DoorScene) -> Finding:
-    """No silence closes it."""
+    """Silence must not close it."""
     if scene.new is None or not scene.latched or not scene.was_open:
         return None
     if not _left_open(scene) or _bypass(scene):
         return KEPT if scene.mode == OPEN else None
-    return Doubt("open no more, though the last request was OPEN", _comes_back(scene))
+    return Doubt("no longer open, though the last request was OPEN", _comes_back(scene))
 
 
 def _comes_back(scene: DoorScene) -> Callable[[], bool]:
-    """A CLOSE was on its way, or the contact has flickered, which is for another law to judge."""
+    """Excused if a CLOSE was on its way, or if the contact only flickered: another law judges that."""
     left_at = scene.now
 
     def excused() -> bool:
@@ -73,7 +73,7 @@ def _bypassed(scene: DoorScene) -> Finding:
         return None
     if not _left_open(scene):
         return KEPT if scene.mode == OPEN else None
-    text = "open no more after a fleet adapter's CLOSE, though the supervisor holds it open"
+    text = "no longer open after a fleet adapter's CLOSE, though the supervisor holds it open"
     return Doubt(text, _comes_back(scene))
 
 
@@ -99,7 +99,7 @@ def _people(scene: DoorScene) -> Finding:
         return None
     if scene.shut < SHUT:
         return KEPT
-    return f"opened by people, and shut as soon as RMF said CLOSE, {scene.shut} times in a row"
+    return f"opened by people, and closed as soon as RMF sent CLOSE, {scene.shut} times in a row"
 
 
 def _opened(state: d.DoorState) -> bool:
@@ -119,7 +119,7 @@ LAWS: Final[tuple[Law[DoorScene], ...]] = (
     named(
         ANSWERED,
         "D1.answer",
-        reason="The supervisor repeats itself at each state: a state for each request has no end",
+        reason="The supervisor repeats itself at each state: a state for each request would never end",
         source=SUPERVISOR,
     ),
     named(ONE, "B0.one"),
@@ -127,13 +127,13 @@ LAWS: Final[tuple[Law[DoorScene], ...]] = (
     Law(
         "T1.numbers",
         "current_mode is a number of DoorMode.msg",
-        "RMF compares numbers: one that it does not know is never OPEN",
+        "RMF compares numbers: a number that it does not know is never OPEN",
         "DoorMode.msg",
         _numbers,
     ),
     Law(
         "D2.opens",
-        "OPEN opens the door: it is not CLOSED any more after 30 s of asking",
+        "OPEN opens the door: after 30 s of requests it is no longer CLOSED",
         "DoorOpen has no timeout: the robot waits for ever. OPEN is 2, in requests and states alike",
         DOOR_OPEN + "; DoorMode.msg",
         _opens,
@@ -149,8 +149,8 @@ LAWS: Final[tuple[Law[DoorScene], ...]] = (
     ),
     Law(
         "D1.bypass",
-        "A CLOSE on adapter_door_requests closes nothing: only the supervisor's does",
-        "It is one robot's: the supervisor knows whether another still stands in the doorway",
+        "A CLOSE on adapter_door_requests closes nothing; only the supervisor's CLOSE does",
+        "It is from one robot: only the supervisor knows whether another stands in the doorway",
         "rmf_ros2 door_supervisor/Node.cpp; door_adapter_template",
         _bypassed,
         sensed=True,
@@ -158,31 +158,31 @@ LAWS: Final[tuple[Law[DoorScene], ...]] = (
     Law(
         "D2.holds",
         "A door that is held stays OPEN, and does not flap",
-        "A robot sets out at the first OPEN",
+        "A robot drives off at the first OPEN",
         DOOR_OPEN,
         _holds,
         sensed=True,
     ),
     Law(
         "D2.people",
-        "CLOSE lets go, and never drives shut: a door that people opened stays theirs",
-        "RMF's supervisor says CLOSE at every open door that no robot has asked for",
+        "CLOSE releases the door and never drives it shut: people keep a door that they opened",
+        "RMF's supervisor sends CLOSE to every open door that no robot has requested",
         SUPERVISOR,
         _people,
         sensed=True,
     ),
     Law(
         "D3.travel",
-        "OPEN is what a sensor sees at the end of the travel, not what was asked for",
-        "A robot sets out at OPEN, and the leaf is still in its way",
+        "OPEN is what a sensor sees at the end of the travel, not what was requested",
+        "A robot drives off at OPEN, and the door leaf would still be in its way",
         DOOR_OPEN,
         _travels,
         sensed=True,
     ),
     Law(
         "D3.fresh",
-        "OPEN is not shown from memory: its door_time advances",
-        "A controller that is not reached any more may have closed the door: OFFLINE says so",
+        "OPEN is never a remembered state: its door_time advances",
+        "A controller that cannot be reached may have closed the door: show OFFLINE",
         "DoorState.msg, door_time",
         fresh(_opened),
         sensed=True,

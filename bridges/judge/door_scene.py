@@ -1,4 +1,4 @@
-"""What is remembered of a door: what was asked of it, and how it has moved since."""
+"""What is remembered of a door: what was requested of it, and how it has moved since."""
 
 from collections import deque
 from typing import Final
@@ -16,19 +16,19 @@ AT_ONCE_S: Final = 0.3
 CROSSES_S: Final = 0.5
 """A state may be heard after the CLOSE that it has caused."""
 DWELLS_S: Final = 0.5
-"""No operator lets a door that people have opened go sooner."""
+"""No operator releases a door that people have opened sooner than this."""
 OPENING_S: Final = 1.0
-"""None turns round sooner while it opens."""
+"""No operator reverses an opening door sooner than this."""
 
 
 class DoorScene(Scene[d.DoorState]):
     """`latched`: the last request was OPEN. `asked_at`: the first OPEN of this latch; `asked`: how many
     since the door was last seen other than closed, at `not_closed_at`. `closed_at`: the last CLOSE on
-    door_requests, `adapter_closed_at` that of a fleet adapter to the supervisor. `was_open`: the door
-    has been open in this latch. `reopened`: when it reopened at once, in this latch. `instant`: how
-    many times in a row it was OPEN as soon as it was asked; `opened`: just now, and it counts.
-    `shut`: how many times in a row a door that people had opened went shut at RMF's CLOSE; `left`:
-    just now such an opening ended."""
+    door_requests; `adapter_closed_at`: that of a fleet adapter to the supervisor. `was_open`: the
+    door has been open in this latch. `reopened`: when it reopened at once, in this latch. `instant`:
+    how many times in a row it was OPEN as soon as that was requested; `opened`: the latest state is
+    the first OPEN of this latch. `shut`: how many times in a row a door that people had
+    opened closed at RMF's CLOSE; `left`: the latest state ends such an opening."""
 
     kind = d.DoorState
 
@@ -54,7 +54,7 @@ class DoorScene(Scene[d.DoorState]):
         return self.before.current_mode.value if self.before else -1
 
     def take_other(self, heard: Heard) -> bool:
-        """Requests to this door, and what fleet adapters say of it."""
+        """Requests to this door, from the supervisor and from fleet adapters."""
         message = heard.message
         if not isinstance(message, d.DoorRequest) or message.door_name != self.name:
             return False
@@ -70,13 +70,13 @@ class DoorScene(Scene[d.DoorState]):
         return True
 
     def forget(self) -> None:
-        """A silence is over: what was asked before may be forgotten."""
+        """Forget what was requested before a silence: the node may have forgotten it."""
         self.latched = self.was_open = False
         self._people_at = NOT_YET
         self.not_closed_at = self.now
 
     def settle(self, state: d.DoorState) -> None:
-        """How it moves."""
+        """Note how it moves."""
         self.opened = self.left = False
         if self.mode != CLOSED:
             self.not_closed_at, self.openings = self.now, 0
@@ -113,7 +113,7 @@ class DoorScene(Scene[d.DoorState]):
             self._people_open_at = self.now
 
     def _people_leave(self, at_once: bool) -> None:
-        """The opening that people made is over, or ends."""
+        """Note that an opening by people has ended."""
         if self._people_at > NOT_YET and self._people_close_at > NOT_YET:
             self.left = True
             self.shut = self.shut + 1 if at_once else 0

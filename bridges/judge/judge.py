@@ -1,4 +1,4 @@
-"""Holds one device's messages against the laws of its kind."""
+"""Checks one device's messages against the laws of its kind."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -22,14 +22,14 @@ SCENES: Final[Mapping[Kind, type[Scene[Any]]]] = MappingProxyType(
     {"lift": LiftScene, "door": DoorScene, "charger": ChargerScene}
 )
 LEEWAY_S: Final = 1.0
-"""Two topics may be so far apart."""
+"""How far apart in time (s) two topics may be heard."""
 SHOWN: Final = 3
-"""How much evidence is kept of one law."""
+"""The most pieces of evidence stored for one law."""
 
 
 @dataclass
 class _Tally:
-    """Of one law. `doubt`: what may still be excused, and what it would be evidence of."""
+    """The score of one law. `doubt`: what may still be excused, and the evidence that it would be."""
 
     law: Law[Any]
     kept: int = 0
@@ -38,20 +38,20 @@ class _Tally:
     doubt: tuple[Doubt, Evidence] | None = None
 
     def found(self, heard: Evidence) -> None:
-        """It is broken."""
+        """Count a breach."""
         self.broken += 1
         if len(self.evidence) < SHOWN:
             self.evidence.append(heard)
 
     def judged(self) -> Judged:
-        """What it comes to."""
+        """The law with its verdict."""
         if self.broken:
             return Judged(self.law, Verdict.BROKEN, self.broken, tuple(self.evidence))
         return Judged(self.law, Verdict.KEPT if self.kept else Verdict.NOT_SEEN, self.kept)
 
 
 class Judge:
-    """One device by RMF's name. Bounded memory, whatever is heard.
+    """Judges one device, by RMF's name for it, in bounded memory.
 
     `only`: the ids of the laws to judge by; all of the kind without it. `broken`: any of them is.
     """
@@ -67,7 +67,7 @@ class Judge:
         self._tallies = [_Tally(law) for law in LAWS[kind] if law.id in ids]
 
     def hear(self, heard: Heard) -> None:
-        """The next message, of any device; in order of arrival."""
+        """Take the next message, of any device, in order of arrival."""
         self.first = self.first or heard
         if self.scene.take(heard):
             for tally in self._tallies:
@@ -78,9 +78,10 @@ class Judge:
         self, publishers: int, retaining: int, supervisors: int, at: float, wall: float
     ) -> None:
         """How many publishers the fire topic has, how many of them retain, and how many supervisors
-        there are; of a lift alone on the graph, because the topic does not say whose alarm it is.
+        there are; only if one lift is on the graph, because the topic does not say whose alarm it is.
         Jazzy's lift supervisor has a volatile publisher, and never uses it (rmf_ros2 7eef65a,
-        lift_supervisor/Node.cpp:52). Only what is found twice counts: ends are met one by one."""
+        lift_supervisor/Node.cpp:52). Only what is found twice counts, because ends are discovered
+        one by one."""
         if isinstance(self.scene, LiftScene) and publishers and not self.scene.others:
             volatile = publishers - retaining
             found = None if 0 < volatile <= supervisors else volatile > 0
@@ -91,7 +92,7 @@ class Judge:
                     self._check(tally, at, wall)
 
     def end(self, at: float, wall: float) -> tuple[Judged, ...]:
-        """Nothing more is heard; each law with its verdict, in the laws' order."""
+        """End the hearing. Returns each law with its verdict, in the laws' order."""
         self.scene.pass_time(at)
         if self.scene.states:
             for tally in self._tallies:
@@ -100,7 +101,7 @@ class Judge:
         return self.verdicts()
 
     def verdicts(self) -> tuple[Judged, ...]:
-        """As far as it has been heard."""
+        """Each law with its verdict so far."""
         return tuple(tally.judged() for tally in self._tallies)
 
     def _breaks(self, tally: _Tally, evidence: Evidence) -> None:

@@ -14,7 +14,7 @@ LONGEST: Final = 60
 
 
 class Verdict(StrEnum):
-    """Of one law."""
+    """The verdict on one law."""
 
     KEPT = "kept"
     BROKEN = "broken"
@@ -26,7 +26,7 @@ class Doubt:
     """It looks broken, unless a message that is on its way still explains it.
 
     Topics have no common order on a wire: a lift's state may be heard before the END that caused it.
-    `excused()` is asked again at each message, for `LEEWAY_S`.
+    `excused()` is called again at each message, for `LEEWAY_S`.
     """
 
     text: str
@@ -34,7 +34,7 @@ class Doubt:
 
 
 Finding = str | Doubt | None
-"""What a law says of the latest message: how it breaks the law, KEPT, or nothing."""
+"""What a law finds in the latest message: how it breaks the law, KEPT, or None if it does not apply."""
 KEPT: Final = ""
 
 
@@ -43,7 +43,7 @@ class Law(Generic[S_contra]):
     """One sentence of RMF's contract, and how it is checked after each message.
 
     `source`: where it can be read. `check(scene)`: a pure function of what has been heard.
-    `sensed`: a stuck or noisy wire below a right node can break it too.
+    `sensed`: a stuck or noisy wire below a correct node can break it too.
     """
 
     id: str

@@ -9,7 +9,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf import words
 
 ENDS_WITHIN_S: Final = 3.0
-"""A state period of 2 s, and what a scan takes."""
+"""A state period of 2 s, and one scan."""
 GRANTS_WITHIN_S: Final = 30.0
 GRANT_ASKED: Final = 10
 JUMPS_WITHIN_S: Final = 1.5
@@ -20,7 +20,7 @@ REOPENED_WITHIN_S: Final = 30.0
 FALSE: Final = 3
 FALSE_WITHIN_S: Final = 30.0
 SETTLED_S: Final = 3.0
-"""After a node began to speak: what it was asked before may not have been heard."""
+"""For this long after a node's first state it may still obey requests that we have not heard."""
 
 
 def opened(state: d.LiftState) -> bool:
@@ -50,19 +50,20 @@ def numbers(scene: LiftScene) -> Finding:
 
 
 def other_lift(scene: LiftScene) -> Finding:
-    """Given to one who asked for another lift alone."""
+    """The lift is not given to a session that only asked for another lift."""
     session = scene.session
     if scene.new is None or not session or session == scene.session_before:
         return None
     if session not in scene.elsewhere or scene.before is None:
         return KEPT
     return Doubt(
-        f"held by {shown(session)}, who asked for another lift", lambda: session in scene.asks
+        f"held by {shown(session)}, which only asked for another lift",
+        lambda: session in scene.asks,
     )
 
 
 def own_name(scene: LiftScene) -> Finding:
-    """Given to nobody who did not ask."""
+    """The lift is not given to a session that did not ask."""
     session = scene.session
     if scene.new is None or scene.before is None or not session:
         return None
@@ -70,7 +71,9 @@ def own_name(scene: LiftScene) -> Finding:
         return None
     if session in scene.asks or session in scene.elsewhere or scene.now - scene.since < SETTLED_S:
         return KEPT
-    return Doubt(f"held by {shown(session)}, who never asked", lambda: session in scene.asks)
+    return Doubt(
+        f"held by {shown(session)}, which never asked for it", lambda: session in scene.asks
+    )
 
 
 def grants(scene: LiftScene) -> Finding:
@@ -85,12 +88,12 @@ def grants(scene: LiftScene) -> Finding:
         served = ask.floors[-1] in scene.new.available_floors or not scene.new.available_floors
         long_s = min(free_s, scene.now - ask.since)
         if asked and served and session and not ask.human and long_s > GRANTS_WITHIN_S:
-            return f"{shown(session)} has asked {ask.times} times in {long_s:.0f} s, and it is free"
+            return f"{shown(session)} has asked {ask.times} times in {long_s:.0f} s; the lift is free"
     return None
 
 
 def bypassed(scene: LiftScene) -> Finding:
-    """Nobody is granted by what fleet adapters say to the supervisor."""
+    """Requests of fleet adapters to the supervisor grant nothing."""
     session = scene.session
     if scene.new is None or scene.before is None or session in ("", scene.session_before):
         return None
@@ -102,19 +105,19 @@ def bypassed(scene: LiftScene) -> Finding:
         later = scene.asks.get(session)
         return later is not None and later.direct
 
-    text = f"held by {shown(session)}, whom the supervisor has not asked for"
+    text = f"held by {shown(session)}, for which the supervisor has not asked"
     return Doubt(text, excused)
 
 
 def ended_unasked(scene: LiftScene) -> Finding:
-    """A session goes by its own END alone."""
+    """A session ends only by its own END."""
     old, new, since = scene.session_before, scene.session, scene.held_since
     if scene.new is None or scene.before is None or old in ("", new):
         return None
     ask = scene.asks.get(old)
     if scene.has_ended(old, since) or (ask and ask.human) or _foreign_end(scene, old, since):
         return KEPT
-    what = f"went from {shown(old)} to {shown(new)}" if new else f"session of {shown(old)} gone"
+    what = f"session {shown(old)} became {shown(new)}" if new else f"session {shown(old)} ended"
 
     def excused() -> bool:
         return scene.has_ended(old, since) or bool(_foreign_end(scene, old, since))
@@ -123,7 +126,7 @@ def ended_unasked(scene: LiftScene) -> Finding:
 
 
 def _foreign_end(scene: LiftScene, session: str, since: float) -> str:
-    """Whose END came just now, while this session's has not since then; "" for nobody's."""
+    """The session whose END has just come, if this session's has not come since then; "" for none."""
     if scene.has_ended(session, since):
         return ""
     others = (who for who in scene.ended if who not in ("", session))
@@ -131,7 +134,7 @@ def _foreign_end(scene: LiftScene, session: str, since: float) -> str:
 
 
 def ended_by_another(scene: LiftScene) -> Finding:
-    """The END of who does not have it changes nothing."""
+    """The END of a session that does not have the lift changes nothing."""
     old = scene.session_before
     if scene.new is None or scene.before is None or not old:
         return None
@@ -146,7 +149,7 @@ def ended_by_another(scene: LiftScene) -> Finding:
 
 
 def ends(scene: LiftScene) -> Finding:
-    """An END of the holder ends it, whatever floor and door it has."""
+    """The holder's END ends the session, whatever floor and door it names."""
     if scene.new is None:
         return None
     if scene.bare_refused >= REFUSED:
@@ -189,7 +192,7 @@ def no_jump(scene: LiftScene) -> Finding:
 
 
 def in_agv(scene: LiftScene) -> Finding:
-    """A robot is let in with the car taken from the public."""
+    """A robot is let in only while the car is not open to the public."""
     state = scene.new
     if state is None or not (scene.offers and scene.offered):
         return None
@@ -215,11 +218,11 @@ def floors(scene: LiftScene) -> Finding:
         return None
     if state.current_floor in ("", *state.available_floors):
         return KEPT
-    return f"current_floor {shown(state.current_floor)} is none of its available_floors"
+    return f"current_floor {shown(state.current_floor)} is not one of its available_floors"
 
 
 def destination(scene: LiftScene) -> Finding:
-    """Where the car goes is what its holder asked for."""
+    """The car goes where its holder asked."""
     state = scene.new
     if state is None or not state.session_id or not state.destination_floor:
         return None
@@ -240,7 +243,7 @@ def unserved(scene: LiftScene) -> Finding:
         return None
     if state.destination_floor in state.available_floors:
         return KEPT
-    return f"destination {shown(state.destination_floor)} is none of its available_floors"
+    return f"destination {shown(state.destination_floor)} is not one of its available_floors"
 
 
 def lets_nobody_in(scene: LiftScene) -> Finding:
@@ -252,7 +255,7 @@ def lets_nobody_in(scene: LiftScene) -> Finding:
 
 
 def grants_nothing(scene: LiftScene) -> Finding:
-    """Under a hazard nobody new gets it."""
+    """Under a hazard no new session gets the lift."""
     state, before = scene.new, scene.before
     if state is None or before is None or state.current_mode not in HAZARDS:
         return None
@@ -264,7 +267,7 @@ def grants_nothing(scene: LiftScene) -> Finding:
 
 
 def no_false(scene: LiftScene) -> Finding:
-    """Nothing calls an alarm off but its end by an operator. With several lifts, whose word is it?"""
+    """Only an operator calls an alarm off. With several lifts it is unknown which one published."""
     if not isinstance(scene.news, d.Bool) or scene.others:
         return None
     often = len(scene.false_alarms) == FALSE
@@ -274,7 +277,7 @@ def no_false(scene: LiftScene) -> Finding:
 
 
 def retained(scene: LiftScene) -> Finding:
-    """Fleets hear the alarm."""
+    """Fleets can hear the alarm."""
     if scene.volatile is None:
         return None
     return "its publisher is volatile: fleet adapters do not match it" if scene.volatile else KEPT

@@ -11,21 +11,21 @@ from bridges.rmf import topics
 
 HAZARDS: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
 GRACE_S: Final = 5.0
-"""The longest `release_grace_s`: within it the same session may go on as it was."""
+"""The longest `release_grace_s`: until then the same session may resume."""
 LATE_S: Final = 5.0
-"""An END may have been on its way before the session was shown."""
+"""An END may have been sent this long before the session was shown."""
 FLOORS: Final = 8
 AT_ONCE_S: Final = 0.3
-"""Longer than a state and a request take to cross on a wire, and than a scan takes."""
+"""Longer than a scan, and than a state and a request take to cross on a wire."""
 REOPENS_WITHIN_S: Final = 1.0
 END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
 
 @dataclass
 class Ask:
-    """The requests of one session. `at`: the latest. `direct_at`: the latest on lift_requests, where it
-    has been asked for without a gap `since` then.
-    `human`: it asked for HUMAN mode. `direct`: it was heard on lift_requests."""
+    """The requests of one session. `at`: the latest. `direct_at`: the latest on lift_requests. `since`:
+    when the present row of requests there, without a gap, began. `human`: it asked for HUMAN mode.
+    `direct`: it was heard on lift_requests."""
 
     at: float
     since: float
@@ -38,9 +38,9 @@ class Ask:
 
 @dataclass
 class Ending:
-    """How the present session was told to end on lift_requests: `at` first, `bare_at` if that was
-    without a floor, `floor_at` with one. RMF's supervisor says the second when a state after the first
-    still shows the session."""
+    """The ENDs of the present session on lift_requests: `at`: the first; `bare_at`: the first without a
+    floor; `floor_at`: the first with one. RMF's supervisor sends one with a floor if the session is
+    still shown after one without."""
 
     at: float = NOT_YET
     bare_at: float = NOT_YET
@@ -49,13 +49,14 @@ class Ending:
 
 class LiftScene(Scene[d.LiftState]):
     """`asks`, `elsewhere`: who asked for this lift, and for others. `ended`: session -> its last END.
-    `granted_at`: since when the present session is shown; `held_since`: the one before. `known`: the
-    beginning of the present one was seen. `last`: who had it before, until `last_at`. `offered`: OPEN
-    has been shown at its destination; `offers`: OPEN is shown while that is not so. `ending`: how it
-    was told to end. `bare_refused`: how many sessions in a row outlived an END without a floor and
-    ended at one with a floor. `reopened`: when the door reopened at once, in one stop. `open_seen`:
-    floor and time of the last OPEN at another floor. `other_asked_at`: when lift_requests last carried
-    another session's request. `free_since`: since when nobody has it and no hazard is there.
+    `granted_at`: since when the present session has been shown; `held_since`: the same of the session
+    before. `known`: the beginning of the present one was seen. `last`: who had it before, until
+    `last_at`. `offered`: OPEN has been shown at its destination; `offers`: OPEN is shown while that
+    is not so. `ending`: the ENDs of the present session. `bare_refused`: how many sessions in a row
+    outlived an END without a floor and ended at one with a floor. `reopened`: when the door
+    reopened at once, in one stop. `open_seen`: floor and time of the last OPEN at another floor.
+    `other_asked_at`: when lift_requests last carried another session's request. `free_since`: since
+    when nobody has it and no hazard is there.
     `false_alarms`: when the fire topic said false without need. `volatile`: whether its publisher
     retains nothing, None if that is not known.
     """
@@ -94,7 +95,7 @@ class LiftScene(Scene[d.LiftState]):
         return self.before.session_id if self.before else ""
 
     def has_ended(self, session: str, since: float) -> bool:
-        """Was it told to end, since then?"""
+        """Has an END for this session come since then?"""
         return self.ended.get(session, NOT_YET) > since - LATE_S
 
     def was_asked_to(self, floor: str) -> bool:
@@ -123,7 +124,7 @@ class LiftScene(Scene[d.LiftState]):
         return True
 
     def forget(self) -> None:
-        """A silence is over."""
+        """Forget what a silence may have ended."""
         self.known = False
         self.granted_at = self.free_since = self.now
         self.offered = True
@@ -131,7 +132,7 @@ class LiftScene(Scene[d.LiftState]):
         self.open_seen = self._open = ("", NOT_YET)
 
     def settle(self, state: d.LiftState) -> None:
-        """The session, its offer, and the door."""
+        """Note the session, whether OPEN is shown to it, and the door."""
         if self.before is not None and self.session != self.session_before:
             self._changed_hands(state)
         if self.session or state.current_mode in HAZARDS:

@@ -1,8 +1,8 @@
 """RMF's nodes, played towards one device: fleet adapters with their robots, and their supervisor.
 
-By RMF's rules (`bridges/rmf_rules/`), without I/O and clock. States of other devices are not given to
-the played supervisor, which would end their sessions. Where a supervisor is there already, only fleet
-adapters are played, and what they say goes through it.
+By RMF's rules (`bridges/rmf_rules/`), without I/O and clock. The played supervisor does not get the
+states of other devices, because it would end their sessions. If a supervisor is on the graph already,
+only fleet adapters are played, and their requests go through it.
 """
 
 from collections import deque
@@ -15,8 +15,8 @@ from bridges.rmf_rules import NEVER, Party, Said
 from bridges.rmf_rules.robot import Phase, Robot
 
 DEAF_S: Final = 6.0
-"""After it has passed on an END without a floor, the played supervisor says nothing for so long. RMF's
-would follow with an END that has one, and hide that the first was refused."""
+"""The played supervisor is silent for this long after an END without a floor. RMF's would send one with
+a floor at once, and so hide that the first was refused."""
 RETAINED: Final = topics.ADAPTER_LIFT_REQUESTS.publish.depth
 
 Step = Phase | float
@@ -25,7 +25,7 @@ Script = Callable[[Robot], Iterator[Step]]
 
 
 class Traveller:
-    """A robot with its fleet adapter. `waits_since`: for its phase; inf: it drives."""
+    """A robot with its fleet adapter. `waits_since`: when its phase began; inf while it drives."""
 
     def __init__(self, requester_id: str, script: Script) -> None:
         self.robot = Robot(requester_id)
@@ -36,12 +36,12 @@ class Traveller:
 
     @property
     def waits_for(self) -> str:
-        """What RMF waits for, in its phase's words."""
+        """What RMF waits for: the name of its phase."""
         phase = self.robot.phase
         return type(phase).__name__ if phase is not None and not phase.done else ""
 
     def go_on(self, now: float) -> list[Said]:
-        """Begin what comes next, if what was under way is over."""
+        """Begin the next step, if the last one is over."""
         if self.done or not self.robot.done or now < self._drives_until:
             return []
         step = next(self._steps, None)
@@ -56,7 +56,7 @@ class Traveller:
         return []
 
     def wake_at(self) -> float:
-        """When its timer is due or its way over."""
+        """When its timer is due, or its drive is over."""
         drives = self._drives_until if self.robot.done and not self.done else NEVER
         return min(self.robot.wake_at(), drives)
 
@@ -64,8 +64,8 @@ class Traveller:
 class Play:
     """One performance for one device. `now` is RMF's clock (s since the epoch).
 
-    `supervisor`: makes one as it starts; None where one is there. `over`: everybody has done what was
-    to do, or `failed` says why not. What is said is returned, to be published and to be judged.
+    `supervisor`: makes a new one; None if one is on the graph. `over`: every step was done, or `failed`
+    says why not. Methods return the messages to be published and judged.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Play:
         return {traveller.robot.requester_id for traveller in self.travellers}
 
     def begin(self, now: float) -> list[Said]:
-        """Everybody sets out."""
+        """Start every robot."""
         return self._go_on(now)
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
@@ -143,7 +143,7 @@ class Play:
         self.failed = f"{traveller.waits_for} of {who} has not ended in {self._patience_s:.0f} s"
 
     def _say(self, said: list[Said], now: float) -> list[Said]:
-        """What somebody of us says, and what others of us answer."""
+        """These messages, with the answers of the other played nodes."""
         out = []
         for topic, message in said:
             out.append((topic, message))

@@ -1,4 +1,4 @@
-"""What is played for a lift, a door and a charger, when it may be, and how it is left."""
+"""What is played for a lift, a door and a charger, when it may be, and how the device is released."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
 FLEET: Final = "rmf_bridge_judge"
 DRIVES_S: Final = 3.0
 DOORWAY_S: Final = 15.0
-"""Longer than nodes wait that close when nothing is said."""
+"""Longer than any node waits that closes a door in silence."""
 SERVED: Final = (d.ChargerStateValue.CHARGER_ASSIGNED, d.ChargerStateValue.CHARGER_CHARGING)
 STRANGER: Final = f"{FLEET}/nobody"
 STAYS_S: Final = 5.0
@@ -43,9 +43,9 @@ def busy(state: words.Stated) -> str:
 
 
 class Performance(ABC):
-    """A play, its topics, and its end. `speaks`: where we publish; `sole`: of those, where nobody else
-    may, because two opinions are no test. `leave` is called each REPEAT_S after the play, however it
-    ended, until `left`."""
+    """A play, its topics, and its end. `speaks`: the topics that we publish; `sole`: those of them that
+    nobody else may publish, because two supervisors would spoil the test. After the play, however it
+    ended, `leave` is called every REPEAT_S until `left`."""
 
     speaks: tuple[AnyTopic, ...]
     hears: tuple[AnyTopic, ...]
@@ -54,7 +54,7 @@ class Performance(ABC):
 
     @property
     def over(self) -> bool:
-        """It has been played, or cannot go on."""
+        """Has it been played, or can it not go on?"""
         return bool(self.failed) or self.play.over
 
     @property
@@ -67,7 +67,7 @@ class Performance(ABC):
         return busy(state)
 
     def begin(self, now: float) -> list[Said]:
-        """It begins."""
+        """Begin."""
         return self.play.begin(now)
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
@@ -79,24 +79,25 @@ class Performance(ABC):
         return self.play.tick(now)
 
     def wake_at(self) -> float:
-        """When it is."""
+        """When the next timer is due."""
         return self.play.wake_at()
 
     @abstractmethod
     def leave(self, now: float) -> list[Said]:
-        """Let go of the device."""
+        """Release the device."""
 
     @property
     @abstractmethod
     def left(self) -> bool:
-        """It is let go."""
+        """Is the device released?"""
 
 
 class Ride(Performance):
     """Robots ride from one floor to another, every second one back.
 
-    `through`: a supervisor is there. `restarts`: the played supervisor restarts with a robot in the
-    car. While the first robot is in the car, a robot that has nothing sends END, as rmf-web does.
+    `through`: a supervisor is on the graph. `restarts`: the played supervisor restarts with a robot
+    in the car. While the first robot is in the car, a robot without a session sends END, as rmf-web
+    does.
     """
 
     def __init__(
@@ -157,7 +158,7 @@ class Ride(Performance):
         return said + self._disturb(now)
 
     def _disturb(self, now: float) -> list[Said]:
-        """What may happen with a robot in the car, when RMF has answered a state and is silent."""
+        """Disturb a ride: what may happen with a robot in the car, between two states."""
         said: list[Said] = []
         if self._stranger_due:
             self._stranger_due = False
@@ -185,7 +186,7 @@ class Ride(Performance):
 
     @property
     def left(self) -> bool:
-        """The lift shows none of us, and has been told."""
+        """END was sent, and the lift shows none of our sessions."""
         free = self._state is None or self._state.session_id not in self.play.names
         return self._leaving > 0 and free
 
@@ -255,7 +256,7 @@ class Passages(Performance):
 
     @property
     def left(self) -> bool:
-        """It has been told, and is not OPEN any more."""
+        """CLOSE was sent, and the door is no longer OPEN."""
         return self._leaving > 0 and self._mode != d.DoorModeValue.MODE_OPEN
 
 
@@ -288,7 +289,7 @@ class Charge(Performance):
 
     @property
     def over(self) -> bool:
-        """Ours is cancelled, or nothing came of it."""
+        """Our request is cancelled, or was never granted."""
         return bool(self.failed) or self._at.cancelled_at < NEVER
 
     def begin(self, now: float) -> list[Said]:
@@ -338,7 +339,7 @@ class Charge(Performance):
 
     @property
     def left(self) -> bool:
-        """It serves our request no more."""
+        """The charger no longer serves our request."""
         state = self._state
         shows = state is not None and state.state in SERVED and state.request_id == self._id
         return self._at.cancelled_at < NEVER and not shows

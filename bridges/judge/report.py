@@ -18,9 +18,9 @@ NARROWEST: Final = 60
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What is told of one judgement. `wall`: when it began (s since the epoch). `heard_s`: how long it
-    was listened for. `states`: how many the device sent. `others`: other devices of its kind.
-    `notes`: what the listener has to say."""
+    """One judgement. `wall`: when it began (s since the epoch). `heard_s`: how long we listened.
+    `states`: how many the device sent. `others`: other devices of its kind. `notes`: remarks of the
+    listener."""
 
     kind: Kind
     name: str
@@ -85,7 +85,7 @@ def _others(report: Report) -> str:
     if not report.others:
         return (
             ": check the name, the domain and the network. States that are published BEST_EFFORT are"
-            " not heard, by RMF on Cyclone DDS neither"
+            " not heard, nor does RMF on Cyclone DDS hear them"
         )
     some = ", ".join(shown(other) for other in report.others[:OTHERS])
     more = len(report.others) - OTHERS
@@ -118,7 +118,7 @@ class ReportJson(msgspec.Struct, frozen=True):
 
 
 def verdict(report: Report) -> Verdict:
-    """Of all laws together."""
+    """The verdict on all laws together."""
     return next((v for v in ORDER if report.of(v)), Verdict.NOT_SEEN)
 
 

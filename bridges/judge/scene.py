@@ -1,6 +1,6 @@
-"""What is remembered of one device while its messages are heard: a little, however many come.
+"""What is remembered of one device while its messages are heard; bounded, however many come.
 
-A scene takes messages and decides nothing; laws read it. What all three kinds have in common is here:
+A scene takes messages and decides nothing; laws read it. This file has what all three kinds share:
 the pace of states, their stamps, and what followed a request.
 """
 
@@ -15,14 +15,14 @@ from bridges.rmf import definitions as d
 from bridges.rmf import words
 
 SILENT_S: Final = 5.0
-"""The slowest pace of the contract is 2 s: two states are missing."""
+"""The slowest pace in the contract is a state every 2 s; after this long two are missing."""
 REMEMBERED: Final = 200
 """How many requesters a scene remembers; a site has some dozens."""
 BURST: Final = 20
 FROZEN_S: Final = 0.05
 ANSWERS_WITHIN_S: Final = 0.1
 EARLY_S: Final = 0.15
-"""Sooner than a timer jitters."""
+"""A state this early (s) cannot be explained by a timer's jitter."""
 
 NOT_YET: Final = float("-inf")
 
@@ -31,7 +31,7 @@ V = TypeVar("V")
 
 
 def keep(known: dict[str, V], key: str, value: V) -> None:
-    """Put it last, and forget the oldest where there are too many."""
+    """Put it last, and forget the oldest if there are too many."""
     known.pop(key, None)
     known[key] = value
     if len(known) > REMEMBERED:
@@ -42,7 +42,7 @@ class Scene(ABC, Generic[T]):
     """One device. Times are those of what was heard (s).
 
     `news`: the message taken last, None when only time has passed. `state`, `before`: the two latest
-    states; `before` is None at the first one, and after a silence: whoever speaks then may have
+    states; `before` is None at the first one, and after a silence, because the node may have
     restarted. `since`: when that was. `gap_s`: from one to the other. `frozen_s`: for how long the
     states have shown the same stamp. `burst_s`: how long the latest BURST unchanged states took.
     `back`: when stamps went backwards.
@@ -76,27 +76,27 @@ class Scene(ABC, Generic[T]):
         return self.take_other(heard)
 
     def pass_time(self, now: float) -> None:
-        """It is later, and nothing was heard."""
+        """Note that time has passed and nothing was heard."""
         self.now, self.news = now, None
 
     @abstractmethod
     def take_other(self, heard: Heard) -> bool:
-        """Take what is no state."""
+        """Take a message that is not a state."""
 
     @abstractmethod
     def settle(self, state: T) -> None:
         """Note what the new state means; `before` and `state` are set."""
 
     def forget(self) -> None:
-        """A silence is over: what was under way may have ended in it."""
+        """Forget what a silence may have ended."""
 
     def asked(self) -> None:
-        """A request to this device has been heard."""
+        """Note a request to this device."""
         self._asked_at = self.now
 
     @property
     def new(self) -> T | None:
-        """The state, if it is what was heard last."""
+        """The state, if it is the latest message."""
         return self.state if self.news is self.state else None
 
     @property
@@ -130,7 +130,8 @@ class Scene(ABC, Generic[T]):
         self.frozen_s = self.now - self._moved_at
 
     def _look_at_pace(self, state: T) -> None:
-        """A state that tells nothing new is due at the node's own pace, and at no request."""
+        """Note the pace of unchanged states: they are due at the node's own rate, never at a
+        request."""
         if self.before is None or _content(state) != _content(self.before):
             return
         self._unchanged.append(self.now)

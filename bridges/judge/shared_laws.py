@@ -1,4 +1,4 @@
-"""Laws that lifts, doors and chargers have in common; each kind gives them its own numbers."""
+"""Laws that lifts, doors and chargers share; each kind numbers them in its own contract."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,7 +11,7 @@ from bridges.rmf import words
 AnyScene = Scene[Any]
 
 STALE_S: Final = 5.0
-"""Older than any reading that a site may call fresh."""
+"""No site may call a reading of this age fresh."""
 BURST_WITHIN_S: Final = 1.0
 ANSWERS: Final = 5
 STEPS_BACK: Final = 4
@@ -19,10 +19,10 @@ STEPS_WITHIN_S: Final = 30.0
 
 
 def rate(scene: AnyScene) -> Finding:
-    """States go on coming."""
+    """States keep coming."""
     if scene.news is None:
         silent_s = scene.now - scene.heard_at
-        return f"silent since then: {silent_s:.1f} s" if silent_s > SILENT_S else None
+        return f"silent since then, for {silent_s:.1f} s" if silent_s > SILENT_S else None
     if scene.new is None or scene.states == 1:
         return None
     return KEPT if scene.gap_s <= SILENT_S else f"no state for {scene.gap_s:.1f} s before this one"
@@ -33,9 +33,9 @@ def answers(scene: AnyScene) -> Finding:
     if scene.new is None:
         return None
     if scene.burst_s < BURST_WITHIN_S:
-        return f"{BURST} states that tell nothing new in {scene.burst_s:.2f} s"
+        return f"{BURST} unchanged states in {scene.burst_s:.2f} s"
     if scene.answers >= ANSWERS:
-        return f"{ANSWERS} of 8 requests were each answered by a state that tells nothing new"
+        return f"{ANSWERS} of 8 requests were each answered by an unchanged state"
     return KEPT
 
 
@@ -62,7 +62,7 @@ def stamped(blind: Callable[[Any], bool]) -> Callable[[AnyScene], Finding]:
 
 
 def fresh(claims: Callable[[Any], bool], stale_s: float = STALE_S) -> Callable[[AnyScene], Finding]:
-    """What a robot acts on is no old reading. `claims(state)`: a robot would act on it."""
+    """A robot must not act on an old reading. `claims(state)`: a robot would act on it."""
 
     def check(scene: AnyScene) -> Finding:
         state = scene.new
@@ -77,7 +77,7 @@ def fresh(claims: Callable[[Any], bool], stale_s: float = STALE_S) -> Callable[[
 
 RATE: Final[Law[AnyScene]] = Law(
     "RATE",
-    "States go on coming, whether the hardware answers or not: never 5 s without one",
+    "States keep coming, whether the hardware answers or not: never 5 s without one",
     "A fleet adapter asks and releases once for each state: without states it waits for ever",
     "rmf_ros2 agv/RobotContext.cpp:1700-1735",
     rate,
@@ -85,22 +85,22 @@ RATE: Final[Law[AnyScene]] = Law(
 ANSWERED: Final[Law[AnyScene]] = Law(
     "ANSWER",
     "No request causes a state: states come by timer and by change",
-    "RMF repeats its request at each state: a state for each request is a loop without end",
+    "RMF repeats its request at each state: a state for each request would loop for ever",
     "rmf_ros2 agv/RobotContext.cpp:1732-1735, lift_supervisor/Node.cpp:58-140",
     answers,
     sensed=True,  # a noisy wire may change what is noted beside the state, ten times a second
 )
 ONE: Final[Law[AnyScene]] = Law(
     "ONE",
-    "Only one node speaks under this name",
-    "RMF believes the latest state, so two nodes make a device that jumps between two truths",
+    "Only one node publishes under this name",
+    "RMF believes the latest state: with two nodes the device would jump between two states",
     "follows from RequestLift.cpp and DoorOpen.cpp, which keep one state",
     one_node,
 )
 STAMP: Final[Law[AnyScene]] = Law(
     "STAMP",
-    "A state that claims anything has the time of its reading",
-    "Without it nobody can tell a sensor's word from a memory; 0 means: never read",
+    "A state that claims anything carries the time of its reading",
+    "Without it a reading cannot be told from a remembered value; 0 means: never read",
     "LiftState.msg, DoorState.msg, ChargerState.msg: the time of the state",
     stamped(lambda state: True),
 )

@@ -1,4 +1,4 @@
-"""From the first message to the verdict: listen, play if that is wanted and allowed, leave, judge.
+"""From the first message to the verdict: listen, play if asked and allowed, release, judge.
 
 Without I/O and clock, so that it is the same on a wire and in virtual time. The shell hands over what
 it hears, publishes what is returned, and calls `turn` at `wake_at`.
@@ -15,15 +15,15 @@ from bridges.recording.heard import Heard
 from bridges.rmf_rules import NEVER, Said
 
 LISTENS_S: Final = 4.0
-"""Before anything is played: the device's state has come, and others have been found."""
+"""Wait this long before a play: for the device's state, and to find other nodes."""
 APPEARS_S: Final = 15.0
-"""So long the first state may take: nodes find each other."""
+"""The first state may take this long, because nodes must find each other."""
 SETTLES_S: Final = 4.0
-"""After it: so long a law may need to be seen broken."""
+"""Listen this long after a play: a law may need it to be seen broken."""
 
 
 class Act(Enum):
-    """What is going on."""
+    """The act that is under way."""
 
     LISTEN = auto()
     PLAY = auto()
@@ -33,8 +33,9 @@ class Act(Enum):
 
 
 class Stage:
-    """`for_s`: how long to listen without a play; inf: until `stop`. `strangers()`: who else speaks
-    where the play would, "" for nobody. `note`: why a play was not played, or not to its end.
+    """`for_s`: how long to listen without a play; inf: until `stop`. `strangers()`: who else
+    publishes on the play's topics, "" for nobody. `note`: why a play was not played, or not to its
+    end.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class Stage:
 
     @property
     def done(self) -> bool:
-        """There is a verdict."""
+        """Is there a verdict?"""
         return self.act is Act.DONE
 
     def begin(self, at: float, wall: float) -> None:
@@ -85,7 +86,7 @@ class Stage:
         return self._told(said)
 
     def turn(self, at: float, wall: float) -> list[Said]:
-        """Time has passed."""
+        """Do what is due now."""
         self._last = (at, wall)
         match self.act:
             case Act.LISTEN if at >= self._until:
@@ -105,7 +106,7 @@ class Stage:
         return NEVER if self.act is Act.DONE else self._until
 
     def stop(self) -> list[Said]:
-        """Enough: let go of the device first, if we have it. May be called again."""
+        """End early, after the device is released if we have it. May be called again."""
         if self.act is Act.PLAY:
             self.note, self._in_haste = "interrupted", True
             return self._begin_leaving()
@@ -116,7 +117,8 @@ class Stage:
 
     @property
     def _now(self) -> float:
-        """RMF's clock: the wall clock of the beginning, which no step bends."""
+        """RMF's clock: the wall clock at the beginning plus the time since, so that no step changes
+        it."""
         return self._epoch + self._last[0]
 
     def _begin_play(self) -> list[Said]:
@@ -158,7 +160,7 @@ class Stage:
         late = self._last[0] >= self._leave_until
         if self._performance.left or late:
             if not self._performance.left:
-                self.note = f"{self.note or 'played'}; and it has not been let go".lstrip("; ")
+                self.note = f"{self.note or 'played'}; and the device was not released".lstrip("; ")
             self._settle()
             return []
         self._until = self._last[0] + REPEAT_S
@@ -169,7 +171,7 @@ class Stage:
         self._until = self._last[0] + SETTLES_S
 
     def _told(self, said: list[Said]) -> list[Said]:
-        """Ours is judged as everybody's is: what the device is asked."""
+        """Judge what we publish like everybody's messages."""
         at, wall = self._last
         for topic, message in said:
             self.judge.hear(Heard(at, wall, topic.name, message))

@@ -197,8 +197,8 @@ def test_a_file_without_its_section_says_what_is_missing(tmp_path: Path) -> None
 def test_a_setting_that_works_but_not_well_is_warned_of() -> None:
     warnings = "\n".join(map(str, load(CONFIG).warnings))
     assert warnings.endswith(
-        "tiny/AMR03 charges only at 'charger_b': if a charge fails there, nothing shows whether robot or"
-        " charger is at fault"
+        "tiny/AMR03 charges only at 'charger_b': if a charge fails there, nothing shows whether robot"
+        " or charger is at fault"
     )
     assert KIND.warnings is not None
     near = [text for _, text in KIND.warnings(settings(near_m=5.0))]

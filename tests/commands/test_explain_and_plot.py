@@ -46,7 +46,7 @@ def test_a_recording_is_explained(bag: Path, capsys: pytest.CaptureFixture[str])
     assert run("explain", bag) == 0
     told = capsys.readouterr().out.splitlines()
     assert told[0] == "lift Lift1, heard from 2027-01-15 08:00:04 to 08:00:17 (14 s)"
-    assert told[2] == "fleet/blue waits for Lift1 at L1 since 08:00:08 (9.7 s)."
+    assert told[2] == "fleet/blue has waited for Lift1 at L1 since 08:00:08 (9.7 s)."
 
 
 def test_explain_prints_json_on_request(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -210,7 +210,7 @@ def test_a_node_that_dies_in_the_middle_is_accused_of_silence_and_nothing_else()
     judge = judged(STATE, lift("fleet/red", "L1"), replace(STATE, session_id="fleet/red"))
     found = {j.law.id: j for j in judge.end(30.0, EPOCH + 30.0) if j.verdict is Verdict.BROKEN}
     assert list(found) == ["L2.rate"]
-    assert found["L2.rate"].evidence[0].text == "silent since then: 29.0 s"
+    assert found["L2.rate"].evidence[0].text == "silent since then, for 29.0 s"
 
 
 def test_a_node_that_comes_back_after_a_silence_may_have_forgotten_its_session() -> None:
