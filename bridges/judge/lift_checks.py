@@ -88,7 +88,9 @@ def grants(scene: LiftScene) -> Finding:
         served = ask.floors[-1] in scene.new.available_floors or not scene.new.available_floors
         long_s = min(free_s, scene.now - ask.since)
         if asked and served and session and not ask.human and long_s > GRANTS_WITHIN_S:
-            return f"{shown(session)} has asked {ask.times} times in {long_s:.0f} s; the lift is free"
+            return (
+                f"{shown(session)} has asked {ask.times} times in {long_s:.0f} s; the lift is free"
+            )
     return None
 
 

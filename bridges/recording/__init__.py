@@ -1,1 +1,1 @@
-"""What was heard on RMF's graph and done by a daemon, as it is kept, read again and understood."""
+"""What was heard on RMF's graph and what a daemon did: stored, read again and understood."""

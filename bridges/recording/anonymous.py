@@ -1,10 +1,10 @@
 """An incident without the site's names: each becomes `name01`, `name02` …, the same one everywhere.
 
-Names are what RMF's messages say in their fields of names, what the cores remember as one word, the
-devices, and what the YAML names. They are replaced in messages, memories, notes and the YAML, also
+Names are the name fields of RMF's messages, the single words that cores remember, the devices, and
+what the YAML names. They are replaced in messages, memories, notes and the YAML, also
 inside of texts. Their order stays, because cores sort by names. A word that is also one of ours (a key
-or a value of the YAML, a word of a core, a topic) stays: replacing it would make another recording.
-Comments of the YAML go; the addresses of its buses become `192.0.2.1`.
+or a value of the YAML, a word of a core, a topic) stays: without it the recording would no longer
+be the same. Comments of the YAML go; the addresses of its buses become `192.0.2.1`.
 """
 
 import enum
@@ -37,7 +37,7 @@ from bridges.settings.reference import schema
 FREE_TEXTS: Final = frozenset(
     {"error_message", "message", "title", "subtitle", "value", "performing_action", "model"}
 )
-"""Fields of messages that hold sentences: names inside them are replaced, they are none themselves."""
+"""Fields of messages that hold sentences. They are not names, but names inside them are replaced."""
 SAID: Final = FREE_TEXTS | {"code", "detail", "reason", "code_fault", "errors", "lost", "io_fault"}
 """Fields of a core's values that hold its own words."""
 NAME: Final = re.compile(r"(?!\d+$)[\w./-]{1,128}")
@@ -98,7 +98,7 @@ def _names_in(value: object, field: str = "") -> Iterator[str]:
 
 
 def _remembered(incident: Incident) -> Iterator[str]:
-    """Each text of one word in a memory or an event, but for what a core says in its own words."""
+    """Each text of one word in a memory or an event, except a core's own words."""
     for entry in incident.entries:
         if isinstance(entry, Known):
             yield from _tree_names([entry.memory, entry.reading])

@@ -2,7 +2,7 @@
 a daemon's ring itself.
 
 A recording is read as a stream, in bounded memory. Topics and types that are not RMF's are skipped and
-counted. If it is damaged, what can be read is given, and then the damage is told.
+counted. If it is damaged, what can be read is yielded, and then the damage is noted.
 
 In our own files `log_time` is by a clock that never steps, and `publish_time` by the wall clock. Others
 have one clock, which may step: then `at` goes on from where it was.
@@ -28,9 +28,9 @@ log = logging.getLogger(__name__)
 
 NS: Final = 1e-9
 CONTINUOUS: Final = "all"
-"""So our recorder calls the files of `keep: continuous`, where it names what others are for."""
+"""The word in the names of `keep: continuous` files; other files have their cause there."""
 STEPPED_NS: Final = 10**9
-"""A clock was set back if it goes back by so much; less is the recorder's disorder."""
+"""A clock that goes back by this much was set back; less is disorder in the recording."""
 LONGEST_MESSAGE: Final = 8 << 20
 INSTALL: Final = "pip install 'rmf-bridges[recording,sqlite]'"
 
@@ -50,8 +50,8 @@ def all_in(
     """Every message of RMF in a recording, and every text of ours, in the order of recording.
 
     `path`: an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. What is skipped or damaged
-    is noted in `notes`; damage is logged where there are none. What `keep` does not want is left out
-    undecoded, which takes a tenth of the time. Raises BagError if it is no recording at all.
+    is noted in `notes`; damage is logged where there are none. What `keep` does not want is skipped
+    undecoded, which takes a tenth of the time. Raises BagError if it is not a recording.
     """
     noted = Notes() if notes is None else notes
     clock = _Clock()
@@ -93,7 +93,7 @@ def _raw(path: Path, noted: Notes) -> Iterator[Raw]:
 
 
 def _parts(path: Path) -> list[Path]:
-    """The files of a recording in their order; its directory, if the whole is read at once."""
+    """The files of a recording in their order; its directory, if that is read as a whole."""
     try:
         if not path.is_dir():
             return [path]
@@ -106,7 +106,7 @@ def _parts(path: Path) -> list[Path]:
         raise BagError(f"{path} is compressed as whole files: unpack them with zstd -d")
     databases = [file for file in files if file.suffix == ".db3"]
     if not databases:
-        raise BagError(f"{path} holds no recording: no .mcap or .db3 file is in it")
+        raise BagError(f"{path} holds no recording: it has no .mcap or .db3 file")
     return [path] if (path / "metadata.yaml").exists() else databases
 
 
@@ -136,7 +136,7 @@ def _raw_of(part: Path, noted: Notes) -> Iterator[Raw]:
             return sqlite_bags.raw_in(part, noted)
     except ImportError as error:
         raise BagError(f"to read {part}, {error.name} is needed: {INSTALL}") from None
-    raise BagError(f"{part} is no recording: neither MCAP nor a .db3 file of rosbag2")
+    raise BagError(f"{part} is not a recording: neither MCAP nor a .db3 file of rosbag2")
 
 
 def _of_ring(path: Path) -> Iterator[Raw]:
@@ -153,7 +153,7 @@ def _of_ring(path: Path) -> Iterator[Raw]:
 
 
 def _beginning(path: Path) -> bytes:
-    """Raises BagError if it cannot be read, or is no regular file."""
+    """Raises BagError if it cannot be read, or is not a regular file."""
     try:
         return user_files.read(path, 15).content
     except OSError as error:

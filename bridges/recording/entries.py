@@ -54,8 +54,8 @@ class Spoken(Entry, frozen=True, tag_field="is", tag=1):
 
 
 class Known(Entry, frozen=True, tag_field="is", tag=2):
-    """All that is to be known of a subject to go on from here: its memory, the last reading, and what
-    was last decided; None before the first. `anew`: the memory is not what the last decision left."""
+    """All that a replay needs to start here: a subject's memory, its last reading, and what was last
+    decided; None before the first. `anew`: the memory is not what the last decision left."""
 
     subject: str
     memory: Tree
@@ -66,8 +66,8 @@ class Known(Entry, frozen=True, tag_field="is", tag=2):
 
 
 class Step(Entry, frozen=True, tag_field="is", tag=3):
-    """An event, and what the core decided. `outputs`, `news`, `faults`: empty where as before, else
-    the new one."""
+    """An event, and what the core decided. `outputs`, `news`, `faults`: only those that have
+    changed."""
 
     subject: str
     event: Tree
@@ -105,7 +105,7 @@ class Died(Entry, frozen=True, tag_field="is", tag=7):
 
 
 class Lost(Entry, frozen=True, tag_field="is", tag=8):
-    """So many entries could not be kept."""
+    """This many entries could not be stored."""
 
     number: int
 

@@ -11,8 +11,8 @@ from bridges.recording.sources import BagError, Notes
 
 
 def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """The run of a daemon that a file is of, and its entries. Of a directory: the first run, and the
-    entries of all files, in the order of their names. Raises BagError."""
+    """The run of a daemon in a file, and its entries. In a directory: the first run, and its entries in
+    all files, in the order of their names. Raises BagError."""
     if path.is_dir():
         return _of_all(sorted(path.glob("*.mcap")), path, notes)
     try:
@@ -33,9 +33,9 @@ def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
 
 
 def _of_all(files: list[Path], folder: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """Of the daemon of the first file; its continuous files alone, if it has any."""
+    """The entries of the first file's daemon; only its continuous files, if it has any."""
     if not files:
-        raise BagError(f"{folder} holds no recording: no .mcap file is in it")
+        raise BagError(f"{folder} holds no recording: it has no .mcap file")
     files = continuous(files)
     head, _ = opened(files[0], notes)
     return head, _in_turn(files, head, notes)

@@ -12,8 +12,8 @@ from bridges.rmf.definitions import Message
 class Heard(Struct, frozen=True):
     """A message, its topic's ROS name, and when it arrived.
 
-    `at`: s on a clock that never steps; its zero means nothing. `wall`: s since the epoch, as the
-    clock of the listening machine said it, so that stamps can be compared with it.
+    `at`: s on a clock that never steps, from any zero. `wall`: s since the epoch, by the clock of the
+    listening machine, so that stamps can be compared with it.
     """
 
     at: float

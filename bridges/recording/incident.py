@@ -1,4 +1,4 @@
-"""One incident: the part of a daemon's entries that belongs to it, and what is said of it. Pure."""
+"""One incident: the entries of a daemon that belong to it, and why it was recorded. Pure."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -25,7 +25,7 @@ class Note(msgspec.Struct, frozen=True):
 
 
 class Incident(msgspec.Struct, frozen=True):
-    """What a file holds. `entries` begin where all that is needed to decide again is known."""
+    """The content of a file. `entries` begin where everything that a replay needs is known."""
 
     head: Head
     entries: Sequence[AnyEntry]
@@ -54,7 +54,7 @@ def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]
 
 
 def readable(step: Step) -> Iterator[tuple[str, Tree]]:
-    """What a step shows, as (topic, JSON): who asks Foxglove or `ros2 bag` reads these."""
+    """A step as (topic, JSON), for readers in Foxglove or `ros2 bag`."""
     event = step.event if isinstance(step.event, dict) else {}
     kind = str(event.get("", ""))
     if kind == READINGS[0]:

@@ -1,4 +1,4 @@
-"""Reads the files that our recorder wrote: the daemon's run, and what happened, to be decided again."""
+"""Reads the files that our recorder wrote: the daemon's run, and its entries, for a replay."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +18,7 @@ NONE = "{} has no entries of an rmf-bridge daemon: only a recording that has the
 
 
 def head_of(path: Path) -> Head:
-    """The run of a daemon that a file is of. Raises BagError."""
+    """The run of the daemon that a file is from. Raises BagError."""
     try:
         for record in records(path):
             if isinstance(record, Metadata) and record.name == HEAD:

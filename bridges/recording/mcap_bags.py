@@ -12,7 +12,7 @@ from bridges.recording.sources import Notes, Raw, Source, releases, source
 from bridges.rmf.releases import Release
 
 LIBRARY: Final = "rmf-bridges"
-"""With this the `library` in the header of our own files begins."""
+"""How the `library` in the header of our own files begins."""
 NO_CHANNEL: Final = Source("", None, "of no channel")
 
 
@@ -35,7 +35,7 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
 
 
 class _Declared:
-    """What a file has said so far of itself. `ours`: our recorder wrote it. `sources`: by channel."""
+    """What a file has declared so far. `ours`: our recorder wrote it. `sources`: by channel."""
 
     def __init__(self) -> None:
         self.ours = False
@@ -43,7 +43,7 @@ class _Declared:
         self._types: dict[int, tuple[str, list[Release]]] = {}
 
     def is_ours(self, found: Source) -> bool:
-        """Is it a topic of our recorder's own?"""
+        """Is it one of our recorder's own topics?"""
         return self.ours and found.topic.startswith(OWN_TOPICS)
 
     def take(self, record: McapRecord) -> None:

@@ -1,7 +1,7 @@
 """Reads the records of an MCAP file, whoever wrote it: in bounded memory, and in time that the file's
 size bounds.
 
-Nothing in the file is believed before it is checked: a length may lie, a chunk may unpack to
+Everything in the file is checked before it is used: a length may be false, a chunk may unpack to
 gigabytes, the end may be missing. The index is not used, so a file without one is read as well. Format:
 https://mcap.dev/spec (version 0).
 """
@@ -21,11 +21,12 @@ from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata, 
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 LONGEST_RECORD: Final = 64 << 20
-"""Of a record, and of what a chunk unpacks to. rosbag2 and Foxglove write chunks of 1 to 8 MB."""
+"""The longest record, and the most that a chunk unpacks to (bytes). rosbag2 and Foxglove write chunks
+of 1 to 8 MB."""
 MOST_UNPACKED: Final = 200
-"""A file may unpack to this many times its size, beyond one chunk: more is no recording."""
+"""A file may unpack to this many times its size, and one chunk: more cannot be a recording."""
 MOST_DECLARED: Final = 10_000
-"""Schemas, and channels."""
+"""The most schemas and channels of a file."""
 FRAME: Final = 9
 """Each record begins with its opcode (1 byte) and its length (8 bytes)."""
 
@@ -67,14 +68,14 @@ def records(path: Path) -> Iterator[McapRecord]:
 
 
 class _Allowances:
-    """What is left of a file's allowances."""
+    """How much more of a file may be unpacked, and how many more channels it may declare."""
 
     def __init__(self, size: int) -> None:
         self._unpacked = LONGEST_RECORD + MOST_UNPACKED * size
         self._declared = MOST_DECLARED
 
     def records(self, source: IO[bytes], size: int) -> Iterator[McapRecord]:
-        """Those from here to the end of the data."""
+        """The records from here to the end of the data."""
         while True:
             at = source.tell()
             opcode, body = _body(source, at, size)

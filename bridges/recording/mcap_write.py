@@ -55,7 +55,7 @@ files: []
 custom_data: ~
 ros_distro: {distro}
 """
-"""Tells rosbag2 the version; the rest it takes from the file's own index."""
+"""Gives rosbag2 the version; it takes the rest from the file's own index."""
 KNOWN_QOS: Final = {topic.name: topic.publish for topic in topics.every()}
 
 

@@ -1,8 +1,8 @@
 """The recorder: one process beside all daemons of a machine, which turns their rings into files.
 
-It has no devices, and no daemon waits for it. Each second it reads what is new in each ring. What gives
-reason for a recording (`triggers.py`) makes a file, once what follows is there too. Nothing is written
-while all is well, unless a YAML asks for `keep: continuous`.
+It has no devices, and no daemon waits for it. Each second it reads what is new in each ring. An
+entry that triggers a recording (`triggers.py`) makes a file, once what follows is in the ring too.
+Nothing is written while all is well, unless a YAML asks for `keep: continuous`.
 """
 
 import logging
@@ -24,9 +24,9 @@ from bridges.recording.triggers import AGAIN_S, DIED, Triggers
 log = logging.getLogger(__name__)
 
 LATE_S: Final = 60.0
-"""What is older than this when a ring is first seen was seen by an earlier recorder."""
+"""An entry older than this when a ring is first seen was handled by an earlier recorder."""
 GRACE_S: Final = 2.0
-"""So much later than what follows, it is in the ring."""
+"""After this much more time, what follows is certainly in the ring."""
 PART_S: Final = 300.0
 """How much one file of `keep: continuous` holds."""
 
@@ -54,7 +54,7 @@ class Recorder:
             self._finish(self._followed.pop(folder))
 
     def close(self) -> None:
-        """Write what has begun, with what there is."""
+        """Write the recordings that have begun, as far as they go."""
         for followed in self._followed.values():
             self._finish(followed)
         self._followed.clear()
@@ -88,8 +88,8 @@ class Recorder:
             self._put(*due)
 
     def _take_died(self, path: Path) -> None:
-        """A ring that a run left without ending in good order is a recording, once. A run that never
-        served has nothing to show: a start that fails is in the log."""
+        """Record the ring of a run that did not end in good order, once. A run that never served has
+        nothing to show: a failed start is in the log."""
         try:
             identity = _identity(path)
             if identity in self._seen_dead:
@@ -106,7 +106,7 @@ class Recorder:
             self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DIED)
 
     def _is_first(self, head: Head) -> bool:
-        """Is it not recorded yet, and no part of a row of deaths at each start?"""
+        """Is it not recorded yet, and not one of many deaths in a row?"""
         last = self._died_at.get(head.file, AGES_AGO)
         if self._shelf.has(head, DIED) or self._now() < last + AGAIN_S:
             return False
@@ -114,7 +114,7 @@ class Recorder:
         return True
 
     def _put(self, incident: Incident, code: str) -> None:
-        """Write a file; what fails is said once, and lost."""
+        """Write a file. A failure is logged once, and the recording is lost."""
         try:
             path = self._shelf.put(incident, wall_of(incident.entries), code)
         except OSError as error:
@@ -129,7 +129,7 @@ class Recorder:
 
 
 class _Followed:
-    """One ring, and what of it is to become a file."""
+    """One ring, and the parts of it that are to become files."""
 
     def __init__(self, path: Path, now: float) -> None:
         """Raises RingError."""
@@ -159,7 +159,7 @@ class _Followed:
             self._part += new
 
     def due(self, now: float) -> list[tuple[Incident, str]]:
-        """What is complete at this time; all that has begun, at infinity."""
+        """The recordings that are complete now; with `now` infinite, all that have begun."""
         found = []
         if self._notes and now >= self._notes[0].at + AFTER_S + GRACE_S:
             found.append(self._incident())
@@ -177,7 +177,7 @@ class _Followed:
         return Incident(read.head, entries, notes), first.code
 
     def _read(self) -> Read:
-        """The ring as it is now; as it was at the beginning, where it is gone."""
+        """The ring as it is now; as it was at first, if it is gone."""
         try:
             read = Read(self._tail.path)
             if read.head.run == self.head.run:
@@ -188,7 +188,8 @@ class _Followed:
         return self._kept
 
     def _continuous(self, *, whole: bool) -> list[tuple[Incident, str]]:
-        """What has come since the last file, up to where all is known: each file stands alone."""
+        """What has come since the last file, up to a place where all is known: each file stands
+        alone."""
         known = [at for at in range(1, len(self._part)) if begins(self._part, at)]
         end = len(self._part) if whole or not known else known[-1]
         entries, self._part = self._part[:end], self._part[end:]
@@ -196,13 +197,13 @@ class _Followed:
 
 
 def _last_words(entries: Sequence[AnyEntry]) -> str:
-    """Of what a run has died, as far as it said so."""
+    """Why a run died, as far as it said so."""
     for entry in entries:
         if isinstance(entry, Died):
             return entry.reason
     if isinstance(entries[-1], Ended):
         return "it ended, and not every output was verified off"
-    return "it ended without a word: killed, or the machine stopped"
+    return "it ended without an entry: killed, or the machine stopped"
 
 
 def _runs(pid: int) -> bool:
@@ -217,7 +218,7 @@ def _runs(pid: int) -> bool:
 
 
 def begins(entries: Sequence[AnyEntry], at: int) -> bool:
-    """Is all that is known said from this place on?"""
+    """Do the entries from this place on begin with all that is known?"""
     following = entries[at + 1 : at + 2]
     return isinstance(entries[at], Clocks) and bool(following) and isinstance(following[0], Known)
 

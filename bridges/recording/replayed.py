@@ -1,8 +1,8 @@
 """A recording played again: today's core decides on what was recorded, and each decision is compared.
 
 A core is a pure function of its memory, an event, the time and its limits. A recording has the memory
-at its beginning and every event, so the decisions come out the same, to the bit, or the core or its
-limits have changed.
+at its beginning and every event. So the decisions come out the same, to the bit, unless the core or
+its limits have changed.
 """
 
 import struct
@@ -34,9 +34,9 @@ AnyDecision = Decision[Any, Any, Any]
 Parts = tuple[str, Tree, Tree]
 """A part of a decision that differs: its name, as recorded, and today."""
 CONTEXT: Final = 6
-"""So many events before a difference are told with it."""
+"""A difference is reported with this many events before it."""
 PARTS: Final = ("outputs", "news", "refused")
-"""What is compared where other limits are tried: what anybody sees."""
+"""The parts that are compared when other limits are tried: those that are visible from outside."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Core:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Where a decision is another one. `wall`: when (s since the epoch). `what`: which part of it.
+    """A decision that differs. `wall`: when (s since the epoch). `what`: which part of it.
 
     `before`: the last events up to this one, each with its time, in words.
     """
@@ -65,7 +65,7 @@ class Difference:
 @dataclass(slots=True)
 class Course:
     """How far a replay has come. `decisions`: how many were compared. `unusable`: entries of subjects
-    that cannot be replayed. `subjects`: those that were. `began`, `ended`: s since the epoch."""
+    that cannot be replayed. `subjects`: those that can. `began`, `ended`: s since the epoch."""
 
     decisions: int = 0
     unusable: int = 0
@@ -119,7 +119,7 @@ def _with(decide: Callable[..., Any], limits: Any) -> Callable[[Any, Any, float]
 
 
 class _Subject:
-    """One subject, decided on again from its memory on."""
+    """One subject, whose decisions are made again from its memory on."""
 
     def __init__(self, core: Core, known: Known) -> None:
         self._core = core
@@ -215,8 +215,8 @@ class Replay:
                     break
 
     def changes(self) -> Iterator[Difference]:
-        """Where other limits decide something else: each time that outputs, state or refusal begin to
-        differ, differ in another way, or are as recorded again."""
+        """Where other limits decide differently: each time that outputs, state or refusal begin to
+        differ, differ in another way, or become as recorded again."""
         shown: dict[tuple[str, str], Tree] = {}
         for entry in self._entries:
             self.course.reach(entry)
@@ -288,4 +288,4 @@ def times(entry: Same) -> tuple[float, ...]:
     try:
         return struct.unpack(f"<{len(entry.times) // 8}d", entry.times)
     except struct.error as error:
-        raise UnknownValue(f"no times: {error}") from error
+        raise UnknownValue(f"not a list of times: {error}") from error

@@ -3,7 +3,8 @@
 It has a head, then SEGMENTS of equal size, used in turn. Each begins with its number and with what was
 known of every subject; entries follow, each with its length and a checksum. The checksum also covers
 the segment's number, so an entry of an earlier turn, or one that a kill has torn, is never taken for
-one. It is written with `pwrite`, not mapped: if somebody truncates the file, that is no fatal signal.
+a valid one. It is written with `pwrite`, not mapped: if somebody truncates the file, no signal
+kills the daemon.
 """
 
 import os
@@ -36,14 +37,14 @@ DIED: Final = "ring.died"
 
 
 class RingError(Exception):
-    """The file is no ring, or it cannot be read."""
+    """The file is not a ring, or it cannot be read."""
 
 
 class Ring:
-    """The writing end. Each method may raise OSError; then the ring is to be made anew."""
+    """The writing end. Each method may raise OSError; then a new ring must be made."""
 
     def __init__(self, folder: Path, head: Head, size: int) -> None:
-        """Make the file, with all its space claimed; the ring of a run that died is kept beside it."""
+        """Make the file, with all its space claimed. The ring of a run that died stays beside it."""
         self.path = folder / NAME
         self._segment_size = max(size // SEGMENTS, PAGE)
         told = entries.encode(head)
@@ -79,7 +80,7 @@ class Ring:
         return self._segment_size - MARK.size - 2 * FRAME.size
 
     def fits(self, length: int) -> bool:
-        """Whether so many bytes of entries (with `frame`) still fit into this segment."""
+        """Whether this many bytes of entries (with `frame`) still fit into this segment."""
         return self._offset + length + FRAME.size <= self._segment_size
 
     def begin_segment(self) -> None:
@@ -100,7 +101,7 @@ class Ring:
         self._offset += len(frames)
 
     def close(self, *, ended: bool) -> None:
-        """`ended`: the run ended in good order, so its ring need not be kept."""
+        """`ended`: the run ended in good order, so its ring is not needed."""
         try:
             if ended:
                 os.pwrite(self._file, b"\1", ENDED_AT)
@@ -208,7 +209,7 @@ def _top(path: Path) -> tuple[Head, int, int]:
         (checksum,) = struct.unpack_from("<I", content, TOP.size)
         told = content[TOP.size + 4 : TOP.size + 4 + length]
         if magic != MAGIC or zlib.crc32(told) != checksum or size < PAGE:
-            raise RingError(f"{path} is no ring of this version")
+            raise RingError(f"{path} is not a ring of this version")
         return entries.decode_head(told), -(-(TOP.size + 4 + length) // PAGE) * PAGE, size
     except OSError as error:
         raise RingError(f"{path} cannot be read: {error.strerror}") from None

@@ -1,4 +1,4 @@
-"""What has been seen of a subject, as its ring shows it, and the entries that say so."""
+"""What a ring already says of a subject, and the entries that say it."""
 
 from typing import Any
 
@@ -33,7 +33,8 @@ class Seen:
 
 
 def known(name: str, subject: Seen, now: float, *, anew: bool = False) -> Known:
-    """All that is to be known of a subject. `anew`: its memory is not what was decided last."""
+    """The entry with all that a replay needs of a subject. `anew`: its memory is not what the last
+    decision left."""
     return Known(
         now,
         name,
@@ -53,7 +54,7 @@ def step(
     decision: AnyDecision,
     news: object,
 ) -> Step:
-    """The entry of a decision: what is as before is left out."""
+    """The entry of a decision: what has not changed is left out."""
     faults, before = decision.report.faults, subject.report
     return Step(
         now,

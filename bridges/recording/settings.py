@@ -1,4 +1,4 @@
-"""The `recording:` section of a YAML: what is kept of what happened, and where."""
+"""The `recording:` section of a YAML: what is recorded, and how much of it is stored."""
 
 from typing import Annotated, Literal
 
@@ -12,14 +12,15 @@ Patience = Annotated[float, Meta(ge=10, le=86400, extra={"unit": "s"})]
 
 
 class Recording(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is kept of what happened. Nothing is written to a disk while all is well.
+    """What is recorded of the daemon's work. Nothing is written to a disk while all is well.
 
     `keep`: `ring` keeps the last minutes in memory, and the recorder makes a file of them when
     something goes wrong; `continuous` makes files of everything, the oldest of which go; `nothing`
     keeps nothing.
     `ring_mb`: the size of the ring. 1 MB is 10 minutes or more of a lift.
-    `files`, `files_mb`: how many files of this daemon, and how much of the disk, the recorder keeps.
-    `waiting_s`: after so long without what was requested a file is made.
+    `files`, `files_mb`: how many files of this daemon the recorder keeps, and how large they may be
+    together.
+    `waiting_s`: a file is made when somebody has waited this long for what was requested.
     """
 
     keep: Literal["nothing", "ring", "continuous"] = "ring"

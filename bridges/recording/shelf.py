@@ -1,4 +1,4 @@
-"""Where recordings lie on a disk: their names, and the bounds that an SD card survives."""
+"""Where recordings are stored: their names, and bounds that spare an SD card."""
 
 import os
 from contextlib import suppress
@@ -25,7 +25,7 @@ class Shelf:
         self.folder = folder
 
     def tidy(self) -> None:
-        """Remove what a recorder that died has begun and not ended."""
+        """Remove the unfinished files of a recorder that died."""
         for begun in self.folder.glob(f".*{SUFFIX}.part"):
             with suppress(OSError):
                 begun.unlink()
@@ -74,5 +74,5 @@ def _stem(head: Head) -> str:
 
 
 def _is_of(path: Path, head: Head) -> bool:
-    """`door` has no part in what `door_1` has."""
+    """Is this a file of that daemon? A file of `door_1` is not one of `door`."""
     return path.stem.rsplit("_", 4)[0] == _stem(head)

@@ -25,7 +25,7 @@ class NotReplayable(BagError):
 
 @dataclass(slots=True)
 class Notes:
-    """What was not given. `skipped`: messages by reason. `damage`: why the end is missing, if it is."""
+    """What is missing. `skipped`: messages by reason. `damage`: why the end is missing, if it is."""
 
     skipped: Counter[str] = field(default_factory=Counter)
     damage: str = ""
@@ -39,7 +39,7 @@ class Notes:
 class Raw(NamedTuple):
     """A message as it was recorded. `at`, `wall`: ns by the recorder's and by the wall clock.
 
-    `decode`: None for a text of our own recorder's.
+    `decode`: None for a text of our own recorder.
     """
 
     at: int
@@ -70,7 +70,7 @@ def source(topic: str, type_name: str, releases: list[Release]) -> Source:
 
 
 def releases(type_name: str, definition: str, digest: str = "") -> list[Release]:
-    """Those that a message may be of; where the recording does not say, all that have it.
+    """The releases that a message may be of; if the recording does not say, all that have it.
 
     `definition`: its text, or "". `digest`: its RIHS01 hash, or "".
     """

@@ -2,8 +2,8 @@
 
 A tree holds None, bool, int, float, str, lists and mappings with text as keys. A tuple is a
 list; anything else is a mapping whose key `""` names its type below `bridges` (`lift.memory.Session`),
-with its fields beside it, or what it holds under `=`. Only types that merely hold values are made
-again: no recording can have anything else called.
+with its fields beside it, or what it holds under `=`. Only types that merely hold values are
+created: no recording can call anything else.
 """
 
 import importlib
@@ -68,7 +68,7 @@ def _other(value: object) -> Tree:
         return {TYPE: MAP, HOLDS: [[tree(key), tree(part)] for key, part in value.items()]}
     if isinstance(value, tuple):  # with names
         return {TYPE: _name(type(value)), HOLDS: [tree(part) for part in value]}
-    raise TypeError(f"{type(value).__name__} is no value of a core")
+    raise TypeError(f"{type(value).__name__} is not a value of a core")
 
 
 def value(found: Tree) -> Any:
@@ -76,7 +76,7 @@ def value(found: Tree) -> Any:
     try:
         return _value(found)
     except (TypeError, KeyError, AttributeError, ValueError, RecursionError) as error:
-        raise UnknownValue(f"no value of a core: {error}") from error
+        raise UnknownValue(f"not a value of a core: {error}") from error
 
 
 def _value(found: Tree) -> Any:
@@ -116,8 +116,8 @@ _structs: dict[type[Any], Struct | None] = {}
 
 
 def first_difference(one: Tree, other: Tree, path: str = "") -> tuple[str, Tree, Tree] | None:
-    """Where two trees differ, and how; None if they do not. A field that only one of them has is no
-    difference: another version of the program knows more, or less."""
+    """Where two trees differ, and how; None if they do not. A field that only one of them has is
+    not a difference: another version of the program has more fields, or fewer."""
     if isinstance(one, dict) and isinstance(other, dict) and one.get(TYPE) == other.get(TYPE):
         names = [name for name in one if name in other]
         below = ((f"{path}.{name}".strip("."), one[name], other[name]) for name in names)
@@ -152,7 +152,7 @@ def _type(name: str) -> type[Any]:
     """The type of this name, if it only holds values. Raises UnknownValue."""
     module, _, own = name.rpartition(".")
     if not _is_home(module) or not own.isidentifier():
-        raise UnknownValue(f"{name!r} is no value of a core")
+        raise UnknownValue(f"{name!r} is not a value of a core")
     try:
         kind: type[Any] = getattr(importlib.import_module(ROOT + module), own)
     except (ImportError, AttributeError):

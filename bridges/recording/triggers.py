@@ -2,9 +2,9 @@
 
 - a fault appears (a hazard is one: it keeps the device from RMF);
 - a request is refused, other than what every handover and start refuse;
-- somebody waits longer than `waiting_s` for what was requested;
+- somebody has waited longer than `waiting_s` for what was requested;
 - the daemon says that a defect ends it.
-The same cause of the same subject counts once in AGAIN_S.
+The same cause at the same subject counts once in AGAIN_S.
 """
 
 from collections.abc import Iterator
@@ -33,14 +33,14 @@ from bridges.rmf.releases import RELEASES
 
 AGAIN_S: Final = 600.0
 GONE_S: Final = 10.0
-"""A request is repeated at 1 Hz; one that is not has been given up."""
+"""A request is repeated at 1 Hz; after this long without a repeat it has been given up."""
 MOST_WAITING: Final = 1000
 
 FAULT, REFUSED, WAITING, DIED = "FAULT", "REFUSED", "WAITING", "DIED"
 
 
 class Triggers:
-    """What one run of a daemon gives reason to record. `waiting_s`: after so long (s) a wait is one."""
+    """Why to record one run of a daemon. `waiting_s`: a wait this long (s) is a reason."""
 
     def __init__(self, waiting_s: float) -> None:
         self._faults: dict[str, set[str]] = {}
@@ -126,7 +126,7 @@ class Waits:
             self._since.pop(next(iter(self._since)))
         if now >= since + self._waiting_s:
             device, who, what = wanted[0], wanted[1], wanted[-1]
-            yield Note(now, WAITING, f"{who} waits for {what} since {now - since:.0f} s", device)
+            yield Note(now, WAITING, f"{who} has waited for {what} for {now - since:.0f} s", device)
             return
         self._since[wanted] = (since, now)
 
@@ -148,7 +148,7 @@ def _wanted(message: Message) -> tuple[str, ...] | None:
 
 
 def _met(message: Message, waiting: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Which of those who wait need not wait any longer."""
+    """Those waits that are over."""
     match message:
         case LiftState():
             return [w for w in waiting if w[0] == message.lift_name and _rides(message, w)]

@@ -1,4 +1,5 @@
-"""Refused requests that wait for an answer: bounded, so that a flood of them causes no other."""
+"""Refused requests that wait for an answer; bounded, so that a flood of requests causes no flood of
+answers."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -10,11 +11,11 @@ from bridges.serve.clock import TELL_GAP_S
 from bridges.serve.subject import Publish
 
 MOST: Final = 10
-"""So many are answered at once, at most each TELL_GAP_S: the last ones."""
+"""At most this many are answered every TELL_GAP_S: the last ones."""
 
 
 class Answers:
-    """The refusals of one device or node. `last`: what was said of the last one."""
+    """The refusals of one device or node. `last`: the last answer, for the status file."""
 
     def __init__(self) -> None:
         self.last: Mapping[str, str] = {}
@@ -27,11 +28,11 @@ class Answers:
 
     @property
     def due_at(self) -> float:
-        """When the next are to be said (monotonic s); NEVER if none waits."""
+        """When the next answers are due (monotonic s); NEVER if none waits."""
         return self._said_at + TELL_GAP_S if self._waiting else NEVER
 
     def say(self, now: float, answer: Callable[[object, str], Answer | None], say: Publish) -> None:
-        """Say what is due."""
+        """Publish the answers that are due."""
         if now < self.due_at:
             return
         self._said_at = now

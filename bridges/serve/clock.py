@@ -32,7 +32,7 @@ class Clock(Struct, frozen=True):
 
 
 def machine_s() -> float:
-    """Seconds since the machine's start, its sleep among them."""
+    """Seconds since the machine's start, its sleep included."""
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 

@@ -40,7 +40,7 @@ STOP_WITHIN_S = 5.0
 STATUS_EVERY_S = 1.0
 ALIVE = "WATCHDOG=1"
 STARTING = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=30000000"
-"""Many units that do not answer make a long start, and no hung one."""
+"""A start with many silent units takes long, and is not a hang."""
 
 
 class Daemon:
@@ -198,7 +198,7 @@ class Daemon:
         return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
 
     def _apart(self) -> list[dict[str, str]]:
-        """What keeps this node apart from others."""
+        """The faults that keep this node and others from hearing each other."""
         return [{"code": code, "detail": detail} for code, detail in self._transport.faults()]
 
     def _tell(self) -> None:

@@ -102,7 +102,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             return None
 
     def was_suspended(self, for_s: float) -> None:
-        """Nothing was scanned for so long (s): everything read before may be outdated."""
+        """Nothing was scanned for this long (s): everything read before may be outdated."""
         self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
 
     def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:

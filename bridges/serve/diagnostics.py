@@ -31,7 +31,7 @@ MOST: Final = 100
 SIMULATED: Final = "SIMULATED"
 PASSIVE: Final = "PASSIVE"
 CONTACTS: Final = "contacts"
-"""In the status file alone: on the graph they would be most of what is said."""
+"""Only in the status file: on the graph they would be most of the traffic."""
 
 
 def diagnosis(

@@ -1,7 +1,7 @@
 """The drop-in of a service: what this YAML needs of systemd, beside the unit for all of them.
 
 `rmf-bridge enable` writes it. The unit alone permits no device, and `run` refuses a drop-in that was
-written for other needs: a daemon that may not open its relay would only say so each second.
+written for other needs: a daemon that may not open its relay could only report that each second.
 """
 
 import hashlib

@@ -36,7 +36,7 @@ MAX_UNSHOWN = 100
 """At most this many names that only requests mention, without a state of such a lift or door."""
 MAX_REQUESTERS = 10_000
 """At most this many requesters of all lifts or doors that the YAML does not name: more than any site's
-robots at a time. Who holds one is never forgotten, so made-up ones would pile up.
+robots at a time. A holder is never forgotten, so made-up ones would pile up.
 """
 DEFECT = "a defect"
 
@@ -164,7 +164,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """For the status file: whether it is passive, who does the same, and who hears whom."""
+        """For the status file: whether it is passive, how many rivals there are, and who hears whom."""
         return {
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
@@ -194,7 +194,8 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     @contextmanager
     def _counting(self, about: str, message: object = None) -> Iterator[None]:
-        """What is not obeyed, or fails for a defect of ours: a core that fails has changed nothing."""
+        """Count what is refused, or fails by a defect of ours. A core that fails has changed
+        nothing."""
         try:
             yield
         except RequestRefused as refusal:
@@ -285,7 +286,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         return len(self._kind.requesters(subject.memory))
 
     def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
-        """Without names never shown, if there is a flood of them: it would return at the next start."""
+        """Leave out names that never published a state, if they are a flood: it would be back at
+        the next start."""
         if len(memories) - len(self._shown) < MAX_UNSHOWN:
             return memories
         real = self._shown | self._reserved
@@ -313,7 +315,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _will_say(self, topic: Topic[Message], message: Message) -> None:
-        """Hold the message back until the round has kept its memories on disk."""
+        """Hold the message back until the round has written its memories to disk."""
         self._unsaid.append((topic, message))
 
     def _say(self) -> None:

@@ -9,7 +9,7 @@ INBOX_SIZE = 512
 """More events for one device between two scans are a flood: the oldest are dropped and counted."""
 
 MOST_NAMES = 2000
-"""More devices than anybody serves: names beyond are made up, and dropped."""
+"""More devices than anybody serves. Further names are made up, and dropped."""
 
 T = TypeVar("T")
 

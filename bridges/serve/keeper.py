@@ -1,7 +1,7 @@
-"""What a kind without hardware keeps on disk, and the message that it publishes about all subjects.
+"""The memory that a kind without hardware has on disk, and the message about all its subjects.
 
 It writes to disk before it publishes, because others act on what is published. If writing fails, the
-kind serves on with the fault NOT_KEPT, and writing is tried again each second.
+kind goes on serving with the fault NOT_KEPT, and tries to write again each second.
 """
 
 import logging
@@ -32,7 +32,7 @@ class MemoryStore(Protocol):
 
 
 class Keeper(Generic[S, L, M, E, R]):
-    """The keeper of one node. `kept`: None to keep nothing. `tell_at`: when to publish next."""
+    """The keeper of one node. `kept`: None to store nothing. `tell_at`: when to publish next."""
 
     def __init__(
         self, kind: GraphKind[S, L, M, E, R], kept: MemoryStore | None, publish: Publish
@@ -47,7 +47,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._pace = Pace()
 
     def restore(self, settings: S, now: float) -> Mapping[str, M]:
-        """The memories that were kept; an invalid file is logged and ignored."""
+        """The memories on disk; an invalid file is logged and ignored."""
         if self._kept is None or self._kind.restore is None:
             return {}
         try:
@@ -85,7 +85,7 @@ class Keeper(Generic[S, L, M, E, R]):
             self._kept.write(kept)
         except OSError as error:
             self._again_at = now + AGAIN_S
-            self._fails(Fault(NOT_KEPT, f"a restart would forget what was told last: {error}"))
+            self._fails(Fault(NOT_KEPT, f"a restart would forget what was published last: {error}"))
         else:
             self._bytes = kept
             self._keeps()

@@ -1,6 +1,6 @@
-"""The last thing that a service leaves: that it has verified every output off, and ends.
+"""The last mark of a service: it says that every output was verified off.
 
-`outputs-off` follows each end of a service, and need not switch again after that. The mark names the
+`outputs-off` follows each end of a service, and has nothing to do after such a mark. The mark names the
 one run of the service that it is about (INVOCATION_ID, systemd.exec(5)), so an old one says nothing;
 one that is missing or cannot be read says nothing either.
 """

@@ -1,4 +1,4 @@
-"""What a daemon that has died showed last of its devices: `status.json`, if it is still there."""
+"""The last status of a daemon that has died: `status.json`, if it is still there."""
 
 import os
 from collections.abc import Mapping

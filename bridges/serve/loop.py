@@ -2,10 +2,11 @@
 
 RMF callbacks and GPIO edges only put something into the inbox. A round scans each device that is due,
 has something in the inbox, or may have changed: first those that answered the last time, then the
-others, the longest overdue first. It ends after one that has kept the bus waiting in vain, so that
-silent devices are asked singly between live ones: a live one's reading is never older than its period
-and one silent device's timeout, even in the first rounds. A device that falls silent costs its retries
-too, once. At the end, whatever its cause, every output is made safe, those that answer first.
+others, the longest overdue first. A round ends after a device that did not answer, so that silent
+devices are read one at a time between live ones: a live device's reading is never older than its
+period plus one silent device's timeout, even in the first rounds. A device that falls silent also
+costs its retries, once. At the end, whatever its cause, every output is made safe, those that
+answer first.
 """
 
 import logging
@@ -23,7 +24,7 @@ from drivers.hal import Bus
 log = logging.getLogger(__name__)
 
 SUSPENDED_S = 0.5
-"""A loop that wakes later than this after its time, with no bus to wait for, did not run meanwhile."""
+"""A loop that wakes this late (s), with no bus to wait for, was suspended."""
 
 
 class Loop:

@@ -21,7 +21,7 @@ class Outlet:
     """Publishers that are declared while their node may speak.
 
     Where RMF's release lacks a topic's message, `bridges/rmf/instead.py` says what is sent. An alarm
-    and its end take the same way, whatever is learnt of the release between.
+    and its end take the same way, even if the release changes in between.
     """
 
     def __init__(self, transport: Transport, named: Named, witness: Nobody = NOBODY) -> None:

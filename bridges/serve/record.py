@@ -1,8 +1,7 @@
 """The record of what a daemon claims, written before it claims: all that is needed to switch it off.
 
-It holds the YAML, and what the daemon made of it: the settings as they were validated, so that who
-switches off need not load and judge the YAML again. Settings that do not decode, as those of another
-version may not, are made from the YAML.
+It holds the YAML and the settings as they were validated, so that `outputs-off` need not load and
+check the YAML again. If the settings do not decode, for example those of another version, it does.
 
 A record is a file named by its content, in the daemon's state directory, or in its runtime directory
 if that cannot be written. So a daemon that restarts on the same YAML finds its record, and one on

@@ -45,7 +45,7 @@ class Rounds(Protocol):
 
     @property
     def finished(self) -> int:
-        """Counts what it has finished, within a round too."""
+        """How many steps it has finished; counts within a round too."""
 
     @property
     def ready(self) -> bool:
@@ -59,7 +59,7 @@ class Rounds(Protocol):
 
 
 class Serving:
-    """One thread of a service, as the daemon sees it. `died`: of what it has died; "" if it has not."""
+    """One thread of a service, as the daemon sees it. `died`: why it died; "" if it has not."""
 
     def __init__(self, serves: Rounds, clock: Clock) -> None:
         self._rounds = 0
@@ -91,7 +91,7 @@ class Serving:
 
     @property
     def ready(self) -> bool:
-        """It has been through its first round, and does what it is for."""
+        """Has it finished its first round, and is it in service?"""
         return self._rounds > 0 and self._serves.ready
 
     def _run(self) -> None:

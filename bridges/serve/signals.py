@@ -68,7 +68,7 @@ def on_reset(reset: Callable[[], None]) -> None:
 
 
 def ignore() -> None:
-    """Let only SIGKILL end this process, which runs shortly and switches outputs off."""
+    """Let only SIGKILL end this process, which runs briefly and switches outputs off."""
     for number in ENDING | {RESET}:
         signal.signal(number, signal.SIG_IGN)
 

@@ -84,7 +84,7 @@ class Subject(Generic[M, V, O, R]):
         return decision
 
     def published(self, memory: M) -> None:
-        """Its report has gone out; `memory` with what the core notes of that."""
+        """Note that its report was published. `memory`: as the core has it after that."""
         if memory is not self.memory:
             self.memory = memory
             self._witness.published(self.name, memory, self._clock.monotonic())

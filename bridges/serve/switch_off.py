@@ -1,7 +1,7 @@
 """Switches off every output of a YAML or record, from a new process. Imports no more than it needs.
 
-On each bus those devices come first that answered the dead daemon last: silent ones would use up the
-time. Each has a short try, then those that have failed are tried again.
+On each bus the devices that answered the dead daemon most recently come first: silent ones would use
+up the time. Each gets a short try, then those that failed are tried again.
 """
 
 import logging
@@ -26,7 +26,7 @@ def outputs_off(
 ) -> set[str]:
     """Switch off every output of a file, except those of the devices in `but`.
 
-    `ages`: how long ago (s) a device had answered the dead daemon; none for one that never had.
+    `ages`: how long ago (s) each device last answered the dead daemon; one that never did is missing.
     Returns the devices that are verified off. Gives up after `timeout_s` in total.
     """
     results: dict[str, bool] = {}

@@ -1,8 +1,8 @@
-"""The witness: what a daemon has seen and done goes into its ring.
+"""The witness: it writes what a daemon sees and does into its ring.
 
 A scan only puts what happened into a queue, which takes less than a microsecond. After the outputs are
 written and the states are published, `flush` encodes the queue and appends it to the ring. A witness
-that fails loses what was to be kept; it never raises, and it delays no scan.
+that fails loses entries; it never raises, and it delays no scan.
 """
 
 import struct
@@ -26,17 +26,17 @@ from bridges.serve.clock import Clock
 from bridges.serve.directory import Once
 
 KNOWN_EVERY_S: Final = 60.0
-"""So often all that is known is written again: a recording may begin there."""
+"""All that is known is written again this often (s), so that a recording can begin there."""
 MOST_WAITING: Final = 20_000
 SAME_AT_ONCE: Final = 20
-"""So many readings without a change make an entry; a kill loses no more of them."""
+"""This many unchanged readings make an entry; a kill loses no more than that."""
 LONGEST_SAME: Final = 400
-"""Of such an entry (bytes)."""
+"""The size of such an entry (bytes)."""
 MOST_SPOKEN_PER_S: Final = 200.0
-"""Of more messages than these only the number is kept: a flood must cost no scan its time."""
+"""More messages than this in a second are only counted: a flood must not delay a scan."""
 STEP_S: Final = 0.05
 AGAIN_S: Final = 10.0
-"""How long a witness whose ring failed waits until it makes another."""
+"""How long (s) a witness whose ring failed waits before it makes another."""
 
 
 class Nobody:
@@ -48,7 +48,7 @@ class Nobody:
         """A core has decided. `before`: the subject's memory until then."""
 
     def published(self, subject: str, memory: object, now: float) -> None:
-        """A report has gone out; `memory`: with what the core notes of that."""
+        """A report was published. `memory`: as the core has it after that."""
 
     def forgotten(self, subject: str, now: float) -> None:
         """A subject is no longer remembered."""
@@ -153,10 +153,10 @@ class Witness(Nobody):
         self._fresh()
         if ring is not None:
             with suppress(OSError):
-                ring.close(ended=True)  # it is not the run that has ended
+                ring.close(ended=True)  # the run goes on; only this ring ends
 
     def _fresh(self) -> None:
-        """Nothing of this is in the ring yet."""
+        """Begin with an empty ring: nothing has been written yet."""
         self._subjects: dict[str, Seen] = {}
         self._out = bytearray()
         self._same: dict[str, Seen] = {}
@@ -176,7 +176,7 @@ class Witness(Nobody):
         self._write()
 
     def _tell_time(self) -> None:
-        """Say what the wall clock shows, if it has stepped; at times, all that is known."""
+        """Write what the wall clock shows, if it has stepped; now and then, all that is known."""
         now = self._clock.monotonic()
         offset_s = self._clock.wall() - now
         stepped = abs(offset_s - self._offset_s) > STEP_S
@@ -219,7 +219,7 @@ class Witness(Nobody):
             self._say_same(name)
 
     def _say_same(self, name: str) -> None:
-        """Write down how often the last reading came again. There is always room for that."""
+        """Write when the last reading came again. There is always room for that."""
         subject = self._same.pop(name, None)
         if subject is not None:
             times, subject.times = subject.times, []
@@ -258,7 +258,7 @@ class Witness(Nobody):
         return True
 
     def _last(self, entry: AnyEntry) -> None:
-        """Append what is said at an end, after all that has come again."""
+        """Append the last entry, after those of repeated readings."""
         self._say_all_same()
         self._put(entry)
 
@@ -301,7 +301,8 @@ class Witness(Nobody):
             self._frame(content)
 
     def _next_segment(self, now: float) -> None:
-        """Begin it with all that is known; of very many subjects, with those that half of it holds."""
+        """Begin the next segment with all that is known. If that is more than half of it, the rest
+        of the subjects is left out."""
         assert self._ring is not None
         self._say_all_same()
         self._write()

@@ -122,5 +122,5 @@ def test_a_file_that_is_not_a_recording_or_cannot_be_written_is_reported(
     judge = ["judge", "lift", "Lift1", "--recording", str(bag), "--junit", nowhere]
     assert main(judge) == 73
     told = capsys.readouterr().err
-    assert "is no recording" in told
+    assert "is not a recording" in told
     assert f"{nowhere} cannot be written: No such file or directory" in told

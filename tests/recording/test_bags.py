@@ -133,7 +133,7 @@ def test_a_file_that_is_not_a_recording_is_named_with_what_to_do(tmp_path: Path)
 
     assert said == {
         "none": "/none cannot be read: No such file or directory",
-        "notes.txt": "/notes.txt is no recording: neither MCAP nor a .db3 file of rosbag2",
+        "notes.txt": "/notes.txt is not a recording: neither MCAP nor a .db3 file of rosbag2",
         "packed": "/packed is compressed as whole files: unpack them with zstd -d",
-        ".": " holds no recording: no .mcap or .db3 file is in it",
+        ".": " holds no recording: it has no .mcap or .db3 file",
     }

@@ -181,7 +181,7 @@ def test_a_robot_that_waits_too_long_for_a_lift_makes_a_file_and_a_served_one_do
     assert machine.files() == []
     machine.live(70, lambda: machine.say("lift_requests", asked))
 
-    assert reasons(machine.only()) == [("WAITING", "Lift1", "r1 waits for L3 since 180 s")]
+    assert reasons(machine.only()) == [("WAITING", "Lift1", "r1 has waited for L3 for 180 s")]
     assert len(list(heard_in(machine.only()))) > 100
 
 
@@ -204,7 +204,7 @@ def test_a_killed_run_is_recorded_once_even_if_the_recorder_restarts(
     machine.live(5)
 
     assert reasons(machine.only()) == [
-        ("DIED", "", "it ended without a word: killed, or the machine stopped")
+        ("DIED", "", "it ended without an entry: killed, or the machine stopped")
     ]
     assert head_of(machine.only()).run == "00000001"
 

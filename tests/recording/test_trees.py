@@ -83,7 +83,7 @@ def test_a_tree_that_holds_no_value_of_a_core_is_refused(told: Any) -> None:
 
 
 def test_an_object_that_no_core_uses_cannot_become_a_tree() -> None:
-    with pytest.raises(TypeError, match="Exception is no value of a core"):
+    with pytest.raises(TypeError, match="Exception is not a value of a core"):
         tree(Exception())
 
 
