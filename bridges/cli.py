@@ -29,7 +29,7 @@ COMMANDS = {
         "check my_lift.yaml --building-map hospital.building.yaml",
     ),
     "enable": (
-        "make a service of a device YAML, or renew it after a change",
+        "make a service of a device YAML, or update it after a change",
         "enable my_lift.yaml --dry-run",
     ),
     "disable": ("end a service, outputs off; its YAML stays", "disable my_lift"),
@@ -44,7 +44,7 @@ COMMANDS = {
         "status --json",
     ),
     "doctor": (
-        "look for what keeps a bridge from working on this machine; nothing is switched",
+        "find what keeps a bridge from working on this machine; switches nothing",
         "doctor my_lift.yaml --scan",
     ),
     "explain": (
@@ -60,7 +60,7 @@ COMMANDS = {
         "send lift Lift1 L3 --session me --direct --localhost",
     ),
     "judge": (
-        "hold any lift, door or charger node against RMF's contract",
+        "check any lift, door or charger node against RMF's contract",
         "judge lift Lift1 --active --ride L1 L3 --localhost",
     ),
     "release": ("end the session of whoever holds a lift", "release Lift1"),
@@ -79,7 +79,7 @@ COMMANDS = {
     ),
     "log": ("show the log of a device's service", "log my_lift.yaml --follow --event fault"),
     "incident": (
-        "make a recording of a daemon's last minutes, for whoever looks into it",
+        "make a recording of a daemon's last minutes, to find out what happened",
         'incident my_lift.yaml --note "the robot waits before an open door"',
     ),
     "recorder": (
@@ -87,7 +87,7 @@ COMMANDS = {
         "recorder --output /var/lib/rmf-bridge-recorder",
     ),
     "replay": (
-        "let today's core decide again on what was recorded, and compare",
+        "repeat a recording's decisions with the present program, and compare",
         "replay my_lift_2026-11-22_10-00-00.mcap --config other.yaml",
     ),
     "completion": (

@@ -12,7 +12,7 @@ PATIENCE_S: Final = 120.0
 
 
 class Refused(Exception):
-    """The simulation does not do it; the text is its answer."""
+    """The simulation refuses; the text is its answer."""
 
 
 class Caller:

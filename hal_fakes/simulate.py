@@ -26,14 +26,15 @@ LogFormat = Literal["text", "json"]
 READY_S = 15.0
 """How long a child may take to serve (a busy Raspberry Pi imports slowly)."""
 PATIENCE_S = 1.5
-"""A simulated bus waits at least so long for an answer: its far side shares this machine, which may be
-busy. Not longer, as a call may take half of the shortest WatchdogSec (bridges/serve/drop_in.py)."""
+"""A simulated bus waits at least this long (s) for an answer: its far side shares this machine,
+which may be busy. Not longer, as a call may take half of the shortest WatchdogSec
+(bridges/serve/drop_in.py)."""
 
 
 class Simulation:
     """The far sides of a file's buses. Those in a process of their own start while the daemon does.
 
-    Made before the daemon leaves the directory that a relative path of the file is relative to.
+    Make it before the daemon changes directory: the file's relative paths must still be valid.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What commands share that hold one device by hand: which, its record and guard, its outputs off."""
+"""What the commands share that hold one device by hand: its record and guard, and its outputs off."""
 
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -27,7 +27,7 @@ def completed_by(argument: argparse.Action, completer: Completer) -> None:
 
 
 def device_names(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    """The devices of FILE; nothing if it is no YAML of ours."""
+    """The devices of FILE; none if it is not a valid device YAML."""
     from bridges.settings.load import SettingsError, load
 
     with suppress(SettingsError, OSError, TypeError):

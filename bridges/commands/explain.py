@@ -55,15 +55,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds(0.1, 86400),
         default=LISTENS_S,
         metavar="SECONDS",
-        help=f"with --live: listen so long (default {LISTENS_S:.0f})",
+        help=f"with --live: how long to listen (default {LISTENS_S:.0f})",
     )
     parser.add_argument(
         "--follow",
         action="store_true",
-        help="with --live: go on, and tell each change; Ctrl-C ends",
+        help="with --live: keep listening, and print each change; Ctrl-C ends",
     )
     parser.add_argument("--kind", choices=KINDS, help="where a lift and a door have the same name")
-    parser.add_argument("--session", default="", metavar="ID", help="whose ride is asked about")
+    parser.add_argument("--session", default="", metavar="ID", help="the session in question")
     parser.add_argument("--json", action="store_true", help="the explanation as JSON")
     add_span_arguments(parser)
     add_graph_arguments(parser)
@@ -71,9 +71,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """0; 1 when the device or anything of RMF was not heard, or the graph cannot be joined; 66 when
-    FILE is no recording that can be read."""
+    FILE is not a recording that can be read."""
     if (args.file is None) == (args.live is None):
-        complain("explain", "name a FILE, or --live DEVICE: one of them")
+        complain("explain", "name either a FILE or --live DEVICE")
         return 2
     try:
         return _live(args) if args.file is None else _recorded(args)
@@ -96,7 +96,9 @@ def _recorded(args: argparse.Namespace) -> int:
         site.take(heard)
     site.story_from(span.begins_at)
     if not site.messages:
-        complain("explain", f"{args.file} holds nothing of RMF's lifts, doors and chargers then")
+        complain(
+            "explain", f"{args.file} has nothing about RMF's lifts, doors and chargers in that time"
+        )
         return 1
     if args.device is None and len(devices := site.devices()) != 1:
         return _all(site, devices, as_json=args.json)
@@ -111,7 +113,7 @@ def _all(site: Site, devices: list[tuple[Kind, str]], *, as_json: bool) -> int:
         return 0
     for one in told:
         print(f"{one.kind} {one.device}: {one.now[0]}")
-    print("\nMore of one of them: give its name after FILE.")
+    print("\nFor more about one of them, give its name after FILE.")
     return 0
 
 
@@ -152,7 +154,7 @@ def _live(args: argparse.Namespace) -> int:
 
 
 def _listen(ear: Ear, site: Site, for_s: float) -> None:
-    """Listen for so long."""
+    """Listen for this long (s)."""
     until = time.monotonic() + for_s
     site.passed(time.monotonic(), time.time())
     while (left_s := until - time.monotonic()) > 0:
@@ -162,7 +164,7 @@ def _listen(ear: Ear, site: Site, for_s: float) -> None:
 
 
 def _follow(ear: Ear, site: Site, args: argparse.Namespace) -> None:
-    """Tell each change, until Ctrl-C."""
+    """Print each change, until Ctrl-C."""
     told: object = None
     _listen(ear, site, args.for_s)
     while True:

@@ -53,7 +53,7 @@ def _domain(text: str) -> int:
 
 
 def seconds(least: float, most: float) -> Callable[[str], float]:
-    """What reads an option's number of seconds, for argparse."""
+    """A reader of an option's number of seconds, for argparse."""
 
     def read(text: str) -> float:
         with suppress(ValueError):

@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when the file is written; 69 where there is no ring; 73 if the file cannot be written."""
+    """0 when the file is written; 69 without a ring; 73 if the file cannot be written."""
     try:
         from bridges.recording import mcap_write
     except ImportError as error:
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _hint(*, died: bool) -> str:
     if died:
-        return "--died is the run before the last one: of the last one, leave it out"
+        return "--died is the run before the last one; for the last one, leave it out"
     return "Does its daemon run, and does its YAML keep a ring?"
 
 

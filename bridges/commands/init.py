@@ -160,12 +160,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _there_already(file: Path) -> int:
-    print(f"{file} is there already, and stays: choose another name", file=sys.stderr)
+    print(f"{file} already exists and is not changed: choose another name", file=sys.stderr)
     return EX_CANTCREAT
 
 
 def _written(file: Path, given: Given) -> int:
-    """Write what `check` finds right."""
+    """Write the draft, if `check` finds no error in it."""
     try:
         text = draft(answers(given))
         understood(file, text.encode())
@@ -205,7 +205,9 @@ def _needed(question: Question, given: Given, args: argparse.Namespace) -> bool:
     if question.needed(given):
         return True
     if getattr(args, question.name) is not None:
-        raise Impossible(f"--{question.name} says nothing for {given['kind']} on {given['wiring']}")
+        raise Impossible(
+            f"--{question.name} has no meaning for a {given['kind']} on {given['wiring']}"
+        )
     return False
 
 
@@ -252,7 +254,7 @@ def answers(given: Given) -> Answers:
         if name in told:
             told[name] = _number(name, told[name], most)
     if not told["name"].strip() or not told["name"].isprintable():
-        raise Impossible(f"{told['name']!r} is no name for a {told['kind']}")
+        raise Impossible(f"{told['name']!r} is not a name for a {told['kind']}")
     for name in ("floors", "signals"):
         if name in told:
             told[name] = tuple(part.strip() for part in told[name].split(",") if part.strip())

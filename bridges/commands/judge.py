@@ -1,4 +1,4 @@
-"""`rmf-bridge judge`: hold any lift, door or charger node against RMF's contract.
+"""`rmf-bridge judge`: check any lift, door or charger node against RMF's contract.
 
 `bridges/judge/` has the laws and the plays; here are the options, the graph, the clock and the verdict.
 Exit code 0: every law that was seen is kept. 1: one is broken. 2: a wrong command line. 66: the
@@ -51,7 +51,7 @@ BESIDE: dict[str, tuple[str, ...]] = {
     "fleet": (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name),
     "coordinator": (topics.CHARGER_REQUESTS.name, topics.CHARGER_CANCELS.name),
 }
-"""Whose topics a play may share, if it is told to play beside them."""
+"""Whose topics a play may share, with `--beside`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +70,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="the verdict as one JSON object")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="the verdict for a CI server")
     parser.add_argument(
-        "--laws", action="store_true", help="print the laws of this kind, and why they are; no NAME"
+        "--laws",
+        action="store_true",
+        help="print the laws of this kind, with their reasons; no NAME",
     )
     parser.add_argument(
         "--recording",
@@ -100,7 +102,7 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
         "--robot",
         default=f"{FLEET}/robot1",
         metavar="FLEET/ROBOT",
-        help="who asks for the charger; one that it knows",
+        help="the robot to request the charger for; one that the charger knows",
     )
     parser.add_argument(
         "--restarts",
@@ -112,14 +114,14 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
         action="append",
         choices=tuple(BESIDE),
         default=[],
-        help="play although this one is on the graph, and through a supervisor",
+        help="play although this one is on the graph; rides and passages go through a supervisor",
     )
     parser.add_argument(
         "--patience",
         type=seconds(0.1, 7 * 86400),
         default=120.0,
         metavar="S",
-        help="how long a robot waits for one thing (default: 120)",
+        help="how long a robot waits at each step (default: 120)",
     )
 
 
@@ -138,9 +140,7 @@ def performance_of(args: argparse.Namespace) -> Performance | None:
     if not args.active:
         args.usage(f"this moves {words_of(args)}: say --active as well")
     if args.restarts and not args.localhost:
-        args.usage(
-            "--restarts needs --localhost: on site a restart is not to be tried with a device"
-        )
+        args.usage("--restarts needs --localhost: never restart a supervisor with a real device")
     through = "supervisor" in args.beside
     match args.kind:
         case "lift":
@@ -156,7 +156,7 @@ def performance_of(args: argparse.Namespace) -> Performance | None:
 
 
 def words_of(args: argparse.Namespace) -> str:
-    """The device, for a person."""
+    """The device, in words."""
     return f"the {args.kind} {shown(args.name)}"
 
 
@@ -171,7 +171,7 @@ def run(args: argparse.Namespace) -> int:
     if args.recording is None:
         return _live(args, performance)
     if performance is not None:
-        args.usage("a recording cannot be played with: leave --active out")
+        args.usage("a recording cannot be moved: leave --active out")
     try:
         return _recorded(args)
     except BagError as error:
@@ -184,7 +184,7 @@ def _recorded(args: argparse.Namespace) -> int:
     for last in within(args.recording, Span(args.from_, args.to), "judge"):
         judge.hear(last)
     if last is None or judge.first is None:
-        complain("judge", f"{args.recording} holds nothing of RMF's then")
+        complain("judge", f"{args.recording} has no message of RMF in that time")
         return os.EX_UNAVAILABLE
     return tell(report(judge, judge.end(last.at, last.wall), last.at - judge.first.at), args)
 
@@ -213,7 +213,7 @@ def _live(args: argparse.Namespace, performance: Performance | None) -> int:
 def _begins(args: argparse.Namespace, performance: Performance | None) -> str:
     """What is under way, for whoever waits for the verdict."""
     if performance is not None:
-        return f"plays with {words_of(args)}; Ctrl-C lets it go, and judges"
+        return f"plays with {words_of(args)}; Ctrl-C releases it, and judges"
     until = "until Ctrl-C" if args.for_s == NEVER else f"for {args.for_s:g} s"
     return f"listens to {words_of(args)} {until}"
 
@@ -251,16 +251,16 @@ class Live:
         self._looked_at = 0.0
 
     def strangers(self) -> str:
-        """Who speaks where the play would alone."""
+        """Who else publishes on the play's topics."""
         found = [name for name in self._sole if self._ear.ends[name].matched()]
         if not found:
             return ""
         who = [name for name, topics in BESIDE.items() if set(topics) & set(found)]
         beside = " ".join(f"--beside {name}" for name in who)
-        return f"others publish on {', '.join(found)}: to play all the same, say {beside}"
+        return f"others publish on {', '.join(found)}: to play all the same, add {beside}"
 
     def judge(self, stage: Stage) -> None:
-        """Until there is a verdict. Whatever ends a play, the device is let go first."""
+        """Run until there is a verdict. Whatever ends a play, the device is released first."""
         stage.begin(time.monotonic(), time.time())
         try:
             with _told_to_end() as told:

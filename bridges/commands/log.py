@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     if name not in known:
         there = ", ".join(sorted(known)) or "none"
         print(
-            f"{name} is no service here (services: {there}); what the journal still has of it:",
+            f"{name} is not a service here (services: {there}); what the journal still has of it:",
             file=sys.stderr,
         )
     sys.stdout.flush()

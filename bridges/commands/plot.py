@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _output(text: str) -> Path:
     if Path(text).suffix.lower() not in SUFFIXES:
-        raise argparse.ArgumentTypeError(f"'{text}' ends with none of {', '.join(SUFFIXES)}")
+        raise argparse.ArgumentTypeError(f"'{text}' does not end with one of {', '.join(SUFFIXES)}")
     return Path(text)
 
 

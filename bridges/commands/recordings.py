@@ -19,9 +19,9 @@ from bridges.rmf import topics
 
 CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[ T])?(\d\d?):(\d\d)(?::(\d\d(?:\.\d+)?))?")
 SAME_S = 2.4
-"""Less than after what a daemon is taken to be silent (3 s)."""
+"""Shorter than the silence (3 s) after which a daemon counts as silent."""
 STAMPED = 12
-"""So many bytes of a DiagnosticArray are CDR's head and the stamp (OMG DDSI-RTPS 10.2; Header)."""
+"""This many bytes of a DiagnosticArray are CDR's head and the stamp (OMG DDSI-RTPS 10.2; Header)."""
 MOST_TOLD = 512
 FIRST_OF_OTHERS = 300
 COORDINATOR = b"charger_coordinator"
@@ -83,7 +83,7 @@ def _time(text: str) -> Time:
             raise ValueError
     except ValueError:
         why = "write 14:03:07, '2026-11-22 14:03:07', or +90 for 90 s after the beginning"
-        raise argparse.ArgumentTypeError(f"'{text}' is no time: {why}") from None
+        raise argparse.ArgumentTypeError(f"'{text}' is not a time: {why}") from None
     return Time(None, day, int(hour) * 3600.0 + int(minute) * 60.0 + float(second or 0))
 
 
@@ -133,7 +133,7 @@ class Sieve:
 def told_between(path: Path, span: Span, command: str, device: str) -> Iterator[Heard | Own]:
     """What concerns the device ("": all), messages and our recorder's texts, as `between` gives it.
 
-    Of what is much the same each second a part is left out (`Sieve`).
+    Messages that differ little from second to second are thinned out (`Sieve`).
     """
     return between(path, span, command, Sieve(device).keep)
 

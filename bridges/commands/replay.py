@@ -1,4 +1,4 @@
-"""`rmf-bridge replay FILE`: today's core decides again on what was recorded."""
+"""`rmf-bridge replay FILE`: the present program repeats the recorded decisions."""
 
 import argparse
 import json
@@ -21,7 +21,7 @@ from bridges.settings.load import SettingsError, load
 
 EX_DATAERR, EX_CONFIG = 65, 78
 MOST: Final = 200
-"""So many differences are told at most."""
+"""At most this many differences are printed."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -117,7 +117,7 @@ def _lines(
 
 
 def _what_if(one: Difference) -> Iterator[str]:
-    """One line: what would have been, or that it is as it was again."""
+    """One line: what would have been decided, or that the decision is as recorded again."""
     where = f"{_time(one.wall)} {one.subject}: {_part(one)}"
     if one.today is None:
         yield f"{where}: as recorded again"

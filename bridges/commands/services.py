@@ -18,7 +18,7 @@ from bridges.serve.record import PATTERN
 CONFIG: Final = Path("etc/rmf-bridges")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 """What a unit's instance may be called without escapes."""
-NO_INSTANCE: Final = "{!r} is no name of a service: letters, digits and _ . - alone"
+NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
 LEFT_ON: Final = (
     "what {} had claimed is not verified off, and another drop-in may not let it be reached: mend"
     " that and try again. If that hardware is gone, cut its supply, then: rm {}"
@@ -93,7 +93,7 @@ def carry_out(steps: Iterable[Step], args: argparse.Namespace) -> int:
         print("only root may do that: use sudo, or --dry-run to see it", file=sys.stderr)
         return os.EX_NOPERM
     if not args.root.is_dir():
-        print(f"{args.root} is no folder: is the card mounted?", file=sys.stderr)
+        print(f"{args.root} is not a folder: is the card mounted?", file=sys.stderr)
         return os.EX_NOINPUT
     for step in steps:
         if not live and (

@@ -56,7 +56,7 @@ def unheard(device: Device, around: Heard, clock: Clock) -> Answer:
             ),
         )
         return answer
-    answer.say(f"Nobody publishes a state of {device.name}: {_others(around)}.")
+    answer.say(f"Nobody publishes a state of {device.name}; {_others(around)}.")
     near = get_close_matches(device.name.lower(), {n.lower(): n for n in others}, 1)
     mean = next((f" (did you mean {name}?)" for name in others if [name.lower()] == near), "")
     what = f"start the daemon of {device.name}, or correct the spelling of its name{mean}"
@@ -68,11 +68,11 @@ def unheard(device: Device, around: Heard, clock: Clock) -> Answer:
 
 
 def _others(around: Heard) -> str:
-    """`heard were lifts Lift2; doors ward`."""
+    """`these were heard: lifts Lift2; doors ward`."""
     parts = [
         f"{kind}s {', '.join(names[:MOST_NAMES])}" for kind, names in around.names.items() if names
     ]
-    return f"heard were {'; '.join(parts)}" if parts else "no state of any device was heard"
+    return f"these were heard: {'; '.join(parts)}" if parts else "no state of any device was heard"
 
 
 def silent(device: Device, clock: Clock) -> Answer | None:

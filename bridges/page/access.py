@@ -23,7 +23,7 @@ COST: Final = (2**14, 8, 1)
 """N, r and p: 16 MB and about 50 ms for one try."""
 MOST_COST: Final = 2**17
 SESSION_S: Final = 12 * 3600.0
-"""A shift; after that somebody says again who they are."""
+"""A login lasts for a shift."""
 IDLE_S: Final = 3600.0
 MOST_SESSIONS: Final = 100
 TRIES: Final = 5
@@ -85,23 +85,23 @@ def users(file: Path) -> dict[str, str]:
             continue
         user, _, stored = line.partition(":")
         if not USER.fullmatch(user) or user in found:
-            raise PasswordError(f"{file}:{number}: not a user's name, or a second time")
+            raise PasswordError(f"{file}:{number}: not a user's name, or the same name twice")
         try:
             _parts(stored)
         except PasswordError as error:
             raise PasswordError(f"{file}:{number}: {error}") from None
         found[user] = stored
     if not found:
-        raise PasswordError(f"{file}: no user in it; add one with rmf-bridge page --add-user NAME")
+        raise PasswordError(f"{file}: it has no user; add one with rmf-bridge page --add-user NAME")
     return found
 
 
 def add_user(file: Path, user: str, password: str) -> None:
     """Add a user, or give one another password. Raises PasswordError."""
     if not USER.fullmatch(user):
-        raise PasswordError(f"'{user}' is no user's name: letters, digits and . _ @ - only")
+        raise PasswordError(f"'{user}' is not a user name: use only letters, digits and . _ @ -")
     if len(password) < SHORTEST:
-        raise PasswordError(f"the password is too short: {SHORTEST} characters at least")
+        raise PasswordError(f"the password is too short: use at least {SHORTEST} characters")
     known = users(file) if file.exists() else {}
     known[user] = hashed(password)
     text = "".join(f"{name}:{stored}\n" for name, stored in known.items())
@@ -115,7 +115,7 @@ def add_user(file: Path, user: str, password: str) -> None:
 
 
 class Tries:
-    """How often an address has tried in vain. Bounded: the ones that are longest ago are forgotten."""
+    """How often an address has failed to log in. Bounded: the oldest ones are forgotten."""
 
     def __init__(self) -> None:
         self._failed_at: OrderedDict[str, list[float]] = OrderedDict()
@@ -126,7 +126,7 @@ class Tries:
         return len(recent) < TRIES
 
     def failed(self, address: str, now: float) -> None:
-        """One more try was in vain."""
+        """Note one more failed try."""
         recent = [at for at in self._failed_at.pop(address, ()) if now - at < TRIES_IN_S]
         self._failed_at[address] = [*recent, now]
         while len(self._failed_at) > MOST_ADDRESSES:
@@ -150,7 +150,7 @@ class Sessions:
         self._by_secret: OrderedDict[str, Session] = OrderedDict()
 
     def begin(self, user: str, now: float) -> str:
-        """A new session's secret. Whoever had one before has a new one now."""
+        """Begin a session and return its secret. A user's earlier session ends."""
         secret = secrets.token_urlsafe(32)
         self._by_secret[secret] = Session(user, now, now, secrets.token_urlsafe(16))
         while len(self._by_secret) > MOST_SESSIONS:
@@ -182,11 +182,11 @@ class Door:
         self._nobody = hashed(secrets.token_urlsafe(16))
 
     def refuses(self, user: str, password: str, address: str, now: float) -> str:
-        """Why this user may not come in; "" if they may. A user who is not known takes as long."""
+        """Why this user may not come in; "" if they may. An unknown user takes as long to refuse."""
         if not self._tries.allowed(address, now):
             return "too many wrong passwords; wait a minute"
         right = matches(password[:1024], self._known.get(user, self._nobody))
         if right and user in self._known:
             return ""
         self._tries.failed(address, now)
-        return "this user and password do not go together"
+        return "wrong user or password"

@@ -34,7 +34,7 @@ LONGEST_FILE: Final = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """A button: its text, the question that is asked once more, and the command's words."""
+    """A button: its text, the question that confirms it, and the command's words."""
 
     text: str
     question: str
@@ -45,7 +45,7 @@ class Action:
 class Local:
     """A daemon on this machine that serves the device: its YAML, and what a simulation can do.
 
-    `presses`, `fails`: the signals and parts of its plant; none if it is no simulation.
+    `presses`, `fails`: the signals and parts of its plant; none if it is not a simulation.
     """
 
     file: str
@@ -56,7 +56,7 @@ class Local:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """One action, as it is kept. `code`: the command's exit code; None if it took too long."""
+    """One past action. `code`: the command's exit code; None if it took too long."""
 
     wall: float
     user: str
@@ -66,9 +66,9 @@ class Done:
 
     @property
     def came(self) -> str:
-        """What came of it, in a sentence or a few."""
+        """The outcome, in a few sentences."""
         if self.code is None:
-            return f"no answer within {TIMEOUT_S:.0f} s: see what the device does"
+            return f"no answer within {TIMEOUT_S:.0f} s: check what the device does"
         return self.said.strip() or ("done" if self.code == 0 else f"exit code {self.code}")
 
 
@@ -130,7 +130,7 @@ def _runtime(local: Local) -> tuple[str, ...]:
 
 
 class Deeds:
-    """Carries actions out, and keeps who did what."""
+    """Carries actions out, and remembers who did what."""
 
     def __init__(self, folder: Path | None) -> None:
         """`folder`: where `actions.jsonl` is written, if anywhere."""
@@ -138,7 +138,7 @@ class Deeds:
         self.latest: deque[Done] = deque(maxlen=MOST_KEPT)
 
     async def do(self, action: Action, user: str) -> Done:
-        """Run the command. It never raises; what went wrong stands in `said`."""
+        """Run the command. Never raises; `said` has what went wrong."""
         code, said = await _run(action.words)
         done = Done(time.time(), user, action.text, code, said)
         self.latest.appendleft(done)

@@ -1,4 +1,5 @@
-"""The buttons of a device, for who has logged in. Each asks once more before its command is run."""
+"""The buttons of a device, for a logged-in user. Each asks for confirmation before its command is
+run."""
 
 import itertools
 import time
@@ -22,7 +23,7 @@ MOST_TOLD: Final = 10
 
 
 class Buttons:
-    """Shows them, and does what they say."""
+    """Shows the buttons, and carries their actions out."""
 
     def __init__(
         self, gallery: Gallery, here: Here, login: Login, deeds: Deeds, graph: Sequence[str]
@@ -34,7 +35,7 @@ class Buttons:
         self._graph = graph
 
     def show(self, key: Key, request: Request) -> None:
-        """The device's buttons, and who did what lately; nothing for who has not logged in."""
+        """The device's buttons, and who did what lately; nothing for a user who has not logged in."""
         if not self._login.user(request):
             return
         with ui.element("section").classes("panel wide-part").props('aria-label="Actions"'):
@@ -52,7 +53,7 @@ class Buttons:
                 (time.strftime("%H:%M:%S", time.localtime(one.wall)), one.user, one.text, one.came)
                 for one in itertools.islice(self._deeds.latest, MOST_TOLD)
             ]
-            told = table(("when", "who", "what", "came of it"), rows, "Done on this page lately")
+            told = table(("when", "who", "what", "outcome"), rows, "Done on this page lately")
             place.set_content(told if rows else "")
 
         tell()
@@ -127,7 +128,7 @@ class Buttons:
         ui.button(action.text, on_click=lambda: self._ask(action, request))
 
     async def _ask(self, action: Action, request: Request) -> None:
-        """Ask once more, do it, and say what came of it."""
+        """Ask for confirmation, carry it out, and show the outcome."""
         with ui.dialog() as dialog, ui.card():
             dialog.props('aria-label="Are you sure?"')
             ui.label(action.question)
@@ -140,7 +141,7 @@ class Buttons:
             return
         user = self._login.user(request)
         if not user:
-            ui.notify("You are logged in no longer: nothing was done.", type="warning")
+            ui.notify("You are no longer logged in: nothing was done.", type="warning")
             return
         done = await self._deeds.do(action, user)
         kind: Literal["positive", "negative"] = "positive" if done.code == 0 else "negative"

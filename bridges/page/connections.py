@@ -1,4 +1,4 @@
-"""Ends connections that only take: a browser that does not read, and a socket that asks for nothing."""
+"""Ends useless connections: a browser that does not read, and a socket that sends no request."""
 
 import asyncio
 import logging
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 LOOK_S: Final = 1.0
 MOST_WAITING: Final = 50
-"""Packets for a browser that does not read them: five seconds. A browser that reads has a few."""
+"""The most unread packets of a browser: about five seconds of them. A browser that reads has a few."""
 
 
 async def watch() -> None:

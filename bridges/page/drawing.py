@@ -1,6 +1,6 @@
 """The site's devices as HTML and SVG: a shaft, a door, a charger, a robot. Pure.
 
-Every text goes through `html.escape`: names come from the network. Nothing is told by colour alone;
+Every text goes through `html.escape`: names come from the network. Nothing is shown only by colour;
 each drawing says in words what it shows.
 """
 
@@ -15,7 +15,7 @@ from bridges.rmf import words
 
 OLD: Final = ' class="old"'
 MOST_FLOORS: Final = 40
-"""More landings are not drawn; the words still say where the car is."""
+"""A shaft with more landings is not drawn; the words still say where the car is."""
 FLOOR_PX, SHAFT_PX, LABEL_PX = 22, 44, 46
 ARROWS: Final = {d.LiftMotion.MOTION_UP: "▲", d.LiftMotion.MOTION_DOWN: "▼"}
 LEAVES: Final = {"open": 0.12, "moving": 0.3, "closed": 0.5}
@@ -72,7 +72,7 @@ def _facts(view: DeviceView) -> Iterable[str]:
 
 
 def had(stands: Stands) -> str:
-    """In minutes, so that a card is not another each second: `at least 12 min`."""
+    """In minutes, so that a card does not change every second: `at least 12 min`."""
     minutes = int(stands.for_s // 60)
     if stands.at_least:
         return f"at least {minutes} min" if minutes else "since before this page heard of it"
@@ -136,7 +136,8 @@ def _car(state: d.LiftState, floors: Sequence[str], left: str) -> str:
 
 
 def floors_of(state: d.LiftState) -> list[str]:
-    """The landings from the top down, which RMF lists from the bottom up; none of too many."""
+    """The landings from the top down (RMF lists them from the bottom up); empty if there are too
+    many."""
     floors = list(dict.fromkeys(state.available_floors))
     return floors[::-1] if len(floors) <= MOST_FLOORS else []
 

@@ -1,4 +1,4 @@
-"""What every browser is shown of the site: each card drawn once, when it changes, for all of them.
+"""What browsers show of the site: each card is drawn once, when it changes, for all of them.
 
 Whatever has changed in a turn goes to each browser as one script, made once: a browser that had to
 understand an update for each card could not keep up with 300 of them in a second.
@@ -15,7 +15,7 @@ from bridges.page.listener import Listener
 from bridges.page.site import MOST_DEVICES, DeviceView, Site
 
 AGES_S: Final = 1.0
-"""How often what changes by itself is drawn again: ages, silence."""
+"""How often (s) ages and silences, which change by themselves, are drawn again."""
 SILENT_S: Final = 3.0
 Key = tuple[str, str]
 """A device's kind, and its name as it is shown."""
@@ -42,10 +42,10 @@ class Wall(Protocol):
     """One browser's view of the site."""
 
     def change(self, script: str) -> None:
-        """Something is another now: what `script` made of it."""
+        """Show a change, by this script."""
 
     def rebuild(self) -> None:
-        """Cards were added, or have gone."""
+        """Draw everything again: cards were added, or have gone."""
 
 
 class Gallery:
@@ -63,7 +63,7 @@ class Gallery:
         self._aged_at = float("-inf")
 
     def turn(self) -> None:
-        """Take what was heard, and draw what has changed by it, or by time."""
+        """Take what was heard, and draw what has changed since."""
         heard = self._listener.turn()
         now = self._clock()
         changed: dict[str, str] = {}
@@ -96,16 +96,16 @@ class Gallery:
         if trouble:
             yield _wrong(trouble)
         elif heard_at is None:
-            yield "nothing was heard yet: check the domain and the network"
+            yield "nothing heard yet: check the domain and the network"
         elif (silent_s := self._clock() - heard_at) > SILENT_S:
             yield _wrong(f"nothing was heard for {silent_s:.0f} s")
         for kind in sorted(self._site.crowded):
             yield f"more than {MOST_DEVICES} {kind}s are on the graph: some are not shown"
         if self._listener.lost:
-            yield f"{self._listener.lost} messages came too fast, and were lost"
+            yield f"{self._listener.lost} messages came too fast and were lost"
 
     def _draw(self, every: Iterable[DeviceView]) -> dict[str, str]:
-        """The cards that are others now, by their places."""
+        """The cards that have changed, by their places."""
         changed, added = {}, False
         for shown in every:
             key = (shown.row.kind, shown.row.name)

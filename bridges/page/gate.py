@@ -10,8 +10,7 @@ from bridges.page.guard import Refusal, Scope
 from bridges.page.login import Login
 
 MOST_BROWSERS: Final = 50
-"""Views that are held at once; each takes up to a megabyte. One that is not used any more is forgotten
-within a minute."""
+"""The most views at once; each takes up to a megabyte. An unused view is dropped within a minute."""
 OF_EVERYBODY: Final = ("/login", "/favicon.ico")
 LIBRARY: Final = "/_nicegui/"
 """The library's own scripts and styles."""
@@ -19,7 +18,7 @@ SOCKET: Final = "/_nicegui_ws/"
 
 
 class Gate:
-    """Lets requests in. `closed`: only those of who has logged in."""
+    """Lets requests in. `closed`: only those of logged-in users."""
 
     def __init__(self, login: Login, *, closed: bool) -> None:
         self._login = login
@@ -33,5 +32,5 @@ class Gate:
         if self._closed and not self._login.user(HTTPConnection(scope)):
             return Refusal(303, "log in first", f"/login?next={quote(path)}")
         if not path.startswith(SOCKET) and len(Client.instances) >= MOST_BROWSERS:
-            return Refusal(503, "too many browsers look at this page; try again in a minute")
+            return Refusal(503, "too many browsers have this page open; try again in a minute")
         return None

@@ -1,8 +1,8 @@
 """What every request to the page must pass before anything else sees it: its Host, its Origin, a login.
 
 A page on 127.0.0.1 can be reached by any web site that the same browser has open: by a name that is
-made to mean 127.0.0.1 (DNS rebinding), or by a socket or form of another origin. So only the names that
-the page was given are answered, and only its own origin may open its socket or post.
+made to resolve to 127.0.0.1 (DNS rebinding), or by a socket or form of another origin. So only the
+names that the page was given are answered, and only its own origin may open its socket or post.
 """
 
 import ipaddress
@@ -42,14 +42,14 @@ class Refusal:
 def refused(scope: Scope, hosts: Collection[str]) -> str:
     """Why this request is not answered; "" if it is. `hosts`: names, with or without a port.
 
-    An address is answered as well: only a name can be made to mean another machine.
+    An address is answered as well: only a name can be made to resolve to another machine.
     """
     headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
     host = headers.get("host", "").lower()
     if not _is_address(host) and not any(
         host in (known, host_of(known)) or host_of(host) == known for known in hosts
     ):
-        return "this page does not answer to that host name"
+        return "this page does not serve that host name"
     origin = headers.get("origin")
     changes = scope["type"] == "websocket" or scope.get("method") not in ("GET", "HEAD", "OPTIONS")
     if origin is None:

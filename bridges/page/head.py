@@ -1,4 +1,4 @@
-"""What every view begins with: its title, the ways to the others, and who has logged in."""
+"""The head of every view: its title, links to the others, and who has logged in."""
 
 from html import escape
 from typing import Final
@@ -10,9 +10,9 @@ from bridges.page.login import Login
 from bridges.rmf.words import printable
 
 BLUE: Final = "#005a93"
-"""Of buttons: white is read on it by day and by night."""
+"""The colour of buttons: white text is readable on it in both themes."""
 GREEN: Final = "#00674c"
-"""Of what says that a command was done; white is not read on the library's own."""
+"""The colour of success; white text is not readable on the library's own."""
 
 
 def head(title: str, login: Login, request: Request) -> None:
@@ -28,7 +28,7 @@ def head(title: str, login: Login, request: Request) -> None:
 
 
 def main(style: str = "") -> ui.element:
-    """The part of a view that is its own."""
+    """The main part of a view."""
     return ui.element("main").props("id=main").classes(style)
 
 

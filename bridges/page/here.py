@@ -23,7 +23,7 @@ from bridges.serve.places import runtimes
 class Served:
     """A device that a daemon here serves: its YAML, what it senses and what it drives now.
 
-    `contacts`: each signal that is known: is it asserted?
+    `contacts`: each known signal, and whether it is asserted.
     """
 
     local: Local

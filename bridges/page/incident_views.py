@@ -56,7 +56,7 @@ class IncidentViews:
         """The file itself."""
         path = self._path(name)
         if path is None:
-            return Response("no incident of that name", status_code=404)
+            return Response("there is no incident of that name", status_code=404)
         return FileResponse(path, filename=name, media_type="application/octet-stream")
 
     def _path(self, name: str) -> Path | None:
@@ -69,11 +69,13 @@ class IncidentViews:
         try:
             items = "".join(map(_item, incidents.listed(self._folder)))
         except OSError as error:
-            return f"<p>{escape(f'{self._folder}: {error.strerror}. There is no incident.')}</p>"
-        return f'<ul class="incidents">{items}</ul>' if items else "<p>There is none.</p>"
+            return (
+                f"<p>{escape(f'{self._folder}: {error.strerror}. No incident can be shown.')}</p>"
+            )
+        return f'<ul class="incidents">{items}</ul>' if items else "<p>There are no incidents.</p>"
 
     async def _view(self, path: Path | None, client: Client, link: str = "") -> None:
-        """It is shown at once, and filled when the recording is read: that may take long."""
+        """Show the view at once, and fill it when the recording has been read, which may take long."""
         with main():
             if path is None:
                 part("<p>There is no incident of that name.</p>")
@@ -109,7 +111,7 @@ def _download(name: str) -> str:
 def _told(found: incidents.Recording) -> Iterator[str]:
     yield "".join(f"<p>{escape(note)}</p>" for note in found.notes)
     if not found.devices:
-        yield "<p>It holds nothing of RMF's lifts, doors and chargers.</p>"
+        yield "<p>It has nothing about RMF's lifts, doors and chargers.</p>"
     for told, drawing in found.devices:
         yield f"<h2>{escape(f'{told.kind} {told.device}')}</h2>"
         yield explanation(told)

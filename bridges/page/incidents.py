@@ -1,7 +1,7 @@
 """The folder of recordings: what is in it, and one of them understood. No other folder is ever read.
 
-A recording may come from elsewhere and be made to hurt, so it is read in a process of its own
-(`python -m bridges.page.incidents FILE`), which may take only so much memory and time.
+A recording may come from elsewhere and be hostile, so it is read in a process of its own
+(`python -m bridges.page.incidents FILE`) with limited memory and time.
 """
 
 import asyncio
@@ -28,14 +28,14 @@ from bridges.recording.sources import BagError, Notes
 SUFFIX: Final = ".mcap"
 MOST_LISTED: Final = 500
 MOST_DEVICES: Final = 50
-"""Of one recording; more are counted."""
+"""The most devices shown of one recording; more are counted."""
 LONGEST_S: Final = 20.0
-"""A recording is read for so long at most; the rest of it is left out, and that is said."""
+"""A recording is read for this long (s) at most; the page says that the rest is left out."""
 
 ENDED_S: Final = 60.0
-"""Then its process is ended: nothing of RMF's is in it, and much else."""
+"""Its process is ended after this long (s): the recording is full of messages that are not RMF's."""
 MOST_MEMORY: Final = 128 << 20
-"""What its process may take, beside the page in the unit's 256 MB (bytes)."""
+"""The memory of its process (bytes), which shares the unit's 256 MB with the page."""
 
 
 @dataclass(frozen=True, slots=True)

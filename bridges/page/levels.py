@@ -71,7 +71,7 @@ def _fields(tree: Tree) -> Iterator[tuple[str, str]]:
 
 
 def in_words(value: Tree) -> str:
-    """A value in a word or a few."""
+    """A value in a few words."""
     match value:
         case None | "":
             return "-"

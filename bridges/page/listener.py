@@ -18,7 +18,7 @@ from bridges.rmf.transport import Transport, TransportError
 log = logging.getLogger(__name__)
 
 WAITING: Final = 20_000
-"""Messages that may wait for the site. More come only from a flood; those are lost, and counted."""
+"""The most messages that wait for the site. More come only in a flood: they are lost, and counted."""
 LONGEST_TURN_S: Final = 0.05
 """A flood must not keep the browsers waiting."""
 AGAIN_S: Final = 3.0
@@ -53,7 +53,7 @@ class Listener:
             self.lost += 1
 
     def turn(self) -> bool:
-        """Take what has arrived, on the caller's thread. Whether there was anything."""
+        """Take what has arrived, on the caller's thread. True if there was anything."""
         any_heard = False
         until = time.monotonic() + LONGEST_TURN_S
         while time.monotonic() < until:

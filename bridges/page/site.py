@@ -1,7 +1,7 @@
-"""What the page knows of RMF's graph: the latest of each device, and ten minutes of each one's past.
+"""What the page knows of RMF's graph: each device's latest state, and its last ten minutes.
 
 Pure: time comes with each message. Names come from the network, where anybody may make them up, so
-everything has a bound; who is known stays, whoever comes later.
+everything has a bound, and known devices stay whatever comes later.
 """
 
 from collections.abc import Sequence
@@ -27,14 +27,15 @@ from bridges.serve import diagnostics
 KEPT_S: Final = 600.0
 """The past that a device's page shows."""
 MOST_DEVICES: Final = 500
-"""Of each kind; RMF's largest sites have a tenth of it."""
+"""The most devices of each kind; RMF's largest sites have a tenth of it."""
 MOST_LINES: Final = 100
-"""Of what one device did. Its view shows forty; with six hundred of each a large site takes 150 MB."""
+"""The most story lines of one device. Its view shows forty. With six hundred each a large site takes
+150 MB."""
 MOST_ROBOTS: Final = 500
 UNSEEN_S: Final = 10.0
-"""Of a charger that was silent for longer nobody knows who was there."""
+"""After a longer silence (s) of a charger it is unknown who was there."""
 GONE_AFTER_S: Final = 60.0
-"""A device silent for so long gives way to a new one when there is no room."""
+"""When there is no room, a device that was silent for this long (s) gives way to a new one."""
 
 HEARD: Final[tuple[AnyTopic, ...]] = (
     topics.LIFT_STATES,
@@ -141,7 +142,7 @@ class Site:
         ]
 
     def knows(self, kind: str, name: str) -> bool:
-        """Whether the device of this printed name is still here; whatever has no state always is."""
+        """Whether the device of this printed name is still known; what has no states always is."""
         return kind not in KINDS or self._found(kind, name) is not None
 
     def explain(
@@ -183,7 +184,7 @@ class Site:
         self._remember(device, heard)
 
     def _stood(self, state: d.ChargerState, at: float) -> None:
-        """Note who has the charger, and since when. What was while it was silent is not known."""
+        """Note who has the charger, and since when. What happened while it was silent is unknown."""
         who = f"{state.robot_fleet}/{state.robot_name}" if state.robot_name else ""
         before, _, _ = self._since.get(state.charger_name, ("", 0.0, False))
         last_at = self._last_at.get(("charger", state.charger_name), float("-inf"))
@@ -192,7 +193,7 @@ class Site:
             self._since[state.charger_name] = who, at, unseen
 
     def _standing(self, charger: str) -> Stands | None:
-        """As of the last state: what came after it is not known."""
+        """How long its robot has had the charger, as of the last state."""
         who, since, at_least = self._since.get(charger, ("", 0.0, False))
         last_at = self._last_at.get(("charger", charger), since)
         return Stands(last_at - since, at_least) if who else None

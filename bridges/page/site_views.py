@@ -38,8 +38,8 @@ NOT_HERE: Final = (
 
 
 class SiteWall:
-    """One browser's view of the site: few elements of the library's, which a browser goes through at
-    each update."""
+    """One browser's view of the site. It has few elements of the library's, because a browser goes
+    through all of them at each update."""
 
     def __init__(self, gallery: Gallery, client: Client) -> None:
         self._gallery = gallery
@@ -63,7 +63,7 @@ class SiteWall:
             self._client.run_javascript(script)
 
     def rebuild(self) -> None:
-        """All cards whose name is looked for, by kind and name."""
+        """Draw all cards that match the search, by kind and name."""
         self._missed = not self._client.has_socket_connection
         self._built += 1  # what is the same as before would not be sent
         wanted = str(self._find.value or "").lower()
@@ -122,7 +122,7 @@ class SiteViews:
         key = (kind, name)
         with main("device"):
             if key not in self._gallery.shown:
-                part(f"<p>{escape(f'No {kind} of the name {name} was heard.')}</p>", WIDE)
+                part(f"<p>{escape(f'No {kind} named {name} was heard.')}</p>", WIDE)
                 return
             drawn = [(part(), self._card)]
             with ui.element("section").classes("panel"):
@@ -148,7 +148,7 @@ class SiteViews:
         ui.timer(AGES_S, refresh)
 
     def _card(self, key: Key) -> str:
-        return self._gallery.cards.get(key, "<p>It is heard no more.</p>")
+        return self._gallery.cards.get(key, "<p>It is no longer heard.</p>")
 
     def _why(self, key: Key) -> str:
         found = self._explained(key)

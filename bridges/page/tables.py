@@ -28,7 +28,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) 
 def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:
     """The tables of the device's YAML, wires and limits, as `rmf-bridge check` prints them.
 
-    `contacts`: each signal that is known: is it asserted? The wires have it in a column.
+    `contacts`: each known signal, and whether it is asserted: a column of the wires.
     """
     found = _tables(file, _changed_at(file), device)
     if isinstance(found, str):

@@ -40,10 +40,10 @@ HERE_S: Final = 1.0
 RECONNECT_S: Final = 30.0
 """A browser that is away for longer loads its view again."""
 MOST_HISTORY: Final = 100
-"""Updates that a browser which was away is sent again; beyond them it loads its view again."""
+"""How many missed updates a browser is sent when it is back; after more it loads its view again."""
 MOST_CONNECTIONS: Final = 200
 MOST_BYTES: Final = 64 * 1024
-"""Of one message from a browser; the library's own are a hundredth of it."""
+"""The longest message from a browser; the library's own are a hundredth of it."""
 
 
 def serve(

@@ -1,4 +1,4 @@
-"""What is said where RMF's release lacks a message: its purpose takes the next best way.
+"""What is sent where RMF's release lacks a message: the nearest message that it has.
 
 - EmergencySignal to all fleets: `fire_alarm_trigger`, which every release's fleet adapters hear.
 - Alert: the log. What it is about is among the daemon's faults too, and so in its diagnostics.
@@ -29,13 +29,13 @@ def converted(message: Message) -> Message | None:
 
 
 def remarks(topic: AnyTopic, wanted: str) -> list[str]:
-    """What a person is told of a topic that is sent on; `wanted`: the YAML's `release`."""
+    """Remarks for `check` on a topic whose message a release lacks. `wanted`: the YAML's `release`."""
     names = RELEASES if wanted == "auto" else [wanted]
     way = (
         f"goes out on {INSTEAD[topic.name].name}" if topic.name in INSTEAD else "goes into the log"
     )
     return [
-        f"RMF's {name} has no {topic.type.__name__}: there what is for {topic.name} {way}"
+        f"RMF's {name} has no {topic.type.__name__}: on it {topic.name} {way}"
         for name in names
         if not RELEASES[name].has(topic.type)
     ]

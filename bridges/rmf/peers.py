@@ -1,10 +1,10 @@
 """The other nodes on the graph by the ends that they announce: which release of RMF is there, and whose
 types do not fit ours.
 
-A fleet adapter tells the release: it publishes FleetState and, in newer releases, hears
-EmergencySignal; our daemons do neither. With `auto` ours is that of the fleet adapters: the default
-while there is none, and the present one once there are two, which is a fault. The transports tell what
-they see.
+A fleet adapter shows the release: it publishes FleetState and, in newer releases, subscribes to
+EmergencySignal; our daemons do neither. With `auto` we speak the release of the fleet adapters: the
+default while there is none, and still the present one if there are two, which is a fault. The
+transports report the ends that they see.
 """
 
 import logging
@@ -24,7 +24,7 @@ from bridges.rmf.topics import AnyTopic
 log = logging.getLogger(__name__)
 
 MOST: Final = 5000
-"""More ends of others than any site has."""
+"""More ends of other nodes than any site has."""
 WITNESSES: Final = {
     (type_name(FleetState), True),
     (type_name(EmergencySignal), False),
@@ -56,20 +56,20 @@ class Peers:
         self._named: set[tuple[str, bool]] = set()
 
     def ours(self, topic: AnyTopic, *, publishes: bool) -> None:
-        """An end of our own."""
+        """Note an end of our own."""
         self._ours[topic.name.strip("/"), publishes] = topic
 
     def seen(self, key: Hashable, end: Announced) -> None:
-        """An end is there."""
+        """Note that an end is there."""
         if len(self._ends) < MOST or key in self._ends:
             self._ends[key] = end
 
     def gone(self, key: Hashable) -> None:
-        """It has left."""
+        """Note that an end has left."""
         self._ends.pop(key, None)
 
     def clear(self) -> None:
-        """Nothing is known any more: we join anew."""
+        """Forget all ends, because we join again."""
         self._ends.clear()
 
     def settle(self) -> bool:
@@ -89,18 +89,18 @@ class Peers:
                 self.name(self._ours[end.topic, not end.publishes], published=end.publishes)
 
     def name(self, topic: AnyTopic, *, published: bool) -> None:
-        """Log that what others publish on a topic, or hear there, is of another type; once."""
+        """Log, once, that other nodes publish or subscribe to a topic with another type."""
         key = topic.name.strip("/"), published
         if key not in self._named:
             self._named.add(key)
             notices.misfit(topic, notices.NOT_HEARD if published else notices.NOT_SERVED, "type")
 
     def differs(self, topic: AnyTopic, before: Release) -> bool:
-        """Is this topic's message another one in the present release than in that one?"""
+        """Does this topic's message differ between the present release and that one?"""
         return _hash_of(topic, self.release) != _hash_of(topic, before)
 
     def faults(self) -> list[tuple[str, str]]:
-        """(code, detail) of what keeps nodes apart now."""
+        """(code, detail) of what now keeps nodes from hearing each other."""
         heard = sorted(release.name for release in self._heard())
         found = [(MIXED, f"{' and '.join(heard)} are both on this graph")] if len(heard) > 1 else []
         counts = Counter(end.topic for end in list(self._ends.values()) if self._misfits(end))
@@ -123,7 +123,7 @@ class Peers:
         return end.type != type_name(ours.type) or not fits
 
     def _name_mixed(self, heard: set[Release]) -> None:
-        """Once when it begins."""
+        """Log two releases once, when the second appears."""
         if len(heard) > 1 and not self._mixed:
             names = " ".join(sorted(release.name for release in heard))
             log.warning(pairs("two_releases", on_this_graph=names, we_speak=self.release.name))
@@ -135,6 +135,6 @@ def _hash_of(topic: AnyTopic, release: Release) -> str:
 
 
 def _only(hashed: str) -> Iterator[Release]:
-    """The release that this hash tells, if it is one alone."""
+    """The release of this hash, if only one has it."""
     found = releases_of(hashed)
     return iter(found if len(found) == 1 else ())

@@ -56,10 +56,10 @@ JAZZY: Final = Release(
 KILTED: Final = Release("kilted")
 RELEASES: Final = {release.name: release for release in (JAZZY, KILTED)}
 DEFAULT: Final = JAZZY
-"""What is spoken where nobody tells: the release that most sites have."""
+"""The release to speak while no fleet adapter shows one: most sites have it."""
 DIFFERING: Final = frozenset[type]().union(
     *(release.lacks | {message for message, _ in release.without} for release in RELEASES.values())
 )
-"""The messages that tell one release from another."""
+"""The messages that differ between releases."""
 NEWEST: Final = KILTED
-"""What holds every message and field."""
+"""The release that has every message and field."""

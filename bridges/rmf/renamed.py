@@ -37,12 +37,12 @@ class Renamed:
         return self._transport.release
 
     def faults(self) -> list[tuple[str, str]]:
-        """(code, detail) of what keeps this node apart from others now."""
+        """(code, detail) of what now keeps this node and others from hearing each other."""
         return self._transport.faults()
 
     @property
     def lives(self) -> bool:
-        """It hears what comes."""
+        """Whether its thread runs."""
         return self._transport.lives
 
     def _named(self, topic: Topic[M]) -> Topic[M]:

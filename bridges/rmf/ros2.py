@@ -99,7 +99,7 @@ class Ros2Transport(Threaded):
         return subscription
 
     def faults(self) -> list[tuple[str, str]]:
-        """What keeps it apart from others; from any thread."""
+        """What keeps it and other nodes from hearing each other; from any thread."""
         with self._lock:
             if not self.lives or self._stay is None:
                 return []

@@ -50,7 +50,7 @@ class Threaded:
         return self._peers.release
 
     def faults(self) -> list[tuple[str, str]]:
-        """(code, detail) of what keeps it apart from others now; from any thread."""
+        """(code, detail) of what now keeps it and others from hearing each other; from any thread."""
         return self._peers.faults()
 
     @property

@@ -39,7 +39,7 @@ class Topic(Struct, Generic[M_co], frozen=True):
         return replace(self, name=name)
 
     def live(self) -> "Topic[M_co]":
-        """The same topic for who wants nothing that was retained."""
+        """The same topic for a subscriber that wants no retained messages."""
         return replace(self, subscribe=VOLATILE)
 
 

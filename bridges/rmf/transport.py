@@ -68,7 +68,8 @@ class Transport(Protocol):
         """The release of RMF's messages that it speaks now."""
 
     def faults(self) -> list[tuple[str, str]]:
-        """(code, detail) of what keeps this node apart from others now; from any thread."""
+        """(code, detail) of what now keeps this node and others from hearing each other; from any
+        thread."""
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Declare a publisher with `topic.publish` QoS."""

@@ -30,8 +30,8 @@ from bridges.rmf.zenoh_keys import Keys
 from bridges.rmf.zenoh_place import Place, Tell
 
 HEARTBEAT_S: Final = 0.5
-"""As in rmw_zenoh: so long after a retained message its number is sent again. So subscribers notice a
-loss."""
+"""As in rmw_zenoh: this long after a retained message its number is sent again, so that subscribers
+notice a loss."""
 LONGEST: Final = 1 << 20
 """The longest sample (bytes) that may wait for our thread. RMF's messages are far shorter; a hundred
 samples of this length fit into a small Pi's memory."""

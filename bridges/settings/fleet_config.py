@@ -10,7 +10,7 @@
 
 Older files have `robots:` beside `rmf_fleet:`, with `rmf_config: {charger: {waypoint: charger_a}}`, and
 one pair of lists for all levels. Source: open-rmf/fleet_adapter_template, config.yaml and
-fleet_adapter.py. Other keys are not ours, and are not looked at.
+fleet_adapter.py. Other keys do not concern us, and are ignored.
 """
 
 import re
@@ -39,7 +39,7 @@ class Charger(msgspec.Struct, frozen=True):
 
 
 class OlderRobot(msgspec.Struct, frozen=True):
-    """A robot's part that is RMF's."""
+    """The part of a robot's settings that is for RMF."""
 
     charger: Charger | None = None
 

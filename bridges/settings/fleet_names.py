@@ -1,7 +1,7 @@
 """Compares a coordinator's YAML with the configuration of a fleet's adapter, and with RMF's map.
 
 The two are written by different people, and RMF says nothing when they differ: a robot waits for ever,
-or stays on a pad. Each mismatch is told with its file, its line and what to write.
+or stays on a pad. Each mismatch is reported with its file, its line and what to write.
 """
 
 import math
@@ -27,7 +27,7 @@ FINISHING = ("charge", "park", "nothing")
 
 
 class Compared(Struct):
-    """What was found: what cannot be right, what may be a mistake, what else is good to know."""
+    """What was found: errors, possible mistakes, and what else is good to know."""
 
     errors: list[Problem] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""What is wrong with a file, and where: without YAML, for those who only report it."""
+"""What is wrong with a file, and where. Loads no YAML library, for code that only reports problems."""
 
 from collections.abc import Iterable
 

@@ -1,12 +1,12 @@
 """A charger with its maker's own CAN frames, by the driver's map, with a plant behind it.
 
 It charges while every frame of its map comes on time with the values of `on`. It stops when a frame has
-the values of `off`, or when one stays away for three periods. A machine that holds this station
-up holds the daemon up as well, so such a gap counts as one look only.
+the values of `off`, or when one stays away for three periods. A busy machine delays this
+station as well as the daemon, so a long gap between two looks counts as one look only.
 
 Failing part `node`, beside those of the plant and the bus: `off` is silent, `stuck` says what it said
-before, `slow` says it every two seconds, `garbage` sends frames of six bytes, `wrong` a state of no
-list.
+before, `slow` says it every two seconds, `garbage` sends frames of six bytes, `wrong` an unlisted
+state.
 """
 
 import time

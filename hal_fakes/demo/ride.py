@@ -25,7 +25,7 @@ CHARGE_S: Final = 3.0
 
 
 def dawns(world: World) -> bool:
-    """Every daemon is up, listens, and has said what its sensors see."""
+    """Every daemon is up, listens, and has published what its sensors read."""
     lift = world.journal.latest(LIFT)
     return (
         world.listened_to(topics.LIFT_REQUESTS, topics.DOOR_REQUESTS, topics.CHARGER_REQUESTS)

@@ -13,13 +13,13 @@ NEVER: Final = float("inf")
 SLOWNESS: Final = 10.0
 
 CLEARANCE_MM: Final = 60.0
-"""Between a robot's receiver and the pad when it is down."""
+"""The gap (mm) between a robot's receiver and the pad when it is down."""
 RISE_MM: Final = 40.0
 RISE_S: Final = 0.4
 HEIGHTS_MM: Final[dict[FailureMode | None, float]] = {"off": 0.0, "garbage": 20.0, "wrong": 52.0}
 """How high the pad rises where it does not rise to RISE_MM."""
 GAP_MM: Final = (10.0, 30.0)
-"""Where the two can couple."""
+"""The gaps (mm) at which the two can couple."""
 
 AMBIENT_C: Final = 25.0
 TRIP_C: Final = 95.0

@@ -7,10 +7,10 @@ FleetUpdateHandle.cpp) and seen with Jazzy's:
    waypoint that the graph does not have is the end of the adapter.
 2. It is a task when RMF finds the battery too low for the way to the dedicated waypoint (the automatic
    retreat; never while the robot stands there already, and Jazzy's never below the recharge threshold),
-   or when its planner wants it. That task ends at
-   recharge_soc. It is no task when it is the fleet's `finishing_request: charge`. That one lasts until
-   the next task, however full the battery is. `nothing` stays. `park` drives to a parking spot; Jazzy's
-   (branch jazzy, 7eef65a) knows no spots, and goes where ChargeBattery would, at each assignment too.
+   or when its planner wants it. That task ends at recharge_soc. As the fleet's `finishing_request:
+   charge` it is not a task, and lasts until the next task, however full the battery is. With
+   `nothing` a robot stays. With `park` it drives to a parking spot; Jazzy's (branch jazzy, 7eef65a)
+   knows no spots, and goes where ChargeBattery would, at each assignment too.
 3. A robot without a task shows the mode IDLE and no task id, also while it charges. WaitForCharge
    alone sets CHARGING, and nothing sets it back: every later task shows it too.
 4. An EasyFullControl adapter that starts forgets the assignments: it takes the retained one, and a
@@ -44,8 +44,7 @@ class AdapterCrashed(Exception):
 class FleetRobot:
     """`place`: the waypoint at which it stands; "" on the road. `goes_to`: where it drives.
     `dedicated`, `waits`: its charging assignment. `doing`: its task, or what it does without one.
-    `task_id`: "" without a task. `mode`: the last that a phase has set. `stuck`: it
-    drives nowhere."""
+    `task_id`: "" without a task. `mode`: the last that a phase has set. `stuck`: it cannot drive."""
 
     name: str
     place: str

@@ -108,7 +108,7 @@ def test_a_card_that_is_not_mounted_is_reported_before_the_first_step(
     root = tmp_path / "card"
     assert main([command, str(LIFT), "--root", str(root), "--dry-run"]) == os.EX_NOINPUT
     told = capsys.readouterr()
-    assert (told.out, told.err) == ("", f"{root} is no folder: is the card mounted?\n")
+    assert (told.out, told.err) == ("", f"{root} is not a folder: is the card mounted?\n")
     assert main([command, str(LIFT), "--root", str(root)]) == os.EX_NOINPUT
     assert (root.exists(), calls) == (False, [])
 
@@ -158,7 +158,7 @@ def test_a_file_that_cannot_name_a_service_is_refused(
     file = tmp_path / name
     file.write_bytes(LIFT.read_bytes())
     assert enable.run(_told(file, tmp_path)) == os.EX_CONFIG
-    assert "is no name of a service" in capsys.readouterr().err
+    assert "is not a service name" in capsys.readouterr().err
 
 
 def _told(file: Path, root: Path) -> argparse.Namespace:

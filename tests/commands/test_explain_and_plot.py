@@ -58,7 +58,7 @@ def test_explain_prints_json_on_request(bag: Path, capsys: pytest.CaptureFixture
 
 def test_explain_answers_for_the_time_of_to(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("explain", bag, "--to", "08:00:07") == 0
-    assert "fleet/red waits for Lift1 at L2 since 08:00:06" in capsys.readouterr().out
+    assert "fleet/red has waited for Lift1 at L2 since 08:00:06" in capsys.readouterr().out
 
 
 def test_explain_tells_the_story_from_the_time_of_from(
@@ -72,7 +72,7 @@ def test_explain_tells_the_story_from_the_time_of_from(
 
 def test_another_session_is_asked_about(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("explain", bag, "--session", "fleet/red") == 0
-    assert "What RMF looks at for fleet/red:" in capsys.readouterr().out
+    assert "What RMF checks for fleet/red:" in capsys.readouterr().out
 
 
 def test_explain_gives_each_of_several_devices_a_line(
@@ -94,7 +94,7 @@ def test_a_device_that_was_not_heard_is_exit_1(
     bag: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run("explain", bag, "Lift2") == 1
-    assert "(is it Lift1?)" in " ".join(capsys.readouterr().out.split())
+    assert "(did you mean Lift1?)" in " ".join(capsys.readouterr().out.split())
 
 
 def test_a_recording_that_was_cut_is_explained_as_far_as_it_goes(
@@ -144,7 +144,7 @@ def test_a_ride_is_drawn_in_each_format(suffix: str, bag: Path, tmp_path: Path) 
 
 def test_the_page_has_the_sentences_too(bag: Path, tmp_path: Path) -> None:
     assert run("plot", bag, "-o", tmp_path / "ride.html") == 0
-    assert "fleet/blue waits for Lift1 at L1" in (tmp_path / "ride.html").read_text("utf-8")
+    assert "fleet/blue has waited for Lift1 at L1" in (tmp_path / "ride.html").read_text("utf-8")
 
 
 def test_a_picture_that_cannot_be_written_is_exit_1(

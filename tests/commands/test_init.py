@@ -112,7 +112,7 @@ def test_a_missing_folder_is_reported_before_any_question_is_asked(
     ("words", "answer"),
     [
         ("--kind door", "no terminal to ask on: give --name, or --yes for 'Door1'"),
-        ("--kind door --floors L1 --yes", "--floors says nothing for door on modbus"),
+        ("--kind door --floors L1 --yes", "--floors has no meaning for a door on modbus"),
         ("--kind lift --wiring http --yes", "a lift is not wired by http: gpio, modbus, rs485"),
         ("--kind lift --floors L1 --yes", "a lift has at least two floors, each name once, not L1"),
         (
@@ -123,7 +123,7 @@ def test_a_missing_folder_is_reported_before_any_question_is_asked(
         ("--kind door --unit 0 --yes", "unit is '0': write a whole number from 1 to 247"),
         ("--kind door --domain-id x --yes", "domain_id is 'x': write a whole number from 0 to 232"),
         ("--kind charger --wiring http --address x_y!:z --yes", "with these answers check would"),
-        ("--kind door --name= --yes", "'' is no name for a door"),
+        ("--kind door --name= --yes", "'' is not a name for a door"),
     ],
 )
 def test_an_impossible_answer_is_reported_and_nothing_is_written(

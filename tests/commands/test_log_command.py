@@ -86,5 +86,5 @@ def test_an_unknown_service_is_reported_before_the_journals_lines(tmp_path: Path
         text=True,
         check=True,
     )
-    assert told.stderr.startswith("no_such_lift is no service here (services: ")
+    assert told.stderr.startswith("no_such_lift is not a service here (services: ")
     assert told.stdout == "asked for --unit=rmf-bridge@no_such_lift\n"

@@ -51,7 +51,7 @@ def test_an_impossible_user_or_a_short_password_is_not_added(
 @pytest.mark.parametrize(
     ("text", "mode", "why"),
     [
-        ("", 0o600, "no user in it"),
+        ("", 0o600, "it has no user"),
         ("ann:secret\n", 0o600, ":1: not a hash"),
         ("# people\nann\n", 0o600, ":2: not a hash"),
         ("", 0o644, "open to other users"),
@@ -69,7 +69,7 @@ def test_a_file_that_cannot_be_used_says_where_and_why(
 
 def test_after_five_wrong_passwords_an_address_waits_a_minute(stored: str) -> None:
     door = Door({"ann": stored})
-    wrong = "this user and password do not go together"
+    wrong = "wrong user or password"
     waits = "too many wrong passwords; wait a minute"
     tries = [("ann", "x"), ("ann", "y"), ("eve", "correct horse"), ("ann", ""), ("ann", "z" * 9999)]
     assert [door.refuses(*one, "10.0.0.1", at) for at, one in enumerate(tries)] == [wrong] * 5

@@ -26,7 +26,7 @@ def test_requests_to_the_pages_own_names_are_answered(host: str) -> None:
 def test_a_request_to_any_other_name_is_not_answered_so_dns_rebinding_fails(
     host: str,
 ) -> None:
-    assert asked(host) == "this page does not answer to that host name"
+    assert asked(host) == "this page does not serve that host name"
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://localhost:8081"])

@@ -126,7 +126,7 @@ def test_a_command_without_a_ring_or_a_recording_says_what_to_do(
     )
     assert died.stderr == (
         f"{none}/ring.died cannot be read: No such file or directory."
-        " --died is the run before the last one: of the last one, leave it out\n"
+        " --died is the run before the last one; for the last one, leave it out\n"
     )
     assert (nowhere.returncode, nowhere.stdout, nowhere.stderr) == (
         73,

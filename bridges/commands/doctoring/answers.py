@@ -164,19 +164,21 @@ def _scanned(
     began = time.monotonic()
     found = [number for number in asked if answering(number)]
     took_s = time.monotonic() - began
-    text = f"of {what}s {ranges(asked)} these answer: {ranges(found) or 'none'} ({took_s:.1f} s)"
+    text = (
+        f"of the {what}s {ranges(asked)} these answer: {ranges(found) or 'none'} ({took_s:.1f} s)"
+    )
     strangers = sorted(set(found) - ours)
     if found == asked:
         return note(subject, text, f"it answers whatever the {what} is, as many TCP modules do")
     if strangers and not ours <= set(found):
         do = f"write the {what} that answers, or give the device its own"
-        means = f"{what} {ranges(sorted(ours))} of this file may be another one"
+        means = f"{what} {ranges(sorted(ours))} of this file may be wrong"
         return warning(subject, text, means, do)
     if strangers:
         return note(subject, text, f"{what} {ranges(strangers)} is in no device of this file")
     if not found:
         do = "supply, cable (A and B), baud rate and parity, the gateway's own timeout"
-        return wrong(subject, text, "nobody is there, or nobody is heard", do)
+        return wrong(subject, text, "nothing is there, or nothing is heard", do)
     return ok(subject, text)
 
 

@@ -27,14 +27,16 @@ def interface(machine: Machine, name: str, bitrate: int | None) -> Iterator[Find
         yield wrong(CAN, f"there is no interface {name}; CAN interfaces here: {seen}", DEAF, do)
         return
     if not _is_can(machine, name):
-        yield wrong(CAN, f"{name} is no CAN interface", DEAF, "socketcan: the name of one")
+        yield wrong(
+            CAN, f"{name} is not a CAN interface", DEAF, "write the name of one under socketcan:"
+        )
         return
     if not int(machine.text(f"{folder}/flags") or "0", 16) & IFF_UP:
         yield wrong(CAN, f"{name} is down", DEAF, HOW.format(name, rate))
         return
     details = _details(machine, name)
     if details is None:
-        found = f"{name} is up; without the command ip its bitrate is not known"
+        found = f"{name} is up; its bitrate is not known without the command ip"
         yield note(CAN, found, "", "sudo apt install iproute2")
     elif details.kind != "can":
         yield note(CAN, f"{name} is up, and {details.kind}: it has no wire")
@@ -47,7 +49,7 @@ class _Timing(msgspec.Struct, frozen=True):
 
 
 class Controller(msgspec.Struct, frozen=True):
-    """What `ip -details` tells of a controller."""
+    """What `ip -details` says of a controller."""
 
     state: str = "?"
     bittiming: _Timing = _Timing()
@@ -81,7 +83,7 @@ def _controller(name: str, told: Controller, bitrate: int | None) -> Iterator[Fi
     rate = told.bittiming.bitrate
     how = HOW.format(name, bitrate or rate)
     if bitrate is not None and rate != bitrate:
-        found = f"{name} has {rate} bit/s, and these stations come with {bitrate}"
+        found = f"{name} has {rate} bit/s, but these stations come with {bitrate}"
         yield warning(CAN, found, "one station at another bitrate stops the whole bus", how)
     else:
         yield ok(CAN, f"{name} is up at {rate} bit/s; compare that with the stations")
@@ -92,7 +94,7 @@ def _controller(name: str, told: Controller, bitrate: int | None) -> Iterator[Fi
     elif state not in ("ERROR-ACTIVE", "?"):
         yield warning(CAN, f"{name} is {state.lower()}", "it counts many errors", check)
     if not told.restart_ms:
-        means = "after a bus-off nobody is heard until somebody sets it down and up"
+        means = "after a bus-off nothing is heard until somebody sets it down and up"
         yield warning(CAN, f"{name} has no restart-ms", means, how)
 
 

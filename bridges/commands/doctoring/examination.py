@@ -31,7 +31,7 @@ XNERGY_BITRATE: Final = 250_000
 class Options:
     """What the command line asks for. `kill_test`: device and output; None without the test.
 
-    `whole_scan`: every unit or node of a bus. `listen_s`: how long to hear RMF's graph; 0 for not.
+    `whole_scan`: every unit or node of a bus. `listen_s`: how long to listen to RMF's graph (s); 0: not at all.
     `line`: with the options that name that graph.
     """
 
@@ -78,16 +78,16 @@ def examined(
 
 def _file(config: Config, building: "BuildingMap | None") -> Iterator[Finding]:
     """The subject `file`: what `check` would say of it, in short."""
-    yield ok("file", f"{config.path} is a {config.kind}, and right")
+    yield ok("file", f"{config.path} is a valid file of a {config.kind}")
     for problem in config.warnings:
         yield note("file", str(problem), "legal, and worth a look", "rmf-bridge check FILE")
     if building is None:
         return
     from bridges.settings.map_names import mismatches
 
-    means = "RMF finds by name: a robot waits for ever"
+    means = "RMF finds devices by name: a robot would wait for ever"
     for problem in (problems := mismatches(config, building)):
-        yield wrong("file", str(problem), means, "one name, in the YAML and on the map")
+        yield wrong("file", str(problem), means, "use the same name in the YAML and on the map")
     if not problems:
         yield ok("file", f"same names as in {building.file}")
 
@@ -126,7 +126,7 @@ def _answering(config: Config, places: Places, now: Served, options: Options) ->
         kept.own(places)
         held = directory.RuntimeDirectory(places, config.path.absolute(), serves=False)
     except (directory.AlreadyRunning, directory.Unknown, PermissionError) as error:
-        yield wrong(DAEMON, str(error), NOT_ASKED, "stop what uses it, and ask again")
+        yield wrong(DAEMON, str(error), NOT_ASKED, "stop what uses it, and try again")
         return
     try:
         for name in names:

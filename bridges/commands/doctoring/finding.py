@@ -12,7 +12,7 @@ EXIT_CODE: Final = {"ok": WELL, "note": WELL, "warning": WARNINGS, "wrong": WRON
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """One thing that was looked at. What is `ok` has neither a meaning nor something to do."""
+    """One finding. A finding that is `ok` has neither a meaning nor a remedy."""
 
     subject: str
     level: Level
@@ -32,12 +32,12 @@ def note(subject: str, found: str, means: str = "", do: str = "") -> Finding:
 
 
 def warning(subject: str, found: str, means: str, do: str) -> Finding:
-    """It works, and may not on another day."""
+    """It works now, but may fail later."""
     return Finding(subject, "warning", found, means, do)
 
 
 def wrong(subject: str, found: str, means: str, do: str) -> Finding:
-    """It cannot work so."""
+    """It cannot work like this."""
     return Finding(subject, "wrong", found, means, do)
 
 

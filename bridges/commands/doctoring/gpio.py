@@ -45,7 +45,7 @@ def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
     if found is None:
         yield _no_header(machine, chip)
         return
-    board = BOARDS.get(found.label, "no Raspberry Pi that is known here")
+    board = BOARDS.get(found.label, "not a known Raspberry Pi")
     yield ok(GPIO, f"{found.device.name} is {found.label}, {board}, {found.lines} lines")
     if chip is not None and not found.label.startswith(HEADER_LABEL):
         yield warning(
@@ -69,9 +69,9 @@ def _no_header(machine: Machine, chip: int | None) -> Finding:
     seen = ", ".join(f"{one.device.name} ({one.label})" for one in chips(machine))
     if len(list(chips(machine))) < len(devices(machine)):
         names = ", ".join(device.name for device in devices(machine))
-        do = "sudo before the command, or be in the group gpio"
-        text = f"of {names} only this may be looked at: {seen or 'nothing'}"
-        return wrong(GPIO, text, "whether the header is there is not known", do)
+        do = "use sudo, or join the group gpio"
+        text = f"of {names} this user may only open: {seen or 'nothing'}"
+        return wrong(GPIO, text, "it is not known whether the header is there", do)
     text = f"no chip is {'the header' if chip is None else f'gpiochip{chip}'}; there is {seen}"
     return wrong(GPIO, text, "no pin can be claimed", "look at gpiodetect; leave chip: out on a Pi")
 
@@ -97,13 +97,13 @@ def lines(machine: Machine, chip: Chip, wires: Iterable[Wire]) -> Iterator[Findi
             now = line(machine, chip, _offset(wire))
         except OSError as error:
             found = f"{describe(wire.point)} ({wire.signal}) cannot be looked at: {error.strerror}"
-            yield note(GPIO, found, "who holds it is not known", "a kernel of 5.10 or newer")
+            yield note(GPIO, found, "it is not known who holds it", "use a kernel of 5.10 or newer")
             return
         if now.consumer:
             free = False
             names = " or ".join(holders(chip.device, machine.at("/proc"))) or repr(now.consumer)
             found = f"{describe(wire.point)} ({wire.signal}) is held by {names}"
-            do = "stop that program or take its overlay out of config.txt; or another pin"
+            do = "stop that program or take its overlay out of config.txt; or use another pin"
             yield wrong(GPIO, found, "the daemon cannot claim it", do)
     if free:
         yield ok(GPIO, "no other program holds a pin of this file")
@@ -170,7 +170,7 @@ def death(machine: Machine) -> Iterator[Finding]:
     elif said in ("N", "0"):
         yield ok(DEATH, f"the kernel makes an output an input again. {KILL_TEST}")
     else:
-        found = "whether the kernel keeps an output's level is not known"
+        found = "it is not known whether the kernel keeps an output's level"
         yield warning(DEATH, found, means, KILL_TEST)
 
 

@@ -35,14 +35,14 @@ SENDERS: Final = {
     "adapter_door_requests": "RMF's fleet adapters",
     "fleet_states": "RMF's fleet adapters",
 }
-"""Without these nobody asks for anything. The other topics may be silent."""
+"""Nobody can request anything without these. The other topics may be silent."""
 LIBRARIES: Final = {"dds": "cyclonedds", "zenoh": "eclipse-zenoh"}
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
     """How to look. `listen_s`: how long. `serving`: our own daemon is on the graph too; None if
-    that is not known. `watch`: the command that shows this graph.
+    unknown. `watch`: the command that shows this graph.
     """
 
     localhost: bool
@@ -78,7 +78,7 @@ def graph(config: Config, look: Look) -> Iterator[Finding]:
 
 def _interface(domain: int, loopback: bool) -> Finding:
     if loopback:
-        means = "nobody on another machine is heard"
+        means = "no other machine is heard"
         do = "network: of the YAML, or ROS's variables"
         return note(NETWORK, f"domain {domain}, on this machine alone", means, do)
     found = sorted(address for _, address in addresses())
@@ -110,7 +110,7 @@ def _heard(config: Config, transport: Transport, look: Look) -> Iterator[Finding
 
 
 def _listened(ear: Ear, listen_s: float) -> list[Any]:
-    """Every message that comes in so long."""
+    """Every message that comes in this time (s)."""
     until, messages = time.monotonic() + listen_s, list[Any]()
     while (left_s := until - time.monotonic()) > 0:
         messages += [heard.message for heard in ear.listen(left_s)]
@@ -128,7 +128,7 @@ def _senders(topic: str, end: Subscription, look: Look) -> Finding:
 
 
 def _rivals(ends: Sequence[Subscription], serving: bool | None) -> Iterator[Finding]:
-    """Another node that does what this one shall do."""
+    """Other nodes that do the work of this one."""
     rivals = max((end.matched() for end in ends), default=0) - (serving is not False)
     if rivals > 0:
         means = "ours only listens (passive) while the other one is there"
@@ -146,7 +146,7 @@ def _ours(devices: Sequence[str], heard: set[str], look: Look) -> Iterator[Findi
         elif serving and name not in heard:
             do = f"rmf-bridge log FILE; {look.alone}"
             yield warning(
-                GRAPH, f"{name} is not heard from our daemon", "nor by RMF, it may be", do
+                GRAPH, f"{name} is not heard from our daemon", "RMF may not hear it either", do
             )
         elif serving:
             yield ok(GRAPH, f"{name} is heard")
@@ -157,8 +157,8 @@ def _ours(devices: Sequence[str], heard: set[str], look: Look) -> Iterator[Findi
 
 def _messages(transport: Transport) -> Iterator[Finding]:
     for topic, count in transport.dropped.items():
-        means = "its sender has another version of RMF's messages, or sends nonsense"
-        do = "the same release of RMF's message packages on every machine"
+        means = "its sender has another version of RMF's messages, or sends invalid data"
+        do = "install the same release of RMF's message packages on every machine"
         yield wrong(MESSAGES, f"{count} on {topic} could not be decoded", means, do)
     if transport.speaks == "ros2":
         yield from _installed()
@@ -178,15 +178,15 @@ def _installed() -> Iterator[Finding]:
         except TransportError as error:
             problems.append(str(error))
     for text in problems:
-        means = "a sample of it would be read as something else, so it is not spoken"
-        yield wrong(MESSAGES, text, means, "the same release of RMF's packages everywhere")
+        means = "its samples would be misread, so it is not used"
+        yield wrong(MESSAGES, text, means, "install the same release of RMF's packages everywhere")
     if not problems:
         yield ok(MESSAGES, "the installed ROS packages are those that this version knows")
 
 
 @contextmanager
 def overheard() -> Iterator[list[str]]:
-    """What the transports log as warnings and errors meanwhile."""
+    """The warnings and errors that the transports log meanwhile."""
     said: list[str] = []
     ears = logging.Handler(logging.WARNING)
     ears.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]
@@ -204,4 +204,4 @@ def overheard() -> Iterator[list[str]]:
 
 
 def _ignore(message: object) -> None:
-    """Only who sends counts here."""
+    """The messages do not matter: only their senders are counted."""

@@ -11,19 +11,19 @@ from bridges.commands.doctoring.users import User
 from bridges.serve.places import Places
 
 FREE_LEAST: Final = 50 << 20
-"""Below this much free space (bytes) a log that runs on fills the disk soon."""
+"""With less free space than this (bytes) a growing log soon fills the disk."""
 
 
 def clock(machine: Machine) -> Iterator[Finding]:
     """The subject `clock`: RMF compares the stamps of states with its own clock."""
-    found = "it is not synchronised"
+    found = "the clock is not synchronised"
     means = (
         "states carry wrong stamps, and RMF may take them for old; durations do not depend on it"
     )
     do = "timedatectl timesync-status; is the time server reached? A Pi has no clock of its own"
     synchronised = machine.synchronised()
     if synchronised:
-        yield ok("clock", "it is synchronised")
+        yield ok("clock", "the clock is synchronised")
     elif synchronised is None:
         yield note("clock", "the kernel does not say whether it is synchronised", means, do)
     elif "NTP=no" in (machine.printed("timedatectl", "show") or "").splitlines():
@@ -44,13 +44,17 @@ def watchdog(machine: Machine) -> Iterator[Finding]:
     fed = (machine.printed(*words) or "").strip()
     if not fed:
         do = "systemctl show --property=RuntimeWatchdogUSec on the target"
-        yield note(subject, "whether systemd feeds the hardware watchdog is not known", means, do)
+        yield note(
+            subject, "it is not known whether systemd feeds the hardware watchdog", means, do
+        )
     elif fed in ("0", "infinity"):
         do = (
             "RuntimeWatchdogSec=10 below [Manager] in /etc/systemd/system.conf.d/watchdog.conf, then"
             " sudo systemctl daemon-reexec (a Raspberry Pi's has 15 s at most)"
         )
-        yield warning(subject, "there is one, and systemd does not feed it", means, do)
+        yield warning(
+            subject, "there is a hardware watchdog, but systemd does not feed it", means, do
+        )
     else:
         yield ok(subject, f"the hardware restarts this machine if systemd is silent for {fed}")
 
@@ -63,7 +67,7 @@ def directories(machine: Machine, places: Places, who: User) -> Iterator[Finding
         if not who.service and not _may_write(found, machine, who):
             yield wrong(
                 "disk",
-                f"{who.name} may not write in {machine.named(found)}, where {folder} is to be",
+                f"{who.name} may not write in {machine.named(found)}, where {folder} belongs",
                 "there is no status, and after a death nobody knows what was on",
                 "start the daemon as a user who may, or give it another place with --runtime-dir",
             )

@@ -1,9 +1,9 @@
 """The kill test: does an output go off when the process that holds it on is killed?
 
 Another process (`victim.py`) switches one output on as the daemon would, with its lock, its record and
-its guard. It is killed with -9. Then the guard must have the output verified off, as systemd's
-ExecStopPost has it after the death of a service. On GPIO the line is looked at in between: does the
-kernel keep it as an output?
+its guard. It is killed with -9. Then the guard must switch the output off and verify it, as
+systemd's ExecStopPost does after the death of a service. On GPIO the line is checked in between: does
+the kernel keep it as an output?
 """
 
 import os
@@ -24,7 +24,7 @@ from bridges.serve.record import Records
 KILL_TEST: Final = "kill test"
 STARTS_S: Final = 15.0
 SEEN_S: Final = 1.0
-"""So long a relay is on before the kill: somebody beside it can see that."""
+"""How long (s) a relay is on before the kill, so that somebody beside it can see it."""
 OFF_WITHIN_S: Final = 15.0
 """`outputs-off` has 5 s, and may be tried twice."""
 LOOK_S: Final = 0.02
@@ -65,7 +65,7 @@ def _kernel(name: str, still: bool | None) -> Iterator[Finding]:
         return
     if still:
         do = "dtparam=strict_gpiod in /boot/firmware/config.txt, reboot, and test again"
-        means = "where nobody can run outputs-off, the relay stays on"
+        means = "if outputs-off cannot run, the relay stays on"
         yield warning(KILL_TEST, f"{name}: the kernel kept the line as it was", means, do)
     else:
         yield ok(KILL_TEST, f"{name}: the kernel let the line go at once")
@@ -75,7 +75,8 @@ def _outcome(name: str, off_after_s: float | None) -> Finding:
     if off_after_s is None:
         found = f"{name} is not verified off {OFF_WITHIN_S:g} s after kill -9"
         return wrong(KILL_TEST, found, "IT MAY STILL BE ON", CUT)
-    found = f"{name} was on, its process was killed with -9, and the guard had it verified off"
+    done = "the guard switched it off and verified that"
+    found = f"{name} was on, its process was killed with -9, and {done}"
     return ok(KILL_TEST, f"{found} after {off_after_s:.1f} s")
 
 
@@ -104,7 +105,7 @@ def _ended_early(victim: "subprocess.Popen[bytes]") -> str:
 
 
 def _ended(victim: "subprocess.Popen[bytes]") -> None:
-    """The end of its input has a victim that lives switch off and end."""
+    """Wait until the victim has ended. A victim that lives switches off when its input ends."""
     assert victim.stdin
     assert victim.stdout
     victim.stdin.close()

@@ -1,7 +1,7 @@
 """This machine as the doctor sees it: its files, what its commands print, what its devices answer.
 
-It is the only way in. `root` is a made-up machine's directory in the tests; its commands are scripts in
-`usr/bin` there, and `ioctl` answers for its devices.
+The doctor has no other access to it. In tests `root` is the directory of a made-up machine; its
+commands are scripts in `usr/bin` there, and `ioctl` answers for its devices.
 """
 
 import fcntl
@@ -18,7 +18,7 @@ COMMAND_S: Final = 3.0
 PLACES: Final = ("usr/sbin", "usr/bin", "sbin", "bin")
 TEXT_MAX: Final = 1 << 20
 TIMEX_MAX: Final = 512
-"""More than any kernel's struct timex; zeroes ask and set nothing."""
+"""Longer than any kernel's struct timex. Zeroes only read the clock's state."""
 TIME_ERROR: Final = 5
 
 
@@ -35,7 +35,7 @@ def _installed(package: str) -> bool:
 
 
 def _synchronised() -> bool | None:
-    """Whether the kernel's clock is kept right by somebody: adjtimex(2), which is asked only."""
+    """Whether the kernel's clock is synchronised, read by adjtimex(2)."""
     import ctypes
 
     state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_MAX))

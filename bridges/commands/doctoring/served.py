@@ -67,12 +67,12 @@ def _told(one: Daemon) -> Iterator[Finding]:
     if one.state != "serving":
         do = "rmf-bridge log FILE; then restart it"
         age = "never" if one.age_s is None else f"{one.age_s:.0f} s ago"
-        yield wrong(DAEMON, f"it runs, and wrote its status {age}", "it may hang", do)
+        yield wrong(DAEMON, f"it runs, but wrote its status {age}", "it may hang", do)
     else:
         version = one.status.get("version", "?")
         yield ok(DAEMON, f"it serves this file, version {version}; {NOT_ASKED}")
     if one.status.get("simulated"):
-        means = "no hardware moves; what is said of pins and ports holds for a real device"
+        means = "no hardware moves; what follows about pins and ports is for a real device"
         yield note(DAEMON, "it is a SIMULATION", means, "run it without --simulate on the Pi")
     else:
         yield from _listeners(one.status)
@@ -87,7 +87,7 @@ def _told(one: Daemon) -> Iterator[Finding]:
 
 
 def _listeners(status: Status) -> Iterator[Finding]:
-    """Who hears the states; topics without a listener are common beside them."""
+    """Who hears the states. Other topics often have no listener."""
     for topic, nodes in status.get("heard_by", {}).items():
         if nodes:
             yield ok(DAEMON, f"{topic}: heard by {nodes} node{'s' if nodes > 1 else ''}")

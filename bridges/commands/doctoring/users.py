@@ -64,7 +64,7 @@ def users(machine: Machine) -> Iterator[Finding]:
         name = _name(machine, machine.uid)
         yield note(
             subject,
-            f"the unit {UNIT} is not installed; what follows is judged for {name}",
+            f"the unit {UNIT} is not installed; what follows is checked for {name}",
             "the daemon does not start at boot, and nobody restarts it",
             'README, "On the Pi, under systemd"',
         )
@@ -81,7 +81,7 @@ def users(machine: Machine) -> Iterator[Finding]:
         yield wrong(
             subject,
             f"there is no group {' and no group '.join(missing)}, which a service may need",
-            "`rmf-bridge enable` cannot give it to the daemon, whose devices stay closed",
+            "`rmf-bridge enable` cannot give it to the daemon, which then cannot open its devices",
             "; ".join(f"sudo groupadd --system {group}" for group in missing)
             + "; then sudo rmf-bridge enable FILE",
         )

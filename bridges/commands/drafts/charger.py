@@ -6,7 +6,7 @@ from bridges.commands.drafts.answers import Answers
 from bridges.commands.drafts.points import Points
 
 HTTP = """\
-    # What the maker's state numbers mean: ask the maker. A number that stands nowhere is an error.
+    # What the maker's state numbers mean: ask the maker. An unlisted number is an error.
     codes:
       idle: [0]
       handshake: [1, 2, 3, 4]

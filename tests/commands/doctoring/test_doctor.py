@@ -107,7 +107,7 @@ def test_a_module_is_read_and_its_units_are_found_and_nothing_is_written(
     code, found = doctor(tapped.file, tmp_path, "--listen", "0")
     reading, scan = found["bus module"]
     assert reading == ("ok", "ward_door answers: closed yes")
-    assert scan[1].startswith("of units 1 to 16 these answer: 1 (")
+    assert scan[1].startswith("of the units 1 to 16 these answer: 1 (")
     assert found["daemon"] == [("ok", "none serves this file, so its buses are asked here")]
     assert tapped.functions <= READS
     assert module.relay() == []
@@ -269,7 +269,7 @@ def test_for_people_each_finding_has_a_line_below_its_subject(
     words = ["doctor", str(module.file), "--listen", "0", "--runtime-dir", str(tmp_path / "run")]
     cli.main(words)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[:2] == ["file", f"  ok       {module.file} is a door, and right"]
+    assert lines[:2] == ["file", f"  ok       {module.file} is a valid file of a door"]
     assert "  ok       ward_door answers: closed yes" in lines
     assert "\x1b" not in "".join(lines)
 
@@ -323,7 +323,7 @@ def test_a_canopen_receiver_answers_and_is_found_by_its_node(tmp_path: Path) -> 
         file.write_text(CAN.format(port=port, node=10))
         _, found = doctor(file, tmp_path, "--listen", "0")
         assert [level for level, _ in found["bus can"]] == ["ok", "ok"]
-        assert "of nodes 1 to 16 these answer: 10 (" in found["bus can"][1][1]
+        assert "of the nodes 1 to 16 these answer: 10 (" in found["bus can"][1][1]
         file.write_text(CAN.format(port=port, node=4))
         code, found = doctor(file, tmp_path, "--listen", "0")
         (heard, silent, scanned) = sorted(found["bus can"])

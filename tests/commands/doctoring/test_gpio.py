@@ -122,10 +122,10 @@ def test_a_doctor_without_permission_for_the_chip_says_so_and_judges_nothing_on_
         Finding(
             "gpio",
             "wrong",
-            "of gpiochip0, gpiochip10 only this may be looked at:"
+            "of gpiochip0, gpiochip10 this user may only open:"
             " gpiochip10 (gpio-brcmstb@107d508500)",
-            "whether the header is there is not known",
-            "sudo before the command, or be in the group gpio",
+            "it is not known whether the header is there",
+            "use sudo, or join the group gpio",
         )
     ]
 

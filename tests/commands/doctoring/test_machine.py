@@ -37,7 +37,7 @@ def test_the_exit_code_is_that_of_the_worst_finding() -> None:
 
 def test_without_the_unit_the_user_who_asks_counts_as_the_daemons(made: MadeUp) -> None:
     assert told(list(users(made.machine))) == [
-        ("note", f"the unit {UNIT} is not installed; what follows is judged for pi")
+        ("note", f"the unit {UNIT} is not installed; what follows is checked for pi")
     ]
     assert (user(made.machine).name, user(made.machine).service) == ("pi", False)
 
@@ -64,9 +64,9 @@ def test_the_services_user_has_the_groups_of_the_unit(made: MadeUp) -> None:
 @pytest.mark.parametrize(
     ("synchronised", "printed", "found"),
     [
-        (True, "NTP=no", [("ok", "it is synchronised")]),  # chrony keeps it
-        (False, "NTP=no", [("warning", "it is not synchronised, and NTP is off")]),
-        (False, "NTP=yes", [("warning", "it is not synchronised")]),
+        (True, "NTP=no", [("ok", "the clock is synchronised")]),  # chrony keeps it
+        (False, "NTP=no", [("warning", "the clock is not synchronised, and NTP is off")]),
+        (False, "NTP=yes", [("warning", "the clock is not synchronised")]),
         (None, "", [("note", "the kernel does not say whether it is synchronised")]),
     ],
 )
@@ -133,7 +133,7 @@ def test_a_directory_that_the_user_may_not_write_is_wrong(tmp_path: Path) -> Non
     places = Places(Path("/run/rmf-bridge/lift"), Path("/run/rmf-bridge/lift"))
     found = list(health.directories(made.machine, places, made.user))
     assert [one.found for one in found if one.level == "wrong"] == [
-        "pi may not write in /run, where /run/rmf-bridge/lift is to be"
+        "pi may not write in /run, where /run/rmf-bridge/lift belongs"
     ]
 
 
@@ -209,7 +209,7 @@ def test_an_interface_that_is_up_and_recovers_by_itself_is_well(made: MadeUp) ->
 def test_each_fault_of_a_can_interface_is_named(made: MadeUp) -> None:
     can0(made, state="BUS-OFF", bittiming={"bitrate": 500000})
     assert can_found(made, 250_000) == [
-        ("warning", "can0 has 500000 bit/s, and these stations come with 250000"),
+        ("warning", "can0 has 500000 bit/s, but these stations come with 250000"),
         ("wrong", "can0 is bus-off: it has left the bus"),
         ("warning", "can0 has no restart-ms"),
     ]
@@ -222,12 +222,12 @@ def test_an_interface_that_is_down_or_missing_or_not_can_is_wrong(made: MadeUp) 
     can0(made, flags="0x80")
     assert can_found(made) == [("wrong", "can0 is down")]
     made.write("/sys/class/net/can0/type", "1\n")
-    assert can_found(made) == [("wrong", "can0 is no CAN interface")]
+    assert can_found(made) == [("wrong", "can0 is not a CAN interface")]
 
 
 def test_without_the_command_ip_the_bitrate_is_not_known(made: MadeUp) -> None:
     can0(made)
     (made.root / "usr/bin/ip").unlink()
     assert can_found(made) == [
-        ("note", "can0 is up; without the command ip its bitrate is not known")
+        ("note", "can0 is up; its bitrate is not known without the command ip")
     ]

@@ -55,7 +55,7 @@ def form(user: str = USER, password: str = PASSWORD) -> str:
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", ""])
 def test_a_host_of_another_name_is_refused(address: str, host: str) -> None:
     status, _, text = ask(address, "/", {"Host": host})
-    assert (status, text) == (403, "this page does not answer to that host name")
+    assert (status, text) == (403, "this page does not serve that host name")
 
 
 def test_a_login_from_another_origin_is_refused(address: str) -> None:
