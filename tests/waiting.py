@@ -14,8 +14,8 @@ PATIENCE_S = 120.0
 """Long enough for a very busy machine; a test that passes never waits for it."""
 
 TOO_LATE = re.compile(
-    r" within [\d.]+ s\b|what came first is no echo|echo came late|is half a frame"
-    r"|is no frame: a collision"
+    r" within [\d.]+ s\b|what came first is not the echo|echo came late|is half a frame"
+    r"|is not a frame: a collision"
 )
 """What a bus says of an answer that is late, or that meets the next one on a serial line."""
 

@@ -96,7 +96,7 @@ def _place_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]
     looked_at += [(("errors", *path), at) for path, at in settings.errors.places()]
     for path, at in looked_at:
         if not json_fields.is_field(at):
-            yield path, f"{at!r} is no field: write names with dots between them (status.code)"
+            yield path, f"{at!r} is not a field: write names with dots between them (status.code)"
 
 
 def _timer_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
@@ -175,7 +175,7 @@ def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
     known = settings.codes.meanings() if settings.codes else {}
     for word, code in settings.state_words.items():
         if code not in known:
-            yield ("state_words", word), f"{code} stands nowhere in codes: an unknown state"
+            yield ("state_words", word), f"{code} is not in codes: an unknown state"
 
 
 def _lacks(settings: Settings, what: str) -> bool:

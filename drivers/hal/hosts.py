@@ -11,5 +11,5 @@ def misspelt_address(host: str) -> str:
     try:
         ipaddress.IPv4Address(host)
     except ValueError:
-        return f"{host} is no address: write four numbers from 0 to 255 with dots between them"
+        return f"{host} is not an address: write four numbers from 0 to 255 with dots between them"
     return ""

@@ -158,7 +158,7 @@ class HttpBus(Bus):
         self._safe_backoff.insist()
 
     def close(self) -> None:
-        """Nothing is kept between calls."""
+        """No connection stays open between calls."""
 
     @contextmanager
     def _attempt(self, backoff: Backoff) -> Iterator[None]:
@@ -278,7 +278,7 @@ def _tls_failure(error: BaseException | None, ca_file: str | None) -> str:
     import ssl
 
     if ca_file and not os.path.isfile(ca_file):
-        return f"{ca_file} is no file"
+        return f"{ca_file} is not a file"
     while error is not None and not isinstance(error, ssl.SSLError):
         error = error.__cause__ or error.__context__
     return excerpt(getattr(error, "verify_message", None) or str(error)) if error else ""

@@ -48,7 +48,9 @@ def base(text: str) -> Base:
         raise ValueError("no user or password here: put a bearer token in a file, as token_file")
     found = _BASE.fullmatch(text)
     if not found:
-        raise ValueError(f"{text!r} is no address of an API: write 192.168.1.60:8080/api, say")
+        raise ValueError(
+            f"{text!r} is not the address of an API: write, for example, 192.168.1.60:8080/api"
+        )
     scheme = found["scheme"] or "http"
     port = int(found["port"] or PORTS[scheme])
     if not 1 <= port <= 65535:

@@ -171,7 +171,7 @@ def named(
     """Every landing must be in `given`, and nothing else. `what`: the missing entry, for the text."""
     for level in given:
         if level not in levels:
-            yield section, f"{level!r} is no landing of this lift, which has {', '.join(levels)}"
+            yield section, f"{level!r} is not a landing of this lift, which has {', '.join(levels)}"
     for level in levels:
         if level not in given:
             yield section, f"no {what} for {level}"

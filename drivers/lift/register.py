@@ -207,7 +207,7 @@ def _floor(found: LiftMap, words: Mapping[str, int]) -> tuple[str | None, str]:
     number = found.floor.number(words["floor"])
     if number in found.floor.codes:
         return found.floor.codes[number], ""
-    return None, "" if number in found.floor.between_floors else f"code {number} is no floor's"
+    return None, "" if number in found.floor.between_floors else f"code {number} is not a floor's"
 
 
 def _door(

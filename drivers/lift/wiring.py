@@ -172,7 +172,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             return None, "a BCD digit above 9"
         if number in self.codes:
             return self.codes[number], ""
-        return None, "" if number in self.between_floors else f"code {number} is no floor's"
+        return None, "" if number in self.between_floors else f"code {number} is not a floor's"
 
     def show(self, level: str | None) -> dict[str, bool]:
         """Signal -> asserted at a landing (None: between floors). ValueError if it has no code."""

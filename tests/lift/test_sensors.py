@@ -41,7 +41,7 @@ def test_an_open_door_is_offered_when_every_input_confirms_it() -> None:
             ["FLOOR_CODE_ILLEGAL"],
         ),
         (
-            {"level": None, "code_fault": "code 7 is no floor's"},
+            {"level": None, "code_fault": "code 7 is not a floor's"},
             "AGV, moving at ?",
             ["FLOOR_CODE_ILLEGAL"],
         ),

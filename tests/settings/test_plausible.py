@@ -95,7 +95,7 @@ REFUSED = {
     ),
     "a rate that no unit has": (
         door(LINE.replace("9600", "9800")),
-        "5:72: 'baudrate': 9800 is no rate that units have: 300, 600, 1200, 2400, 4800, 9600, ",
+        "5:72: 'baudrate': 9800 is not a rate that units have: 300, 600, 1200, 2400, 4800, 9600, ",
     ),
 }
 

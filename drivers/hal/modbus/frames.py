@@ -93,7 +93,7 @@ class CoilEcho(WriteSingleCoilResponse):
     def decode(self, data: bytes) -> None:
         """Raises ValueError for another number of bytes."""
         if len(data) != 4:
-            raise ValueError("it is no coil's value")
+            raise ValueError("it is not a coil's value")
         super().decode(data)
         self.registers = [int.from_bytes(data[2:], "big")]
 
@@ -104,7 +104,7 @@ class RegisterEcho(WriteSingleRegisterResponse):
     def decode(self, data: bytes) -> None:
         """Raises ValueError for another number of bytes."""
         if len(data) != 4:
-            raise ValueError("it is no register's value")
+            raise ValueError("it is not a register's value")
         super().decode(data)
 
 

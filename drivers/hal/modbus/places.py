@@ -31,7 +31,7 @@ class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if re.fullmatch(r"[^:]*:[0-9]+", self.host):
             yield ("host",), "write the host alone; its port goes into port"
         elif not re.fullmatch(r"[A-Za-z0-9_.:-]+", self.host):
-            yield ("host",), f"{self.host!r} is no host: write its address, such as 192.168.1.50"
+            yield ("host",), f"{self.host!r} is not a host: write its address, such as 192.168.1.50"
         elif reason := misspelt_address(self.host):
             yield ("host",), reason
 
@@ -56,9 +56,11 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         """A relative path; a rate that no unit has."""
         if not self.port.startswith("/"):
             text = "write the whole path, as `ls /dev/serial/by-id/*` prints it"
-            yield ("port",), f"{self.port!r} is no serial port: {text}"
+            yield ("port",), f"{self.port!r} is not a serial port: {text}"
         if self.baudrate not in BAUDRATES:
-            text = f"{self.baudrate} is no rate that units have: {', '.join(map(str, BAUDRATES))}"
+            text = (
+                f"{self.baudrate} is not a rate that units have: {', '.join(map(str, BAUDRATES))}"
+            )
             yield ("baudrate",), text
 
     def warnings(self) -> Iterable[tuple[tuple[str, ...], str]]:

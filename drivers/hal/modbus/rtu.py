@@ -162,7 +162,7 @@ class Line:
         while len(heard) < len(request) and request.startswith(heard):
             heard += self._heard(self._timeout_s)
         if not heard.startswith(request):
-            raise Noise("what came first is no echo; does the adapter echo? see ignore_echo")
+            raise Noise("what came first is not the echo; does the adapter echo? see ignore_echo")
         return heard[len(request) :]
 
     def _answer(self, request: bytes, heard: bytes) -> bytes:
@@ -197,7 +197,9 @@ class Line:
             heard = (heard + more)[: 2 * FRAME_MAX]
         self._stray = heard
         if not frames.crc_fits(heard):
-            raise Noise(f"{_start(heard)} is no frame: a collision, noise or other line settings")
+            raise Noise(
+                f"{_start(heard)} is not a frame: a collision, noise or other line settings"
+            )
 
     def _silence(self) -> str:
         text = f"no reply within {self._timeout_s:g} s"

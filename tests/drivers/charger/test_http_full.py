@@ -305,7 +305,7 @@ def test_a_whole_profile_has_no_warning_and_each_gap_has_its_own() -> None:
     without = msgspec.structs.replace(FULL, receivers={}, state_words={"READY": 9})
     assert [text for _, text in warnings(without)] == [
         "receiver_id is read, but without receivers nobody is verified",
-        "9 stands nowhere in codes: an unknown state",
+        "9 is not in codes: an unknown state",
     ]
     only_stop = Settings(codes=FULL.codes, stop=Call(path="/off"))
     assert [text for _, text in warnings(only_stop)] == [

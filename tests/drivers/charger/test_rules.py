@@ -140,7 +140,7 @@ WRONG = {
     ),
     "temperature.tC: {above": (
         "tempe rature: {above",
-        "'tempe rature' is no field: write names with dots between them (status.code)",
+        "'tempe rature' is not a field: write names with dots between them (status.code)",
     ),
     "{above: 20}": ("{above: 20, below: 20}", "'below' must be greater than above"),
     "{means: charging, when: {apower: {above: 20}}} ": (

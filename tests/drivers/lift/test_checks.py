@@ -59,7 +59,7 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
     (
         {"floor_code": {"encoding": "one_hot", "lines": {"B1": line(20), "L9": line(21)}}},
         [
-            ("floor_code.lines", "'L9' is no landing of this lift, which has B1, G, 1"),
+            ("floor_code.lines", "'L9' is not a landing of this lift, which has B1, G, 1"),
             ("floor_code.lines", "no line for G"),
             ("floor_code.lines", "no line for 1"),
         ],
@@ -75,7 +75,7 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
     (
         binary(codes={1: "B1", 2: "G", 3: "L9"}),
         [
-            ("floor_code.codes", "'L9' is no landing of this lift, which has B1, G, 1"),
+            ("floor_code.codes", "'L9' is not a landing of this lift, which has B1, G, 1"),
             ("floor_code.codes", "no code for 1"),
         ],
     ),

@@ -67,7 +67,7 @@ def test_only_listed_codes_are_floors_and_no_line_on_is_between_floors() -> None
         "000": (None, ""),
         "001": ("B1", ""),
         "010": ("G", ""),
-        "011": (None, "code 3 is no floor's"),
+        "011": (None, "code 3 is not a floor's"),
         "100": ("1", ""),
     }
 

@@ -37,7 +37,7 @@ def test_a_car_at_a_landing_is_read_from_its_registers() -> None:
     ("words", "changes"),
     [
         ({"floor": 0}, {"level": None}),
-        ({"floor": 9}, {"level": None, "code_fault": "code 9 is no floor's"}),
+        ({"floor": 9}, {"level": None, "code_fault": "code 9 is not a floor's"}),
         ({"floor": 0xFF03}, {"level": "L3"}),
         ({"motion": 0x0100}, {"motion": Motion.UP}),
         ({"motion": 0x0300}, {"motion": Motion.CONTRADICTORY}),

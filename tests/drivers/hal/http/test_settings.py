@@ -25,16 +25,16 @@ def test_an_address_is_host_port_and_path(text: str, parts: Base, url: str | Non
 @pytest.mark.parametrize(
     ("text", "hint"),
     [
-        ("ftps://tpu/api", "is no address of an API"),
+        ("ftps://tpu/api", "is not the address of an API"),
         ("admin:secret@tpu/api", "token_file"),
         ("tpu:99999", "ports are 1 to 65535"),
         ("tpu:0", "ports are 1 to 65535"),
-        ("tpu/api?x=1", "is no address of an API"),
-        ("tpu/a b", "is no address of an API"),
-        ("ftp://tpu", "is no address of an API"),
-        ("-tpu", "is no address of an API"),
-        ("tpu\n", "is no address of an API"),
-        ("", "is no address of an API"),
+        ("tpu/api?x=1", "is not the address of an API"),
+        ("tpu/a b", "is not the address of an API"),
+        ("ftp://tpu", "is not the address of an API"),
+        ("-tpu", "is not the address of an API"),
+        ("tpu\n", "is not the address of an API"),
+        ("", "is not the address of an API"),
     ],
 )
 def test_a_text_that_is_not_an_address_is_refused_with_its_fix(text: str, hint: str) -> None:

@@ -105,6 +105,6 @@ def test_an_answer_that_stops_half_way_ends_by_the_deadline(site: Site) -> None:
 
 def test_a_missing_ca_file_is_named(site: Site) -> None:
     bus = site.bus(ca_file="/no/such/ca.pem")
-    with pytest.raises(HalError, match=r"fails: /no/such/ca\.pem is no file: check ca_file"):
+    with pytest.raises(HalError, match=r"fails: /no/such/ca\.pem is not a file: check ca_file"):
         bus.get_json("/status")
     bus.close()

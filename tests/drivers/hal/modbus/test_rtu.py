@@ -209,7 +209,7 @@ def test_an_adapter_that_does_not_echo_although_the_file_says_so_is_named(
 ) -> None:
     door(line)
     text = fails(bus_to(line.port, ignore_echo=True), IN0)
-    assert "what came first is no echo; does the adapter echo? see ignore_echo" in text
+    assert "what came first is not the echo; does the adapter echo? see ignore_echo" in text
 
 
 def test_a_port_that_vanishes_is_found_again_by_its_path(line: SerialModule) -> None:

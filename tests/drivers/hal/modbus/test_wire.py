@@ -61,8 +61,8 @@ def test_a_reset_connection_does_not_count_as_a_reply() -> None:
         ("module.ward-3", []),
         ("fe80::1", []),
         ("192.168.1.50:502", ["write the host alone; its port goes into port"]),
-        ("tcp://a", ["'tcp://a' is no host: write its address, such as 192.168.1.50"]),
-        ("a b", ["'a b' is no host: write its address, such as 192.168.1.50"]),
+        ("tcp://a", ["'tcp://a' is not a host: write its address, such as 192.168.1.50"]),
+        ("a b", ["'a b' is not a host: write its address, such as 192.168.1.50"]),
     ],
 )
 def test_a_host_is_an_address_or_a_name(host: str, problems: list[str]) -> None:
@@ -101,7 +101,9 @@ def test_a_port_is_a_path_and_preferably_a_stable_one() -> None:
         settings = Settings(serial=line)
         return list(line.problems()), list(warnings(settings))
 
-    text = "'COM3' is no serial port: write the whole path, as `ls /dev/serial/by-id/*` prints it"
+    text = (
+        "'COM3' is not a serial port: write the whole path, as `ls /dev/serial/by-id/*` prints it"
+    )
     assert found("COM3") == ([(("port",), text)], [])
     assert found("/dev/serial/by-id/x") == ([], [])
     assert found("/dev/ttyAMA0") == ([], [])
