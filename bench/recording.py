@@ -149,7 +149,7 @@ class Day:
         report = self._lift.decision.report
         state = state_message("Lift1", self._settings, report, Time(int(WALL + self.now)))
         self._witness.spoken("lift_states", state, sent=True)
-        self._lift.told(KIND.published(self._lift.memory, report))
+        self._lift.published(KIND.published(self._lift.memory, report))
         if self.now % RIDE_S < 15.0:
             request = LiftRequest(
                 "Lift1", Time(int(self.now)), "fleet/robot", 1, _floor(self.now), 2
