@@ -216,9 +216,10 @@ def _forgotten(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> Non
     sender = lift.sender(asks.value)
     it = "a supervisor that does so" if sender == DIRECT else "it"
     found.say(
-        f"{sender.capitalize()} has asked for {asks.value} {clock.since(asks.since)}, though {holder} has"
-        f" the lift: {it} has forgotten {holder}, by a restart or a lost END, and passes on nothing"
-        " more of it. Our node then hears that robot's own requests and its END; other nodes do not."
+        f"{sender.capitalize()} has asked for {asks.value} {clock.since(asks.since)}, though {holder}"
+        f" has the lift: {it} has forgotten {holder}, by a restart or a lost END, and passes none of"
+        " its requests on. Our node then hears that robot's own requests and its END; other nodes do"
+        " not."
     )
 
 
@@ -239,7 +240,7 @@ def _without_word(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> 
         f" each state: its fleet adapter is gone.{once}",
         Step(
             "a person",
-            f"look into the car: if it is empty, {_release(lift)} ends the session",
+            f"check the car; if it is empty, {_release(lift)} ends the session",
         ),
     )
     own = lift.own(clock.now)

@@ -8,7 +8,7 @@ from datetime import UTC
 import pytest
 
 from bridges import cli
-from bridges.commands.faults import told
+from bridges.commands.faults import for_explain
 from bridges.explain.explanation import Explanation
 from bridges.explain.phrases import JOINS, on_graph
 from bridges.explain.site import Site
@@ -62,12 +62,12 @@ def test_a_situations_commands_name_the_graph(name: str) -> None:
     site = Site(device, graph=GRAPH)
     for one in heard:
         site.take(one)
-    assert_all_name_it(texts_of(site.explain(kind, device, UTC, told())))
+    assert_all_name_it(texts_of(site.explain(kind, device, UTC, for_explain())))
 
 
 def test_each_faults_remedy_names_the_graph() -> None:
-    assert_all_name_it([on_graph(do, GRAPH) for _, do in told().values()])
-    assert not [do for _, do in told().values() if re.search(r"`(send|release) ", do)]
+    assert_all_name_it([on_graph(do, GRAPH) for _, do in for_explain().values()])
+    assert not [do for _, do in for_explain().values() if re.search(r"`(send|release) ", do)]
 
 
 def test_nothing_heard_is_looked_into_on_that_graph() -> None:
