@@ -31,8 +31,8 @@ XNERGY_BITRATE: Final = 250_000
 class Options:
     """What the command line asks for. `kill_test`: device and output; None without the test.
 
-    `whole_scan`: every unit or node of a bus. `listen_s`: how long to listen to RMF's graph (s); 0: not at all.
-    `line`: with the options that name that graph.
+    `whole_scan`: every unit or node of a bus. `listen_s`: how long to listen to RMF's graph; 0: not
+    at all. `line`: with the options that name that graph.
     """
 
     runtime_dir: str | None = None
