@@ -33,7 +33,7 @@ def test_a_robots_request_on_lift_requests_was_passed_on_by_the_supervisor() -> 
     told = lift(
         ("adapter_lift_requests", asks("fleet/blue")), ("lift_requests", asks("fleet/blue"))
     )
-    assert "The supervisor asks for fleet/blue since" in told
+    assert "The supervisor has asked for fleet/blue since" in told
     assert "--direct" not in told
 
 
@@ -42,8 +42,8 @@ def test_who_asks_for_a_session_on_lift_requests_that_no_robot_asks_for_is_not_k
     others: tuple[tuple[str, d.LiftRequest], ...],
 ) -> None:
     told = lift(*others, ("lift_requests", asks("me")))
-    assert f"{EITHER.capitalize()} asks for me since" in told
-    assert "The supervisor asks for" not in told
+    assert f"{EITHER.capitalize()} has asked for me since" in told
+    assert "The supervisor has asked for" not in told
 
 
 def test_who_ends_a_session_on_lift_requests_alone_is_not_known() -> None:
@@ -63,5 +63,5 @@ def test_a_doors_sender_is_named_by_its_requester_id(requester: str, sender: str
         site.take(Heard(float(n), WALL + n, "door_states", state))
         site.take(Heard(float(n), WALL + n, "door_requests", request))
     told = site.explain("door", "ward", UTC)
-    assert any(f"On door_requests {sender} asks for OPEN since" in one for one in told.now)
+    assert any(f"On door_requests {sender} has asked for OPEN since" in one for one in told.now)
     assert [one.text for one in told.story if "asks for" in one.text] == [f"{sender} asks for open"]
