@@ -33,14 +33,17 @@ class Arch:
 
 
 FAST: Final = "mitigations=off"
-"""For the kernel: what it does against leaks of a processor that is not there costs TCG a lot."""
+"""For the kernel: what it does against leaks of a processor that is not there costs TCG a lot.
+
+So do five levels of pages, and what keeps the kernel off a program's pages (SMAP): amd64's has neither.
+"""
 COUNTED: Final = ("-accel", "tcg", "-icount", "shift=0")
 ARCHS: Final = {
     "amd64": Arch(
         "qemu-system-x86_64",
         "qemu-system-x86",
         ("-M", "q35"),
-        (*COUNTED, "-cpu", "max"),
+        (*COUNTED, "-cpu", "max,la57=off,smap=off,smep=off,umip=off"),
         "ttyS0",
     ),
     "arm64": Arch(

@@ -29,7 +29,7 @@ PARTS: Final = {
     ),
     "site": (
         *LIFT,
-        "deaths.kill_9",
+        "deaths.phases",
         "world.edited_yaml",
         "world.full_run",
         "world.read_only_root",

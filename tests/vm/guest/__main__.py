@@ -1,5 +1,6 @@
 """Runs the checks that the host names, each in a process of its own, and tells it how they ended."""
 
+import io
 import json
 import os
 import subprocess
@@ -20,10 +21,16 @@ def main() -> int:
     while not PORT.exists():  # udev names it, at about this time
         time.sleep(0.1)
     with PORT.open("r+b", buffering=0) as port:
-        port.write(b'{"booted": true}\n')
+        _tell(port, {"booted": True})
         for line in iter(port.readline, b""):
-            port.write(json.dumps(_run(line.decode().strip())).encode() + b"\n")
+            _tell(port, _run(line.decode().strip()))
     return 0
+
+
+def _tell(port: io.FileIO, what: dict[str, object]) -> None:
+    left = json.dumps(what).encode() + b"\n"
+    while left:  # the kernel takes 32 KB at once, and a log may be longer
+        left = left[port.write(left) or 0 :]
 
 
 def _run(name: str) -> dict[str, object]:

@@ -1,14 +1,17 @@
 """Deaths of a daemon whose relays are on. "Off" is a write that the kernel has traced."""
 
+import os
+import signal
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from tests.vm.guest import header
-from tests.vm.guest.rides import energise
+from tests.vm.guest.rides import HELD, LIFT, asking, energise
 from tests.vm.guest.system import (
     Wrong,
     back,
     cursor,
+    heard,
     journal,
     keep,
     kill,
@@ -20,15 +23,79 @@ from tests.vm.guest.system import (
 )
 
 SERVICE = unit("lift")
+MODE, HOLD = {18}, set(HELD)
+"""What is on together: the mode; the mode and the door's hold."""
+ODD = 5
+"""The floor code's lowest bit: it falls when the car comes by L2."""
 KILLED_S, STOPPED_S = 1.0, 4.0
 """What docs/reliability.md promises of a core of 1,000 MIPS."""
 
 
-def kill_9() -> str:
-    """kill -9, two relays on: off, and the service is back."""
-    took = _dies(lambda: kill(SERVICE, "KILL"))
-    keep("lift", took)
-    return f"off after {took:.2f} s"
+def phases() -> str:
+    """kill -9 at each phase of a ride, during a start and after END, relays on: off, and it is back."""
+    took = {}
+    with asking("lift", "Lift1", "L3", "--session", "vm/robot"):
+        took["mode asked for"] = _dies_with(set(), MODE)
+        took["car moving"] = _dies_with(MODE, MODE | {24}, at=lambda: not header.level(ODD))
+        took["door held"] = _dies_with(MODE, HOLD)
+        took["start"] = _dies_at_start()
+    with asking("lift", "Lift1", "--end", "--session", "vm/robot"):
+        took["after END"] = _dies_with(HOLD, MODE)
+    keep("lift", took["door held"])
+    return "off after " + ", ".join(f"{s:.2f} s ({phase})" for phase, s in took.items())
+
+
+def _dies_with(*outputs: set[int], at: Callable[[], bool] = lambda: True) -> float:
+    """kill -9 when just these outputs have been on in turn, and `at`; how long until off (s)."""
+    old = pid(SERVICE)
+    _on(*outputs, at=at)
+    return _killed(old, outputs[-1])
+
+
+def _on(*outputs: set[int], at: Callable[[], bool] = lambda: True) -> None:
+    """Wait until these, and no others, are the last that have been on together, and `at`."""
+    until(
+        lambda: header.together(LIFT)[-len(outputs) :] == [*outputs] and at(),
+        f"lines {outputs} are on, one set after the other",
+        pause_s=0.02,
+    )
+
+
+def _killed(old: int, relays: set[int]) -> float:
+    when = header.now()
+    os.kill(old, signal.SIGKILL)
+    took = off_after({line: LIFT[line] for line in relays}, when)
+    back(SERVICE, old)
+    return took
+
+
+def _dies_at_start() -> float:
+    """kill -9 when a start has `outputs-off` run, as the relays are still on: that of the last death
+    was killed too."""
+    old, running = pid(SERVICE), _group() / "cgroup.procs"
+    _on(MODE, HOLD)
+    when = header.now()
+
+    def others() -> set[int]:
+        return (
+            {int(word) for word in running.read_text().split()} - {old}
+            if running.exists()
+            else set()
+        )
+
+    os.kill(old, signal.SIGKILL)
+    post = until(others, "outputs-off runs after the death", pause_s=0.02)
+    for each in post:
+        os.kill(each, signal.SIGKILL)
+    until(lambda: len(others() - post) > 1, "the next daemon has outputs-off run", pause_s=0.02)
+    if header.off_at(LIFT, when):
+        raise Wrong("the relays were off before the start")
+    return _killed(pid(SERVICE), HOLD)
+
+
+def _group() -> Path:
+    """The service's control group."""
+    return Path(f"/sys/fs/cgroup{shown(SERVICE, 'ControlGroup')['ControlGroup']}")
 
 
 def hang() -> str:
@@ -43,7 +110,7 @@ def crash() -> str:
 
 def out_of_memory() -> str:
     """The unit's memory is used up, two relays on: off, and the service is back."""
-    limit = Path(f"/sys/fs/cgroup{shown(SERVICE, 'ControlGroup')['ControlGroup']}/memory.max")
+    limit = _group() / "memory.max"
     before = limit.read_text()
 
     def starve() -> None:
@@ -105,10 +172,7 @@ def two_on_one_pin() -> str:
     drop_in.write_text(Path(f"/etc/systemd/system/{SERVICE}.d/10-enable.conf").read_text())
     sh("systemctl", "daemon-reload")
     sh("systemctl", "start", "--no-block", service)
-    until(
-        lambda: SERVICE in journal(mark, service) or "held by" in journal(mark, service),
-        "the holder's name",
-    )
+    heard(mark, service, f"{SERVICE}|held by")
     sh("systemctl", "stop", service)
     drop_in.unlink()
     copy.unlink()

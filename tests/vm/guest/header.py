@@ -116,6 +116,18 @@ def on(lines: dict[int, bool], since: float = 0.0) -> dict[int, float]:
     return {n: last[n].at for n, high in lines.items() if n in last and last[n].level == high}
 
 
+def together(lines: Mapping[int, bool]) -> list[set[int]]:
+    """Which of these outputs have been on together, in turn since the chip was plugged."""
+    found: list[set[int]] = [set()]
+    for each in writes():
+        if each.line in lines:
+            others = found[-1] - {each.line}
+            on = others | {each.line} if each.level == lines[each.line] else others
+            if on != found[-1]:
+                found.append(on)
+    return found
+
+
 def off_at(lines: Mapping[int, bool], after: float) -> dict[int, float]:
     """When each of these lines was first written off after that time (monotonic s)."""
     found: dict[int, float] = {}

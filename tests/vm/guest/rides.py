@@ -1,7 +1,10 @@
 """Requests of RMF's from outside of the services."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from tests.vm.guest import header
-from tests.vm.guest.system import Wrong, sh, until
+from tests.vm.guest.system import Wrong, beside, sh, until
 
 ROOM = ("--domain-id", "7", "--localhost")
 LIFT = dict.fromkeys((18, 16, 22, 23, 24), True)
@@ -13,6 +16,14 @@ HELD = [16, 18]
 def send(*words: str, fails: bool = False) -> str:
     """A request of RMF's, and its effect; with `fails`, it has none in time."""
     return sh("rmf-bridge", "send", *words, *ROOM, fails=fails)
+
+
+@contextmanager
+def asking(*words: str) -> Iterator[None]:
+    """A request of RMF's goes out each second meanwhile, also to a service that comes back; its effect
+    is the end."""
+    with beside("rmf-bridge", "send", *words, *ROOM, "--direct", "--timeout", "150"):
+        yield
 
 
 def energise() -> dict[int, bool]:

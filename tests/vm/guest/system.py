@@ -1,9 +1,12 @@
 """Commands, units of systemd and waiting, for the checks."""
 
+import re
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Timer
 from typing import Final, TypeVar
 
 CONFIG: Final = Path("/mnt/tests/vm/guest/config")
@@ -27,6 +30,20 @@ def sh(*words: str, fails: bool = False) -> str:
     if (done.returncode != 0) is not fails:
         raise Wrong(f"{' '.join(words)}: exit code {done.returncode}: {done.stdout.strip()[-300:]}")
     return done.stdout
+
+
+@contextmanager
+def beside(*words: str) -> Iterator[None]:
+    """A command that runs meanwhile. Raises Wrong if its exit code is not 0."""
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as it:
+        try:
+            yield
+            told = it.communicate()[0]
+        finally:
+            it.kill()
+    print(f"{time.monotonic():.3f} $ {' '.join(words)} -> {it.returncode}\n{told}", end="")
+    if it.returncode:
+        raise Wrong(f"{' '.join(words)}: exit code {it.returncode}: {told.strip()[-300:]}")
 
 
 def until(
@@ -117,6 +134,24 @@ def journal(after: str, service: str) -> str:
     sh("journalctl", "--sync")
     words = ("--no-hostname", "-o", "short-monotonic", f"--after-cursor={after}")
     return sh("journalctl", *words, "-u", service)
+
+
+def heard(after: str, service: str, pattern: str) -> float:
+    """When the journal had a line of a service, later than `after`, with this in it (monotonic s)."""
+    words = ("journalctl", "--follow", "--no-tail", "-o", "cat", f"--after-cursor={after}")
+    with subprocess.Popen([*words, "-u", service], stdout=subprocess.PIPE, text=True) as follows:
+        late = Timer(LATE_S, follows.kill)
+        late.start()
+        try:
+            assert follows.stdout
+            for line in follows.stdout:
+                print(line, end="")
+                if re.search(pattern, line):
+                    return time.monotonic()
+        finally:
+            late.cancel()
+            follows.kill()
+    raise Wrong(f"not within {LATE_S:g} s: {service} says {pattern!r}")
 
 
 def enable(name: str) -> str:

@@ -1,7 +1,6 @@
 """A door on RS-485 and a charger on CAN: services whose relays are at the far end of a wire."""
 
 import json
-import re
 import socket
 import time
 from collections.abc import Callable
@@ -15,14 +14,13 @@ from tests.vm.guest.system import (
     cursor,
     enable,
     far_side,
-    journal,
+    heard,
     keep,
     kill,
     pid,
     ready_s,
     sh,
     unit,
-    until,
 )
 
 KILLED_S: Final = 2.0
@@ -71,7 +69,7 @@ def charge() -> str:
     _charge("vm-1")
     mark = cursor()
     send("charger", "charger_b", "--cancel", "vm-1")
-    until(lambda: "state=IDLE" in journal(mark, unit("charger")), "it is idle")
+    heard(mark, unit("charger"), "state=IDLE")
     return "charging, then cancelled"
 
 
@@ -80,7 +78,7 @@ def _charge(request: str) -> None:
     tell("charger", "press charger_b robot off")
     tell("charger", "press charger_b robot on")
     send("charger", "charger_b", "--robot", "vm/robot", "--request-id", request)
-    until(lambda: "state=CHARGING" in journal(mark, unit("charger")), "it charges")
+    heard(mark, unit("charger"), "state=CHARGING")
 
 
 def charger_killed() -> str:
@@ -112,12 +110,11 @@ def _fault_ends(what: str, breaks: Callable[[], object], mends: Callable[[], obj
     name, device, word = what.split()
     mark, began = cursor(), time.monotonic()
     breaks()
-    fault = re.compile(f"fault device={device} .*{word}")
-    until(lambda: fault.search(journal(mark, unit(name))), f"a fault with {word!r}")
-    seen = time.monotonic()
+    seen = heard(mark, unit(name), f"fault device={device} .*{word}")
+    mended = time.monotonic()
     mends()
-    until(lambda: f"fault_over device={device}" in journal(mark, unit(name)), "its end")
-    return f"a fault after {seen - began:.1f} s, over after {time.monotonic() - seen:.1f} s"
+    over = heard(mark, unit(name), f"fault_over device={device}")
+    return f"a fault after {seen - began:.1f} s, over after {over - mended:.1f} s"
 
 
 def _killed(name: str) -> str:

@@ -138,6 +138,8 @@ def said() -> str:
     """The journal is readable: a line for each event, key=value, no traceback."""
     text = sh("journalctl", "-b", "-u", SERVICE, "-o", "cat", "-t", "rmf-bridge")
     lines = text.splitlines()
+    if not lines:
+        raise Wrong("the journal has no line of the service")
     if others := [line for line in lines if not EVENT.match(line)]:
         raise Wrong(f"{len(others)} of {len(lines)} lines: {others[0]}")
     return f"{len(lines)} lines, the longest has {max(map(len, lines))} characters"
