@@ -25,20 +25,21 @@ rm -rf "$work" "$here"/build/lib "$here"/build/bdist.* # else a wheel keeps modu
 umask 022
 mkdir -p "$root/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$page/$lib/lib/python$python" "$work/wheel" "$wheels"
 
-# The libraries. The page's are those that the daemons have not.
+# The libraries. The page's are those that the daemons have not. Left out is what only Cyclone's own commands import,
+# and what colorzero was built with: half of the byte code that an installation would have to make.
 [ "$python" != 3.13 ] || "$here/deb/lgpio.sh" "$arch" "$wheels"
 "$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work/wheel" "$here"
 fill() {
   into=$1; shift
   "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
-    --find-links "$wheels" --target "$into" "$@"
+    --find-links "$wheels" --without cyclonedds:rich-click --without colorzero:setuptools --target "$into" "$@"
 }
 fill "$root/$site" --extra=gpio --extra=recording
 cp -R "$root/$site" "$page/$site"
 fill "$page/$site" --extra=gpio --extra=recording --extra=page
 (cd "$root/$site" && find . ! -type d -print0) | (cd "$page/$site" && xargs -0 rm -f)
 for each in "$root/$site" "$page/$site"; do
-  rm -rf "$each/bin" "$each/cyclonedds/.libs/idlc" # programs of the libraries
+  rm -rf "$each/bin" "$each/cyclonedds/tools" "$each/cyclonedds/.libs/idlc" # programs of the libraries
   find "$each" -type f -exec chmod 644 {} +
   find "$each" -type d -empty -delete
 done

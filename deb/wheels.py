@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
@@ -21,6 +21,9 @@ from packaging.utils import canonicalize_name
 MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
 GLIBC = (34, 31, 28, 27, 24, 17)
 """Of the manylinux tags: Debian 12 has 2.36. A tag means that version or a newer one."""
+
+Without = Collection[tuple[str, ...]]
+"""By whom it is not really needed, and what."""
 
 
 def main() -> int:
@@ -34,9 +37,10 @@ def main() -> int:
     }
     _fetch([str(args.wheel)], args)
     extras = {canonicalize_name(args.wheel.name.split("-")[0]): tuple(args.extra)}
-    while missing := sorted(set(_missing(args.target, machine, extras))):
+    without = {tuple(each.split(":")) for each in args.without}
+    while missing := sorted(set(_missing(args.target, machine, extras, without))):
         _fetch(missing, args)
-    wrong = sorted(set(_wrong(args.target, machine, extras)))
+    wrong = sorted(set(_wrong(args.target, machine, extras, without)))
     print(*wrong, sep="\n", file=sys.stderr)
     return 1 if wrong else 0
 
@@ -51,6 +55,13 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--arch", choices=MACHINES, required=True)
     parser.add_argument("--python", required=True, help="such as 3.11")
     parser.add_argument("--extra", action="append", default=[], help="an extra of the wheel")
+    parser.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        metavar="BY:NEED",
+        help="what a distribution says that it needs, and does not where it goes",
+    )
     return parser.parse_args()
 
 
@@ -72,13 +83,15 @@ def _fetch(what: list[str], args: argparse.Namespace) -> None:
 
 
 def _needed(
-    target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]]
+    target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[Requirement]:
     """What the distributions there need on that machine."""
     for found in distributions(path=[str(target)]):
         asked = extras.get(canonicalize_name(found.name), ())
         for text in found.requires or ():
             need = Requirement(text)
+            if (canonicalize_name(found.name), canonicalize_name(need.name)) in without:
+                continue
             given = [machine | {"extra": extra} for extra in ("", *asked)]
             if need.marker is None or any(map(need.marker.evaluate, given)):
                 extras[canonicalize_name(need.name)] = (
@@ -93,20 +106,20 @@ def _there(target: Path) -> dict[str, Distribution]:
 
 
 def _missing(
-    target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]]
+    target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[str]:
     there = _there(target)
-    for need in _needed(target, machine, extras):
+    for need in _needed(target, machine, extras, without):
         if canonicalize_name(need.name) not in there:
             yield f"{need.name}{need.specifier}"
 
 
 def _wrong(
-    target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]]
+    target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[str]:
     """Requirements that what is there does not meet: two packages want different versions."""
     there = _there(target)
-    for need in _needed(target, machine, extras):
+    for need in _needed(target, machine, extras, without):
         version = there[canonicalize_name(need.name)].version
         if not need.specifier.contains(version, prereleases=True):
             yield f"{need} is not met by {version}"

@@ -25,7 +25,7 @@ def wheel(folder: Path, name: str, *needs: str) -> Path:
     return path
 
 
-def fill(tmp_path: Path, arch: str) -> Path:
+def fill(tmp_path: Path, arch: str, *options: str) -> Path:
     """Fill a site-packages for this architecture; returns it."""
     for each in ("for_arm", "for_pc"):
         wheel(tmp_path, each)
@@ -38,7 +38,7 @@ def fill(tmp_path: Path, arch: str) -> Path:
     target = tmp_path / "site-packages"
     places = [str(each) for each in (WHEELS, first, "--find-links", tmp_path, "--target", target)]
     subprocess.run(
-        [sys.executable, *places, "--arch", arch, "--python", "3.12"],
+        [sys.executable, *places, "--arch", arch, "--python", "3.12", *options],
         check=True,
         env={"PIP_NO_INDEX": "1"},
     )
@@ -48,6 +48,11 @@ def fill(tmp_path: Path, arch: str) -> Path:
 def test_requirements_are_those_of_the_target_machine(tmp_path: Path) -> None:
     modules = sorted(file.stem for file in fill(tmp_path, "arm64").glob("*.py"))
     assert modules == ["first", "for_arm"]
+
+
+def test_what_is_not_really_needed_is_left_out(tmp_path: Path) -> None:
+    site = fill(tmp_path, "arm64", "--without", "first:for-arm")
+    assert [file.stem for file in site.glob("*.py")] == ["first"]
 
 
 def test_the_daemons_own_user_may_read_what_root_has_built(tmp_path: Path) -> None:
