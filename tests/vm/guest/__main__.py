@@ -16,7 +16,7 @@ BYTE_CODE: Final = ("-X", "pycache_prefix=/run/checks")
 
 
 def main() -> int:
-    """Say that the machine is up, then read a name (`deaths.kill_9`) from each line, for ever."""
+    """Say that the machine is up, then read a name (`deaths.phases`) from each line, for ever."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     while not PORT.exists():  # udev names it, at about this time
         time.sleep(0.1)

@@ -1,4 +1,4 @@
-"""One check: `python3 -m tests.vm.guest.one deaths.kill_9` prints how that function ended, as JSON.
+"""One check: `python3 -m tests.vm.guest.one deaths.phases` prints how that function ended, as JSON.
 
 A check returns what it has found, and raises Wrong if that is not right. What it prints is the log.
 """

@@ -132,14 +132,17 @@ def cursor() -> str:
 def journal(after: str, service: str) -> str:
     """What a service has said since then."""
     sh("journalctl", "--sync")
-    words = ("--no-hostname", "-o", "short-monotonic", f"--after-cursor={after}")
-    return sh("journalctl", *words, "-u", service)
+    return sh("journalctl", *_monotonic(after, service))
+
+
+def _monotonic(after: str, service: str) -> tuple[str, ...]:
+    return "--no-hostname", "-o", "short-monotonic", f"--after-cursor={after}", "-u", service
 
 
 def heard(after: str, service: str, pattern: str) -> float:
-    """When the journal had a line of a service, later than `after`, with this in it (monotonic s)."""
-    words = ("journalctl", "--follow", "--no-tail", "-o", "cat", f"--after-cursor={after}")
-    with subprocess.Popen([*words, "-u", service], stdout=subprocess.PIPE, text=True) as follows:
+    """When a service has said a line with this in it, later than `after` (monotonic s)."""
+    words = ["journalctl", "--follow", "--no-tail", *_monotonic(after, service)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as follows:
         late = Timer(LATE_S, follows.kill)
         late.start()
         try:
@@ -147,7 +150,7 @@ def heard(after: str, service: str, pattern: str) -> float:
             for line in follows.stdout:
                 print(line, end="")
                 if re.search(pattern, line):
-                    return time.monotonic()
+                    return float(line.partition("]")[0].lstrip("[ "))
         finally:
             late.cancel()
             follows.kill()
