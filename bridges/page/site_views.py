@@ -123,6 +123,12 @@ class SiteViews:
         with main("device"):
             if key not in self._gallery.shown:
                 part(f"<p>{escape(f'No {kind} named {name} was heard.')}</p>", WIDE)
+
+                def look() -> None:
+                    if key in self._gallery.shown:
+                        ui.navigate.reload()
+
+                ui.timer(AGES_S, look)
                 return
             drawn = [(part(), self._card)]
             with ui.element("section").classes("panel"):

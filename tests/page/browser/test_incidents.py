@@ -85,7 +85,7 @@ def test_a_recording_is_shown_without_any_graph(tab: Page, address: str) -> None
     [
         ("cut.mcap", "damaged"),
         ("bomb.mcap", "unpacks to more than"),
-        (HOSTILE, "no recording"),
+        (HOSTILE, "not a recording"),
         ("passwd.mcap", "no incident"),
     ],
 )
@@ -108,12 +108,14 @@ def test_a_file_from_elsewhere_is_opened_by_its_name_too(
     told = {
         "cut.mcap": "damaged",
         "bomb.mcap": "unpacks to more than",
-        HOSTILE: "no recording",
+        HOSTILE: "not a recording",
         "rosbag2.mcap": "lift Lift19",
     }
     opened = tmp_path / HOSTILE
+    shutil.copy(folder / "rosbag2.mcap", opened)
     tab = context.new_page()
     with page(str(opened)) as alone:
+        opened.unlink()
         tab.goto(alone)
         tab.get_by_text("No such file").first.wait_for()
         for name, text in told.items():

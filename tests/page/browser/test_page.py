@@ -76,6 +76,15 @@ def test_the_timeline_of_a_device_grows(
     shot("device")
 
 
+def test_a_page_that_was_opened_too_early_shows_its_device_once_it_is_heard(
+    tab: Page, address: str, graph: Graph, until: Until
+) -> None:
+    tab.goto(f"{address}lift/Lift77")
+    tab.get_by_text("No lift named Lift77 was heard").wait_for()
+    graph.lift("Lift77", "L1", 0, "")
+    until(lambda: tab.locator("article.card").count() == 1, "its card")
+
+
 def see_lift_held(tab: Page, address: str, graph: Graph, until: Until) -> None:
     """fleet/robot has a lift, and the site shows it."""
     graph.lift("Lift1", "L1", 2, "fleet/robot")
@@ -94,7 +103,7 @@ def test_without_a_login_nothing_can_be_done(
 
 def test_a_wrong_password_is_refused(tab: Page, address: str, complaints: list[str]) -> None:
     log_in(tab, address, "wrong")
-    assert "do not go together" in tab.get_by_role("alert").inner_text()
+    assert "wrong user or password" in tab.get_by_role("alert").inner_text()
     assert all("403" in one for one in complaints)
     complaints.clear()
 
