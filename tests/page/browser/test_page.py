@@ -72,6 +72,7 @@ def test_the_timeline_of_a_device_grows(
     graph.lift("Lift1", "L1", 0, "")
     tab.goto(f"{address}lift/Lift1")
     graph.lift("Lift1", "L2", 2, "fleet/other")
+    until(lambda: tab.locator(".timeline").count() == 1, "the timeline")
     until(lambda: "fleet/other" in tab.locator(".timeline").inner_text(), "the session's lane")
     shot("device")
 
