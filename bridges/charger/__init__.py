@@ -1,11 +1,12 @@
 """Chargers: ChargerRequest becomes commands to a station, and its readings become ChargerState."""
 
-from bridges.charger import core, messages, refusals
+from bridges.charger import core, memory, messages, refusals, report, settings, signals
 from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Cancelled, ChargerOutputs, ChargerSample, Requested
 from bridges.core.kind import Kind
+from bridges.core.recorded import Recorded
 from bridges.rmf.topics import (
     CHARGER_CANCELS,
     CHARGER_REFUSALS,
@@ -39,3 +40,16 @@ KIND: Kind[
     publishes=lambda settings: (CHARGER_REFUSALS,),
     answer=refusals.answer,
 )
+
+RECORDED: Recorded = {
+    "charger.memory.Memory": memory.Memory,
+    "charger.memory.Session": memory.Session,
+    "charger.report.ChargerReport": report.ChargerReport,
+    "charger.settings.Robot": settings.Robot,
+    "charger.signals.Activity": signals.Activity,
+    "charger.signals.Cancelled": signals.Cancelled,
+    "charger.signals.ChargerOutputs": signals.ChargerOutputs,
+    "charger.signals.ChargerSample": signals.ChargerSample,
+    "charger.signals.Measured": signals.Measured,
+    "charger.signals.Requested": signals.Requested,
+}

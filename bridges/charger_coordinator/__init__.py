@@ -1,6 +1,6 @@
 """The charger coordinator: which robot charges where, and who waits, for all chargers of a site."""
 
-from bridges.charger_coordinator import core, keep, messages
+from bridges.charger_coordinator import core, keep, memory, messages, report, schedule, signals
 from bridges.charger_coordinator.memory import Memory, Site
 from bridges.charger_coordinator.report import SiteReport
 from bridges.charger_coordinator.settings import Settings, speaks_of, tables, warnings
@@ -14,6 +14,7 @@ from bridges.charger_coordinator.signals import (
 )
 from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind
+from bridges.core.recorded import Recorded
 from bridges.rmf.topics import (
     ADAPTER_CHARGER_CANCELS,
     ADAPTER_CHARGER_REQUESTS,
@@ -69,3 +70,21 @@ KIND: GraphKind[
     speaks_of=speaks_of,
     on_map=lambda settings: settings.on_map(),
 )
+
+RECORDED: Recorded = {
+    "charger_coordinator.memory.Grant": memory.Grant,
+    "charger_coordinator.memory.Memory": memory.Memory,
+    "charger_coordinator.memory.Nudge": memory.Nudge,
+    "charger_coordinator.memory.Seen": memory.Seen,
+    "charger_coordinator.memory.Standing": memory.Standing,
+    "charger_coordinator.memory.Wish": memory.Wish,
+    "charger_coordinator.report.SiteReport": report.SiteReport,
+    "charger_coordinator.schedule.LocalTime": schedule.LocalTime,
+    "charger_coordinator.signals.Dedicated": signals.Dedicated,
+    "charger_coordinator.signals.FleetSeen": signals.FleetSeen,
+    "charger_coordinator.signals.ReceiverHeard": signals.ReceiverHeard,
+    "charger_coordinator.signals.Sighting": signals.Sighting,
+    "charger_coordinator.signals.StateHeard": signals.StateHeard,
+    "charger_coordinator.signals.Unwanted": signals.Unwanted,
+    "charger_coordinator.signals.Wanted": signals.Wanted,
+}

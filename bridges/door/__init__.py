@@ -2,7 +2,8 @@
 
 from bridges.core.decision import Attended
 from bridges.core.kind import Kind
-from bridges.door import core, messages
+from bridges.core.recorded import Recorded
+from bridges.door import core, memory, messages, report, signals
 from bridges.door.memory import DoorLimits, Memory
 from bridges.door.report import DoorReport
 from bridges.door.settings import DoorSettings
@@ -31,3 +32,13 @@ KIND: Kind[
     attended_by=topics.DOOR_REQUESTS,
     summary=messages.summary,
 )
+
+RECORDED: Recorded = {
+    "door.memory.Memory": memory.Memory,
+    "door.memory.Senses": memory.Senses,
+    "door.report.DoorReport": report.DoorReport,
+    "door.signals.CloseRequested": signals.CloseRequested,
+    "door.signals.DoorOutputs": signals.DoorOutputs,
+    "door.signals.DoorSample": signals.DoorSample,
+    "door.signals.OpenRequested": signals.OpenRequested,
+}

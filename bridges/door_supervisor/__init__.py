@@ -2,7 +2,8 @@
 
 from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind
-from bridges.door_supervisor import core, keep, messages, report
+from bridges.core.recorded import Recorded
+from bridges.door_supervisor import core, keep, memory, messages, report, signals
 from bridges.door_supervisor.memory import Limits, Memory
 from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.settings import Settings, speaks_of
@@ -48,3 +49,12 @@ KIND: GraphKind[
     urgent=core.urgent,
     speaks_of=speaks_of,
 )
+
+RECORDED: Recorded = {
+    "door_supervisor.memory.Holder": memory.Holder,
+    "door_supervisor.memory.Memory": memory.Memory,
+    "door_supervisor.report.DoorHoldReport": report.DoorHoldReport,
+    "door_supervisor.signals.CloseRequested": signals.CloseRequested,
+    "door_supervisor.signals.OpenRequested": signals.OpenRequested,
+    "door_supervisor.signals.StateHeard": signals.StateHeard,
+}

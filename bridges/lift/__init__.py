@@ -1,7 +1,8 @@
 """Lifts: RMF's LiftRequest becomes outputs, and the lift's inputs become LiftState."""
 
 from bridges.core.kind import Kind
-from bridges.lift import core, messages
+from bridges.core.recorded import Recorded
+from bridges.lift import core, memory, messages, report, signals
 from bridges.lift.memory import LiftLimits, Memory
 from bridges.lift.report import LiftReport
 from bridges.lift.settings import LiftSettings
@@ -32,3 +33,25 @@ KIND: Kind[
     state_message=messages.state_message,
     summary=messages.summary,
 )
+
+RECORDED: Recorded = {
+    "lift.memory.Channel": memory.Channel,
+    "lift.memory.Doubted": memory.Doubted,
+    "lift.memory.Forgotten": memory.Forgotten,
+    "lift.memory.Grace": memory.Grace,
+    "lift.memory.Memory": memory.Memory,
+    "lift.memory.Position": memory.Position,
+    "lift.memory.Relays": memory.Relays,
+    "lift.memory.Senses": memory.Senses,
+    "lift.memory.Session": memory.Session,
+    "lift.report.LiftReport": report.LiftReport,
+    "lift.signals.Door": signals.Door,
+    "lift.signals.Ended": signals.Ended,
+    "lift.signals.FromAdapter": signals.FromAdapter,
+    "lift.signals.Hazard": signals.Hazard,
+    "lift.signals.LiftOutputs": signals.LiftOutputs,
+    "lift.signals.LiftSample": signals.LiftSample,
+    "lift.signals.Motion": signals.Motion,
+    "lift.signals.Requested": signals.Requested,
+    "lift.signals.Side": signals.Side,
+}

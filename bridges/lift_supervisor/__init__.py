@@ -2,7 +2,8 @@
 
 from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind
-from bridges.lift_supervisor import core, messages
+from bridges.core.recorded import Recorded
+from bridges.lift_supervisor import core, memory, messages, report, signals
 from bridges.lift_supervisor.memory import Limits, Memory
 from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings, speaks_of
@@ -39,3 +40,14 @@ KIND: GraphKind[
     requester=messages.requester,
     requesters=lambda memory: memory.requesters,
 )
+
+RECORDED: Recorded = {
+    "lift_supervisor.memory.Claim": memory.Claim,
+    "lift_supervisor.memory.Memory": memory.Memory,
+    "lift_supervisor.memory.Turn": memory.Turn,
+    "lift_supervisor.report.SupervisorReport": report.SupervisorReport,
+    "lift_supervisor.signals.Ended": signals.Ended,
+    "lift_supervisor.signals.Requested": signals.Requested,
+    "lift_supervisor.signals.StateHeard": signals.StateHeard,
+    "lift_supervisor.signals.Target": signals.Target,
+}

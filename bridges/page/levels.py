@@ -5,14 +5,11 @@ The ring has what the driver made of the contacts, and what the core decided; no
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Final
 
 from bridges.recording.entries import AnyEntry, Known, Step
+from bridges.recording.incident import ERRORS, READING
 from bridges.recording.ring import NAME, RingError, Tail
 from bridges.recording.trees import HOLDS, TYPE, Tree
-
-SAMPLED: Final = "core.decision.Sampled"
-FAILED: Final = ("core.decision.IoFailed", "core.decision.WriteFailed", "core.decision.Suspended")
 
 Rows = Mapping[str, str]
 """What something is called, and what it is now."""
@@ -53,9 +50,9 @@ class Levels:
     def _event(self, subject: str, event: Tree) -> None:
         if not isinstance(event, dict):
             return
-        if event.get(TYPE) == SAMPLED:
+        if event.get(TYPE) == READING:
             self.sensed[subject] = dict(_fields(event.get("sample")))
-        elif event.get(TYPE) in FAILED:
+        elif event.get(TYPE) in ERRORS:
             self.sensed[subject] = {"the last reading": f"failed: {event.get('reason')}"}
 
     def _outputs(self, subject: str, outputs: Tree) -> None:

@@ -8,7 +8,6 @@ be the same. Comments of the YAML go; the addresses of its buses become `192.0.2
 """
 
 import enum
-import importlib
 import inspect
 import re
 import typing
@@ -43,7 +42,6 @@ SAID: Final = FREE_TEXTS | {"code", "detail", "reason", "code_fault", "errors", 
 NAME: Final = re.compile(r"(?!\d+$)[\w./-]{1,128}")
 ADDRESS: Final = "192.0.2.1"
 HOSTS: Final = ("host", "api_base", "url")
-CORES: Final = ("core", "memory", "signals", "report", "settings", "messages")
 
 Swap = Callable[[str], str]
 
@@ -154,11 +152,7 @@ def our_words() -> frozenset[str]:
     found = {"site", *TOPICS}
     _schema_words(schema(), found)
     for kind in known.kind_names():
-        for name in CORES:
-            try:
-                module = importlib.import_module(f"bridges.{kind}.{name}")
-            except ImportError:
-                continue
+        for module in known.kind_files(kind):
             found |= set(_module_words(module))
     return frozenset(found)
 

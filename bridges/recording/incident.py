@@ -6,13 +6,14 @@ from typing import Final
 
 import msgspec
 
+from bridges.core.decision import IoFailed, Sampled, Suspended, WriteFailed
 from bridges.recording.entries import AnyEntry, Clocks, Head, Known, Step
-from bridges.recording.trees import Tree
+from bridges.recording.trees import Tree, name_of
 
 BEFORE_S: Final = 120.0
 AFTER_S: Final = 30.0
-READINGS: Final = ("core.decision.Sampled", "core.decision.IoFailed")
-ERRORS: Final = ("core.decision.IoFailed", "core.decision.WriteFailed", "core.decision.Suspended")
+READING: Final = name_of(Sampled)
+ERRORS: Final = (name_of(IoFailed), name_of(WriteFailed), name_of(Suspended))
 
 
 class Note(msgspec.Struct, frozen=True):
@@ -57,7 +58,7 @@ def readable(step: Step) -> Iterator[tuple[str, Tree]]:
     """A step as (topic, JSON), for readers in Foxglove or `ros2 bag`."""
     event = step.event if isinstance(step.event, dict) else {}
     kind = str(event.get("", ""))
-    if kind == READINGS[0]:
+    if kind == READING:
         yield "samples", {"subject": step.subject, "sample": event.get("sample")}
     elif kind in ERRORS:
         yield "bus_errors", {"subject": step.subject, "kind": kind, "reason": event.get("reason")}

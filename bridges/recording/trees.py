@@ -1,19 +1,21 @@
 """What cores work with (events, memories, outputs, reports) as trees of plain values, and back.
 
 A tree holds None, bool, int, float, str, lists and mappings with text as keys. A tuple is a
-list; anything else is a mapping whose key `""` names its type below `bridges` (`lift.memory.Session`),
-with its fields beside it, or what it holds under `=`. Only types that merely hold values are
-created: no recording can call anything else.
+list; anything else is a mapping whose key `""` names its type (`lift.memory.Session`), with its fields
+beside it, or what it holds under `=`. Only types with a name (in `bridges/core/recorded.py`, and in
+`RECORDED` of each kind) are written and created: no recording can call anything else.
 """
 
-import importlib
 import math
+import sys
 from collections.abc import Mapping
 from enum import Enum
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import msgspec
+
+from bridges.core.recorded import SHARED
 
 if TYPE_CHECKING:
     Tree = None | bool | int | float | str | list["Tree"] | dict[str, "Tree"]
@@ -25,9 +27,6 @@ HOLDS: Final = "="
 MAP, SET, NUMBER = "map", "set", "number"
 ENDLESS: Final = (math.inf, -math.inf)
 """What JSON has no word for."""
-ROOT: Final = "bridges."
-HOMES: Final = ("core.", "rmf.definitions.", "rmf.constants.")
-"""Modules with values that every kind uses; besides these, those of the kinds themselves."""
 PLAIN: Final = frozenset({type(None), bool, int, float, str})
 
 
@@ -36,10 +35,11 @@ class UnknownValue(ValueError):
 
 
 class Struct(NamedTuple):
-    """A type with fields: its name in a tree, and its fields' names."""
+    """A type with fields: its name in a tree, and each field's name here and there, which differ if the
+    field has been renamed (`msgspec.field(name=…)`)."""
 
     name: str
-    fields: tuple[str, ...]
+    fields: tuple[tuple[str, str], ...]
 
 
 def tree(value: object) -> Tree:
@@ -53,21 +53,21 @@ def tree(value: object) -> Tree:
         return [tree(part) for part in value]  # type: ignore[attr-defined]
     if struct := _struct(kind):
         found: dict[str, Tree] = {TYPE: struct.name}
-        for name in struct.fields:
-            found[name] = tree(getattr(value, name))
+        for name, recorded in struct.fields:
+            found[recorded] = tree(getattr(value, name))
         return found
     return _other(value)
 
 
 def _other(value: object) -> Tree:
     if isinstance(value, Enum):
-        return {TYPE: _name(type(value)), HOLDS: value.name}
+        return {TYPE: name_of(type(value)), HOLDS: value.name}
     if isinstance(value, frozenset | set):
         return {TYPE: SET, HOLDS: sorted(map(tree, value), key=repr)}
     if isinstance(value, Mapping):
         return {TYPE: MAP, HOLDS: [[tree(key), tree(part)] for key, part in value.items()]}
     if isinstance(value, tuple):  # with names
-        return {TYPE: _name(type(value)), HOLDS: [tree(part) for part in value]}
+        return {TYPE: name_of(type(value)), HOLDS: [tree(part) for part in value]}
     raise TypeError(f"{type(value).__name__} is not a value of a core")
 
 
@@ -109,7 +109,7 @@ def _made(kind: type[Any], found: dict[str, Tree], held: Tree) -> object:
         return kind(*map(_value, held))
     struct = _struct(kind)
     assert struct
-    return kind(**{name: _value(found[name]) for name in struct.fields if name in found})
+    return kind(**{name: _value(found[key]) for name, key in struct.fields if key in found})
 
 
 _structs: dict[type[Any], Struct | None] = {}
@@ -139,33 +139,29 @@ def _struct(kind: type[Any]) -> Struct | None:
 
 def _found(kind: type[Any]) -> Struct | None:
     if issubclass(kind, msgspec.Struct):
-        return Struct(_name(kind), kind.__struct_fields__)
+        fields = zip(kind.__struct_fields__, kind.__struct_encode_fields__, strict=True)
+        return Struct(name_of(kind), tuple(fields))
     return None
 
 
-def _name(kind: type) -> str:
-    return f"{kind.__module__}.{kind.__qualname__}".removeprefix(ROOT)
+@cache
+def name_of(kind: type) -> str:
+    """The name of a type in recordings. Raises TypeError if it has none."""
+    package = sys.modules[kind.__module__.rpartition(".")[0] or kind.__module__]
+    for name, named in (*SHARED.items(), *getattr(package, "RECORDED", {}).items()):
+        if named is kind:
+            return str(name)
+    raise TypeError(f"{kind.__name__} is not a value of a core")
 
 
 @cache
 def _type(name: str) -> type[Any]:
-    """The type of this name, if it only holds values. Raises UnknownValue."""
-    module, _, own = name.rpartition(".")
-    if not _is_home(module) or not own.isidentifier():
-        raise UnknownValue(f"{name!r} is not a value of a core")
-    try:
-        kind: type[Any] = getattr(importlib.import_module(ROOT + module), own)
-    except (ImportError, AttributeError):
-        raise UnknownValue(f"{name!r} is not known to this version") from None
-    holds = isinstance(kind, type) and (_struct(kind) or issubclass(kind, Enum | tuple))
-    if not holds or _name(kind) != name:
-        raise UnknownValue(f"{name!r} holds no values")
-    return kind
+    """The type of this name; of the kinds only the one that it begins with is loaded. Raises
+    UnknownValue."""
+    from bridges.settings.names import kind_names, recorded
 
-
-def _is_home(module: str) -> bool:
-    from bridges.settings.names import kind_names
-
-    if not all(part.isidentifier() for part in module.split(".")):
-        return False
-    return f"{module}.".startswith((*HOMES, *(f"{kind}." for kind in kind_names())))
+    kind = name.partition(".")[0]
+    known = recorded(kind) if kind in kind_names() else SHARED
+    if name not in known:
+        raise UnknownValue(f"{name!r} is no value of a core that this version knows")
+    return known[name]

@@ -5,8 +5,9 @@ a driver or a bus by its name.
 """
 
 import importlib
+import pkgutil
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -20,6 +21,7 @@ from drivers.hal import AnyBus
 
 if TYPE_CHECKING:
     from bridges.core.graph_kind import AnyKind
+    from bridges.core.recorded import Recorded
 
 
 def kind_names() -> list[str]:
@@ -57,8 +59,25 @@ def _holding(roots: tuple[str, ...], pattern: str, record: str) -> list[Path]:
 
 def kind_called(name: str) -> "AnyKind":
     """The kind that `kind:` names; one of `kind_names()`."""
-    kind: AnyKind = importlib.import_module(f"bridges.{name}").KIND
+    kind: AnyKind = _package(name).KIND
     return kind
+
+
+def recorded(kind: str) -> "Recorded":
+    """The names of a kind's values in recordings; none if its values are those of another kind."""
+    found: Recorded = getattr(_package(kind), "RECORDED", {})
+    return found
+
+
+def kind_files(name: str) -> Iterator[ModuleType]:
+    """Every file of a kind. Raises ImportError if one cannot be imported."""
+    package = _package(name)
+    for file in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+        yield importlib.import_module(file.name)
+
+
+def _package(kind: str) -> ModuleType:
+    return importlib.import_module(f"bridges.{kind}")
 
 
 def driver_called(kind: str, name: str) -> AnyDriver:

@@ -1,12 +1,14 @@
 """Incidents without names: nothing of the site is left, and they are decided as before."""
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
+from bridges import lift
 from bridges.recording import mcap_write
-from bridges.recording.anonymous import anonymous
+from bridges.recording.anonymous import anonymous, our_words
 from bridges.recording.entries import Head, Spoken
 from bridges.recording.files import opened
 from bridges.recording.incident import Incident
@@ -68,6 +70,17 @@ def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses
             LiftState(lift_name="name1", current_floor="name2", session_id="fleet/name3")
         ).cdr
     )
+
+
+def test_a_kind_whose_words_cannot_be_read_makes_nothing_anonymous(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its words would be taken for the site's names, and the recording could not be decided again."""
+    monkeypatch.setitem(sys.modules, lift.__name__ + ".report", None)
+    our_words.cache_clear()
+
+    with pytest.raises(ImportError):
+        anonymous(whole(CORPUS[0]))
 
 
 def _spoken(state: LiftState) -> Spoken:

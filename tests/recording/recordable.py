@@ -1,0 +1,114 @@
+"""Every type that a daemon can record, found by walking from what the cores take and give."""
+
+import enum
+import types
+import typing
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any
+
+import msgspec
+
+from bridges.core.decision import Decision
+from bridges.rmf import constants
+from bridges.rmf.definitions import Message
+from bridges.settings.names import kind_called, kind_names
+
+PLAIN: dict[Any, Any] = {bool: True, int: 1, float: 1.5, str: "a", None: None, type(None): None}
+BOXES: dict[Any, Any] = {tuple: tuple, frozenset: frozenset, set: frozenset}
+Bound = Mapping[Any, Any]
+"""What the parameters of a generic type stand for."""
+
+
+@cache
+def recordable() -> tuple[Any, ...]:
+    """The types, generic ones with their parameters: all that is inside of a memory, an event, outputs,
+    a report or a message of any kind."""
+    found: dict[Any, None] = {}
+    for start in _starts():
+        _walk(start, {}, found)
+    return tuple(found)
+
+
+def _starts() -> Iterator[Any]:
+    yield Message
+    yield from (one for one in vars(constants).values() if _is_enum(one))
+    for kind in map(kind_called, kind_names()):
+        hints = typing.get_type_hints(kind.decide)
+        memory, event, _now, _limits, decision = hints.values()
+        assert typing.get_origin(decision) is Decision, f"{kind.name}: walk from {hints}"
+        yield from (memory, event, *typing.get_args(decision))
+
+
+def _walk(hint: Any, bound: Bound, found: dict[Any, None]) -> None:
+    for one in _single(_filled(hint, bound)):
+        plain = typing.get_origin(one) or one
+        if one in found or one in PLAIN or plain is typing.Literal:
+            continue
+        if plain in BOXES or plain in (list, dict, Mapping):
+            for part in typing.get_args(one):
+                _walk(part, bound, found) if part is not ... else None
+            continue
+        found[one] = None
+        assert _is_enum(plain) or issubclass(plain, msgspec.Struct | tuple), f"{one} in {found}"
+        for part in fields(one).values():
+            _walk(part, {}, found)
+        for (
+            below
+        ) in plain.__subclasses__():  # a field of a type also holds those that derive from it
+            _walk(below, {}, found)
+
+
+def fields(one: Any) -> dict[str, Any]:
+    """The fields of a struct, with the parameters of a generic one filled in."""
+    plain = typing.get_origin(one) or one
+    if _is_enum(plain):
+        return {}
+    names = getattr(plain, "__parameters__", ())
+    bound = dict(zip(names, typing.get_args(one), strict=False))
+    return {name: _filled(hint, bound) for name, hint in typing.get_type_hints(plain).items()}
+
+
+def _filled(hint: Any, bound: Bound) -> Any:
+    """A hint with its parameters filled in."""
+    if isinstance(hint, typing.TypeVar):
+        return bound.get(hint, None)
+    names = getattr(hint, "__parameters__", ())
+    return hint[tuple(bound.get(name) for name in names)] if names and bound else hint
+
+
+def _single(hint: Any) -> Iterator[Any]:
+    """The parts of a union, each by itself; what is annotated without its annotation."""
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        for part in typing.get_args(hint):
+            yield from _single(part)
+    elif typing.get_origin(hint) is typing.Annotated:
+        yield from _single(typing.get_args(hint)[0])
+    else:
+        yield hint
+
+
+def _is_enum(one: Any) -> bool:
+    return isinstance(one, type) and issubclass(one, enum.Enum) and one.__module__ != "enum"
+
+
+def specimens(one: Any) -> list[Any]:
+    """Every member of an enumeration; of a struct one with every field filled."""
+    plain = typing.get_origin(one) or one
+    if _is_enum(plain):
+        return list(plain)
+    return [plain(**{name: _specimen(hint) for name, hint in fields(one).items()})]
+
+
+def _specimen(hint: Any) -> Any:
+    first = next((one for one in _single(hint) if one not in (None, type(None))), None)
+    plain, parts = typing.get_origin(first) or first, typing.get_args(first)
+    if plain in PLAIN:
+        return PLAIN[plain]
+    if plain is typing.Literal:
+        return parts[0]
+    if plain in BOXES:
+        return BOXES[plain](_specimen(part) for part in parts if part is not ...)
+    if plain in (dict, Mapping):
+        return {_specimen(parts[0]): _specimen(parts[1])}
+    return specimens(first)[0]
