@@ -32,6 +32,7 @@ from drivers.hal.modbus.wire import (
     COIL_ON,
     EXCEPTIONS,
     READS,
+    UNDEFINED,
     WRITES,
     Answer,
     NoReply,
@@ -139,7 +140,7 @@ class ModbusBus(Bus):
         if answer is None:
             self._turn_at = self.now() + TURN_S
             raise backoff.failed(f"{text}{reason}, tried {tries}x")
-        if answer.exception:
+        if answer.exception is not None:
             raise self._refused(backoff, unit, text, answer.exception)
         backoff.mended()
         return answer
@@ -165,7 +166,7 @@ class ModbusBus(Bus):
     def _refused(self, backoff: Backoff, unit: int, text: str, code: int) -> HalError:
         """The error for an exception reply. Exceptions 1 to 3 show that the unit works: no backoff."""
         self._watchdogs.refused(unit, code)
-        text += f"exception {code}, {EXCEPTIONS.get(code, EXCEPTIONS[9])}"
+        text += f"exception {code}, {EXCEPTIONS.get(code, UNDEFINED)}"
         if code not in (1, 2, 3):
             backoff.failed(text)
         return Refused(text, code)

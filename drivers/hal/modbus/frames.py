@@ -121,12 +121,21 @@ def tcp_request(question: Question, number: int) -> bytes:
 
 
 def tcp_answer(question: Question, number: int, heard: bytes) -> tuple[int, Answer | None]:
-    """How many bytes were used, and the answer once it is complete. Raises BadReply."""
-    try:
-        used, reply = TCP.handleFrame(heard, question.unit, number)
-    except FAILURES as error:
-        raise BadReply(str(error)) from error
-    return used, None if reply is None else _answer(question, reply)
+    """How many bytes were used, and the answer once it is complete. Raises BadReply.
+
+    Replies to other requests and of other units are dropped. pymodbus alone would take a reply numbered
+    0 for any request's, and to a request to unit 0 that of any unit.
+    """
+    used = 0
+    while True:
+        size, unit, replied, content = TCP.decode(heard[used:])
+        used += size
+        if not content:
+            return used, None
+        if replied == 0:
+            raise BadReply("it is numbered 0, and must bear the number of the request")
+        if (unit, replied) == (question.unit, number):
+            return used, _decoded(question, content)
 
 
 def rtu_request(question: Question) -> bytes:
@@ -136,13 +145,7 @@ def rtu_request(question: Question) -> bytes:
 
 def rtu_answer(question: Question, frame: bytes) -> Answer:
     """The answer in a frame whose CRC is right. Raises BadReply."""
-    try:
-        reply = DECODER.decode(frame[1:-2])
-    except FAILURES as error:
-        raise BadReply(str(error)) from error
-    if reply is None:
-        raise BadReply(f"{frame.hex(' ')} does not decode")
-    return _answer(question, reply)
+    return _decoded(question, frame[1:-2])
 
 
 def rtu_size(heard: bytes) -> int:
@@ -169,6 +172,17 @@ def _request(question: Question, number: int = 0) -> ModbusPDU:
     if function in (5, 6):
         return REQUESTS[function](*where, registers=[question.value])
     return REQUESTS[function](*where, count=question.value)
+
+
+def _decoded(question: Question, content: bytes) -> Answer:
+    """The answer in a frame's function and data. Raises BadReply."""
+    try:
+        reply = DECODER.decode(content)
+    except FAILURES as error:
+        raise BadReply(str(error)) from error
+    if reply is None:
+        raise BadReply(f"{content.hex(' ')} does not decode")
+    return _answer(question, reply)
 
 
 def _answer(question: Question, reply: ModbusPDU) -> Answer:

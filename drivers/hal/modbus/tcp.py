@@ -8,7 +8,7 @@ from drivers.hal.modbus import frames
 from drivers.hal.modbus.wire import Answer, BadReply, NoReply, Question, Unreachable
 
 NUMBERS: Final = 0xFFFF
-"""Transactions are numbered 1 to this. pymodbus takes a reply numbered 0 for any request's."""
+"""Transactions are numbered 1 to this. 0 is what a gateway sends that numbers no reply."""
 
 
 class Connection:

@@ -28,11 +28,11 @@ EXCEPTIONS: Final = {
     6: "server device busy",
     7: "negative acknowledge",
     8: "memory parity error: look at the unit",
-    9: "an exception that Modbus does not define",
     10: "gateway path unavailable: look at the gateway's settings",
     11: "gateway target device failed to respond: look at the unit's power, cable and id",
 }
 """Modbus Application Protocol V1.1b3, section 7."""
+UNDEFINED: Final = "which Modbus does not define: the unit is at fault; ask its maker what it means"
 ILLEGAL_ADDRESS: Final = 2
 
 
@@ -46,10 +46,10 @@ class Question(Struct, frozen=True):
 
 
 class Answer(NamedTuple):
-    """A unit's reply: bits or registers as numbers, or the number of an exception (0 for none)."""
+    """A unit's reply: bits or registers as numbers, or the number of an exception, which may be 0."""
 
     values: tuple[int, ...] = ()
-    exception: int = 0
+    exception: int | None = None
 
 
 class Unreachable(Exception):

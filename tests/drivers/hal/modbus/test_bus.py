@@ -21,6 +21,23 @@ from tests.waiting import wait_until
 IN0 = "unit 1 discrete input 0"
 
 
+def test_unit_0_is_asked_as_any_other_and_no_other_unit_answers_for_it(module: Module) -> None:
+    door(module, unit=0)
+    bus = bus_to(module.port, timeout_s=0.3, retries=0)
+    opened = "unit 0 discrete input 0"
+    assert bus.lines({opened: None}, {}).read() == {opened: False}
+    module.reply = lambda request: bits_reply(request, b"\1").replace(b"\0\2\1", b"\1\2\1")
+    assert fails(bus, opened).endswith("no reply within 0.3 s, tried 1x")
+
+
+def test_a_reply_numbered_0_says_what_the_gateway_must_do(module: Module) -> None:
+    door(module)
+    module.reply = lambda request: bytes(2) + module.answer(request)[2:]
+    assert "it is numbered 0, and must bear the number of the request" in fails(
+        bus_to(module.port), IN0
+    )
+
+
 def test_a_refused_connection_pauses_the_bus_and_asks_once_a_pause() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]

@@ -6,7 +6,7 @@ What is TCP's alone is in `test_bus.py`, and the line's alone in `test_rtu.py`.
 import pytest
 
 from drivers.hal.modbus.points import parse, ranges
-from drivers.hal.modbus.wire import EXCEPTIONS
+from drivers.hal.modbus.wire import EXCEPTIONS, UNDEFINED
 from drivers.hal.points import HalError
 from tests.drivers.hal.modbus.module import Module, Time, bits_reply, bus_to, door, fails, frame
 
@@ -75,11 +75,11 @@ def test_an_address_that_is_missing_itself_is_refused_each_time(either: Module) 
     assert len(either.asked) == 2
 
 
-@pytest.mark.parametrize("code", range(1, 13))
+@pytest.mark.parametrize("code", [*range(13), 255])
 def test_an_exception_is_named(either: Module, code: int) -> None:
     either.reply = lambda request: frame(request, bytes((0x82, code)))
     text = fails(bus_to(either.port), IN0)
-    named = EXCEPTIONS.get(code, "an exception that Modbus does not define")
+    named = EXCEPTIONS.get(code, UNDEFINED)
     assert text.endswith(f"read discrete input 0: exception {code}, {named}")
     assert len(either.asked) == 1
 
