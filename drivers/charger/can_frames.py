@@ -3,11 +3,12 @@
 A map says what the frames mean (`can_map.py`). The charger charges while it receives the frames of the
 map at the map's periods, and stops by itself when they cease. So each frame is sent from a scan, never
 by a cyclic sender: when the daemon hangs, the frames cease. While the charger's own frames are missing,
-the driver sends only the frames that switch its power off.
+the driver sends only those that switch its power off, and those that wake it, if the map has any.
 """
 
 import functools
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Annotated
 
 import msgspec
@@ -19,10 +20,10 @@ from bridges.core.spelling import unknown
 from bridges.core.table import Table
 from drivers import DriverError
 from drivers.charger import dbc
-from drivers.charger.can_map import PROFILE, FrameMap, Problems, Sent, rows, tables
+from drivers.charger.can_map import NMT, PROFILE, FrameMap, Problems, Sent, rows, tables
 from drivers.charger.rules import Meant, meaning, with_errors
 from drivers.driver_type import DriverType
-from drivers.hal import can
+from drivers.hal import HalError, can
 from drivers.hal.can.broadcasts import Broadcasts, Said
 from drivers.profiles import profile_problems
 
@@ -112,14 +113,19 @@ def _encoding_problems(settings: Settings, sent: Sent, on: bool) -> Problems:
 
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """(place, path) of the frames, for this device alone; nothing while the map has problems."""
+    """(place, path) of the frames, for this device alone; nothing while the map has problems.
+
+    CANopen's NMT frame is everybody's.
+    """
     if any(profile_problems(PROFILE, settings.profile, settings.map)):
         return
     found = frame_map(settings)
     if any(found.problems()):
         return
     frames = dbc.load(found.dbc)
-    for name in (*found.state_frames(), *(sent.frame for sent in found.send)):
+    ours = [*found.state_frames(), *(sent.frame for sent in found.send)]
+    ours += [wake.frame for wake in found.wake if frames.id(wake.frame) != NMT]
+    for name in ours:
         yield f"frame {can.named(frames.id(name))}", ("map",) if settings.map else ("profile",)
 
 
@@ -157,7 +163,7 @@ def warnings(settings: Settings) -> Problems:
 
 
 def create(name: str, settings: Settings, bus: can.CanBus) -> "FrameDriver":
-    """The charger's driver on its bus; it sends nothing before the first reading."""
+    """The charger's driver on its bus; before the first reading it only wakes it."""
     return FrameDriver(settings, bus)
 
 
@@ -171,18 +177,19 @@ class FrameDriver:
         self._frames = Broadcasts(bus, _said(self._map, self._dbc))
         self._in_error = False
         self._power: bool | None = None
+        self._sent_on: bool | None = None
         self._seen = False
         self._touched = False
 
     def open(self) -> None:
         """Check that scans are frequent enough for each period; send nothing. Raises DriverError."""
-        for sent in self._map.send:
+        for sent in (*self._map.send, *self._map.wake):
             self._frames.check_pace(sent.frame, sent.every_s)
 
     def read(self) -> ChargerSample:
         """Read and decode the charger's fresh frames. Raises DriverError."""
         self._seen = False
-        values = self._values(self._frames.read())
+        values = self._values(self._read())
         meant = self._meant(values)
         if self._undiagnosed(meant.activity, values):
             state, *_ = self._map.state_frames()
@@ -205,18 +212,18 @@ class FrameDriver:
         return meaning(self._map.rules, codes, lambda at: _heard(values, at), code)
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Send each frame that is due, for power on or off. Raises DriverError."""
+        """Send each frame that is due, for power on or off. Raises DriverError.
+
+        A charger that is not seen is told to stop, whatever is wanted of it.
+        """
         if outputs.power is not None:
-            if outputs.power != self._power:
-                self._frames.feed_at_once()
             self._power = outputs.power
-        if self._power is not None and (self._seen or not self._power):
-            self._feed(self._power)
+        if self._power is not None:
+            self._feed(self._power and self._seen)
 
     def make_safe(self) -> None:
         """Send the frames for power off at once; the other frames cease. Raises DriverError."""
-        self._power = False
-        self._frames.feed_at_once()
+        self._power, self._sent_on = False, None
         self._feed(on=False)
         self._touched = False
 
@@ -228,7 +235,21 @@ class FrameDriver:
             except DriverError:
                 return  # its frames cease, so it stops by itself
 
+    def _read(self) -> dict[str, bytes]:
+        """Its fresh frames. Without them, send what wakes it, if it is due. Raises HalError."""
+        try:
+            return self._frames.read()
+        except HalError:
+            for wake in self._map.wake:
+                payload = functools.partial(self._dbc.encode, wake.frame, wake.says)
+                with suppress(HalError):  # what keeps us from reading says more
+                    self._frames.feed(self._dbc.id(wake.frame), wake.every_s, payload)
+            raise
+
     def _feed(self, on: bool) -> None:
+        if on != self._sent_on:
+            self._frames.feed_at_once()
+        self._sent_on = on
         for sent in self._map.send:
             values = sent.values(on, self._setpoints)
             if values is None:

@@ -29,6 +29,9 @@ Signal = Annotated[
 ]
 Mask = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]
 Fresh = Annotated[float, msgspec.Meta(ge=0.05, le=60, extra={"unit": "s"})]
+WakeEvery = Annotated[float, msgspec.Meta(ge=0.2, le=60, extra={"unit": "s"})]
+NMT: Final = 0x000
+"""The id by which CANopen's nodes are started (CiA 301); its payload says which node is meant."""
 
 
 class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -72,6 +75,19 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         return {**self.on, **{signal: setpoints[name] for signal, name in self.setpoints.items()}}
 
 
+class Wake(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A frame that wakes a charger which is not heard. It must not charge.
+
+    `frame`: its name in the DBC file; none of those in `send`.
+    `every_s`: its period, from the daemon's start until the charger is heard, and while it is silent.
+    `says`: signal -> value.
+    """
+
+    frame: Name
+    every_s: WakeEvery
+    says: dict[Name, float]
+
+
 class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A make's frames.
 
@@ -92,6 +108,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     `rules`: derive the state from other signals; tried before its codes.
     `errors`: signals that mean an error, whatever the state is.
     `send`: the frames that the driver sends.
+    `wake`: for a charger that says nothing before it is woken: the frames that do it, such as CANopen's
+    NMT start.
     """
 
     dbc: Name
@@ -109,6 +127,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     rules: list[Rule] = msgspec.field(default_factory=list)
     errors: Errors = Errors()
     send: Annotated[list[Sent], msgspec.Meta(min_length=1)]
+    wake: Annotated[list[Wake], msgspec.Meta(max_length=8)] = msgspec.field(default_factory=list)
 
     def problems(self) -> Problems:
         """A DBC file that cannot be read; a frame or signal that it lacks."""
@@ -129,6 +148,22 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             for key, signals in (("on", sent.on), ("setpoints", sent.setpoints), ("off", sent.off)):
                 for signal in signals or () if sent.frame in found.frames() else ():
                     yield from _lacks(found, ("send", str(n), key, signal), sent.frame, signal)
+        for n, wake in enumerate(self.wake):
+            yield from self._wake_problems(found, ("wake", str(n)), wake)
+
+    def _wake_problems(self, found: dbc.Dbc, path: tuple[str, ...], wake: Wake) -> Problems:
+        """A frame that may charge, or that cannot be made."""
+        if wake.frame in (sent.frame for sent in self.send):
+            yield (*path, "frame"), f"{wake.frame} is in send: what wakes a charger must not charge"
+        lacks = list(_lacks(found, (*path, "frame"), wake.frame))
+        for signal in wake.says if not lacks else ():
+            lacks += _lacks(found, (*path, "says", signal), wake.frame, signal)
+        yield from lacks
+        if not lacks:
+            try:
+                found.encode(wake.frame, wake.says)
+            except ValueError as error:
+                yield (*path, "says"), str(error)
 
     def signals(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """Each signal that is read: (where in the map, Frame.Signal)."""
@@ -191,10 +226,12 @@ def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
 def tables(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[Table]:
     """The frames as bytes, to hold against `candump`: those that are sent, and samples of the read."""
     frames = dbc.load(found.dbc)
+    sent = [_sent(frames, sent, on, setpoints) for sent in found.send for on in (True, False)]
+    woken = [_row(frames, w.frame, "it is silent", w.every_s, w.says) for w in found.wake]
     yield Table(
         "frames that are sent",
         ("frame", "id", "while", "every", "bytes", "says"),
-        tuple(_sent(frames, sent, on, setpoints) for sent in found.send for on in (True, False)),
+        (*sent, *woken),
     )
     yield Table(
         "frames that are read, by samples (other signals 0)",
@@ -204,13 +241,18 @@ def tables(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[Table]:
 
 
 def _sent(frames: dbc.Dbc, sent: Sent, on: bool, setpoints: Mapping[str, float]) -> tuple[str, ...]:
-    values = sent.values(on, setpoints)
-    first = (sent.frame, named(frames.id(sent.frame)), f"power {'on' if on else 'off'}")
+    values, level = sent.values(on, setpoints), f"power {'on' if on else 'off'}"
     if values is None:
-        return (*first, "-", "-", "is not sent")
-    says = (f"{name} {_physical(frames, sent.frame, name, v)}" for name, v in values.items())
-    payload = frames.encode(sent.frame, values)
-    return (*first, f"{sent.every_s:g} s", payload.hex(" ").upper(), ", ".join(says))
+        return (sent.frame, named(frames.id(sent.frame)), level, "-", "-", "is not sent")
+    return _row(frames, sent.frame, level, sent.every_s, values)
+
+
+def _row(
+    frames: dbc.Dbc, frame: str, during: str, every_s: float, values: Mapping[str, float]
+) -> tuple[str, ...]:
+    says = ", ".join(f"{name} {_physical(frames, frame, name, v)}" for name, v in values.items())
+    payload = frames.encode(frame, values).hex(" ").upper()
+    return frame, named(frames.id(frame)), during, f"{every_s:g} s", payload, says
 
 
 def _samples(found: FrameMap, frames: dbc.Dbc) -> Iterator[tuple[str, ...]]:

@@ -2,7 +2,8 @@
 
 It charges while every frame of its map comes on time with the values of `on`. It stops when a frame has
 the values of `off`, or when one stays away for three periods. A busy machine delays this
-station as well as the daemon, so a long gap between two looks counts as one look only.
+station as well as the daemon, so a long gap between two looks counts as one look only. If the map wakes
+it, it sleeps until then, and again after it was off.
 
 Failing part `node`, beside those of the plant and the bus: `off` is silent, `stuck` says what it said
 before, `slow` says it every two seconds, `garbage` sends frames of six bytes, `wrong` an unlisted
@@ -52,6 +53,10 @@ class FrameCharger:
         self._dbc = dbc.load(self._map.dbc)
         self._setpoints: Mapping[str, float] = settings.setpoints
         self._wanted = {self._dbc.id(sent.frame): sent for sent in self._map.send}
+        self._wakes = {
+            self._dbc.id(w.frame): self._dbc.encode(w.frame, w.says) for w in self._map.wake
+        }
+        self._slept_through = dict(self._wakes)
         self._fed_at: dict[str, float] = {}
         self._looked_at = float("-inf")
         self._watched_s = 0.0
@@ -62,8 +67,13 @@ class FrameCharger:
         """A frame that feeds it, or that takes its power away."""
         self._look(now)
         extended = dbc.EXTENDED if message.is_extended_id else 0
-        sent = self._wanted.get(message.arbitration_id | extended)
-        if sent is None or self.plant.failures.get("node") == "off":
+        heard = message.arbitration_id | extended
+        if self.plant.failures.get("node") == "off":
+            return
+        if self._slept_through.get(heard) == bytes(message.data):
+            del self._slept_through[heard]
+        sent = self._wanted.get(heard)
+        if sent is None or self._slept_through:
             return
         if self._says(sent, bytes(message.data), on=True):
             self._fed_at[sent.frame] = self._watched_s
@@ -77,7 +87,9 @@ class FrameCharger:
         mode = self.plant.failures.get("node")
         self.plant.drive("power", self._fed() and mode != "off", now)
         period_s = SLOW_S if mode == "slow" else STATUS_S
-        if mode == "off" or now < self._status_at + period_s:
+        if mode == "off":
+            self._slept_through = dict(self._wakes)
+        if mode == "off" or self._slept_through or now < self._status_at + period_s:
             return
         self._status_at = now
         if mode != "stuck" or not self._status:

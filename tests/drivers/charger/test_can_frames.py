@@ -1,5 +1,6 @@
 """The driver of makers' frames: published bytes, the pace of what is sent, maps that are wrong."""
 
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -273,15 +274,32 @@ def test_without_a_wanted_level_the_last_one_is_still_sent(charger: Charger) -> 
     assert [charger.scan(OFF, 0.5), charger.scan(LEFT, 0.5), charger.scan(LEFT)] == [KEPT_OFF] * 3
 
 
-def test_a_charger_that_is_not_heard_is_kept_off_and_gets_no_setpoints(charger: Charger) -> None:
+def test_a_charger_that_falls_silent_in_a_charge_is_told_to_stop_in_each_period_until_it_is_heard(
+    charger: Charger,
+) -> None:
     charger.scan(ON)
     charger.far.now += 2
+    sent_at = []
+    while charger.far.now < 6:
+        assert failure(charger.driver.read)
+        charger.driver.write(ON if charger.far.now < 4 else LEFT)
+        charger.far.now += 0.05
+        if charger.got:
+            assert charger.got == KEPT_OFF
+            sent_at.append(charger.far.now)
+            charger.got = []
+    gaps_s = [after - before for before, after in itertools.pairwise(sent_at)]
+    assert len(gaps_s) >= 6
+    assert all(0.4 <= gap_s <= 0.6 for gap_s in gaps_s)
+    assert charger.scan(LEFT) == FED
+
+
+def test_a_charge_that_was_found_is_left_to_itself_when_it_falls_silent(charger: Charger) -> None:
+    charger.scan(LEFT)
+    charger.far.now += 2
     assert failure(charger.driver.read)
-    for level in (ON, LEFT):
-        charger.driver.write(level)
+    charger.driver.write(LEFT)
     assert charger.got == []
-    charger.driver.write(OFF)
-    assert charger.got == KEPT_OFF
 
 
 def test_make_safe_takes_the_power_away(charger: Charger) -> None:
