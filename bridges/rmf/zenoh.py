@@ -29,17 +29,18 @@ from bridges.rmf.settings import Zenoh
 from bridges.rmf.threaded import LOOK_EVERY_S, Threaded
 from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
-from bridges.rmf.zenoh_ends import Order, ZenohEnd, ZenohPublisher, ZenohSubscription
+from bridges.rmf.zenoh_alone import ROUTER_MET, WHY_AWAY, Alone
+from bridges.rmf.zenoh_ends import ZenohEnd, ZenohPublisher, ZenohSubscription
 from bridges.rmf.zenoh_keys import WAYS, Keys
-from bridges.rmf.zenoh_peers import ZenohPeers
-from bridges.rmf.zenoh_session import closed, opened, trim_memory
+from bridges.rmf.zenoh_peers import Merged, Order, Tokens, ZenohPeers
+from bridges.rmf.zenoh_session import closed, contained, opened, trim_memory
 
 log = logging.getLogger(__name__)
 
+UNLINKED: Final = "NO_ROUTER"
 NO_ROUTER: Final = (
     "no router answers, or it refuses this node: RMF hears nothing until one accepts it"
 )
-ROUTER: Final = "a router has connected to this machine's nodes, and would forward simulated states"
 
 
 class ZenohTransport(Threaded):
@@ -68,8 +69,14 @@ class ZenohTransport(Threaded):
         self._failed = False
         self._ends: tuple[ZenohEnd, ...] = ()
         self._deaf: set[str] = set()
-        self._watcher = ZenohPeers(self._peers, lambda: self._orders.put(self._follow_release))
         self._orders: SimpleQueue[Order] = SimpleQueue()
+        do = self._orders.put
+        self._watcher = ZenohPeers(self._peers, Merged(do, self._follow_release), do)
+        self._looks = Merged(do, self._look)
+        self._alone = Alone()
+        self._away = False
+        self._presence: zenoh.LivelinessToken | None = None
+        self._witnesses: Tokens | None = None
         self._session: zenoh.Session | None = None
         self._linked: bool | None = None
         self._met_router = False
@@ -85,6 +92,15 @@ class ZenohTransport(Threaded):
         atexit.register(self.close)
         self._start(self._listen, "zenoh")
 
+    def faults(self) -> list[tuple[str, str]]:
+        """Also: it is off the graph, or no router answers."""
+        found = super().faults()
+        if self._away:
+            found.insert(0, (ROUTER_MET, WHY_AWAY))
+        elif self._linked is False:
+            found.insert(0, (UNLINKED, self._why_unlinked or NO_ROUTER))
+        return found
+
     def publisher(self, topic: AnyTopic) -> ZenohPublisher:
         """Declare a publisher with `topic.publish` QoS."""
         publisher = ZenohPublisher(
@@ -95,7 +111,7 @@ class ZenohTransport(Threaded):
             self._deaf,
             self._watcher.tell,
         )
-        with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
+        with self._lock, self._reporting(f"topic {topic.name} cannot be published"), contained():
             self._attach(publisher)
             self._ends += (publisher,)
         return publisher
@@ -113,7 +129,7 @@ class ZenohTransport(Threaded):
             attached=self._settings.keys == "rmw_zenoh",
             tell=self._watcher.tell,
         )
-        with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
+        with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"), contained():
             self._attach(subscription)
             self._ends += (subscription,)
         return subscription
@@ -151,19 +167,37 @@ class ZenohTransport(Threaded):
         way, name = WAYS[self._settings.keys], str(session.zid())
         self._keys: Keys = way(self.domain_id, name, self.name, self.release)
         self._numbers = count(1)
-        self._presence = session.liveliness().declare_token(self._keys.presence())
         self._neighbours = {}
         self._events = session.info.declare_transport_events_listener(
             Callback(partial(self._neighbour, self._neighbours), indirect=False), history=True
         )
         self._session = session
-        self._witnesses = self._watcher.watch(session, self._keys)
+        self._appear(session)
         trim_memory()
 
+    def _appear(self, session: zenoh.Session) -> None:
+        """Be on the graph, with every end."""
+        self._presence = session.liveliness().declare_token(self._keys.presence())
+        self._witnesses = self._watcher.watch(session, self._keys)
+        for end in self._ends:
+            self._attach(end)
+
+    def _vanish(self) -> None:
+        """Take everything off the graph, and stay in the session to see when the router has gone."""
+        for end in self._ends:
+            end.leave()
+        self._deaf.clear()
+        if self._witnesses:
+            self._witnesses.leave()
+        presence, self._presence = self._presence, None
+        if presence:
+            presence.undeclare()  # type: ignore[no-untyped-call]
+
     def _attach(self, end: ZenohEnd) -> None:
-        """Give an end its place in the session, if there is one and the release has its message."""
+        """Give an end its place, if we are on the graph and the release has its message."""
         self._peers.ours(end.topic, publishes=isinstance(end, ZenohPublisher))
-        if self._session is None or not self.release.has(end.topic.type):
+        off = self._away or end.place or not self.release.has(end.topic.type)
+        if self._session is None or off:
             return
         number = next(self._numbers)
         if isinstance(end, ZenohSubscription) and end.others_only:
@@ -180,10 +214,10 @@ class ZenohTransport(Threaded):
             neighbours[str(event.transport.zid)] = event.transport.whatami
         else:
             neighbours.pop(str(event.transport.zid), None)
-        self._orders.put(self._look)
+        self._looks()
 
     def _withdraw(self, publisher: ZenohPublisher) -> None:
-        with self._lock:
+        with self._lock, contained():
             if publisher in self._ends:
                 self._ends = tuple(end for end in self._ends if end is not publisher)
                 publisher.leave()
@@ -211,8 +245,6 @@ class ZenohTransport(Threaded):
             self._closing = [closing for closing in self._closing if closing.is_alive()]
             try:
                 self._join()
-                for end in self._ends:
-                    self._attach(end)
             except (TransportError, zenoh.ZError) as error:  # for example, a secret is missing now
                 self._why_unlinked = str(error)
                 self._leave()
@@ -238,12 +270,14 @@ class ZenohTransport(Threaded):
         failures = 0
         while not self._closed and failures < notices.FAILURES:
             try:
-                order = self._orders.get(timeout=None if self._loopback else LOOK_EVERY_S)
+                forever = self._loopback and not self._away
+                order = self._orders.get(timeout=None if forever else LOOK_EVERY_S)
             except Empty:
                 order = _nothing
             try:
-                order()
-                self._follow_network()
+                with contained():
+                    order()
+                    self._follow_network()
                 failures = 0
             except Exception as error:  # noqa: BLE001 - logged by _recover
                 failures += 1
@@ -260,7 +294,11 @@ class ZenohTransport(Threaded):
 
     def _follow_network(self) -> None:
         """Join again if the machine's addresses have changed since the last time."""
-        if self._loopback or not self._look_is_due():
+        if self._loopback:
+            if self._away:
+                self._look()
+            return
+        if not self._look_is_due():
             return
         self._look()
         if (self._leaves_machine() and self._network_changed()) or self._session is None:
@@ -276,9 +314,7 @@ class ZenohTransport(Threaded):
         neighbours = list(self._neighbours.values())
         routers = zenoh.WhatAmI.ROUTER in neighbours
         if self._loopback:
-            if routers:
-                log.error(pairs("left_graph", node=self.name, reason=ROUTER))
-                self._leave()
+            self._keep_apart(self._alone.away(routers, time.monotonic()))
             return
         self._met_router |= routers
         linked = routers or (not self._met_router and bool(neighbours))
@@ -291,6 +327,23 @@ class ZenohTransport(Threaded):
         else:
             reason = self._why_unlinked or NO_ROUTER
             log.warning(pairs("not_linked", node=self.name, connect=where, reason=reason))
+
+    def _keep_apart(self, away: bool) -> None:
+        """Leave the graph where a router is, and return to it when that has gone."""
+        with self._lock:
+            before, session = self._away, self._session
+            if self._closed or session is None or not (before or away):
+                return
+            self._away = away
+            if away and not before:
+                log.error(pairs("left_graph", node=self.name, reason=WHY_AWAY))
+            try:
+                self._vanish() if away else self._appear(session)
+            except zenoh.ZError:
+                self._away = True  # the next look tries again
+                raise
+        if not away:
+            log.info(pairs("back_on_graph", node=self.name))
 
 
 def _nothing() -> None:

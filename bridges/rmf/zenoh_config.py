@@ -22,8 +22,8 @@ RETRY: Final = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_f
 COMMON: Final[Configuration] = {
     "scouting/multicast/enabled": False,
     "scouting/delay": 1,  # ms: scouting is off, so there is nothing to wait for
-    # zenoh's clock panics before 1970, and then sends and hears nothing more. Advanced publishers number
-    # their samples, and nothing here needs the time.
+    # zenoh's own clock panics before 1970, and then sends and hears nothing more. What is retained is
+    # ordered by its number, so nothing needs the time.
     "timestamping/enabled": False,
     # A new message waits while retained ones are queried. A node that hangs must not delay a fire alarm
     # for longer than this (ms); rmw_zenoh would wait forever.

@@ -26,8 +26,10 @@ from bridges.rmf.definitions import Message
 from bridges.rmf.releases import NEWEST
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Receive, TransportError
-from bridges.rmf.zenoh_keys import Keys
+from bridges.rmf.zenoh_keys import Keys, Kind
+from bridges.rmf.zenoh_peers import Merged, Order
 from bridges.rmf.zenoh_place import Place, Tell
+from bridges.rmf.zenoh_session import contained
 
 HEARTBEAT_S: Final = 0.5
 """As in rmw_zenoh: this long after a retained message its number is sent again, so that subscribers
@@ -37,9 +39,6 @@ LONGEST: Final = 1 << 20
 samples of this length fit into a small Pi's memory."""
 AT_ONCE: Final = 100
 """The most samples taken from one subscription before the others have their turn."""
-
-Order = Callable[[], None]
-"""Work for the transport's thread."""
 
 
 class Declared(Protocol):
@@ -69,6 +68,10 @@ class ZenohEnd(ABC):
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
         """Take a place in a session. `number`: unique within it."""
 
+    def _placed(self, session: zenoh.Session, keys: Keys, kind: Kind, number: int) -> Place:
+        misfit, tell, do = self.log_misfit, self._tell, self._do
+        return Place(session, keys, kind, self.topic, number, misfit, tell, do)
+
     def leave(self) -> None:
         """Leave a session that stays open."""
         place, self.place = self.place, None
@@ -83,10 +86,10 @@ class ZenohEnd(ABC):
         self.place = self._end = None
         return held
 
-    def log_misfit(self, token: str, policy: str) -> None:
-        """Log a peer that does not fit, once."""
-        if token not in self._noticed:
-            self._noticed.add(token)
+    def log_misfit(self, policy: str) -> None:
+        """Log, once for each policy, that a peer does not fit."""
+        if policy not in self._noticed:
+            self._noticed.add(policy)
             self._do(partial(notices.misfit, self.topic, self._notice, policy))
 
 
@@ -118,7 +121,7 @@ class ZenohPublisher(ZenohEnd):
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
         """Take a place in a session, and send what was retained again for late joiners."""
-        place = Place(session, keys, "MP", self.topic, number, self.log_misfit, self._tell)
+        place = self._placed(session, keys, "MP", number)
         self._release = keys.release
         self._end = end = self._declared(session, place.key)
         place.appear()
@@ -134,9 +137,10 @@ class ZenohPublisher(ZenohEnd):
         self._retained.append(sample)
         place, end = self.place, self._end  # another thread may clear them at any time
         if place is None or end is None:
-            raise TransportError(f"topic {self.topic.name}: not sent: this end has no session")
+            raise TransportError(f"topic {self.topic.name}: not sent: the node is not on the graph")
         try:
-            self._put(end, place, sample)
+            with contained():
+                self._put(end, place, sample)
         except zenoh.ZError as error:
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
@@ -198,7 +202,7 @@ class ZenohSubscription(ZenohEnd):
     ) -> None:
         super().__init__(topic, notices.NOT_HEARD, do, tell)
         self.others_only = others_only
-        self._rung = False
+        self._ring = Merged(do, self.take)
         self._own_session = ""
         self._received = received
         self._dropped = dropped
@@ -207,7 +211,7 @@ class ZenohSubscription(ZenohEnd):
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
         """Take a place in a session."""
-        place = Place(session, keys, "MS", self.topic, number, self.log_misfit, self._tell)
+        place = self._placed(session, keys, "MS", number)
         self._release = keys.release
         self.place, self._own_session = place, keys.session
         origin = Locality.REMOTE if self.others_only else Locality.ANY
@@ -235,7 +239,6 @@ class ZenohSubscription(ZenohEnd):
 
     def take(self) -> None:
         """Deliver what has arrived, at most AT_ONCE samples; the rest waits for the next turn."""
-        self._rung = False
         for _ in range(min(AT_ONCE, len(self._waiting))):
             try:
                 message = self._message(self._waiting.popleft())
@@ -246,11 +249,6 @@ class ZenohSubscription(ZenohEnd):
                 notices.hand_on(self._dropped, self.topic, self._received, message)
         if self._waiting:
             self._ring()
-
-    def _ring(self) -> None:
-        if not self._rung:
-            self._rung = True
-            self._do(self.take)
 
     def _arrived(self, sample: Sample) -> None:
         """Called on zenoh's thread. A full queue drops its oldest sample, as KEEP_LAST does."""

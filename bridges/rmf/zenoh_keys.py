@@ -28,6 +28,8 @@ Kind = Literal["MP", "MS"]
 NODE_ID: Final = 0
 _HEAD: Final = struct.Struct("<qqB")
 GID_LENGTH: Final = 16
+LONGEST: Final = 2000
+"""No token of a ROS node is longer (characters): ROS bounds each name in it to 255."""
 HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 
 
@@ -113,7 +115,7 @@ class RmwZenoh:
         ]
 
     def peer(self, token: str) -> Peer | None:
-        parts = token.split("/")
+        parts = token.split("/") if len(token) <= LONGEST else []
         qos = parts[12].split(":") if len(parts) > 12 else []
         if len(qos) < 6:
             return None
@@ -160,7 +162,7 @@ class Ros2Dds:
         ]
 
     def peer(self, token: str) -> Peer | None:
-        parts = token.split("/")
+        parts = token.split("/") if len(token) <= LONGEST else []
         qos = parts[6].split(":") if len(parts) > 6 else []
         if len(qos) < 4:
             return None

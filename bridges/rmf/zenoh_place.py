@@ -3,14 +3,13 @@
 from collections.abc import Callable
 
 import zenoh
-from zenoh import Sample, SampleKind
-from zenoh.handlers import Callback
 
 from bridges.rmf import zenoh_keys
 from bridges.rmf.peers import Announced
 from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.zenoh_keys import Keys, Kind
+from bridges.rmf.zenoh_peers import Order, Tokens
 
 Tell = Callable[[str, Announced | None], None]
 """Takes a token and its end, or None when it has gone."""
@@ -20,9 +19,9 @@ class Place:
     """An end's place in one session: its token, and the tokens of its peers.
 
     Peers are the ends of the other kind on the same topic, in any process. `peers`: those that this
-    end reaches, by their tokens. `unheard`: the gids of those that do not fit. `misfit(token, policy)`:
-    called on zenoh's thread for each peer whose QoS does not fit. `tell(token, end)`: likewise for each
-    that comes, and with None when it goes.
+    end reaches, by their tokens. `unheard`: the gids of those that do not fit. `misfit(policy)`: called
+    on zenoh's thread for each peer whose QoS does not fit. `tell(token, end)`: likewise for each that
+    comes, and with None when it goes. `do`: as `Tokens`.
     """
 
     def __init__(
@@ -32,8 +31,9 @@ class Place:
         kind: Kind,
         topic: AnyTopic,
         number: int,
-        misfit: Callable[[str, str], None],
+        misfit: Callable[[str], None],
         tell: Tell,
+        do: Callable[[Order], None],
     ) -> None:
         self.key = keys.data(topic)
         self.token = keys.token(kind, topic, number)
@@ -48,11 +48,8 @@ class Place:
         retained = topic.publish if kind == "MP" else topic.subscribe
         self._transient_local = retained.durability == "transient_local"
         self._live = session.liveliness()
-        self._watching = self._live.declare_subscriber(
-            keys.others("MS" if kind == "MP" else "MP", topic),
-            Callback(self._look, indirect=False),
-            history=True,
-        )
+        others = keys.others("MS" if kind == "MP" else "MP", topic)
+        self._tokens = Tokens(session, keys, [others], self._meet, self._part, do)
         self._alive: zenoh.LivelinessToken | None = None
 
     def appear(self) -> None:
@@ -63,29 +60,23 @@ class Place:
         """Withdraw the token."""
         if self._alive:
             self._alive.undeclare()  # type: ignore[no-untyped-call]
-        self._watching.undeclare()  # type: ignore[no-untyped-call]
+        self._tokens.leave()
 
-    def _look(self, sample: Sample) -> None:
-        """A peer's token has come or gone. Called on zenoh's thread."""
-        token = str(sample.key_expr)
-        if sample.kind == SampleKind.DELETE:
-            self.peers.pop(token, None)
-            self.unheard.discard(zenoh_keys.gid(token))
-            self._tell(token, None)
-        elif (peer := self._keys.peer(token)) is None:
-            return
-        else:
-            self._tell(token, peer.announced)
-            self._meet(token, peer)
+    def _part(self, token: str) -> None:
+        """A peer has gone. Called on zenoh's thread, as `_meet` is."""
+        self.peers.pop(token, None)
+        self.unheard.discard(zenoh_keys.gid(token))
+        self._tell(token, None)
 
     def _meet(self, token: str, peer: zenoh_keys.Peer) -> None:
+        self._tell(token, peer.announced)
         policy = self._incompatible(peer)
         if not policy:
             self.peers[token] = peer
             return
         self.unheard.add(zenoh_keys.gid(token))
         if policy != "type":  # `peers.py` logs those of every end
-            self._misfit(token, policy)
+            self._misfit(policy)
 
     def _incompatible(self, theirs: zenoh_keys.Peer) -> str:
         """The QoS policy by which DDS would not match the two ends; "" if it would match them."""

@@ -2,11 +2,24 @@
 
 import ctypes
 import json
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 import zenoh
 
 from bridges.rmf.zenoh_config import Configuration
+
+
+@contextmanager
+def contained() -> Iterator[None]:
+    """Around every call into zenoh: a panic there is no Exception, and would end the daemon. Raises
+    ZError for it."""
+    try:
+        yield
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # pyo3's, which cannot be imported
+            raise
+        raise zenoh.ZError(f"zenoh has panicked: {error}") from error
 
 
 def opened(ways: list[Configuration]) -> zenoh.Session:
@@ -16,7 +29,8 @@ def opened(ways: list[Configuration]) -> zenoh.Session:
     for key, value in wanted.items():
         config.insert_json5(key, json.dumps(value))
     try:
-        return zenoh.open(config)
+        with contained():
+            return zenoh.open(config)
     except zenoh.ZError:
         if further:
             return opened(further)
@@ -24,7 +38,7 @@ def opened(ways: list[Configuration]) -> zenoh.Session:
 
 
 def closed(session: zenoh.Session, held: list[object]) -> None:
-    with suppress(zenoh.ZError):  # on a dead link the farewell is lost
+    with suppress(zenoh.ZError), contained():  # on a dead link the farewell is lost
         session.close()  # type: ignore[no-untyped-call]
     held.clear()
 

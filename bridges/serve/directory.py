@@ -192,21 +192,31 @@ class MemoryFile:
 
 
 class Once:
-    """Logs one line when a write fails, and one when it works again; the daemon runs on."""
+    """Logs one line when a write fails, and one when it works again; the daemon runs on.
 
-    def __init__(self) -> None:
+    `fails`, `again`: the two events; `key`: of what is written; `level`: of the first.
+    """
+
+    def __init__(
+        self,
+        fails: str = "not_written",
+        again: str = "written_again",
+        key: str = "what",
+        level: int = logging.WARNING,
+    ) -> None:
         self._wrong: dict[str, str] = {}
+        self._fails, self._again, self._key, self._level = fails, again, key, level
 
     def failed(self, what: str, error: Exception) -> None:
         """Note a failed attempt; the caller will try again."""
         if what not in self._wrong:
-            log.warning(pairs("not_written", what=what, reason=error))
+            log.log(self._level, pairs(self._fails, **{self._key: what}, reason=error))
         self._wrong[what] = str(error)
 
     def works(self, what: str) -> None:
         """Note a successful attempt."""
         if self._wrong.pop(what, None) is not None:
-            log.info(pairs("written_again", what=what))
+            log.info(pairs(self._again, **{self._key: what}))
 
 
 class RuntimeDirectory:

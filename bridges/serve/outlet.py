@@ -4,14 +4,12 @@ import logging
 import threading
 from collections.abc import Callable, Iterable
 
-from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.instead import INSTEAD, converted
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Publisher, Transport, TransportError
+from bridges.serve.directory import Once
 from bridges.serve.witness import NOBODY, Nobody
-
-log = logging.getLogger(__name__)
 
 Named = Callable[[Topic[Message]], Topic[Message]]
 """Renames a topic as the site's YAML says."""
@@ -30,6 +28,7 @@ class Outlet:
         self._witness = witness
         self._ends: dict[str, Publisher[Message]] = {}
         self._instead: set[str] = set()
+        self._once = Once("not_published", "published_again", "topic", logging.ERROR)
         self._lock = threading.Lock()
 
     def open(self, topics: Iterable[Topic[Message]]) -> None:
@@ -39,15 +38,16 @@ class Outlet:
                 self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> None:
-        """Publish. A failure is logged: the next message may get through."""
+        """Publish. A failure is logged once: the next message may get through."""
         way, wanted = self._way(topic, message)
         if wanted is None:
             return
         try:
             self._end(way).publish(wanted)
         except TransportError as error:
-            log.error(pairs("not_published", topic=topic.name, reason=error))
+            self._once.failed(topic.name, error)
         else:
+            self._once.works(topic.name)
             self._witness.spoken(self._named(way).name, wanted, sent=True)
 
     def _way(

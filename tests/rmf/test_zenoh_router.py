@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 import trustme
 
-from bridges.rmf import addresses, zenoh_config
+from bridges.rmf import addresses, zenoh_alone, zenoh_config
 from bridges.rmf import definitions as d
 from bridges.rmf.settings import Zenoh, ZenohTls
-from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_STATES
+from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.transport import TransportError
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf import peer
-from tests.rmf.zenoh_programs import Router, free_port
+from tests.rmf.zenoh_programs import Router, free_port, meeting
 from tests.waiting import wait_until
 
 DOMAIN = 7
@@ -323,14 +323,16 @@ def test_an_address_that_cannot_be_listened_on_is_an_error() -> None:
 # --- what is simulated never reaches a router ----------------------------------------------------
 
 
-def test_a_node_on_loopback_takes_no_notice_of_the_settings_and_opens_no_other_address() -> None:
+def test_a_node_on_loopback_takes_no_notice_of_the_settings_and_opens_no_other_address(
+    domain: int,
+) -> None:
     zenoh = Zenoh(connect=("tcp/10.0.0.5:7447",), listen=("tcp/0.0.0.0:0",))
-    node = ZenohTransport("simulated", DOMAIN, loopback=True, settings=zenoh)
+    node = ZenohTransport("simulated", domain, loopback=True, settings=zenoh)
     try:
         assert {address for address, _ in listening(os.getpid())} == {"0100007F"}
     finally:
         node.close()
-    for config in zenoh_config.on_loopback(DOMAIN):
+    for config in zenoh_config.on_loopback(domain):
         for key in ("connect/endpoints", "listen/endpoints"):
             endpoints = config.get(key, [])
             assert isinstance(endpoints, list)
@@ -353,15 +355,56 @@ def listening(pid: int) -> set[tuple[str, str]]:
     }
 
 
-def test_a_router_that_comes_to_a_simulation_drives_it_off_the_graph(
-    site: Site, caplog: pytest.LogCaptureFixture
+def test_a_router_drives_a_node_that_must_stay_here_off_the_graph_until_it_has_gone(
+    site: Site, domain: int, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    node = ZenohTransport("simulated", DOMAIN, loopback=True)
-    site.nodes.append(node)
-    states = node.publisher(LIFT_STATES)
-    states.publish(d.LiftState())
-    meeting = f"tcp/127.0.0.1:{zenoh_config.LOOPBACK_PORT + DOMAIN}"
-    site.router(connect__endpoints=[meeting])
-    wait_until(lambda: any("left_graph" in text for text in caplog.messages), "it has left")
+    caplog.set_level(logging.INFO)
+    monkeypatch.setattr(zenoh_alone, "GONE_AFTER_S", 0.0)
+    lift, rmf = (ZenohTransport(name, domain, loopback=True) for name in ("lift", "rmf"))
+    site.nodes += [lift, rmf]
+    talk, alarm = Talk(lift, rmf), lift.publisher(FIRE_ALARM_TRIGGER)
+    asked: list[d.LiftRequest] = []
+    asks, hears = rmf.publisher(LIFT_REQUESTS), lift.subscribe(LIFT_REQUESTS, asked.append)
+    wait_until(lambda: talk.arrives("before") and hears.matched() == 1, "RMF and lift meet")
+    assert lift.faults() == []
+
+    router = site.router(connect__endpoints=[meeting(domain)])
+    wait_until(lambda: [code for code, _ in lift.faults()] == ["ROUTER_ON_LOOPBACK"], "it has left")
+    assert (talk.publisher.matched(), hears.matched(), lift.lives) == (0, 0, True)
+    with pytest.raises(TransportError, match="the node is not on the graph"):
+        talk.publisher.publish(d.LiftState(lift_name="away"))
     with pytest.raises(TransportError):
-        states.publish(d.LiftState())
+        alarm.publish(d.Bool(True))
+    wait_until(lambda: asks.matched() == 0, "RMF knows that it has gone")
+    asks.publish(d.LiftRequest(session_id="unheard"))
+
+    router.leave()
+    rang: list[d.Bool] = []
+    rmf.subscribe(FIRE_ALARM_TRIGGER, rang.append)
+    wait_until(lambda: talk.arrives("after") and rang, "RMF hears the lift again, and its alarm")
+    wait_until(lambda: hears.matched() == 1, "the lift knows of RMF")
+    wait_until(lambda: asked or peer.sent(asks, d.LiftRequest(session_id="heard")), "it hears")
+    assert {request.session_id for request in asked} == {"heard"}
+    assert "away" not in talk.heard
+    assert lift.faults() == []
+    said = [text.split(" ")[0] for text in caplog.messages if "node=lift" in text]
+    assert said == ["left_graph", "back_on_graph"]
+
+
+def test_a_node_stays_away_while_a_router_is_there_and_for_ten_seconds_after_it_was_last_seen() -> (
+    None
+):
+    alone = zenoh_alone.Alone()
+    seen = [alone.away(router, now) for router, now in [(False, 5.0), (True, 6.0), (True, 60.0)]]
+    assert seen == [False, True, True]
+    assert [alone.away(False, now) for now in (60.1, 69.9)] == [True, True]
+    assert alone.away(True, 69.95)
+    assert [alone.away(False, now) for now in (79.9, 80.0, 90.0)] == [True, False, False]
+
+
+def test_a_node_whose_router_does_not_answer_says_so_as_a_fault(site: Site) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    lift = site.node("lift", endpoint, mode="client")
+    wait_until(lambda: [code for code, _ in lift.faults()] == ["NO_ROUTER"], "it is a fault")
+    site.router(endpoint)
+    wait_until(lambda: lift.faults() == [], "it is over")

@@ -323,6 +323,7 @@ def test_a_lost_transport_is_logged_and_does_not_end_the_daemon(
     site.node.round()
     assert "not_published topic=lift_requests" in caplog.text
     site.until(4.0)
+    assert caplog.text.count("not_published topic=lift_requests") == 1
     assert site.node.devices()["Lift1"]["holder"] == "fleet/a (1 s)"
 
 
