@@ -18,6 +18,7 @@ from pathlib import Path
 from tests.torture.deaths import kills, shortages, signals
 from tests.torture.forged import forged
 from tests.torture.table import Table
+from tests.torture.wires import wires
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -52,6 +53,7 @@ def _one_after_another(here: Path, seed: int, options: argparse.Namespace, table
     signals(here / "c", table)
     shortages(here / "d", random.Random(seed + 2), options.times, table)
     forged(here / "e", random.Random(seed + 3), options.forged_s, table)
+    wires(here / "f", random.Random(seed + 4), options.forged_s, options.times, table)
 
 
 def _tried(part: Callable[[], None], failed: list[str]) -> None:
