@@ -1,4 +1,4 @@
-"""What a daemon's wires bring that is wrong in one place: replies, silences, routers, tokens, clocks."""
+"""What a daemon's wires bring that is wrong in one place: replies, routers, tokens, clocks."""
 
 import json
 import random
