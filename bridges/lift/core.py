@@ -90,7 +90,7 @@ def decide(
 
 
 def published(memory: Memory, shown: LiftReport) -> Memory:
-    """The memory once this report is published. After OPEN at the destination a robot may be inside."""
+    """The memory once this report was sent. After OPEN at the destination a robot may be inside."""
     session = memory.session
     if session is None or shown.open_at != session.destination:
         return memory

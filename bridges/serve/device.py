@@ -182,9 +182,9 @@ class Node(Generic[S, L, M, X, E, O, R]):
         report = subject.decision.report
         news = report.news()
         if now >= self._pace.due_at(news):
-            self._send(report)
+            if self._send(report):  # a door that nobody was shown OPEN has let nobody in
+                subject.published(self._kind.published(subject.memory, report))
             self._pace.published(news, now)
-            subject.published(self._kind.published(subject.memory, report))
         self.wake_at = min(subject.wake_at, self._pace.due_at(news))
 
     def _answer(self) -> None:
@@ -197,14 +197,15 @@ class Node(Generic[S, L, M, X, E, O, R]):
         assert decision is not None
         return self._kind.answer(self.name, request, reason, decision.report)
 
-    def _send(self, report: R) -> None:
+    def _send(self, report: R) -> bool:
+        """Publish the state; False if it was not sent."""
         try:
             at = self._clock.stamp(report.read_at)
         except ClockError as error:
             log.error(pairs("not_published", topic=self._kind.states.name, reason=error))
-            return
+            return False
         state = self._kind.state_message(self.name, self._settings, report, at)
-        self._publish(self._kind.states, state)
+        return self._publish(self._kind.states, state) is not False
 
     def _log(self) -> None:
         """Comes last: a log line takes as long as a scan."""

@@ -37,18 +37,19 @@ class Outlet:
             if self._transport.release.has(topic.type):
                 self._end(topic)
 
-    def publish(self, topic: Topic[Message], message: Message) -> None:
-        """Publish. A failure is logged once: the next message may get through."""
+    def publish(self, topic: Topic[Message], message: Message) -> bool:
+        """Publish; False when it was not sent. That is logged once: the next one may get through."""
         way, wanted = self._way(topic, message)
         if wanted is None:
-            return
+            return True
         try:
             self._end(way).publish(wanted)
         except TransportError as error:
             self._once.failed(topic.name, error)
-        else:
-            self._once.works(topic.name)
-            self._witness.spoken(self._named(way).name, wanted, sent=True)
+            return False
+        self._once.works(topic.name)
+        self._witness.spoken(self._named(way).name, wanted, sent=True)
+        return True
 
     def _way(
         self, topic: Topic[Message], message: Message

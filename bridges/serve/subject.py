@@ -21,8 +21,8 @@ log = logging.getLogger(__name__)
 Status = Mapping[str, Any]
 """A part of the status file, as JSON values."""
 
-Publish = Callable[[Topic[Message], Message], None]
-"""Sends to RMF, and does not raise."""
+Publish = Callable[[Topic[Message], Message], bool | None]
+"""Sends to RMF, and does not raise. False: nobody can have heard it."""
 
 V = TypeVar("V")
 """The events of a core."""

@@ -34,6 +34,9 @@ NMT: Final = 0x000
 """The id by which CANopen's nodes are started (CiA 301); its payload says which node is meant."""
 
 
+Frames = dbc.Dbc
+
+
 class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The charger's state, as one number.
 
@@ -151,7 +154,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         for n, wake in enumerate(self.wake):
             yield from self._wake_problems(found, ("wake", str(n)), wake)
 
-    def _wake_problems(self, found: dbc.Dbc, path: tuple[str, ...], wake: Wake) -> Problems:
+    def _wake_problems(self, found: Frames, path: tuple[str, ...], wake: Wake) -> Problems:
         """A frame that may charge, or that cannot be made."""
         if wake.frame in (sent.frame for sent in self.send):
             yield (*path, "frame"), f"{wake.frame} is in send: what wakes a charger must not charge"

@@ -212,6 +212,7 @@ class Story:
         self.limits = LiftLimits.of(self.settings, DEBOUNCE if debounce is None else debounce)
         self.now = 0.0
         self.wall_step_s = 0.0
+        self.deaf = False  # nothing can be sent
         self.told: list[tuple[float, LiftState]] = []
         self.alarms: list[tuple[float, Message]] = []
         self.hear: Callable[[LiftState], None] = lambda state: None
@@ -320,9 +321,12 @@ class Story:
             arrived, self.incoming = self.incoming, []
             self.receive(*arrived)
 
-    def _publish(self, topic: Topic[Any], message: Any) -> None:
+    def _publish(self, topic: Topic[Any], message: Any) -> bool:
+        if self.deaf:
+            return False
         if topic == LIFT_STATES:
             self.told.append((self.now, message))
             self.hear(message)
         else:
             self.alarms.append((round(self.now, 2), message))
+        return True

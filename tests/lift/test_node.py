@@ -131,3 +131,19 @@ def test_outputs_are_made_safe_and_a_failure_of_that_is_logged() -> None:
     story.building.unwritable = ""
     assert story.node.make_safe()
     assert story.outputs == LiftOutputs()
+
+
+def test_a_door_whose_open_state_could_not_be_sent_has_let_nobody_in() -> None:
+    heard, unheard = Story(Building(OPEN_AT_L1)), Story(Building(OPEN_AT_L1))
+    unheard.deaf = True
+    for story in (heard, unheard):
+        story.run(1.0)
+        story.asks("A", "L1")
+        story.run(40.0)
+    assert [story.node.status()["boarded"] for story in (heard, unheard)] == ["yes", "no"]
+    assert heard.building.driven.hold_door is not None
+    assert unheard.building.driven == LiftOutputs()
+    unheard.deaf = False
+    unheard.asks("A", "L1")
+    unheard.run(45.0)
+    assert unheard.node.status()["boarded"] == "yes"

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 
@@ -14,6 +15,7 @@ from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.transport import TransportError
 from bridges.rmf.zenoh import ZenohTransport
 from bridges.rmf.zenoh_peers import Merged
+from tests.rmf import peer
 from tests.rmf.zenoh_programs import meeting
 from tests.waiting import wait_until
 
@@ -80,20 +82,31 @@ def test_an_order_that_is_given_often_waits_once_and_may_be_given_again_while_it
 def test_a_flood_of_tokens_is_walked_seldom_and_what_comes_in_it_is_heard(
     node: ZenohTransport, domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    walks: list[None] = []
+    walks: list[int] = []
     settle = node._peers.settle
-    monkeypatch.setattr(node._peers, "settle", lambda: walks.append(None) or settle())
+
+    def walk() -> bool:
+        walks.append(1)
+        return settle()
+
+    monkeypatch.setattr(node._peers, "settle", walk)
     hears = node.subscribe(LIFT_REQUESTS, lambda request: None)
-    with node._lock, stranger(domain) as flood:  # our thread waits for the lock at its first order
-        node._orders.put(lambda: node._lock.acquire() and node._lock.release())
+    held, goes_on = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        held.set()
+        goes_on.wait()
+
+    with stranger(domain) as flood:
+        node._orders.put(hold)
+        wait_until(held.is_set, "our thread is busy")
         flood.claims("MP", "lift_requests", type_text(node), range(300))
         wait_until(lambda: hears.matched() == 300, "all are counted")
         before = len(walks)
-        assert node._orders.qsize() <= 2
-        node._lock.release()
+        goes_on.set()
         wait_until(lambda: len(walks) > before, "they are walked")
+        wait_until(node._orders.empty, "nothing waits")
         assert len(walks) <= before + 2
-        node._lock.acquire()
 
 
 def test_beyond_the_bound_ends_are_left_out_once_said_and_counted_when_there_is_room(
@@ -104,7 +117,10 @@ def test_beyond_the_bound_ends_are_left_out_once_said_and_counted_when_there_is_
 ) -> None:
     monkeypatch.setattr(zenoh_peers, "MOST", 20)
     hears = node.subscribe(LIFT_REQUESTS, lambda request: None)
-    crowded = lambda: [text for text in caplog.messages if text.startswith("crowded")]  # noqa: E731
+
+    def crowded() -> list[str]:
+        return [text for text in caplog.messages if text.startswith("crowded")]
+
     with stranger(domain) as flood:
         for again in range(2):
             flood.claims(
@@ -199,5 +215,5 @@ def test_samples_bear_no_time_of_zenohs_clock_which_panics_before_1970(
         key = node._keys.data(LIFT_STATES)
         far.session.declare_subscriber(key, lambda sample: stamps.append(sample.timestamp))
         publisher = node.publisher(LIFT_STATES)
-        wait_until(lambda: stamps or publisher.publish(d.LiftState()), "it arrives")
+        wait_until(lambda: stamps or peer.sent(publisher, d.LiftState()), "it arrives")
     assert set(stamps) == {None}
