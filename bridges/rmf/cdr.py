@@ -13,9 +13,9 @@ import struct
 import typing
 from collections.abc import Callable
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
-from bridges.rmf.definitions import field_types
+from bridges.rmf.definitions import PACKAGES, field_types
 from bridges.rmf.releases import NEWEST, Release
 
 T = TypeVar("T")
@@ -27,6 +27,11 @@ Get = Callable[[bytes, int], tuple[Value, int]]
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 BIG_ENDIAN = b"\x00\x00\x00\x00"
 HEADER = 4
+LONGEST: Final = 1 << 20
+"""The longest sample (bytes) that is taken from the network. A FleetState of 200 robots takes 46 kB,
+and 0.7 MB with 50 places ahead of each of them."""
+LONGEST_FLAT: Final = 1 << 16
+"""The longest sample of a type that lists no other messages: a hundred of these may wait."""
 CODES = {"int32": "i", "uint32": "I", "uint64": "Q", "float32": "f"}
 BYTES = ("uint8", "byte")
 
@@ -50,11 +55,20 @@ def encode(message_type: type, message: object, release: Release = NEWEST) -> by
     return bytes(out)
 
 
+@cache
+def longest(message_type: type) -> int:
+    """The longest sample (bytes) of this type that is taken."""
+    listed = (typing.get_args(kind)[:1] for kind in field_types(message_type).values())
+    return LONGEST if any(one and one[0] in PACKAGES for one in listed) else LONGEST_FLAT
+
+
 def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T:
     """The message in a sample, of either byte order. Raises CdrError for anything else.
 
     Up to three bytes may follow the last field, because RTPS pads payloads to a multiple of four.
     """
+    if len(sample) > longest(message_type):
+        raise CdrError(f"{len(sample)} bytes long")
     order = _ORDERS.get(sample[:2])
     if order is None:
         raise CdrError(f"not plain CDR: the sample begins with {sample[:4].hex(' ') or 'nothing'}")

@@ -34,9 +34,6 @@ from bridges.rmf.zenoh_session import contained
 HEARTBEAT_S: Final = 0.5
 """As in rmw_zenoh: this long after a retained message its number is sent again, so that subscribers
 notice a loss."""
-LONGEST: Final = 1 << 20
-"""The longest sample (bytes) that may wait for our thread. RMF's messages are far shorter; a hundred
-samples of this length fit into a small Pi's memory."""
 AT_ONCE: Final = 100
 """The most samples taken from one subscription before the others have their turn."""
 
@@ -253,7 +250,8 @@ class ZenohSubscription(ZenohEnd):
     def _arrived(self, sample: Sample) -> None:
         """Called on zenoh's thread. A full queue drops its oldest sample, as KEEP_LAST does."""
         size = len(sample.payload)
-        self._waiting.append(CdrError(f"{size} bytes long") if size > LONGEST else sample)
+        long = size > cdr.longest(self.topic.type)
+        self._waiting.append(CdrError(f"{size} bytes long") if long else sample)
         self._ring()
 
     def _message(self, sample: Sample | CdrError) -> Message | None:

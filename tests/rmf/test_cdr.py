@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridges.rmf import definitions as d
-from bridges.rmf.cdr import CdrError, decode, encode
+from bridges.rmf.cdr import LONGEST, LONGEST_FLAT, CdrError, decode, encode
 from tests.rmf.values import MESSAGE_TYPES, repeatable, values
 
 REQUEST = d.LiftRequest("Lift1", d.Time(5, 6), "fleet/robot", 1, "L3", 2)
@@ -19,6 +19,34 @@ REQUEST_BYTES = bytes.fromhex(
     "02"
 )
 MESSAGES = st.sampled_from(MESSAGE_TYPES).flatmap(values)
+
+
+def _fleet(robots: int, places: int) -> d.FleetState:
+    ahead = tuple(d.Location(level_name="Level 10 (north wing)", index=n) for n in range(places))
+    robot = d.RobotState(
+        name="hospital_delivery_robot_017",
+        model="TinyRobot-Extended-2",
+        task_id="compose.dispatch-17-0123456789abcdef0123456789abcdef",
+        location=ahead[0],
+        path=ahead,
+    )
+    return d.FleetState("hospital_fleet", (robot,) * robots)
+
+
+def test_two_hundred_robots_with_their_paths_are_heard_and_what_is_longer_is_not() -> None:
+    legal = _fleet(200, 50)
+    sample = encode(d.FleetState, legal)
+    assert len(sample) < 0.7 * LONGEST
+    assert decode(d.FleetState, sample) == legal
+    with pytest.raises(CdrError, match="bytes long"):
+        decode(d.FleetState, encode(d.FleetState, _fleet(400, 50)))
+
+
+def test_a_request_or_state_is_short() -> None:
+    names = "x" * (LONGEST_FLAT - 100)
+    assert decode(d.LiftRequest, encode(d.LiftRequest, d.LiftRequest(names))).lift_name == names
+    with pytest.raises(CdrError, match="bytes long"):
+        decode(d.LiftRequest, encode(d.LiftRequest, d.LiftRequest(names + "x" * 100)))
 
 
 def test_a_request_is_these_very_bytes() -> None:

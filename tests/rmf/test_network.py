@@ -15,9 +15,22 @@ from tests.rmf.conftest import ROS2
 from tests.rmf.joining import joining
 from tests.waiting import wait_until
 
+INTERNAL = (
+    "<Internal><MultipleReceiveThreads>false</MultipleReceiveThreads>"
+    "<WriterLingerDuration>100 ms</WriterLingerDuration><MaxSampleSize>1048576 B</MaxSampleSize>"
+    "<DefragReliableMaxSamples>1</DefragReliableMaxSamples>"
+    "<PrimaryReorderMaxSamples>1</PrimaryReorderMaxSamples>"
+    "<SecondaryReorderMaxSamples>1</SecondaryReorderMaxSamples></Internal>"
+)
 AUTO = (
-    f"<CycloneDDS><Domain>{cyclone.LEAVING}<Discovery><ParticipantIndex>auto</ParticipantIndex>"
-    "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>{}</Discovery></Domain></CycloneDDS>"
+    f"<CycloneDDS><Domain>{INTERNAL}<Discovery><SPDPInterval>2 s</SPDPInterval>"
+    "<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
+    "<DiscoveredLocatorPruneDelay>inf</DiscoveredLocatorPruneDelay>"
+    "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>{}</Discovery></Domain></CycloneDDS>"
+)
+ON_ROS = (
+    f"<CycloneDDS><Domain>{INTERNAL}<Discovery><SPDPInterval>2 s</SPDPInterval></Discovery></Domain>"
+    "</CycloneDDS>"
 )
 ALARM = FIRE_ALARM_TRIGGER.named("ping_fire_alarm_trigger")
 PEERS = '<Peers><Peer address="10.0.0.5"/><Peer address="rmf.local"/></Peers>'
@@ -41,12 +54,22 @@ PEERS = '<Peers><Peer address="10.0.0.5"/><Peer address="rmf.local"/></Peers>'
         ({"CYCLONEDDS_URI": "file:///c.xml"}, AUTO.format("") + ",file:///c.xml"),
         (
             {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", "ROS_STATIC_PEERS": "10.0.0.5"},
-            "",
+            ON_ROS,
         ),
     ],
 )
 def test_ross_variables_become_cyclones_configuration(environ: dict[str, str], wanted: str) -> None:
     assert cyclone.configuration(environ) == wanted
+
+
+def test_a_ros_node_has_our_settings_before_the_users_own_which_prevail() -> None:
+    assert cyclone.for_ros({}) == ON_ROS
+    assert cyclone.for_ros({"CYCLONEDDS_URI": "file:///c.xml"}) == f"{ON_ROS},file:///c.xml"
+
+
+def test_on_loopback_a_node_has_the_same_settings() -> None:
+    assert INTERNAL in LOOPBACK
+    assert "<SPDPInterval>2 s</SPDPInterval>" in LOOPBACK
 
 
 class Machine:
