@@ -67,7 +67,7 @@ def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T
 
     Up to three bytes may follow the last field, because RTPS pads payloads to a multiple of four.
     """
-    if len(sample) > longest(message_type):
+    if len(sample) > longest(typing.cast(type, message_type)):
         raise CdrError(f"{len(sample)} bytes long")
     order = _ORDERS.get(sample[:2])
     if order is None:

@@ -43,7 +43,7 @@ E = TypeVar("E", bound=core.Entity)
 
 CANNOT_JOIN: Final = (
     "is a network interface up, and does CYCLONEDDS_URI, if set, name one that exists? "
-    "`network: localhost` needs none. Cannot join DDS domain"
+    "`network: localhost` needs none. Is the clock after 1970? Cannot join DDS domain"
 )
 LOOK_EVERY_NS: Final = int(LOOK_EVERY_S * 1e9)
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
