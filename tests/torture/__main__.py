@@ -15,10 +15,10 @@ import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from tests.torture.dds import long_names, lost_network
 from tests.torture.deaths import kills, shortages, signals
 from tests.torture.forged import forged
 from tests.torture.table import Table
-from tests.torture.wire import long_names, lost_network
 from tests.torture.wires import wires
 
 
@@ -55,7 +55,7 @@ def _one_after_another(here: Path, seed: int, options: argparse.Namespace, table
     shortages(here / "d", random.Random(seed + 2), options.times, table)
     forged(here / "e", random.Random(seed + 3), options.forged_s, table)
     wires(here / "f", random.Random(seed + 4), options.forged_s, options.times, table)
-    long_names(here / "f", options.forged_s / 4, table)
+    long_names(here / "g", options.forged_s / 4, table)
     lost_network(table)
 
 

@@ -79,7 +79,7 @@ def _most_mib(pid: int) -> float:
 
 def lost_network(table: Table) -> None:
     """`lo` goes down, and comes back: our states are heard soon, by a node with RMF's defaults."""
-    inside = f"ip link set lo up && exec {sys.executable} -m tests.torture.wire"
+    inside = f"ip link set lo up && exec {sys.executable} -m tests.torture.dds"
     alone = shutil.which("unshare")
     if not alone or subprocess.run([alone, "-n", "true"], capture_output=True).returncode:
         table.count("no network (needs root and unshare)", "not tried")
