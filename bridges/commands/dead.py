@@ -87,7 +87,7 @@ def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
     if not config.buses:
         logging.info(pairs("nothing_to_switch_off", file=file, kind=config.kind))
         return 0
-    return _told(_unsafe(config, (), answered) == set())
+    return _told(_unsafe(config, (), answered, TIMEOUT_S) == set())
 
 
 def _off_by_records(
@@ -95,16 +95,19 @@ def _off_by_records(
 ) -> int:
     """Switch off what these records name; all records by default."""
     found = [r for r in records.unreleased() if names is None or r.name in names]
-    return _told(not [r for r in found if not _off_by_record(records, r, answered)])
+    each_s = TIMEOUT_S / max(1, len(found))  # a dead bus of one leaves time for the others
+    return _told(not [r for r in found if not _off_by_record(records, r, answered, each_s)])
 
 
-def _off_by_record(records: Records, record: Record, answered: Mapping[str, float]) -> bool:
+def _off_by_record(
+    records: Records, record: Record, answered: Mapping[str, float], within_s: float
+) -> bool:
     try:
         config = record.config()
     except SettingsError as error:
         _say(error)
         return False
-    unsafe = _unsafe(config, record.safe, answered)
+    unsafe = _unsafe(config, record.safe, answered, within_s)
     try:
         if unsafe:
             records.still_unsafe(record, unsafe, config)
@@ -115,8 +118,10 @@ def _off_by_record(records: Records, record: Record, answered: Mapping[str, floa
     return not unsafe
 
 
-def _unsafe(config: Config, safe: tuple[str, ...], answered: Mapping[str, float]) -> set[str]:
-    return set(config.devices) - set(safe) - outputs_off(config, TIMEOUT_S, safe, answered)
+def _unsafe(
+    config: Config, safe: tuple[str, ...], answered: Mapping[str, float], within_s: float
+) -> set[str]:
+    return set(config.devices) - set(safe) - outputs_off(config, within_s, safe, answered)
 
 
 def _told(all_off: bool) -> int:

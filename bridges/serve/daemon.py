@@ -31,6 +31,7 @@ from bridges.serve.notify import notify, watchdog_s
 from bridges.serve.predecessor import Predecessor
 from bridges.serve.record import Record
 from bridges.serve.service import OpenBus, clock_of, named_by, service
+from bridges.serve.serving import stop
 from bridges.serve.witness import NOBODY, Nobody, Witness
 from bridges.settings.load import Config
 
@@ -117,10 +118,10 @@ class Daemon:
         """Run until a signal, and return the exit code: 0 when every output is off and verified."""
         signals.on_reset(self._service.reset)
         self._service.subscribe()
-        for loop in self._loops:
-            loop.start()
         log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
         try:
+            for loop in self._loops:
+                loop.start()
             self._watch()
         except Exception as error:
             self._witness.died(f"{type(error).__name__}: {error}")
@@ -165,20 +166,19 @@ class Daemon:
 
     def _shut_down(self) -> bool:
         self._convenience("sd_notify", partial(notify, "STOPPING=1"))
-        deadline = time.monotonic() + STOP_WITHIN_S
-        safe = [loop.stop(max(0.1, deadline - time.monotonic())) for loop in self._loops]
-        self._witness.ended(safe=all(safe))
+        safe = stop(self._loops, STOP_WITHIN_S)
+        self._witness.ended(safe=safe)
         self._convenience("transport", self._transport.close)
         if self._predecessor is not None:
             self._predecessor.close()
-        if all(safe):
+        if safe:
             self._runtime.released()
             if not self._left():
                 self._convenience("mark", last_mark.leave)
             if self._guard is not None:
                 self._guard.dismiss()
-        log.info(pairs("stopped", outputs_off=all(safe)))
-        return all(safe)
+        log.info(pairs("stopped", outputs_off=safe))
+        return safe
 
     def _left(self) -> list[str]:
         """Records of dead daemons whose outputs are not verified off."""

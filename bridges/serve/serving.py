@@ -2,6 +2,8 @@
 
 import logging
 import threading
+import time
+from collections.abc import Sequence
 from typing import Protocol
 
 from bridges.log import pairs
@@ -58,6 +60,15 @@ class Rounds(Protocol):
         """Outputs off, and everything released. False if that could not be verified."""
 
 
+def stop(loops: Sequence["Serving"], within_s: float) -> bool:
+    """End all at once, so that none waits for another; False if one does not end, or not safely."""
+    for loop in loops:
+        loop.close()
+    deadline = time.monotonic() + within_s
+    ended = [loop.ended(max(0.0, deadline - time.monotonic())) for loop in loops]
+    return all(ended)
+
+
 class Serving:
     """One thread of a service, as the daemon sees it. `died`: why it died; "" if it has not."""
 
@@ -73,16 +84,20 @@ class Serving:
         """Start the thread."""
         self._thread.start()
 
-    def stop(self, timeout_s: float) -> bool:
-        """End after the current round, outputs off; False if it does not end, or not safely."""
+    def close(self) -> None:
+        """Ask for the end: after the current round, outputs off."""
         self._serves.inbox.close()
-        self._thread.join(timeout_s)
+
+    def ended(self, timeout_s: float) -> bool:
+        """Wait for the end; False if it does not come, or not safely."""
+        if self._thread.ident is not None:  # else it was never started
+            self._thread.join(timeout_s)
         return not self._thread.is_alive() and self._safe
 
     @property
     def alive(self) -> bool:
-        """False when the thread has ended, by `stop` or by a defect."""
-        return self._thread.is_alive()
+        """False when it serves no more: stopped, or, even if it still switches off, by a defect."""
+        return self._thread.is_alive() and not self.died
 
     @property
     def finished(self) -> int:

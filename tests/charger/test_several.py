@@ -11,6 +11,7 @@ from bridges.rmf.definitions import ChargerState, ChargerStateValue
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.topics import CHARGER_STATES
 from bridges.serve.service import service
+from bridges.serve.serving import stop
 from bridges.settings.load import load
 from tests.drivers.hal.http.far_end import Caller, Conversation, FarEnd, always, answer
 from tests.waiting import wait_until
@@ -51,7 +52,7 @@ def daemon(file: Path, **stations: Conversation) -> Iterator[list[ChargerState]]
         for loop in served.loops:
             loop.start()
         yield states
-        assert all(loop.stop(10.0) for loop in served.loops)
+        assert stop(served.loops, 10.0)
 
 
 def told(states: list[ChargerState], name: str) -> list[tuple[int, str]]:

@@ -1,7 +1,8 @@
 """`rmf-bridge`, with a part inside that fails as soon as a file exists.
 
-`python -m tests.serve.hurt reader|bus FILE run …`: `reader` is the transport's, which raises again and
-again; `bus` is Modbus, whose next reading never ends.
+`python -m tests.serve.hurt PART FILE run …`: `reader` is the transport's, which raises again and again;
+`bus` is Modbus, whose next reading never ends; `loop` is the thread of the bus `dead`, and `watch` the
+daemon's own, which raise.
 """
 
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from bridges import cli
+from bridges.serve.loop import Loop
 from drivers.hal.modbus import ModbusBus
 from hal_fakes.wire import wire
 
@@ -25,17 +27,30 @@ def _reader() -> type:
     return ZenohTransport
 
 
-def _raises() -> None:
+def _daemon() -> type:
+    from bridges.serve.daemon import Daemon
+
+    return Daemon
+
+
+def _raises(*_: Any) -> None:
     raise MemoryError("none left")
 
 
-def _hangs() -> None:
+def _raises_for_the_dead(loop: Loop) -> None:
+    if loop.name == "bus-dead":
+        _raises()
+
+
+def _hangs(*_: Any) -> None:
     threading.Event().wait()
 
 
-HURTS: dict[str, tuple[Callable[[], type], str, Callable[[], None]]] = {
+HURTS: dict[str, tuple[Callable[[], type], str, Callable[..., None]]] = {
     "reader": (_reader, "_follow_network", _raises),
     "bus": (lambda: ModbusBus, "read", _hangs),
+    "loop": (lambda: Loop, "round", _raises_for_the_dead),
+    "watch": (_daemon, "_require_life", _raises),
 }
 
 
@@ -47,7 +62,7 @@ def main(argv: Sequence[str]) -> int:
 
     def hurt(*arguments: Any) -> object:
         if Path(file).exists():
-            fail()
+            fail(*arguments)
         return whole(*arguments)
 
     setattr(owner(), name, hurt)

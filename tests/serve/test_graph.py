@@ -18,7 +18,7 @@ from bridges.serve import graph as graph_node
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from bridges.serve.presence import SPREAD_MOST_S
-from bridges.serve.serving import Serving
+from bridges.serve.serving import Serving, stop
 from hal_fakes import wire
 from tests.rmf.domains import domain_of_this_run
 from tests.waiting import wait_until
@@ -372,5 +372,5 @@ def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
     wait_until(lambda: heard, "the request is passed on")
     assert replace(heard[0], request_time=request.request_time) == request
     assert thread.alive
-    assert thread.stop(5.0)
+    assert stop([thread], 5.0)
     assert not thread.alive

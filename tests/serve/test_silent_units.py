@@ -8,6 +8,7 @@ import pytest
 
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.serve.service import service
+from bridges.serve.serving import stop
 from bridges.settings.load import load
 from tests.depth import depth
 from tests.drivers.hal.modbus.line import SerialModule
@@ -134,7 +135,7 @@ def test_on_a_real_bus_a_live_unit_is_asked_between_any_two_silent_ones(
     wait_until(lambda: len({*module.units_asked()}) > silent, "each unit has been asked")
     wait_until(lambda: loop.ready, "each door has published a state")
     asked = module.units_asked()
-    assert not loop.stop(30.0), "silent units cannot be verified off"
+    assert not stop([loop], 30.0), "silent units cannot be verified off"
     since_it_answered = [unit for unit, _ in groupby(asked[asked.index(live) :])]
     assert since_it_answered[::2] == [live] * len(since_it_answered[::2])
     assert [unit for unit, _ in groupby(asked) if unit != live][:silent] == [
