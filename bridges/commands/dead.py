@@ -13,7 +13,7 @@ from pathlib import Path
 from bridges import log
 from bridges.log import pairs
 from bridges.serve import directory as runtime
-from bridges.serve import signals
+from bridges.serve import last_mark, signals
 from bridges.serve.last_shown import ages
 from bridges.serve.places import Places, act_as_owner, by_hand, work_somewhere
 from bridges.serve.record import Record, Records
@@ -31,18 +31,25 @@ def switch_off(args: argparse.Namespace) -> int:
     file = args.file.absolute()
     try:
         places = _places(file, args.runtime_dir)
-    except (runtime.Unknown, PermissionError) as error:
+    except PermissionError as error:
         logging.error(str(error))
         return os.EX_UNAVAILABLE
     work_somewhere(places or by_hand(file))
     if places is None:
         return _off_by_yaml(file, {})
     answered = ages(places)
-    if args.record and _asked_by_our_daemon(places):
-        return _off_by_records(Records(places, file), answered, args.record)
+    records = Records(places, file)
+    if args.record:  # the daemon that asks holds the lock meanwhile (`serve/predecessor.py`)
+        return _off_by_records(records, answered, args.record)
+    claimed = last_mark.says_claimed(os.environ) and bool(records.unreleased())
     try:
-        held = runtime.RuntimeDirectory(places, file, serves=False)
+        held = runtime.RuntimeDirectory(
+            places, file, serves=False, wait_s=0.0 if claimed else runtime.WAIT_S
+        )
     except runtime.AlreadyRunning as error:
+        if claimed:
+            logging.warning("%s. But this run's outputs are not off yet", error)
+            return _off_by_records(records, answered)
         logging.error("%s. That switches its outputs off", error)
         return os.EX_UNAVAILABLE
     try:
@@ -56,24 +63,17 @@ def switch_off(args: argparse.Namespace) -> int:
 def _places(file: Path, given: str | None) -> Places | None:
     """The daemon's directories. None if they cannot be trusted and systemd says that it is dead.
 
-    Raises Unknown or PermissionError if it cannot be known whether a daemon runs there.
+    Raises PermissionError if it cannot be known whether a daemon runs there.
     """
     try:
         places = runtime.find(file, given)
         act_as_owner(places)
-        runtime.holder(places)
-    except (runtime.Unknown, PermissionError) as error:
+    except PermissionError as error:
         if "SERVICE_RESULT" not in os.environ:  # set for ExecStopPost: systemd.exec(5)
             raise
         logging.error("%s; switching off what %s names", error, file)
         return None
     return places
-
-
-def _asked_by_our_daemon(places: Places) -> bool:
-    """Whether our parent holds the lock (`serve/predecessor.py`), or its pid is not readable."""
-    found = runtime.holder(places)
-    return found is None or found.pid in (0, os.getppid())
 
 
 def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:

@@ -10,8 +10,9 @@ from bridges.commands.written import no_folder, not_written
 from bridges.recording.bags import INSTALL
 from bridges.recording.incident import AFTER_S, BEFORE_S, Incident, Note, part
 from bridges.recording.ring import DIED, NAME, Read, RingError
-from bridges.serve import directory as runtime
+from bridges.serve import holder
 from bridges.serve.clock import machine_s
+from bridges.serve.directory import find
 
 EX_UNAVAILABLE = 69
 
@@ -48,10 +49,10 @@ def run(args: argparse.Namespace) -> int:
     if why := no_folder(path):  # before the wait
         return not_written(path, why)
     try:
-        places = runtime.find(args.file.absolute(), args.runtime_dir)
-        follows = not args.died and runtime.holder(places) is not None
+        places = find(args.file.absolute(), args.runtime_dir)
+        follows = not args.died and holder.look(places) is not None
         incident = _incident(places.runtime / (DIED if args.died else NAME), args, follows)
-    except (runtime.Unknown, RingError) as error:
+    except (PermissionError, RingError) as error:
         print(f"{error}. {_hint(died=args.died)}", file=sys.stderr)
         return EX_UNAVAILABLE
     if args.anonymous:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from bridges.commands.completion import Completer, completed_by, device_names
-from bridges.serve.places import as_given, by_hand
+from bridges.serve.places import as_given, by_hand, opened
 
 ANSWER_S = 5.0
 
@@ -41,7 +41,9 @@ def names(verb: str) -> Completer:
 
 
 def _sockets(args: argparse.Namespace) -> list[Path]:
-    return sorted(_folder(args).glob("plant*.sock"))
+    with suppress(FileNotFoundError, NotADirectoryError), opened(_folder(args)):
+        return sorted(_folder(args).glob("plant*.sock"))
+    return []
 
 
 def _folder(args: argparse.Namespace) -> Path:

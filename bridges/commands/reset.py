@@ -5,7 +5,8 @@ import os
 import sys
 from pathlib import Path
 
-from bridges.serve import directory as runtime
+from bridges.serve import holder
+from bridges.serve.directory import find
 from bridges.serve.places import Places, act_as_owner
 from bridges.serve.signals import RESET
 
@@ -22,18 +23,18 @@ def run(args: argparse.Namespace) -> int:
         if not args.runtime_dir and not args.file.exists():
             print(f"{args.file} does not exist", file=sys.stderr)
             return 1
-        places = runtime.find(args.file.absolute(), args.runtime_dir)
+        places = find(args.file.absolute(), args.runtime_dir)
         act_as_owner(places)
         return _reset(args.file, places)
-    except (runtime.Unknown, PermissionError) as error:
+    except PermissionError as error:
         print(error, file=sys.stderr)
         return os.EX_UNAVAILABLE
 
 
 def _reset(file: Path, places: Places) -> int:
-    found = runtime.holder(places)
-    if found is None or not found.serves or found.pid <= 1:
-        why = f"{found}, which is not a daemon" if found else "no process holds it"
+    found = holder.look(places)
+    if found is None or not found.serves or not found.started:  # else the number may be another's
+        why = f"{found}, which is not a daemon of this version" if found else "no process holds it"
         print(f"no daemon serves {file}: {places.runtime}: {why}", file=sys.stderr)
         return 1
     try:

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     signals.ignore_reset()
     try:
         held = runtime.held(args.file, args.runtime_dir, serves=True, simulated=args.simulate)
-    except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
+    except (runtime.AlreadyRunning, PermissionError) as error:
         logging.error(str(error))
         return os.EX_UNAVAILABLE
     try:

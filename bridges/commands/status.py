@@ -20,7 +20,7 @@ import msgspec
 from bridges.commands.faults import Remedy, here, remedies, values
 from bridges.commands.paint import bold, red
 from bridges.rmf.words import printable
-from bridges.serve import directory
+from bridges.serve import files, holder
 from bridges.serve.places import (
     SERVICE_RUN,
     SERVICE_STATE,
@@ -32,9 +32,9 @@ from bridges.serve.places import (
 from bridges.serve.record import paths, read
 from bridges.serve.subject import Status
 
-OLD_AFTER_S: Final = 5.0
-"""The status file is written each second."""
 UNIT: Final = "rmf-bridge@"
+RUNS: Final = ("active (running)", "activating (start)", "deactivating (stop-sigterm)")
+"""What systemd says of a unit whose process is there."""
 ASK_SYSTEMD_S: Final = 3.0
 WELL, FAULTY, DOWN, NONE = 0, 1, 2, 3
 """Exit codes, as monitoring plugins have them: OK, WARNING, CRITICAL, UNKNOWN."""
@@ -149,14 +149,14 @@ def daemons(
 def _daemon(folder: Path, by: str, unit: str, wall: float) -> Daemon:
     one = Daemon(name=folder.name, state="stopped", by=by, unit=unit)
     try:
-        holder = directory.holder(Places(folder, folder))
-        status, one.age_s = _read(folder / directory.STATUS, wall)
-    except (directory.Unknown, PermissionError) as error:
+        held_by = holder.look(Places(folder, folder))
+        status, one.age_s = _read(folder / holder.STATUS, wall)
+    except PermissionError as error:
         one.state, one.why = "unknown", str(error)
         return one
     one.status = status
-    if holder is not None and holder.serves:
-        fresh = one.age_s is not None and one.age_s <= OLD_AFTER_S
+    if unit in RUNS or (held_by is not None and held_by.serves):
+        fresh = one.age_s is not None and one.age_s <= holder.FRESH_S
         one.state = "serving" if fresh else "old"
     elif status:
         one.state = "died"
@@ -186,11 +186,13 @@ def _without_directory(unit: str) -> str:
 def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
     """The status and its age (s); nothing if there is none, or it cannot be understood."""
     try:
-        written_at = path.stat().st_mtime
-        text = path.read_bytes()
+        written_at = path.lstat().st_mtime
+        text = files.read(path, holder.STATUS_MAX)
         msgspec.json.decode(text, type=StatusFile)
         found = msgspec.json.decode(text, type=dict[str, Any])
-    except (FileNotFoundError, msgspec.MsgspecError):
+    except PermissionError:
+        raise
+    except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
         return {}, None
     return found, max(0.0, wall - written_at)
 
@@ -230,12 +232,19 @@ def _lines(one: Daemon, known: Mapping[str, Remedy], out: TextIO) -> Iterator[st
     yield paint(f"{one.name}: {_state(one)}{simulated}", out) + f" ({by})"
     if one.why:
         yield f"  {printable(one.why)}"
-    if one.state in ("serving", "old"):
+    if one.status and one.state in ("serving", "old"):
         yield from _serving(one, known, out)
 
 
 def _serving(one: Daemon, known: Mapping[str, Remedy], out: TextIO) -> Iterator[str]:
-    about = {"transport": "?", "domain_id": "?", "kind": "?", "version": "?", **one.status}
+    about = {
+        "file": "?",
+        "transport": "?",
+        "domain_id": "?",
+        "kind": "?",
+        "version": "?",
+        **one.status,
+    }
     yield "  {file}: {kind}, version {version}, {transport} domain {domain_id}".format(**about)
     for topic, nodes in one.status.get("heard_by", {}).items():
         yield f"  {topic}: " + ("nobody listens" if not nodes else f"heard by {_nodes(nodes)}")

@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     signals.ignore_reset()
     try:
         held = runtime.held(args.file, args.runtime_dir, serves=False, simulated=args.simulate)
-    except (runtime.AlreadyRunning, runtime.Unknown, PermissionError) as error:
+    except (runtime.AlreadyRunning, PermissionError) as error:
         print(f"walk needs the device for itself: {error}", file=sys.stderr)
         return os.EX_UNAVAILABLE
     try:

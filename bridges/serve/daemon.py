@@ -86,6 +86,7 @@ class Daemon:
         # Every bus is open, and no output is claimed before `serve`: a bus that cannot be opened leaves
         # no record. `outputs-off` reads the record.
         if config.buses and not simulated:
+            self._convenience("mark", partial(last_mark.leave, name=last_mark.CLAIMED))
             runtime.claim(ours)
             self._guard = Guard(outputs_off) if guard.needed() else None
         self._health_topic = named_by(config, DIAGNOSTICS)

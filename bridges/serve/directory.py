@@ -1,7 +1,8 @@
-"""A daemon's files while it runs: its lock, its status and its record.
+"""A daemon's files while it runs: its lock, its name, its status and its record.
 
-`lock`          held by the daemon or by `outputs-off`; names the process, its YAML, and whether
-                it serves
+`holder.lock`   locked by the daemon, `outputs-off`, a walk; nobody else may open it, as whoever could
+                might lock it too, and so keep `outputs-off` from its work
+`holder.json`   who that is, for whoever looks: see `bridges/serve/holder.py`
 `status.json`   the state of every device, for people and scripts
 `claimed-….json`   see `bridges/serve/record.py`
 
@@ -19,26 +20,27 @@ from pathlib import Path
 import msgspec
 
 from bridges.log import pairs
-from bridges.serve.files import replace, show
+from bridges.serve import files, holder
+from bridges.serve.holder import HOLDER, STATUS, LockHolder
 from bridges.serve.places import (
     SERVICE_RUN,
     SERVICE_STATE,
+    Distrusted,
     Places,
     as_given,
     by_hand,
     everywhere,
     named,
-    own,
-    owner_of,
+    opened,
     state_base,
 )
 from bridges.serve.record import Record, Records, paths, read
 
 log = logging.getLogger(__name__)
 
-STATUS = "status.json"
 KEPT = "kept.json"
-LOCK = "lock"
+KEPT_MAX = 64 << 20
+LOCK = "holder.lock"
 WAIT_S = 7.0
 """How long a daemon that starts waits for `outputs-off`, which takes less."""
 LOOK_EVERY_S = 0.05
@@ -48,29 +50,10 @@ class AlreadyRunning(Exception):
     """Another daemon serves this YAML, or uses these directories."""
 
 
-class Unknown(Exception):
-    """This user cannot see whether a daemon runs. The text says what to do."""
-
-
-class LockHolder(msgspec.Struct, frozen=True):
-    """Who holds a lock: its process id, the YAML's path, and whether it serves."""
-
-    pid: int
-    file: str
-    serves: bool
-
-    def __str__(self) -> str:
-        return f"process {self.pid}, for {self.file}" if self.pid else "a running process"
-
-
-NOBODY_KNOWN = LockHolder(0, "", False)
-"""The lock is held, but its holder could not write its name into it."""
-
-
 def find(file: Path, given: str | None) -> Places:
     """The directories of this file's daemon, by the one rule (`bridges/serve/places.py`).
 
-    Raises Unknown if the service's directory cannot be read.
+    Raises PermissionError if the service's directory cannot be read.
     """
     told = as_given(given)
     if told:
@@ -79,69 +62,17 @@ def find(file: Path, given: str | None) -> Places:
 
 
 def _is_about(places: Places, file: Path) -> bool:
-    found = {_written(folder / LOCK).file for folder in places.folders}
+    holders = [holder.shown(places), *map(holder.written, places.folders)]
+    found = {one.file for one in holders if one}
     found |= {record.file for path in paths(places) if (record := read(path))}
     return named(file) in found
 
 
-def holder(places: Places) -> LockHolder | None:
-    """The process that holds the lock now; None if there is none. Raises Unknown.
-
-    The runtime directory's lock names it first: on a read-only root the other one keeps an old name.
-    """
-    found = [_locked(folder) for folder in reversed(places.folders)]
-    return max(filter(None, found), key=lambda each: each.pid != 0, default=None)
-
-
-def _locked(folder: Path) -> LockHolder | None:
-    """Whom the lock of this folder names while it is held. Raises Unknown."""
-    try:
-        lock = _open(folder / LOCK, os.O_RDONLY)
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except OSError as error:
-        raise Unknown(_what_to_do(folder, error)) from None
-    try:
-        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return _written(folder / LOCK)
-    finally:
-        os.close(lock)
-    return None
-
-
-def _written(path: Path) -> LockHolder:
-    """The holder that the lock file names. Raises Unknown."""
-    try:
-        lock = _open(path, os.O_RDONLY)
-    except (FileNotFoundError, NotADirectoryError):
-        return NOBODY_KNOWN
-    except OSError as error:
-        raise Unknown(_what_to_do(path.parent, error)) from None
-    try:
-        return msgspec.json.decode(os.read(lock, 65536), type=LockHolder)
-    except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
-        return NOBODY_KNOWN
-    finally:
-        os.close(lock)
-
-
-def _open(path: Path, flags: int) -> int:
-    """Open without following a symbolic link or waiting for a FIFO."""
-    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o640)
-
-
-def _what_to_do(folder: Path, error: OSError) -> str:
-    owner = owner_of(folder)
-    return (
-        f"whether a daemon runs there cannot be seen: {folder}: {error.strerror}. It belongs to"
-        f" {owner}: use sudo, or give another directory with --runtime-dir"
-    )
-
-
-def _in_use(folder: Path, found: LockHolder) -> str:
+def _in_use(folder: Path, found: LockHolder | None) -> str:
+    if found is None:
+        return f"{folder / LOCK} is locked by a program that has not said its name: end that"
     if not found.serves:
-        used = "a walk, a kill test or outputs-off" if found.pid else "another program"
+        used = "a walk, a kill test or outputs-off"
         return f"{folder} is in use by {found} ({used}): wait for its end"
     stop = f"Ctrl-C where it runs, or kill {found.pid}"
     if folder.parent in (SERVICE_RUN, SERVICE_STATE):
@@ -172,23 +103,28 @@ class MemoryFile:
     def read(self) -> bytes | None:
         """The file's bytes; None if there is no file. Raises OSError."""
         for path in filter(None, (self._instead, self._path)):
-            with suppress(FileNotFoundError, NotADirectoryError):
-                return path.read_bytes()
+            with suppress(FileNotFoundError, NotADirectoryError), opened(path.parent):
+                return files.read(path, KEPT_MAX)
         return None
 
     def write(self, kept: bytes) -> None:
         """Replace the file. Raises OSError if neither path can be written; the old one then remains."""
         try:
-            replace(self._path, kept)
+            _replace(self._path, kept)
             if self._instead is not None:
                 self._instead.unlink(missing_ok=True)
         except OSError as error:
             self._once.failed(str(self._path), error)
             if self._instead is None:
                 raise
-            replace(self._instead, kept)
+            _replace(self._instead, kept)
         else:
             self._once.works(str(self._path))
+
+
+def _replace(path: Path, content: bytes) -> None:
+    with opened(path.parent, make=True):
+        files.replace(path, content)
 
 
 class Once:
@@ -226,17 +162,21 @@ class RuntimeDirectory:
     """
 
     def __init__(self, places: Places, file: Path, *, serves: bool, wait_s: float = WAIT_S) -> None:
-        """Take the locks; waits for an `outputs-off` that holds them. Raises AlreadyRunning."""
+        """Take the locks; waits for an `outputs-off` that holds them.
+
+        Raises AlreadyRunning, and PermissionError if a directory cannot be trusted.
+        """
         self.places = places
         self.path = places.runtime
         self.records = Records(places, file)
-        self._holder = LockHolder(os.getpid(), named(file), serves)
+        self._holder = holder.ourselves(file, serves=serves)
         self._locks: dict[Path, int] = {}
         self._record: Record | None = None
         self._once = Once()
         deadline = time.monotonic() + wait_s
         for folder in places.folders:
             self._lock_by(folder, deadline)
+        self._sign(self._holder)
 
     def claim(self, record: Record) -> None:
         """Write the record of what this daemon is about to claim; a failure is tried again."""
@@ -256,9 +196,10 @@ class RuntimeDirectory:
         """Replace the status file; also write again what failed before or was removed."""
         for folder in self.places.folders:
             self._lock(folder)
+        self._sign(self._holder)
         self._write_record()
         try:
-            show(self.path / STATUS, json)
+            files.show(self.path / STATUS, json)
         except OSError as error:
             self._once.failed(STATUS, error)
         else:
@@ -266,25 +207,32 @@ class RuntimeDirectory:
 
     def close(self) -> None:
         """Release the locks for another daemon, and remove the status, which is now outdated."""
-        with suppress(OSError):
+        with suppress(OSError), opened(self.path):
             (self.path / STATUS).unlink(missing_ok=True)
+        self._sign(msgspec.structs.replace(self._holder, pid=0))
+        self._unlock()
+
+    def _unlock(self) -> None:
         for lock in self._locks.values():
             os.close(lock)
         self._locks.clear()
 
     def _lock_by(self, folder: Path, deadline: float) -> None:
-        """Take the lock; wait while `outputs-off` holds it."""
-        while not self._lock(folder):
-            found = holder(self.places) or _written(folder / LOCK)
-            if found.serves or time.monotonic() >= deadline:
-                self.close()
+        """Take the lock; wait while `outputs-off` holds it. A daemon of an older version, which has
+        another lock, shows its status."""
+        while holder.shown(self.places) or not self._lock(folder):
+            found = holder.look(self.places)
+            if (found and found.serves) or time.monotonic() >= deadline:
+                self._unlock()
                 raise AlreadyRunning(_in_use(folder, found))
             time.sleep(LOOK_EVERY_S)
 
     def _lock(self, folder: Path) -> bool:
-        """Hold the folder's lock; False while another process holds it."""
+        """Hold the folder's lock; False while another process holds it. Raises Distrusted."""
         try:
             return self._has(folder) or self._take(folder)
+        except Distrusted:
+            raise
         except OSError as error:
             self._once.failed(f"{folder}/{LOCK}", error)
             return True
@@ -298,8 +246,8 @@ class RuntimeDirectory:
             return False
 
     def _take(self, folder: Path) -> bool:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        lock = self._opened(folder / LOCK)
+        with opened(folder, make=True) as directory:
+            lock = _lock_in(directory)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -308,23 +256,19 @@ class RuntimeDirectory:
         if old := self._locks.pop(folder, None):
             os.close(old)
         self._locks[folder] = lock
-        self._sign(lock)
         self._once.works(f"{folder}/{LOCK}")
         return True
 
-    def _opened(self, path: Path) -> int:
-        """Open for writing, or read-only if that is not permitted: it can still be locked."""
-        try:
-            return _open(path, os.O_RDWR | os.O_CREAT)
-        except OSError:
-            return _open(path, os.O_RDONLY)
-
-    def _sign(self, lock: int) -> None:
-        """Write our name into the lock; on a full disk an empty file is better than the old name."""
-        content = msgspec.json.encode(self._holder)
-        with suppress(OSError):
-            os.ftruncate(lock, 0)
-            os.pwrite(lock, content, 0)
+    def _sign(self, name: LockHolder) -> None:
+        """Write this name beside each lock that we hold, unless it stands there."""
+        for folder in filter(self._has, self._locks):
+            try:
+                if holder.written(folder) != name:
+                    files.show(folder / HOLDER, msgspec.json.encode(name))
+            except OSError as error:
+                self._once.failed(f"{folder}/{HOLDER}", error)
+            else:
+                self._once.works(f"{folder}/{HOLDER}")
 
     def _write_record(self) -> None:
         if self._record is None:
@@ -337,14 +281,22 @@ class RuntimeDirectory:
             self._once.works("record")
 
 
+def _lock_in(directory: int) -> int:
+    """Open the lock for writing, or read-only if that is not permitted: it can still be locked."""
+    flags = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    try:
+        return os.open(LOCK, flags | os.O_RDWR | os.O_CREAT, 0o600, dir_fd=directory)
+    except OSError:
+        return os.open(LOCK, flags | os.O_RDONLY, dir_fd=directory)
+
+
 def held(
     file: Path, given: str | None, *, serves: bool, simulated: bool = False
 ) -> RuntimeDirectory:
     """The directories for this file, locked by us. A simulation never takes a service's.
 
-    Raises AlreadyRunning, Unknown or PermissionError.
+    Raises AlreadyRunning or PermissionError.
     """
     file = file.absolute()
     found = (as_given(given) or by_hand(file)) if simulated else find(file, given)
-    own(found)
     return RuntimeDirectory(found, file, serves=serves)

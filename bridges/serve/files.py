@@ -1,4 +1,4 @@
-"""Files that are replaced as a whole, so that a reader sees either the old or the new one."""
+"""A daemon's own files. They are replaced as a whole: a reader sees either the old or the new one."""
 
 import os
 from pathlib import Path
@@ -20,10 +20,22 @@ def replace(path: Path, content: bytes) -> None:
 
 
 def show(path: Path, content: bytes) -> None:
-    """Replace a file that need not survive a reboot. Raises OSError."""
+    """Replace a file that need not survive a reboot; its group may read it. Raises OSError."""
     new = path.with_name(f".{path.name}.new")
-    new.write_bytes(content)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC
+    with open(os.open(new, flags, 0o640), "wb") as out:
+        out.write(content)
     new.replace(path)
+
+
+def read(path: Path, longest: int) -> bytes:
+    """What such a file holds, or its first `longest` bytes. Raises OSError; for a link, too.
+
+    A FIFO in its place is not waited for.
+    """
+    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    with open(os.open(path, flags), "rb") as source:
+        return source.read(longest) or b""
 
 
 def _sync(folder: Path) -> None:

@@ -1,8 +1,9 @@
-"""The last mark of a service: it says that every output was verified off.
+"""What a run of a service says to the `outputs-off` that follows it: two marks.
 
-`outputs-off` follows each end of a service, and has nothing to do after such a mark. The mark names the
-one run of the service that it is about (INVOCATION_ID, systemd.exec(5)), so an old one says nothing;
-one that is missing or cannot be read says nothing either.
+`claimed`: it was about to claim outputs, so they are its own to switch off, whoever holds the lock.
+`all-off`, the last one: every output was verified off, and nothing is left to do. A mark names the one
+run that it is about (INVOCATION_ID, systemd.exec(5)), so an old one says nothing; nor does one that is
+missing or cannot be read.
 """
 
 import os
@@ -10,12 +11,13 @@ from collections.abc import Mapping
 from typing import Final
 
 MARK: Final = "all-off"
+CLAIMED: Final = "claimed"
 LONGEST: Final = 64
 
 
-def leave(environ: Mapping[str, str] = os.environ) -> None:
-    """Leave the mark, if a unit of systemd started us. Raises OSError."""
-    if path := _path(environ):
+def leave(environ: Mapping[str, str] = os.environ, name: str = MARK) -> None:
+    """Leave a mark, if a unit of systemd started us. Raises OSError."""
+    if path := _path(environ, name):
         mark = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o640)
         try:
             os.write(mark, environ["INVOCATION_ID"].encode())
@@ -25,8 +27,17 @@ def leave(environ: Mapping[str, str] = os.environ) -> None:
 
 def says_off(environ: Mapping[str, str]) -> bool:
     """Whether this process follows a service that stopped well and left the mark."""
-    path = _path(environ)
-    if not path or environ.get("SERVICE_RESULT") != "success":
+    return environ.get("SERVICE_RESULT") == "success" and _is_left(environ, MARK)
+
+
+def says_claimed(environ: Mapping[str, str]) -> bool:
+    """Whether this process follows a service's run that was about to claim outputs."""
+    return bool(environ.get("SERVICE_RESULT")) and _is_left(environ, CLAIMED)
+
+
+def _is_left(environ: Mapping[str, str], name: str) -> bool:
+    path = _path(environ, name)
+    if not path:
         return False
     try:
         mark = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
@@ -40,7 +51,7 @@ def says_off(environ: Mapping[str, str]) -> bool:
         os.close(mark)
 
 
-def _path(environ: Mapping[str, str]) -> str:
-    """Where the mark of this run is; "" outside of a unit."""
+def _path(environ: Mapping[str, str], name: str) -> str:
+    """Where a mark of this run is; "" outside of a unit."""
     folder = environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
-    return os.path.join(folder, MARK) if folder and environ.get("INVOCATION_ID") else ""
+    return os.path.join(folder, name) if folder and environ.get("INVOCATION_ID") else ""

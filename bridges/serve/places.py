@@ -12,7 +12,7 @@ import os
 import pwd
 import stat
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from msgspec import Struct
@@ -101,55 +101,85 @@ def runtimes() -> Iterator[Path]:
     if os.geteuid() == 0:
         bases += [*USERS_RUN.glob("*/rmf-bridge"), *TMP.glob("rmf-bridge-*/rmf-bridge")]
     for base in dict.fromkeys(bases):
-        with suppress(OSError):
+        with suppress(OSError), opened(base):
             yield from sorted(base.iterdir())
 
 
-def distrusted(folder: Path) -> str:
-    """Why a directory cannot be trusted; "" if only its owner or root can have made it.
+class Distrusted(PermissionError):
+    """Somebody else has made a directory, or could put files into it. The text says which."""
 
-    This holds for each directory above it as well.
+
+def cannot_be_seen(folder: Path, error: OSError) -> PermissionError:
+    """What to do where this user cannot look."""
+    return PermissionError(
+        f"whether a daemon runs there cannot be seen: {folder}: {error.strerror or error}. It belongs"
+        f" to {owner_of(folder)}: use sudo, or give another directory with --runtime-dir"
+    )
+
+
+@contextmanager
+def opened(folder: Path, *, ours: bool = False, make: bool = False) -> Iterator[int]:
+    """A descriptor of a daemon's directory, made if it is missing and `make` says so.
+
+    Only its owner (`ours`: this user) or root can have made it, and nobody else can put anything into
+    it; the same holds, from the top down, for each directory above it. So what follows may use its
+    path. Raises Distrusted, and other OSErrors.
     """
-    owner = folder.lstat().st_uid
+    folder = folder.absolute()
+    owner = _owner(folder, ours=ours or make)
+    for place in (*reversed(folder.parents), folder):
+        if make:
+            with suppress(FileExistsError):
+                place.mkdir(mode=0o700)
+        if why := _distrusted(place, owner, last=place == folder):
+            to_do = "give another directory with --runtime-dir"
+            raise Distrusted(f"{place} {why}, so {folder} cannot be trusted: {to_do}")
+    directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        yield directory
+    finally:
+        os.close(directory)
+
+
+def _owner(folder: Path, *, ours: bool) -> int:
+    """Whose a directory is. Raises Distrusted if it is not this user's, but should be."""
+    try:
+        owner = folder.lstat().st_uid
+    except FileNotFoundError:
+        return os.geteuid()
+    except PermissionError as error:
+        raise cannot_be_seen(folder, error) from None
+    if ours and owner != os.geteuid():
+        whose = owner_of(folder)
+        raise Distrusted(f"{folder} belongs to {whose}: run this with sudo -u {whose}")
+    return owner
+
+
+def _distrusted(place: Path, owner: int, *, last: bool) -> str:
+    """Why others than the owner or root may have made a directory or a link; "" if not."""
+    found = place.lstat()
+    if found.st_uid not in (Path("/").stat().st_uid, owner):
+        return "belongs to another user"
+    if stat.S_ISLNK(found.st_mode):
+        return "is a symbolic link" if last else ""
     others = 0o022 if os.geteuid() == 0 else 0o002
-    for place in (folder, *folder.parents):
-        found = place.lstat()
-        link = stat.S_ISLNK(found.st_mode)
-        if found.st_uid not in (0, owner):
-            return f"{place} belongs to another user"
-        if link and (place == folder or found.st_uid != 0):
-            return f"{place} is a symbolic link"
-        if not link and found.st_mode & others and not found.st_mode & stat.S_ISVTX:
-            return f"{place} can be written by others"
+    if found.st_mode & others and (last or not found.st_mode & stat.S_ISVTX):
+        return "can be written by others"
     return ""
-
-
-def own(places: Places) -> None:
-    """Raises PermissionError where a directory is there and belongs to another user."""
-    for folder in _existing(places):
-        if folder.stat().st_uid != os.geteuid():
-            raise PermissionError(
-                f"{folder} belongs to {owner_of(folder)}: run this with sudo -u {owner_of(folder)}"
-            )
 
 
 def act_as_owner(places: Places) -> None:
     """Root permanently becomes the directories' owner, with the groups that the unit gives.
 
     Files in them can then do no more than their owner could. Raises PermissionError if somebody else
-    could have made them.
+    could have made them, or they are not this user's.
     """
-    for folder in _existing(places):
-        if why := distrusted(folder):
-            raise PermissionError(f"{why}, so {folder} cannot be trusted")
-        found = folder.lstat()
-        if os.geteuid() == 0 and found.st_uid != 0:
-            _become(found.st_uid, found.st_gid)
-    own(places)
-
-
-def _existing(places: Places) -> list[Path]:
-    return [folder for folder in places.folders if os.path.lexists(folder)]
+    for folder in places.folders:
+        with suppress(FileNotFoundError, NotADirectoryError):
+            with opened(folder, ours=os.geteuid() != 0) as directory:
+                found = os.fstat(directory)
+            if found.st_uid != os.geteuid():
+                _become(found.st_uid, found.st_gid)
 
 
 def _become(uid: int, gid: int) -> None:

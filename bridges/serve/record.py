@@ -9,7 +9,6 @@ another YAML overwrites none. Tokens are not in it: they are read from their fil
 """
 
 import hashlib
-import os
 from collections.abc import Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -18,8 +17,8 @@ import msgspec
 
 from bridges import __version__
 from bridges.rmf.settings import Rmf
-from bridges.serve.files import replace
-from bridges.serve.places import Places, named
+from bridges.serve import files
+from bridges.serve.places import Places, named, opened
 from bridges.settings import names
 from bridges.settings.config import Config
 from drivers.profiles import texts
@@ -137,8 +136,9 @@ class Records:
         for folder in self._places.folders:
             path = folder / record.name
             try:
-                if read(path) != record:
-                    replace(path, content)
+                with opened(folder, make=True):
+                    if read(path) != record:
+                        files.replace(path, content)
             except OSError as error:
                 refused = refused or error
             else:
@@ -167,8 +167,6 @@ def paths(places: Places) -> Iterator[Path]:
 def read(path: Path) -> Record | None:
     """The record in a file; None if it is invalid, unreadable or a symbolic link."""
     try:
-        with open(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as source:
-            content = source.read(SIZE_MAX)
-        return msgspec.json.decode(content, type=Record)
+        return msgspec.json.decode(files.read(path, SIZE_MAX), type=Record)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return None

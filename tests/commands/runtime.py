@@ -1,22 +1,25 @@
 """A runtime directory as a daemon that serves has it."""
 
-import fcntl
 import json
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import msgspec
+
+from bridges.serve.holder import HOLDER, ourselves
+
 
 @contextmanager
 def served(folder: Path, told: object) -> Iterator[Path]:
-    """A runtime directory whose lock a daemon holds."""
+    """A runtime directory that a daemon has; after the block that has died, and another process has
+    its number."""
     folder.mkdir()
     (folder / "status.json").write_text(json.dumps(told))
-    lock = os.open(folder / "lock", os.O_RDWR | os.O_CREAT)
-    os.write(lock, json.dumps({"pid": 4711, "file": "x", "serves": True}).encode())
-    fcntl.flock(lock, fcntl.LOCK_EX)
+    name = ourselves(Path("x"), serves=True)
+    (folder / HOLDER).write_bytes(msgspec.json.encode(name))
     try:
         yield folder
     finally:
-        os.close(lock)
+        dead = msgspec.structs.replace(name, started=1)
+        (folder / HOLDER).write_bytes(msgspec.json.encode(dead))

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from bridges import cli
-from bridges.commands import faults
+from bridges.commands import faults, status
 from bridges.commands.status import DOWN, FAULTY, NONE, WELL, Daemon, daemons, show
+from bridges.serve.holder import HOLDER
 from bridges.serve.places import Places
 from bridges.serve.record import Records, of
 from bridges.settings.load import load
@@ -104,6 +105,45 @@ def test_a_daemon_whose_status_is_old_hangs(tmp_path: Path) -> None:
         found = seen(folder, age_s=6.0)
         assert (found[0].state, found[0].level) == ("old", DOWN)
         assert shown(found)[0].startswith("lift_a: runs, but silent for 6 s")
+
+
+def test_a_daemon_that_starts_is_down_until_it_has_written_its_first_status(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with served(tmp_path / "lift_a", {}) as folder:
+        (folder / "status.json").unlink()
+        assert cli.main(["status", "--runtime-dir", str(folder)]) == DOWN
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.startswith("lift_a: runs, but has written no status yet (")
+
+
+@pytest.mark.parametrize("told", [{}, {"devices": {}}, {"devices": {"Lift1": {}}}])
+def test_a_status_that_says_little_is_shown_as_far_as_it_goes(
+    tmp_path: Path, told: dict[str, Any]
+) -> None:
+    with served(tmp_path / "lift_a", told) as folder:
+        assert shown(seen(folder))[0].startswith("lift_a: serving")
+
+
+@pytest.mark.parametrize(
+    ("unit", "state"),
+    [
+        ("active (running)", "serving"),
+        ("deactivating (stop-sigterm)", "serving"),
+        ("activating (auto-restart)", "died"),
+        ("failed (failed)", "died"),
+        ("inactive (dead)", "died"),
+    ],
+)
+def test_of_a_service_systemd_says_whether_it_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unit: str, state: str
+) -> None:
+    """Also where it could not write its name."""
+    monkeypatch.setattr(status, "SERVICE_RUN", tmp_path)
+    with served(tmp_path / "lift_a", lift()) as folder:
+        (folder / HOLDER).unlink()
+        found = seen(folder, units={"lift_a": unit})
+    assert [(one.state, one.unit) for one in found] == [(state, unit)]
 
 
 def test_a_daemon_that_left_its_status_has_died(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """Off after every death: a door's daemon on a real Modbus module, with its relay on."""
 
-import fcntl
 import os
 import pty
 import re
@@ -14,9 +13,12 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
+from msgspec.structs import replace
 
 from bridges.rmf.definitions import DoorModeValue
+from bridges.serve.holder import HOLDER, ourselves
 from bridges.serve.signals import ENDING, WRITES
 from hal_fakes.wire import wire
 from tests.depth import depth
@@ -233,7 +235,7 @@ def test_a_reset_during_outputs_off_is_not_sent_and_does_not_end_it(
     off = subprocess.Popen(
         command("outputs-off", file, "--runtime-dir", tmp_path / "run"), env=environment()
     )
-    wait_until((tmp_path / "run" / "lock").exists, "outputs-off has begun")
+    wait_until((tmp_path / "run" / HOLDER).exists, "outputs-off has begun")
     told = _told("reset", file, "--runtime-dir", tmp_path / "run")
     assert told.returncode == 1
     off.send_signal(signal.SIGUSR1)
@@ -241,14 +243,12 @@ def test_a_reset_during_outputs_off_is_not_sent_and_does_not_end_it(
     hole.close()
 
 
-@pytest.mark.parametrize("lock", ["-1", "1", "0", '{"pid":1,"file":"x","serves":true}', ""])
-def test_a_planted_lock_makes_reset_signal_nobody(tmp_path: Path, lock: str) -> None:
+@pytest.mark.parametrize("name", ["-1", "1", "0", '{"pid":1,"file":"x","serves":true}', ""])
+def test_a_planted_name_makes_reset_signal_nobody(tmp_path: Path, name: str) -> None:
     run = tmp_path / "run"
     run.mkdir()
-    (run / "lock").write_text(lock)
-    with (run / "lock").open() as planted:
-        fcntl.flock(planted, fcntl.LOCK_EX)
-        told = _told("reset", tmp_path / "ward_door.yaml", "--runtime-dir", run)
+    (run / HOLDER).write_text(name)
+    told = _told("reset", tmp_path / "ward_door.yaml", "--runtime-dir", run)
     assert (told.returncode, told.stdout) == (1, "")
     assert "Traceback" not in told.stderr
 
@@ -264,13 +264,13 @@ def test_root_acts_as_the_owner_of_a_directory_and_so_signals_no_one_elses_proce
         os.chmod(base, 0o755)
         run = Path(base) / "run"
         run.mkdir()
-        lock = run / "lock"
-        lock.write_text(f'{{"pid":{roots.pid},"file":"x","serves":true}}')
+        name = run / HOLDER
+        started = int(Path(f"/proc/{roots.pid}/stat").read_text().rpartition(")")[2].split()[19])
+        planted = replace(ourselves(Path("x"), serves=True), pid=roots.pid, started=started)
+        name.write_bytes(msgspec.json.encode(planted))
         os.chown(run, 65534, 65534)
-        os.chown(lock, 65534, 65534)
-        with lock.open() as planted:
-            fcntl.flock(planted, fcntl.LOCK_EX)
-            told = _told("reset", tmp_path / "x.yaml", "--runtime-dir", run)
+        os.chown(name, 65534, 65534)
+        told = _told("reset", tmp_path / "x.yaml", "--runtime-dir", run)
         assert (told.returncode, roots.poll()) == (os.EX_UNAVAILABLE, None)
         roots.kill()
 

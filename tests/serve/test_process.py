@@ -42,7 +42,9 @@ def test_a_signal_releases_the_relay_and_leaves_the_graph_at_once(
         assert running.end(number) == 0
         wait_until(lambda: graph.heard.matched() == 0, "it has left the graph", LEASE_S)
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
-    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["lock", "ring"]
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == [
+        *("holder.json", "holder.lock", "ring")
+    ]
 
 
 def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_the_yaml_says_now(

@@ -4,32 +4,39 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
-from bridges.serve import directory, places
 from bridges.serve.directory import (
+    LOCK,
     AlreadyRunning,
-    LockHolder,
     MemoryFile,
     RuntimeDirectory,
-    Unknown,
     find,
-    holder,
     state_file,
 )
+from bridges.serve.holder import HOLDER, LockHolder, look, ourselves
 from bridges.serve.places import Places
 from bridges.serve.record import Record
+from tests.depth import depth
 
 FILE = Path("/etc/rmf-bridges/lift.yaml")
-OURS = LockHolder(os.getpid(), str(FILE), True)
+OURS = ourselves(FILE, serves=True)
+DEAD = replace(OURS, started=1)
+"""Somebody else has its number by now."""
 CLAIMED = Record(str(FILE), b"kind: lift\n", {"make.yaml": b"for: door_register\n"})
 
 
 def in_one(path: Path) -> Places:
     return Places(path, path)
+
+
+def named(folder: Path, holder: LockHolder) -> None:
+    (folder / HOLDER).write_bytes(msgspec.json.encode(holder))
 
 
 def held(path: Path, *, serves: bool = True, file: Path = FILE) -> RuntimeDirectory:
@@ -50,19 +57,19 @@ def test_a_runtime_directory_has_one_daemon_at_a_time(tmp_path: Path) -> None:
 
 def test_the_daemon_that_holds_a_directory_is_found_with_what_it_serves(tmp_path: Path) -> None:
     there = in_one(tmp_path)
-    assert holder(there) is None
+    assert look(there) is None
     serving = held(tmp_path)
-    assert holder(there) == OURS
+    assert look(there) == OURS
     serving.close()
-    assert holder(there) is None
+    assert look(there) is None
 
 
-def test_either_of_its_locks_shows_that_a_daemon_lives(tmp_path: Path) -> None:
+def test_its_name_in_either_directory_shows_that_a_daemon_lives(tmp_path: Path) -> None:
     both = Places(tmp_path / "run", tmp_path / "state")
     serving = RuntimeDirectory(both, FILE, serves=True)
-    for path in (tmp_path / "run" / "lock", tmp_path / "state" / "lock"):
+    for path in (tmp_path / "run" / HOLDER, tmp_path / "state" / HOLDER):
         path.rename(path.with_name("away"))
-        assert holder(both) == OURS
+        assert look(both) == OURS
         path.with_name("away").rename(path)
     serving.close()
 
@@ -72,15 +79,16 @@ def test_where_the_state_keeps_an_old_name_the_runtime_directory_says_who_it_is(
 ) -> None:
     both = Places(tmp_path / "run", tmp_path / "state")
     serving = RuntimeDirectory(both, FILE, serves=False)
-    old = LockHolder(7, str(FILE), True)  # of the daemon before the root became read-only
-    (tmp_path / "state" / "lock").write_bytes(msgspec.json.encode(old))
-    assert holder(both) == LockHolder(os.getpid(), str(FILE), False)
+    named(tmp_path / "state", DEAD)  # of the daemon before the root became read-only
+    assert look(both) == replace(OURS, serves=False)
     with pytest.raises(AlreadyRunning, match=f"in use by process {os.getpid()}"):
         RuntimeDirectory(both, FILE, serves=True, wait_s=0.0)
-    (tmp_path / "run" / "lock").write_bytes(b"")  # /run is full
-    assert holder(both) == old
+    (tmp_path / "run" / HOLDER).write_bytes(b"")
+    assert look(both) is None
+    with pytest.raises(AlreadyRunning, match="a program that has not said its name"):
+        RuntimeDirectory(both, FILE, serves=True, wait_s=0.0)
     serving.close()
-    assert holder(both) is None
+    assert look(both) is None
 
 
 def test_what_is_claimed_is_remembered_whole_until_it_is_released(tmp_path: Path) -> None:
@@ -168,7 +176,7 @@ def test_a_directory_that_was_removed_is_made_again_with_its_lock_and_its_record
         path.unlink()
     (tmp_path / "run").rmdir()
     serving.write_status(b"{}")
-    assert holder(in_one(tmp_path / "run")) == OURS
+    assert look(in_one(tmp_path / "run")) == OURS
     assert serving.records.unreleased() == [CLAIMED]
     serving.close()
 
@@ -189,20 +197,6 @@ def test_a_start_waits_while_outputs_are_being_switched_off(tmp_path: Path) -> N
         assert other.stdin
         other.stdin.close()
         RuntimeDirectory(in_one(tmp_path), FILE, serves=True, wait_s=20.0).close()
-
-
-@pytest.fixture
-def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A machine with services and users, none of whom is told by systemd where things are."""
-    for name in ("RUNTIME_DIRECTORY", "STATE_DIRECTORY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(places, "SERVICE_RUN", tmp_path / "run")
-    monkeypatch.setattr(places, "SERVICE_STATE", tmp_path / "var")
-    monkeypatch.setattr(places, "USERS_RUN", tmp_path / "user")
-    monkeypatch.setattr(places, "TMP", tmp_path / "tmp")
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "user" / "7"))
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "home"))
-    return tmp_path
 
 
 def test_the_runtime_directory_is_the_given_one_or_systemds_or_the_services_or_the_users(
@@ -228,7 +222,7 @@ def test_after_a_power_cut_only_the_record_shows_the_service(machine: Path) -> N
     serving.close()
     for path in (machine / "run/lift").iterdir():
         path.unlink()
-    (machine / "var/lift/lock").unlink()
+    (machine / "var/lift" / HOLDER).unlink()
     assert find(FILE, None) == service
 
 
@@ -252,28 +246,99 @@ def test_without_xdg_a_daemon_by_hand_is_below_tmp(
     assert find(FILE, None).runtime == machine / f"tmp/rmf-bridge-{os.getuid()}/rmf-bridge/lift"
 
 
-def test_a_lock_that_is_a_symbolic_link_or_nonsense_says_nothing(tmp_path: Path) -> None:
-    (tmp_path / "lock").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(Unknown):
-        holder(in_one(tmp_path))
-    (tmp_path / "lock").unlink()
-    (tmp_path / "lock").write_text(json.dumps({"pid": "all", "file": 1}))
-    assert holder(in_one(tmp_path)) is None
-    assert directory._written(tmp_path / "lock") == LockHolder(0, "", False)
+def test_a_name_that_is_a_symbolic_link_cannot_be_seen_and_nonsense_says_nothing(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / HOLDER).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(PermissionError, match="cannot be seen"):
+        look(in_one(tmp_path))
+    (tmp_path / HOLDER).unlink()
+    for told in ('{"pid": "all", "file": 1}', f'{{"pid": {10**30}, "file": "x"}}', "[]", ""):
+        (tmp_path / HOLDER).write_text(told)
+        assert look(in_one(tmp_path)) is None
 
 
-def test_a_directory_that_somebody_else_could_have_made_is_not_believed(tmp_path: Path) -> None:
-    mine = tmp_path / "mine"
-    mine.mkdir(mode=0o700)
-    assert places.distrusted(mine) == ""
-    (tmp_path / "link").symlink_to(mine)
-    assert "is a symbolic link" in places.distrusted(tmp_path / "link")
-    anybodys = tmp_path / "anybodys"
-    anybodys.mkdir()
-    anybodys.chmod(0o777)
-    assert "can be written by others" in places.distrusted(anybodys)
-    (anybodys / "planted").mkdir()
-    assert "can be written by others" in places.distrusted(anybodys / "planted")
+@pytest.mark.parametrize(
+    "dead",
+    [
+        replace(OURS, started=1),
+        replace(OURS, boot="another"),
+        replace(OURS, pid=0),
+        replace(OURS, pid=-1),
+        replace(OURS, pid=2**22 + 1),
+    ],
+)
+def test_a_number_that_another_process_has_by_now_is_no_holder(
+    tmp_path: Path, dead: LockHolder
+) -> None:
+    named(tmp_path, dead)
+    assert look(in_one(tmp_path)) is None
+    held(tmp_path).close()
+
+
+def test_a_daemon_that_has_not_been_reaped_yet_does_not_live(tmp_path: Path) -> None:
+    with subprocess.Popen(["sleep", "60"]) as other:
+        started = int(Path(f"/proc/{other.pid}/stat").read_text().rpartition(")")[2].split()[19])
+        named(tmp_path, replace(OURS, pid=other.pid, started=started))
+        before = look(in_one(tmp_path))
+        other.kill()
+        os.waitid(os.P_PID, other.pid, os.WEXITED | os.WNOWAIT)
+        assert (before is not None, look(in_one(tmp_path))) == (True, None)
+
+
+def test_a_daemon_whose_version_has_another_lock_is_known_by_its_fresh_status(
+    tmp_path: Path,
+) -> None:
+    told = tmp_path / "status.json"
+    with subprocess.Popen(["sleep", "60"]) as other:
+        told.write_text(json.dumps({"pid": other.pid, "file": str(FILE)}))
+        assert look(in_one(tmp_path)) == LockHolder(other.pid, str(FILE), True)
+        with pytest.raises(AlreadyRunning, match=f"already running: process {other.pid}"):
+            held(tmp_path)
+        assert told.exists(), "what is another's stays"
+        written_at = told.stat().st_mtime
+        os.utime(told, (written_at - 6, written_at - 6))
+        assert look(in_one(tmp_path)) is None
+        os.utime(told)
+        other.kill()
+    held(tmp_path).close()
+
+
+def test_only_its_user_can_open_the_lock_and_its_group_can_read_who_holds_it(
+    tmp_path: Path,
+) -> None:
+    serving = held(tmp_path / "run")
+    modes = {path.name: path.stat().st_mode & 0o777 for path in (tmp_path / "run").iterdir()}
+    serving.close()
+    assert modes == {LOCK: 0o600, HOLDER: 0o640}
+
+
+def test_a_daemon_that_is_refused_leaves_the_other_ones_files_as_they_are(tmp_path: Path) -> None:
+    both = Places(tmp_path / "run", tmp_path / "state")
+    serving = held(tmp_path / "run")
+    serving.write_status(b"{}")
+    before = {path: path.read_bytes() for path in (tmp_path / "run").iterdir()}
+    with pytest.raises(AlreadyRunning):
+        RuntimeDirectory(both, FILE, serves=False, wait_s=0.0)
+    assert {path: path.read_bytes() for path in (tmp_path / "run").iterdir()} == before
+    serving.close()
+
+
+def test_whoever_looks_refuses_nobody_the_lock(tmp_path: Path) -> None:
+    there, end = in_one(tmp_path), threading.Event()
+
+    def looks() -> None:
+        while not end.is_set():
+            look(there)
+
+    looking = threading.Thread(target=looks)
+    looking.start()
+    try:
+        for _ in range(depth(300, 3000)):
+            held(tmp_path).close()
+    finally:
+        end.set()
+        looking.join()
 
 
 def test_a_file_that_must_outlive_the_daemon_is_replaced_whole(

@@ -1,7 +1,6 @@
 """A dead bus that is listed first keeps no relay of another bus on, whatever ends the daemon."""
 
 import os
-import re
 import signal
 import socket
 import subprocess
@@ -18,6 +17,7 @@ from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.settings.load import Config, load
 from tests.depth import depth
+from tests.serve.hostile import live_before_dead, with_a_dead_bus_first
 from tests.serve.site import (
     ROOT,
     SERVICE,
@@ -40,26 +40,8 @@ PARTS = ["loop", "reader", "watch"]
 def two(module: Module) -> Iterator[Path]:
     """The door's YAML; before it another door, on a bus that is connected and never answers."""
     with socket.create_server(("127.0.0.1", 0)) as hole:
-        text = re.sub(
-            r"(?m)^buses:\n", "buses:\n  dead: " + _bus(hole.getsockname()[1]) + "\n", module.yaml
-        )
-        doors = text.partition("doors:\n")[2]
-        far = doors.replace("ward_door:", "far_door:\n    bus: dead")
-        module.file.write_text(
-            text.replace("doors:\n", "doors:\n" + far).replace(
-                "ward_door:", "ward_door:\n    bus: module"
-            )
-        )
+        module.file.write_text(with_a_dead_bus_first(module.yaml, hole.getsockname()[1]))
         yield module.file
-
-
-def _bus(port: int) -> str:
-    return f"{{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}, timeout_s: 1.5}}"
-
-
-def _live_before_dead(log: str) -> None:
-    live = log.index("outputs_off bus=module verified=yes")
-    assert "outputs_off bus=dead" not in log[:live]
 
 
 @pytest.mark.parametrize("number", SIGNALS, ids=lambda number: signal.Signals(number).name)
@@ -69,7 +51,7 @@ def test_a_signal_switches_the_live_bus_off_while_the_dead_one_is_still_waited_f
     with daemon(two, tmp_path / "run", **SERVICE) as running:
         hold_open(module, graph, running)
         assert running.end(number) == 1, "the dead bus is not verified off"
-        _live_before_dead(running.log.read_text())
+        assert live_before_dead(running.log.read_text())
     assert module.relay() == [True, False]
 
 
@@ -93,7 +75,7 @@ def test_a_part_that_dies_switches_the_live_bus_off_while_the_dead_one_is_still_
             1 if part == "watch" else os.EX_SOFTWARE,
             True,
         )
-        _live_before_dead(log)
+        assert live_before_dead(log)
     assert module.relay() == [True, False]
 
 
@@ -126,4 +108,5 @@ def test_what_several_dead_daemons_left_on_shares_the_time_of_one(
 
     monkeypatch.setattr(dead, "outputs_off", silent)
     assert dead._off_by_records(claims, {}) == 1
-    assert (len(given), sum(given)) == (3, pytest.approx(dead.TIMEOUT_S))
+    assert len(given) == 3
+    assert sum(given) == pytest.approx(dead.TIMEOUT_S)

@@ -18,6 +18,7 @@ from pathlib import Path
 from tests.torture.dds import long_names, lost_network
 from tests.torture.deaths import kills, shortages, signals
 from tests.torture.forged import forged
+from tests.torture.held import dead_bus_first, looks, planted, readers
 from tests.torture.table import Table
 from tests.torture.wires import wires
 
@@ -53,6 +54,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _one_after_another(here: Path, seed: int, options: argparse.Namespace, table: Table) -> None:
     signals(here / "c", table)
     shortages(here / "d", random.Random(seed + 2), options.times, table)
+    dead_bus_first(here / "f", table)
+    readers(here / "g", options.times, table)
+    looks(here / "h", table)
+    planted(here / "i", table)
     forged(here / "e", random.Random(seed + 3), options.forged_s, table)
     wires(here / "f", random.Random(seed + 4), options.forged_s, options.times, table)
     long_names(here / "g", options.forged_s / 4, table)

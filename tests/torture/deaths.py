@@ -49,10 +49,11 @@ class Door:
         wait_until(self.is_on, "the relay holds the door", PATIENCE_S)
         return running
 
-    def outputs_off(self) -> int:
+    def outputs_off(self, **env: str) -> int:
         """Run outputs-off as the systemd unit does; its exit code."""
         off = command("outputs-off", self.module.file, "--runtime-dir", self.run)
-        return subprocess.run(off, env=environment(**SERVICE), capture_output=True).returncode
+        environ = environment(**(SERVICE | env))
+        return subprocess.run(off, env=environ, capture_output=True).returncode
 
     def states_go_on(self) -> None:
         """Wait until RMF has heard two more states."""

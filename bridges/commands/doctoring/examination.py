@@ -55,7 +55,7 @@ def examined(
     yield from health.watchdog(machine)
     try:
         places = directory.find(file, options.runtime_dir)
-    except (directory.Unknown, PermissionError) as error:
+    except PermissionError as error:
         places, now = kept.of_service(file), unseen(str(error))
     else:
         yield from health.directories(machine, places, who)
@@ -123,9 +123,8 @@ def _answering(config: Config, places: Places, now: Served, options: Options) ->
     if now.busy or not names:
         return
     try:
-        kept.own(places)
         held = directory.RuntimeDirectory(places, config.path.absolute(), serves=False)
-    except (directory.AlreadyRunning, directory.Unknown, PermissionError) as error:
+    except (directory.AlreadyRunning, PermissionError) as error:
         yield wrong(DAEMON, str(error), NOT_ASKED, "stop what uses it, and try again")
         return
     try:

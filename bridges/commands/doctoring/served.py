@@ -11,7 +11,7 @@ from typing import Final
 from bridges.commands.doctoring.finding import Finding, note, ok, warning, wrong
 from bridges.commands.faults import remedies
 from bridges.commands.status import Daemon, daemons
-from bridges.serve import directory
+from bridges.serve import holder
 from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.serve.subject import Status
@@ -37,16 +37,16 @@ class Served:
 def served(places: Places, file: Path, wall: float) -> Served:
     """The subject `daemon`. `wall`: now, for the age of its status (s since the epoch)."""
     try:
-        holder = directory.holder(places)
-    except directory.Unknown as error:
+        held_by = holder.look(places)
+    except PermissionError as error:
         return unseen(str(error))
-    if holder is None:
+    if held_by is None:
         return _nobody(places, file)
-    if not holder.serves:
-        found = f"{holder} uses it: walk, outputs-off or another doctor"
+    if not held_by.serves:
+        found = f"{held_by} uses it: walk, outputs-off or another doctor"
         return Served([warning(DAEMON, found, NOT_ASKED, "wait until it has ended")], found)
     one = next(daemons([places.runtime], {}, wall))
-    busy, simulated = f"process {holder.pid} serves it", bool(one.status.get("simulated"))
+    busy, simulated = f"process {held_by.pid} serves it", bool(one.status.get("simulated"))
     return Served(list(_told(one)), busy, True, simulated)
 
 

@@ -27,7 +27,7 @@ def main(file: Path, device: str, step: str, runtime_dir: str | None) -> int:
     try:
         config = load(file)
         held = directory.held(file, runtime_dir, serves=False)
-    except (SettingsError, directory.AlreadyRunning, directory.Unknown, PermissionError) as error:
+    except (SettingsError, directory.AlreadyRunning, PermissionError) as error:
         return _say(f"{error}")
     try:
         return _held(config, device, step, held, guard.command(file, runtime_dir))

@@ -21,6 +21,7 @@ from bridges.commands.doctoring.served import served
 from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorState, Time
 from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
 from bridges.serve import record
+from bridges.serve.holder import HOLDER
 from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.settings.load import load
@@ -145,7 +146,7 @@ def test_where_a_daemon_cannot_be_seen_no_bus_is_opened(
     tapped: Tapped, module: Module, tmp_path: Path
 ) -> None:
     (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "lock").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "run" / HOLDER).symlink_to(tmp_path / "elsewhere")
     code, found = doctor(tapped.file, tmp_path, "--listen", "0", "--kill-test", "--yes")
     assert (code, [level for level, _ in found["daemon"]]) == (2, ["wrong"])
     assert [level for level, _ in found["kill test"]] == ["wrong"]

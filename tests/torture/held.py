@@ -1,0 +1,102 @@
+"""What would keep a relay on from outside: a dead bus, waiting readers, many looks, planted links."""
+
+import os
+import shutil
+import signal
+import socket
+import tempfile
+import threading
+from pathlib import Path
+
+from bridges.serve import holder
+from bridges.serve.directory import RuntimeDirectory
+from bridges.serve.places import Distrusted, Places
+from tests.serve.hostile import (
+    NOBODY,
+    group_member,
+    live_before_dead,
+    unit,
+    with_a_dead_bus_first,
+)
+from tests.torture.deaths import PATIENCE_S, door
+from tests.torture.table import Table
+from tests.waiting import wait_until
+
+SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGTSTP, signal.SIGRTMIN)
+TAKES = 3000
+PLANTED = 100
+
+
+def dead_bus_first(directory: Path, table: Table) -> None:
+    """Signals that would end or suspend a process, where a bus that never answers is the first."""
+    with door(directory) as here, socket.create_server(("127.0.0.1", 0)) as hole:
+        module = here.module
+        module.file.write_text(with_a_dead_bus_first(module.yaml, hole.getsockname()[1], 0.5))
+        for number in SIGNALS:
+            running = here.held()
+            code = running.end(number)
+            wait_until(lambda: not here.is_on(), "the relay is off", PATIENCE_S)
+            assert live_before_dead(running.log.read_text())
+            shutil.rmtree(here.run)  # with the record: nothing will verify the dead bus
+            then = f"exit code {code}, the live bus off before the dead one was waited for"
+            table.count("such a signal, a dead bus listed first", then)
+
+
+def readers(directory: Path, times: int, table: Table) -> None:
+    """kill -9, while a member of the directory's group waits for the lock of all it can open."""
+    if os.geteuid() != 0:
+        table.count("a group's member waits for every lock", "not tried: needs root", 0)
+        return
+    with tempfile.TemporaryDirectory() as public, door(directory) as here:
+        os.chmod(public, 0o755)
+        here.run = Path(public) / "run"
+        here.run.mkdir()
+        os.chown(here.run, 0, NOBODY)
+        here.run.chmod(0o2750)
+        for n in range(times):
+            environ = unit(here.run, str(n))
+            running = here.daemon(**environ)
+            wait_until(here.is_on, "the relay holds the door", PATIENCE_S)
+            with group_member(here.run) as opened:
+                assert holder.HOLDER in opened
+                running.end(signal.SIGKILL)
+                assert here.outputs_off(**environ, SERVICE_RESULT="signal") == 0
+            wait_until(lambda: not here.is_on(), "off", PATIENCE_S)
+            table.count("kill -9 while a group's member waits for every lock", "relay off")
+
+
+def looks(directory: Path, table: Table) -> None:
+    """Takes of the lock, each with one try, beside a loop of looks."""
+    places, end = Places(directory, directory), threading.Event()
+
+    def look() -> None:
+        while not end.is_set():
+            holder.look(places)
+
+    looking = threading.Thread(target=look)
+    looking.start()
+    try:
+        for _ in range(TAKES):
+            RuntimeDirectory(places, directory / "lift.yaml", serves=True, wait_s=0.0).close()
+    finally:
+        end.set()
+        looking.join()
+    table.count("a take of the lock beside a loop of looks", "granted", TAKES)
+
+
+def planted(directory: Path, table: Table) -> None:
+    """A start of root's where somebody has planted a link in the way of its directory."""
+    if os.geteuid() != 0:
+        return
+    precious, shared = directory / "precious" / "run", directory / "shared"
+    precious.mkdir(parents=True)
+    shared.mkdir()
+    shared.chmod(0o1777)
+    for n in range(PLANTED):
+        (link := shared / str(n)).symlink_to(precious.parent)
+        os.lchown(link, NOBODY, NOBODY)
+        try:
+            RuntimeDirectory(Places(link / "run", link / "run"), Path("x.yaml"), serves=True)
+        except Distrusted:
+            assert not list(precious.iterdir())
+            table.count("a planted link where root starts a daemon", "refused, nothing written")
