@@ -1,6 +1,7 @@
 """`rmf-bridge incident FILE`: a recording of a daemon's last minutes, because a person wants one."""
 
 import argparse
+import os
 import sys
 import time
 from datetime import datetime
@@ -13,6 +14,7 @@ from bridges.recording.ring import DIED, NAME, Read, RingError
 from bridges.serve import holder
 from bridges.serve.clock import machine_s
 from bridges.serve.directory import find
+from bridges.settings.load import SettingsError
 
 EX_UNAVAILABLE = 69
 
@@ -39,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when the file is written; 69 without a ring; 73 if the file cannot be written."""
+    """0 when the file is written; 65 if its YAML cannot be made anonymous; 69 without a ring; 73 if the file cannot be written."""
     try:
         from bridges.recording import mcap_write
     except ImportError as error:
@@ -55,16 +57,24 @@ def run(args: argparse.Namespace) -> int:
     except (PermissionError, RingError) as error:
         print(f"{error}. {_hint(died=args.died)}", file=sys.stderr)
         return EX_UNAVAILABLE
-    if args.anonymous:
-        from bridges.recording.anonymous import anonymous
-
-        incident = anonymous(incident)
     try:
+        if args.anonymous:
+            incident = _anonymous(incident)
         mcap_write.write(path, incident)
+    except SettingsError as error:
+        print(f"its YAML cannot be made anonymous: {error.problems[0]}", file=sys.stderr)
+        return os.EX_DATAERR
     except OSError as error:
         return not_written(path, error.strerror)
     print(f"{path}: {len(incident.entries)} entries")
     return 0
+
+
+def _anonymous(incident: Incident) -> Incident:
+    """Raises SettingsError."""
+    from bridges.recording.anonymous import anonymous
+
+    return anonymous(incident)
 
 
 def _hint(*, died: bool) -> str:

@@ -4,10 +4,11 @@ In an incident file the texts are JSON under `/rmf_bridge/` (`bridges/recording/
 `readable`). A file may come from anywhere, so a text of another shape is ignored.
 """
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
+
+import msgspec
 
 from bridges.explain.timeline import Level
 
@@ -33,8 +34,8 @@ class Noted:
 def noted(topic: str, text: str) -> Noted | None:
     """The note in a text of this topic (its last part); None if it is not a note."""
     try:
-        told = json.loads(text)
-    except (ValueError, RecursionError):
+        told = msgspec.json.decode(text)
+    except (msgspec.MsgspecError, RecursionError):
         return None
     if not isinstance(told, dict) or not isinstance(subject := told.get("subject"), str):
         return None

@@ -31,6 +31,7 @@ from bridges.rmf import cdr
 from bridges.rmf.definitions import Message
 from bridges.rmf.releases import RELEASES
 from bridges.settings import names as known
+from bridges.settings.config import Config
 from bridges.settings.reference import schema
 
 FREE_TEXTS: Final = frozenset(
@@ -47,9 +48,10 @@ Swap = Callable[[str], str]
 
 
 def anonymous(incident: Incident) -> Incident:
-    """The same incident without names."""
+    """The same incident without names. Raises SettingsError, if today's rules refuse its YAML."""
+    config = of_head(incident.head)
     content = yaml.safe_load(incident.head.yaml)
-    own = {*_subjects(incident), *_own_names(incident.head, content)}
+    own = {*_subjects(incident), *_own_names(config, content)}
     whole = {*own, *_spoken_names(incident), *_remembered(incident)}
     found = {part for name in whole for part in name.split("/")}
     swap = _swap(sorted(found - our_words() - {""}, key=lambda name: (-len(name), name)))
@@ -123,14 +125,14 @@ def _subjects(incident: Incident) -> Iterator[str]:
             yield subject
 
 
-def _own_names(head: Head, content: dict[str, Any]) -> Iterator[str]:
+def _own_names(config: Config, content: dict[str, Any]) -> Iterator[str]:
     """The devices and places that the YAML names; of a kind without hardware, every word of its own."""
-    kind = known.kind_called(head.kind)
+    kind = known.kind_called(config.kind)
     yield from content.get("rmf", {}).get("topics", {}).values()
     if isinstance(kind, GraphKind):
         yield from _words(content.get(kind.devices_key))
         return
-    for name, device in of_head(head).devices.items():
+    for name, device in config.devices.items():
         yield name
         yield from (place for _, _, place in kind.on_map(device))
 

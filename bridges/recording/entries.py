@@ -5,12 +5,27 @@ A subject is a lift, a door, a charger, or a coordinator's site. Its core is a p
 memory at one time and each event after it are enough to have every decision made again.
 """
 
-from typing import Final
+from collections.abc import Callable
+from typing import Annotated, Final, TypeVar
 
 import msgspec
+from msgspec import Meta
 
 from bridges.recording.settings import Recording
+from bridges.recording.texts import MESSAGES
 from bridges.recording.trees import Tree
+from bridges.rmf.releases import RELEASES
+
+LATEST_S: Final = 4e9
+"""Within this time, before and after zero, every sum of three is a date, and fits into an MCAP file."""
+Seconds = Annotated[float, Meta(ge=-LATEST_S, le=LATEST_S)]
+DEEPEST: Final = 60
+"""The most a tree is nested; a core's memory has a tenth of it."""
+E = TypeVar("E")
+
+
+class Invalid(ValueError):
+    """No entry, or no head, that this version can read. The text says why."""
 
 
 class Head(msgspec.Struct, frozen=True):
@@ -19,8 +34,8 @@ class Head(msgspec.Struct, frozen=True):
     `file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files that it uses.
     """
 
-    run: str
-    pid: int
+    run: Annotated[str, Meta(pattern=r"^[\w-]{1,64}$")]
+    pid: Annotated[int, Meta(ge=0, lt=2**31)]
     version: str
     kind: str
     file: str
@@ -34,13 +49,13 @@ class Head(msgspec.Struct, frozen=True):
 class Entry(msgspec.Struct, frozen=True, array_like=True, tag_field="is"):
     """Every entry."""
 
-    at: float
+    at: Seconds
 
 
 class Clocks(Entry, frozen=True, tag_field="is", tag=0):
     """What the wall clock showed at this time (s since the epoch)."""
 
-    wall: float
+    wall: Seconds
 
 
 class Spoken(Entry, frozen=True, tag_field="is", tag=1):
@@ -122,6 +137,7 @@ _ENCODER: Final = msgspec.msgpack.Encoder()
 _DECODER: Final[msgspec.msgpack.Decoder[AnyEntry]] = msgspec.msgpack.Decoder(AnyEntry)
 _JSON: Final[msgspec.json.Decoder[AnyEntry]] = msgspec.json.Decoder(AnyEntry)
 _HEADS: Final = msgspec.msgpack.Decoder(Head)
+_JSON_HEADS: Final = msgspec.json.Decoder(Head)
 
 
 def encode(entry: AnyEntry | Head) -> bytes:
@@ -130,8 +146,8 @@ def encode(entry: AnyEntry | Head) -> bytes:
 
 
 def decode(content: bytes) -> AnyEntry:
-    """Raises msgspec.MsgspecError."""
-    return _DECODER.decode(content)
+    """Raises Invalid."""
+    return _known(_decoded(_DECODER.decode, content))
 
 
 def as_json(entry: AnyEntry | Head) -> str:
@@ -140,15 +156,46 @@ def as_json(entry: AnyEntry | Head) -> str:
 
 
 def of_json(content: str) -> AnyEntry:
-    """Raises msgspec.MsgspecError."""
-    return _JSON.decode(content)
+    """Raises Invalid."""
+    return _known(_decoded(_JSON.decode, content))
 
 
 def head_of_json(content: str) -> Head:
-    """Raises msgspec.MsgspecError."""
-    return msgspec.json.decode(content, type=Head)
+    """Raises Invalid."""
+    return _decoded(_JSON_HEADS.decode, content)
 
 
 def decode_head(content: bytes) -> Head:
-    """Raises msgspec.MsgspecError."""
-    return _HEADS.decode(content)
+    """Raises Invalid."""
+    return _decoded(_HEADS.decode, content)
+
+
+def _decoded(decode: Callable[..., E], content: bytes | str) -> E:
+    try:
+        return decode(content)
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise Invalid(f"not of this version, or damaged: {error}") from None
+
+
+def _known(entry: AnyEntry) -> AnyEntry:
+    """The entry, if this version knows what it names. Raises Invalid."""
+    if isinstance(entry, Spoken):
+        kind, release = MESSAGES.get(entry.type), RELEASES.get(entry.release)
+        if kind is None or release is None or not release.has(kind):
+            raise Invalid(f"no {entry.type[:80]!r} of release {entry.release[:80]!r} is known")
+    elif isinstance(entry, Known):
+        for tree in (entry.memory, entry.reading, entry.outputs, entry.report):
+            _require_shallow(tree, DEEPEST)
+    elif isinstance(entry, Step):
+        for tree in (entry.event, *entry.outputs, *entry.news, *entry.faults, *entry.publish):
+            _require_shallow(tree, DEEPEST)
+    return entry
+
+
+def _require_shallow(tree: Tree, deeper: int) -> None:
+    """Raises Invalid."""
+    if isinstance(tree, dict | list):
+        if deeper == 0:
+            raise Invalid(f"a value is nested more than {DEEPEST} deep")
+        for part in tree.values() if isinstance(tree, dict) else tree:
+            _require_shallow(part, deeper - 1)

@@ -25,7 +25,7 @@ def head_of(path: Path) -> Head:
                 return entries.head_of_json(record.metadata.get("head", ""))
     except OSError as error:
         raise BagError(f"{path} cannot be read: {error.strerror}") from None
-    except (Damaged, msgspec.MsgspecError, RecursionError) as error:
+    except (Damaged, entries.Invalid) as error:
         raise BagError(f"{path}: {error}") from None
     raise NotReplayable(NONE.format(path))
 
@@ -35,7 +35,7 @@ def entries_in(path: Path, notes: Notes) -> Iterator[AnyEntry]:
     for told in _texts(path, ENTRIES, notes):
         try:
             yield entries.of_json(told)
-        except (msgspec.MsgspecError, RecursionError) as error:
+        except entries.Invalid as error:
             notes.damaged(path, f"an entry is invalid: {error}")
             return
 

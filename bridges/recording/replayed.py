@@ -7,7 +7,7 @@ its limits have changed.
 
 import struct
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -15,6 +15,7 @@ from bridges.core.decision import Decision, IoFailed, Sampled
 from bridges.core.graph_kind import GraphKind
 from bridges.log import plain
 from bridges.recording.entries import (
+    LATEST_S,
     AnyEntry,
     Clocks,
     Forgotten,
@@ -24,7 +25,8 @@ from bridges.recording.entries import (
     Same,
     Step,
 )
-from bridges.recording.trees import Tree, UnknownValue, first_difference, tree, value
+from bridges.recording.trees import Tree, UnknownValue, first_difference, tree
+from bridges.recording.typed import typed, types_of
 from bridges.settings.config import Config
 from bridges.settings.load import understood
 from bridges.settings.names import kind_called
@@ -41,10 +43,11 @@ PARTS: Final = ("outputs", "news", "refused")
 
 @dataclass(frozen=True, slots=True)
 class Core:
-    """What a replay needs of a kind, with the limits of one subject."""
+    """What a replay needs of a kind, with the limits of one subject. `types`: `typed.types_of`."""
 
     decide: Callable[[Any, Any, float], Any]
     published: Callable[[Any, Any], Any]
+    types: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,12 +109,14 @@ class Cores:
         config, kind = self._config, self._kind
         if isinstance(kind, GraphKind):
             limits = kind.limits(config.section)
-            return Core(_with(kind.decide, limits), lambda memory, report: memory)
+            return Core(
+                _with(kind.decide, limits), lambda memory, report: memory, types_of(kind.decide)
+            )
         if subject not in config.devices:
             return None
         debounce = config.driver_type(subject).debounce(config.devices[subject])
         limits = kind.limits(config.devices[subject], debounce)
-        return Core(_with(kind.decide, limits), kind.published)
+        return Core(_with(kind.decide, limits), kind.published, types_of(kind.decide))
 
 
 def _with(decide: Callable[..., Any], limits: Any) -> Callable[[Any, Any, float], Any]:
@@ -123,13 +128,18 @@ class _Subject:
 
     def __init__(self, core: Core, known: Known) -> None:
         self._core = core
-        self._memory = value(known.memory)
-        self._reading = value(known.reading)
-        self._report = value(known.report)
-        self._outputs: object = value(known.outputs)
+        self._memory = typed(known.memory, core.types["memory"])
+        self._reading = typed(known.reading, core.types["event"] | None)
+        self._report = typed(known.report, core.types["report"])
+        self._outputs: object = typed(known.outputs, core.types["outputs"])
         self._news = self._report.news() if self._report else None
         self._recorded = _trees(self._outputs, self._report)
         self.last: deque[tuple[float, object]] = deque(maxlen=CONTEXT)
+
+    @property
+    def has_decided(self) -> bool:
+        """Whether there is a reading to come again, and a report to go out."""
+        return self._report is not None
 
     def memory(self) -> Tree:
         """What is remembered now."""
@@ -141,7 +151,7 @@ class _Subject:
 
     def step(self, step: Step) -> list[Parts]:
         """Decide on an event; gives what differs."""
-        event = value(step.event)
+        event = typed(step.event, self._core.types["event"])
         if type(event) in (Sampled, IoFailed):
             self._reading = event
         for part, new in (("outputs", step.outputs), ("news", step.news), ("faults", step.faults)):
@@ -243,7 +253,7 @@ class Replay:
             self._subjects.pop(entry.subject, None)
         elif isinstance(entry, Step | Same | Published):
             subject = self._subjects.get(entry.subject)
-            if subject is not None:
+            if subject is not None and (isinstance(entry, Step) or subject.has_decided):
                 yield from self._decided(subject, entry)
             else:
                 self.course.unusable += entry.subject not in self._subjects
@@ -285,7 +295,9 @@ def _kind(event: object) -> str:
 
 def times(entry: Same) -> tuple[float, ...]:
     """When the reading came again. Raises UnknownValue."""
-    try:
-        return struct.unpack(f"<{len(entry.times) // 8}d", entry.times)
-    except struct.error as error:
-        raise UnknownValue(f"not a list of times: {error}") from error
+    if len(entry.times) % 8:
+        raise UnknownValue("not a list of times")
+    found = struct.unpack(f"<{len(entry.times) // 8}d", entry.times)
+    if not all(abs(at) < LATEST_S for at in found):
+        raise UnknownValue("a time of no machine")
+    return found

@@ -14,8 +14,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Final
 
-import msgspec
-
 from bridges import user_files
 from bridges.recording import entries
 from bridges.recording.entries import AnyEntry, Head
@@ -142,10 +140,13 @@ class Read:
             number, checksum = MARK.unpack_from(content, place)
             if zlib.crc32(number.to_bytes(8, "little")) == checksum and number:
                 starts[number] = place
-        self.segments = {
-            number: _entries(content[starts[number] : starts[number] + size], number)
-            for number in sorted(starts)
-        }
+        try:
+            self.segments = {
+                number: _entries(content[starts[number] : starts[number] + size], number)
+                for number in sorted(starts)
+            }
+        except entries.Invalid as error:
+            raise RingError(f"{path} has an entry that is invalid: {error}") from None
 
     def entries(self) -> Iterator[AnyEntry]:
         """Every entry, the oldest first."""
@@ -171,7 +172,7 @@ class Tail:
         try:
             with self.path.open("rb") as ring:
                 return self._new(ring)
-        except (OSError, msgspec.MsgspecError) as error:
+        except (OSError, entries.Invalid) as error:
             raise RingError(f"{self.path} cannot be followed: {error}") from None
 
     def _new(self, ring: IO[bytes]) -> list[AnyEntry]:
@@ -213,7 +214,7 @@ def _top(path: Path) -> tuple[Head, int, int]:
         return entries.decode_head(told), -(-(TOP.size + 4 + length) // PAGE) * PAGE, size
     except OSError as error:
         raise RingError(f"{path} cannot be read: {error.strerror}") from None
-    except (struct.error, msgspec.MsgspecError) as error:
+    except (struct.error, entries.Invalid) as error:
         raise RingError(f"{path} cannot be read as a ring: {error}") from None
 
 

@@ -105,8 +105,7 @@ def _made(kind: type[Any], found: dict[str, Tree], held: Tree) -> object:
     if issubclass(kind, Enum):
         return kind[str(held)]
     if issubclass(kind, tuple):
-        assert isinstance(held, list)
-        return kind(*map(_value, held))
+        return kind(*map(_value, held if isinstance(held, list) else ()))
     struct = _struct(kind)
     assert struct
     return kind(**{name: _value(found[key]) for name, key in struct.fields if key in found})

@@ -21,6 +21,8 @@ from bridges.settings.problems import Problem as Problem
 from bridges.settings.problems import SettingsError as SettingsError
 
 MAX_DEPTH = 32
+HALVES = re.compile("[\ud800-\udfff]")
+"""Surrogates: halves of a pair in UTF-16, which no text can be written with."""
 
 
 class Sort(Struct, frozen=True):
@@ -90,6 +92,9 @@ class _Composer(yaml.SafeLoader):
             raise _Refused(mark, "an alias ('*name') inside the value that it repeats")
         self._sizes[id(node)] = size = 1 + sum(self._sizes[id(n)] for n in _children(node))
         self._refuse_more_than_most(mark, size)
+        if isinstance(node, ScalarNode) and (half := HALVES.search(node.value)):
+            escaped = f"'\\u{ord(half[0]):04x}' is half of a character"
+            raise _Refused(mark, f"{escaped}: write it as '\\U' and 8 digits, or as it is")
         if isinstance(node, ScalarNode) and is_plain(node) and (odd := slips.odd_space(node.value)):
             self._page.note(node, odd)
             node.value = slips.cleaned(node.value)
