@@ -127,6 +127,9 @@ class _OthersOnce(logging.Filter):
         if record.name.partition(".")[0] in self.OURS:
             return True
         record.exc_info = record.exc_text = None  # a library's traceback helps no operator
+        text = record.getMessage()  # it may quote anybody
+        record.args = None
+        record.msg = text if text.isprintable() else text.encode(ESCAPED).decode("ascii")
         first = place not in self._said
         self._said.add(place)
         return first

@@ -3,8 +3,9 @@
 import asyncio
 import logging
 import time
+from collections.abc import Hashable, Iterable, Iterator
 from contextlib import suppress
-from typing import Final
+from typing import Any, Final
 
 from nicegui import core
 from nicegui.server import Server
@@ -25,10 +26,17 @@ async def watch() -> None:
     while True:
         await asyncio.sleep(LOOK_S)
         await _end_deaf()
-        state = Server.instance.server_state
-        unasked = [one for one in state.connections if getattr(one, "cycle", one) is None]
-        for connection in silent.too_long(unasked, time.monotonic()):
-            connection.transport.close()  # type: ignore[attr-defined]
+        unasked = dict(_unasked(Server.instance.server_state.connections))
+        for one in silent.too_long(unasked, time.monotonic()):
+            unasked[one].transport.close()
+
+
+def _unasked(connections: Iterable[Any]) -> Iterator[tuple[Hashable, Any]]:
+    """The connections on which no request is being answered, each under its last request."""
+    for one in connections:
+        last = getattr(one, "cycle", one)
+        if last is None or getattr(last, "response_complete", False):
+            yield (one, last), one
 
 
 async def _end_deaf() -> None:

@@ -1,21 +1,27 @@
-"""What every request to the page must pass before anything else sees it: its Host, its Origin, a login.
+"""What every request to the page must pass before anything else sees it: its Host, its Origin, a login,
+and that it is whole, in bounded time and size.
 
 A page on 127.0.0.1 can be reached by any web site that the same browser has open: by a name that is
 made to resolve to 127.0.0.1 (DNS rebinding), or by a socket or form of another origin. So only the
 names that the page was given are answered, and only its own origin may open its socket or post.
 """
 
+import asyncio
 import ipaddress
 from collections.abc import Awaitable, Callable, Collection, Iterable, MutableMapping
 from dataclasses import dataclass
 from typing import Any, Final
-from urllib.parse import urlsplit
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
+MOST_BODY: Final = 64 * 1024
+BODY_S: Final = 5.0
+"""How long (s) a request may take to come."""
+ANSWER_S: Final = 120.0
+"""How long (s) an answer may take to go: a recording of 16 MB in 1 Mbit/s."""
 HEADERS: Final = (
     (
         b"content-security-policy",
@@ -54,7 +60,7 @@ def refused(scope: Scope, hosts: Collection[str]) -> str:
     changes = scope["type"] == "websocket" or scope.get("method") not in ("GET", "HEAD", "OPTIONS")
     if origin is None:
         return "no origin" if scope["type"] == "websocket" else ""
-    if changes and urlsplit(origin).netloc.lower() != host:
+    if changes and origin.lower().partition("://")[2] != host:
         return "that is for this page's own origin only"
     return ""
 
@@ -93,6 +99,8 @@ class Guard:
             return
         why = refused(scope, self._hosts)
         refusal = Refusal(403, why) if why else self._gate(scope)
+        if refusal is None and scope["type"] == "http":
+            receive, refusal = await _whole(receive)
         if refusal is not None:
             await _refuse(scope, send, refusal)
             return
@@ -102,14 +110,39 @@ class Guard:
                 message["headers"] = [*message.get("headers", ()), *HEADERS]
             await send(message)
 
-        await self._app(scope, receive, sending)
+        try:
+            async with asyncio.timeout(ANSWER_S if scope["type"] == "http" else None):
+                await self._app(scope, receive, sending)
+        except TimeoutError:
+            return  # the server ends a connection whose answer is incomplete
+
+
+async def _whole(receive: Receive) -> tuple[Receive, Refusal | None]:
+    """The same request with its body read, or why it is refused."""
+    body, more = b"", True
+    try:
+        async with asyncio.timeout(BODY_S):
+            while more:
+                message = await receive()
+                body += message.get("body", b"")
+                more = message.get("more_body", False)
+                if len(body) > MOST_BODY:
+                    return receive, Refusal(413, f"a request takes at most {MOST_BODY} bytes")
+    except TimeoutError:
+        return receive, Refusal(408, f"a request takes at most {BODY_S:.0f} s")
+    parts = [{"type": "http.request", "body": body, "more_body": False}]
+
+    async def whole() -> MutableMapping[str, Any]:
+        return parts.pop() if parts else await receive()
+
+    return whole, None
 
 
 async def _refuse(scope: Scope, send: Send, refusal: Refusal) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 1008, "reason": refusal.why})
         return
-    headers = [(b"content-type", b"text/plain; charset=utf-8"), *HEADERS]
+    headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close"), *HEADERS]
     headers += [(b"location", refusal.to.encode())] if refusal.to else []
     await send({"type": "http.response.start", "status": refusal.status, "headers": headers})
     await send({"type": "http.response.body", "body": refusal.why.encode()})

@@ -16,6 +16,7 @@ from bridges.page import incidents
 from bridges.page.head import head, main, part
 from bridges.page.login import Login
 from bridges.page.why import explanation, story, timeline
+from bridges.rmf.words import printable
 
 
 class IncidentViews:
@@ -94,12 +95,14 @@ class IncidentViews:
 
 
 def _address(name: str) -> str:
-    return f"/incidents/{quote(name, safe='')}"
+    return f"/incidents/{quote(name, safe='', errors='replace')}"
 
 
 def _item(one: incidents.File) -> str:
     at = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(one.wall))
     link = f'<a href="{_address(one.name)}">{escape(one.name)}</a>'
+    if not one.name.isprintable():
+        link = f"<span>{escape(printable(one.name))}: a strange name; rename it to see it here</span>"
     size = f"{one.size / 1024:.0f} KiB"
     return f'<li class="panel"><span class="when">{at}</span>{link}<span>{size}</span></li>'
 

@@ -20,7 +20,6 @@ from bridges.page.access import Door, Sessions
 from bridges.rmf.words import printable
 
 COOKIE: Final = "rmf_bridge_page"
-MOST_BODY: Final = 4096
 STYLE: Final = (Path(__file__).parent / "style.css").read_text(encoding="utf-8")
 FORM: Final = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 <title>Log in · RMF bridges</title>
@@ -114,13 +113,11 @@ class Login:
 
 
 async def _fields(request: Request) -> dict[str, str]:
-    """A form's fields; none of a body that is too long."""
-    body = b""
-    async for part in request.stream():
-        body += part
-        if len(body) > MOST_BODY:
-            return {}
-    found = parse_qs(body.decode(errors="replace"), max_num_fields=10)
+    """A form's fields; none of a form with too many."""
+    try:
+        found = parse_qs((await request.body()).decode(errors="replace"), max_num_fields=10)
+    except ValueError:
+        return {}
     return {name: values[0] for name, values in found.items()}
 
 

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from functools import partial
 from html import escape
 from typing import Final
 
@@ -106,7 +107,8 @@ class SiteViews:
     def install(self) -> None:
         """Put the views at their addresses."""
         ui.page("/", title="Site")(self.site)
-        ui.page("/{kind}/{name}", title="Device")(self.device)
+        for kind in KINDS:
+            ui.page(f"/{kind}/{{name:path}}", title="Device")(partial(self.device, kind))
 
     def site(self, request: Request, client: Client) -> None:
         """Everything, as a wall of cards."""

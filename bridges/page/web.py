@@ -71,6 +71,8 @@ def serve(
         listener = _live(args, join, login, graph)
     gate = Gate(login, closed=not ipaddress.ip_address(address).is_loopback)
     app.add_middleware(Guard, hosts=_hosts(address, netloc, args.host), gate=gate)
+    for name in ("engineio.server", "socketio.server"):
+        logging.getLogger(name).handlers.clear()  # strange frames would fill the log
     app.on_startup(lambda: connections.watch())
     app.on_startup(lambda: _say(f"the page is at http://{netloc}/ (Ctrl-C ends it)"))
     try:
@@ -88,6 +90,7 @@ def serve(
                 message_history_length=MOST_HISTORY,
                 limit_concurrency=MOST_CONNECTIONS,
                 ws_max_size=MOST_BYTES,
+                log_config=None,  # its lines go the way of ours
                 language="en-GB",
             )
     finally:

@@ -179,7 +179,11 @@ class _Subject:
 
     def _decide(self, event: object, at: float) -> AnyDecision:
         self.last.append((at, event))
-        decision: AnyDecision = self._core.decide(self._memory, event, at)
+        try:
+            decision: AnyDecision = self._core.decide(self._memory, event, at)
+        except Exception as error:  # it never raises for what a core has remembered itself
+            why = f"{type(error).__name__}: {error}"
+            raise UnknownValue(f"the core cannot decide on what was recorded: {why}") from error
         self._memory, self._report = decision.memory, decision.report
         return decision
 
