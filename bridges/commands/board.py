@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from msgspec import Struct
-from msgspec.structs import asdict
+from msgspec.structs import asdict, replace
 
 from bridges.commands.columns import aligned
 from bridges.commands.graph import SILENT_AFTER_S
@@ -26,6 +26,8 @@ SETTLES_S: Final = 1.5
 COORDINATOR: Final = "charger_coordinator"
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
 MOST_DIAGNOSES: Final = 2000
+MOST_VALUES: Final = 100
+"""Of one diagnosis; ours have a third of it."""
 MOST_PLACES: Final = 500
 """Of robots. Anybody can make names up, and the page listens for months."""
 SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
@@ -171,7 +173,8 @@ class Board:
         of_daemon = bool(kind) and diagnosis.of_daemon
         ours = of_daemon or kind == COORDINATOR or diagnosis.device in self._latest
         if ours and (status.name in self._diagnoses or self._room(at)):
-            self._diagnoses[status.name] = diagnosis
+            kept = replace(status, values=status.values[:MOST_VALUES])
+            self._diagnoses[status.name] = Diagnosis(at, kind, kept)
 
     def _room(self, now: float) -> bool:
         """For one more diagnosis: anybody can make names up, and a silent one gives way."""

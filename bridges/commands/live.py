@@ -6,7 +6,7 @@ from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Final
 
-from bridges.recording.heard import Heard
+from bridges.recording.heard import Heard, bounded
 from bridges.rmf import topics
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import AnyTopic
@@ -51,7 +51,7 @@ class Ear:
         }
 
     def _received(self, topic: str, message: Message) -> None:
-        self._waiting.put(Heard(time.monotonic(), time.time(), topic, message))
+        self._waiting.put(Heard(time.monotonic(), time.time(), topic, bounded(message)))
 
     def listen(self, timeout_s: float) -> list[Heard]:
         """Everything that has arrived, in order; waits up to `timeout_s` for the first."""

@@ -14,6 +14,8 @@ from bridges.rmf import definitions as d
 from bridges.rmf import words
 
 OLD: Final = ' class="old"'
+LONGEST: Final = 160
+"""The most characters of a text on a card; the whole text is on the device's own page."""
 MOST_FLOORS: Final = 40
 """A shaft with more landings is not drawn; the words still say where the car is."""
 FLOOR_PX, SHAFT_PX, LABEL_PX = 22, 44, 46
@@ -28,7 +30,7 @@ def card(view: DeviceView, *, before: DeviceView | None = None) -> str:
     `before`: as it was drawn the last time, so that its car is seen to move.
     """
     row = view.row
-    name = f"<h3>{escape(row.name)}</h3>"
+    name = f"<h3>{_told(row.name)}</h3>"
     old = bool(row.mark)
     classes = " ".join(
         filter(None, ("card", row.kind, "old" if old else "", "faulty" if row.faults else ""))
@@ -57,7 +59,7 @@ def _marks(view: DeviceView) -> Iterable[tuple[str, str]]:
 
 def _chip(text: str, kind: str) -> str:
     sign = {"fault": "✖ ", "old": "◷ ", "simulated": "◇ "}[kind]
-    return f'<p class="chip {kind}">{sign}{escape(text)}</p>'
+    return f'<p class="chip {kind}">{sign}{_told(text)}</p>'
 
 
 def _facts(view: DeviceView) -> Iterable[str]:
@@ -80,7 +82,12 @@ def had(stands: Stands) -> str:
 
 
 def _fact(name: str, value: str) -> str:
-    return f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>"
+    return f"<dt>{escape(name)}</dt><dd>{_told(value)}</dd>"
+
+
+def _told(text: str) -> str:
+    """As HTML; of a long text its beginning."""
+    return escape(text if len(text) <= LONGEST else f"{text[:LONGEST]}…")
 
 
 def _picture(view: DeviceView, before: DeviceView | None) -> str:
@@ -178,7 +185,7 @@ def _svg(width: float, height: float, said: str, inner: str) -> str:
     return (
         f'<svg class="drawn" style="width:{width / 16:.4g}rem;height:{height / 16:.4g}rem"'
         f' viewBox="0 0 {width:g} {height:g}" role="img"'
-        f' aria-label="{escape(said)}"><title>{escape(said)}</title>{inner}</svg>'
+        f' aria-label="{_told(said)}"><title>{_told(said)}</title>{inner}</svg>'
     )
 
 
@@ -205,5 +212,5 @@ def _robot(robot: Robot, now: float) -> str:
         words.printable(state.location.level_name) or "?",
         f"{max(0.0, min(100.0, state.battery_percent)):.0f} %",
     )
-    inner = "".join(f"<td>{escape(cell)}</td>" for cell in cells)
+    inner = "".join(f"<td>{_told(cell)}</td>" for cell in cells)
     return f"<tr{OLD if old else ''}>{inner}</tr>"

@@ -103,6 +103,8 @@ class Gallery:
             yield f"more than {MOST_DEVICES} {kind}s are on the graph: some are not shown"
         if self._listener.lost:
             yield f"{self._listener.lost} messages came too fast and were lost"
+        if self._listener.cut:
+            yield f"{self._listener.cut} messages were too long and are shown in part"
 
     def _draw(self, every: Iterable[DeviceView]) -> dict[str, str]:
         """The cards that have changed, by their places."""

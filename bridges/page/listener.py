@@ -10,7 +10,7 @@ from typing import Final
 
 from bridges.log import pairs
 from bridges.page.site import HEARD, Site
-from bridges.recording.heard import Heard
+from bridges.recording.heard import Heard, bounded
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Transport, TransportError
@@ -34,6 +34,7 @@ class Listener:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._listen, name="graph", daemon=True)
         self.lost = 0
+        self.cut = 0
         self.trouble = "has not joined RMF's graph yet"
 
     def start(self) -> None:
@@ -90,6 +91,8 @@ class Listener:
 
     def _receive(self, topic: AnyTopic) -> Callable[[Message], None]:
         def receive(message: Message) -> None:
-            self.hear(Heard(time.monotonic(), time.time(), topic.name, message))
+            kept = bounded(message)
+            self.cut += kept is not message
+            self.hear(Heard(time.monotonic(), time.time(), topic.name, kept))
 
         return receive

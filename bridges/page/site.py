@@ -26,8 +26,8 @@ from bridges.serve import diagnostics
 
 KEPT_S: Final = 600.0
 """The past that a device's page shows."""
-MOST_DEVICES: Final = 500
-"""The most devices of each kind; RMF's largest sites have a tenth of it."""
+MOST_DEVICES: Final = 200
+"""The most devices of each kind; RMF's largest sites have a quarter of it."""
 MOST_LINES: Final = 100
 """The most story lines of one device. Its view shows forty. With six hundred each a large site takes
 150 MB."""
@@ -260,7 +260,7 @@ class Site:
         for state in message.robots:
             key = (message.name, state.name)
             if key in self._robots or len(self._robots) < MOST_ROBOTS:
-                self._robots[key] = Robot(message.name, state, at)
+                self._robots[key] = Robot(message.name, replace(state, path=()), at)
 
 
 def _kind(name: str) -> Kind:

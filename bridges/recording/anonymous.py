@@ -22,6 +22,7 @@ from msgspec.structs import replace
 
 from bridges.core.graph_kind import GraphKind
 from bridges.recording.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Lost, Spoken, Step
+from bridges.recording.heard import FREE_TEXTS
 from bridges.recording.incident import Incident
 from bridges.recording.replayed import of_head
 from bridges.recording.sources import TOPICS
@@ -34,10 +35,6 @@ from bridges.settings import names as known
 from bridges.settings.config import Config
 from bridges.settings.reference import schema
 
-FREE_TEXTS: Final = frozenset(
-    {"error_message", "message", "title", "subtitle", "value", "performing_action", "model"}
-)
-"""Fields of messages that hold sentences. They are not names, but names inside them are replaced."""
 SAID: Final = FREE_TEXTS | {"code", "detail", "reason", "code_fault", "errors", "lost", "io_fault"}
 """Fields of a core's values that hold its own words."""
 NAME: Final = re.compile(r"(?!\d+$)[\w./-]{1,128}")

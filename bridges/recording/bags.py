@@ -16,7 +16,7 @@ from typing import Final
 from bridges import user_files
 from bridges.log import pairs
 from bridges.recording.entries import Spoken
-from bridges.recording.heard import Heard, Own
+from bridges.recording.heard import Heard, Own, bounded
 from bridges.recording.incident import timed
 from bridges.recording.ring import MAGIC, Read, RingError
 from bridges.recording.sources import BagError, Notes, Raw, releases, source
@@ -65,7 +65,7 @@ def all_in(
             if raw.decode is None:
                 yield Own(at, wall, raw.topic, cdr.decode_text(raw.sample))
             else:
-                yield Heard(at, wall, raw.topic, raw.decode(raw.sample))
+                yield Heard(at, wall, raw.topic, bounded(raw.decode(raw.sample)))
         except cdr.CdrError:
             noted.skipped[f"{raw.topic}: cannot be decoded"] += 1
     if noted.damage and notes is None:

@@ -24,7 +24,8 @@ LONGEST_RECORD: Final = 64 << 20
 """The longest record, and the most that a chunk unpacks to (bytes). rosbag2 and Foxglove write chunks
 of 1 to 8 MB."""
 MOST_UNPACKED: Final = 200
-"""A file may unpack to this many times its size, and one chunk: more cannot be a recording."""
+FIRST_UNPACKED: Final = 2 << 20
+"""A file may unpack to this many times its size, and so much (bytes) beside: more is no recording."""
 MOST_DECLARED: Final = 10_000
 """The most schemas and channels of a file."""
 FRAME: Final = 9
@@ -71,7 +72,7 @@ class _Allowances:
     """How much more of a file may be unpacked, and how many more channels it may declare."""
 
     def __init__(self, size: int) -> None:
-        self._unpacked = LONGEST_RECORD + MOST_UNPACKED * size
+        self._unpacked = FIRST_UNPACKED + MOST_UNPACKED * size
         self._declared = MOST_DECLARED
 
     def records(self, source: IO[bytes], size: int) -> Iterator[McapRecord]:
@@ -107,21 +108,23 @@ class _Allowances:
             yield read(_stream(body))
 
     def _unpack(self, chunk: Chunk) -> bytes:
-        most = min(LONGEST_RECORD, self._unpacked)
+        size, most = chunk.uncompressed_size, min(LONGEST_RECORD, self._unpacked)
+        if size > most:
+            raise Damaged(f"a chunk of {len(chunk.data)} bytes unpacks to more than {most}")
         if chunk.compression == "zstd":
             reader = zstandard.ZstdDecompressor(max_window_size=LONGEST_RECORD).stream_reader(
                 chunk.data
             )
-            unpacked = reader.read(most + 1)
+            unpacked = reader.read(size + 1)
         elif chunk.compression == "lz4":
-            unpacked = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, most + 1)
+            unpacked = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, size + 1)
         elif chunk.compression == "":
             unpacked = chunk.data
         else:
             raise Damaged(f"a chunk is compressed by {chunk.compression[:20]!r}, not zstd or lz4")
-        if len(unpacked) > most:
-            raise Damaged(f"a chunk of {len(chunk.data)} bytes unpacks to more than {most}")
-        self._unpacked -= len(unpacked)
+        if len(unpacked) != size:
+            raise Damaged(f"a chunk of {len(chunk.data)} bytes does not unpack to {size}, as it says")
+        self._unpacked -= size
         return unpacked
 
 

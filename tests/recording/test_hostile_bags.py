@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
 from bridges.recording.bags import BagError, Notes, heard_in
-from bridges.recording.mcap_read import LONGEST_RECORD, MAGIC, MOST_DECLARED
+from bridges.recording.mcap_read import FIRST_UNPACKED, LONGEST_RECORD, MAGIC, MOST_DECLARED
 from bridges.recording.texts import text
 from bridges.rmf import cdr
 from bridges.rmf.definitions import LiftState
@@ -89,26 +89,39 @@ def test_no_bytes_of_a_file_make_the_reader_fail(tmp_path: Path) -> None:
     [(zstandard.compress, b"zstd"), (lz4.frame.compress, b"lz4")],
     ids=["zstd", "lz4"],
 )
+@pytest.mark.parametrize("says", [10, 4 * LONGEST_RECORD], ids=["a lie", "true"])
 def test_what_unpacks_to_more_than_any_recording_is_not_unpacked(
-    tmp_path: Path, pack: Callable[[bytes], bytes], compression: bytes
+    tmp_path: Path, pack: Callable[[bytes], bytes], compression: bytes, says: int
 ) -> None:
     packed = pack(bytes(4 * LONGEST_RECORD))
-    bomb = MAGIC + chunk(compression, packed, 10)
+    bomb = MAGIC + chunk(compression, packed, says)
     del pack
     tracemalloc.start()
     _, damage = read(tmp_path / "a.mcap", bomb)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
 
-    assert damage.endswith(f"a chunk of {len(packed)} bytes unpacks to more than {LONGEST_RECORD}")
+    said = f"does not unpack to {says}, as it says" if says == 10 else "unpacks to more than "
+    assert f"a chunk of {len(packed)} bytes {said}" in damage
     assert peak < 3 * LONGEST_RECORD
 
 
 def test_many_chunks_that_unpack_to_much_are_stopped_early(tmp_path: Path) -> None:
-    part = chunk(b"zstd", zstandard.compress(record(0x80, bytes(LONGEST_RECORD // 2))), 10)
+    half = record(0x80, bytes(FIRST_UNPACKED // 2))
+    part = chunk(b"zstd", zstandard.compress(half), len(half))
     _, damage = read(tmp_path / "a.mcap", MAGIC + 40 * part)
 
     assert "unpacks to more than" in damage
+
+
+def test_two_kilobytes_of_tiny_records_are_not_worth_a_minute(tmp_path: Path) -> None:
+    tiny = record(0x80, b"") * (LONGEST_RECORD // 9)
+    path = tmp_path / "a.mcap"
+    path.write_bytes(MAGIC + chunk(b"zstd", zstandard.compress(tiny), len(tiny)))
+    notes = Notes()
+
+    assert list(heard_in(path, notes)) == []
+    assert "unpacks to more than 3" in notes.damage
 
 
 @pytest.mark.parametrize(
