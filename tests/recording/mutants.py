@@ -3,10 +3,14 @@
 Each is made of a valid one (`corpus`), by some changes of its decoded values.
 """
 
+import io
+import os
 import random
 import struct
 import zlib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -15,13 +19,18 @@ import msgspec
 from mcap.writer import CompressionType, Writer
 from msgspec.structs import replace
 
+from bridges import cli
+from bridges.page.incidents import read
+from bridges.page.levels import Levels
 from bridges.recording import entries
 from bridges.recording.bags import heard_in
 from bridges.recording.entries import Spoken
 from bridges.recording.files import opened
 from bridges.recording.mcap_write import ENTRIES, HEAD, NOTES, String
+from bridges.recording.recorder import Recorder
 from bridges.recording.ring import FRAME, MAGIC, MARK, PAGE, SEGMENTS, TOP
-from bridges.recording.sources import Notes
+from bridges.recording.shelf import Shelf
+from bridges.recording.sources import BagError, Notes
 from bridges.recording.texts import MESSAGES, text
 from bridges.rmf import cdr
 from bridges.rmf.definitions import Message
@@ -29,7 +38,6 @@ from bridges.rmf.releases import RELEASES
 from bridges.rmf.rihs01 import type_name
 
 CORPUS: Final = Path(__file__).parent / "corpus"
-ENDS: Final = tuple(getattr(float, "fromhex")(x) for x in ("0x1.fffffffffffffp+1023",))
 NUMBERS: Final = (
     *(0, -1, 1, 3, 2**31, 2**53, 2**63 - 1, -(2**63), 2**64 - 1),
     *(0.5, -0.0, 1e-300, 1e10, 9e18, 1e300, -1e300, float("nan"), float("inf"), float("-inf")),
@@ -273,3 +281,59 @@ def _message(writer: Writer, own: dict[str, int], one: list[Any], at_ns: int) ->
         schema = writer.register_schema(kind, "ros2msg", definition)
         own[f"{topic} {kind}"] = writer.register_channel(f"/{topic}", "cdr", schema)
     writer.add_message(own[f"{topic} {kind}"], at_ns, one[6], at_ns)
+
+
+Codes = frozenset[int]
+READS: Final[Codes] = frozenset({0, 1, os.EX_NOINPUT})
+DECIDES: Final[Codes] = READS | {os.EX_DATAERR, os.EX_CONFIG}
+WRITES: Final[Codes] = frozenset({0, os.EX_DATAERR, os.EX_UNAVAILABLE})
+JUDGES: Final[Codes] = READS | {os.EX_UNAVAILABLE}
+
+
+def commands(told: Plain, folder: Path) -> Iterator[tuple[tuple[str, ...], Codes]]:
+    """Each command that reads a recording or a ring, with how it may end. `folder`: for all files."""
+    run = folder / "run"
+    run.mkdir(parents=True, exist_ok=True)
+    for name in ("ring", "ring.died"):
+        (run / name).write_bytes(as_ring(told))
+    file, yaml, out = folder / "a.mcap", folder / "a.yaml", str(folder / "out.mcap")
+    write_file(told, file)
+    yaml.write_bytes(told.head["yaml"] if isinstance(told.head.get("yaml"), bytes) else b"")
+    for path in map(str, (run / "ring", file)):
+        yield ("replay", path), DECIDES
+        yield ("replay", path, "--config", str(yaml), "--json"), DECIDES
+        yield ("explain", path, told.subject), READS
+        if told.kind in ("lift", "door", "charger"):
+            yield ("plot", path, "--device", told.subject, "-o", str(folder / "a.html")), READS
+            yield ("judge", told.kind, told.subject, "--recording", path), JUDGES
+    of = ("incident", str(yaml), "--runtime-dir", str(run), "-o", out)
+    yield (*of, "--after", "0"), WRITES
+    yield (*of, "--died", "--anonymous"), WRITES
+
+
+def ended(words: Sequence[str]) -> tuple[int, str]:
+    """A command's exit code, and what it said on standard error."""
+    errors = io.StringIO()
+    with redirect_stdout(io.StringIO()), redirect_stderr(errors):
+        code = cli.main([*words])
+    return code, errors.getvalue()
+
+
+def endings(mutator: Mutator, times: int, folder: Path) -> Counter[str]:
+    """How the commands end for so many wrong recordings. Any that ends otherwise raises."""
+    found: Counter[str] = Counter()
+    for _ in range(times):
+        told = mutator.next()
+        for words, codes in commands(told, folder):
+            code, said = ended(words)
+            assert code in codes, (words, code, said)
+            assert code < os.EX_USAGE or said.strip(), (words, code)
+            assert "Traceback" not in said, said
+            found[f"{words[0]}: {code}"] += 1
+        with suppress(BagError):
+            read(folder / "a.mcap", {})
+        recorder = Recorder(lambda: [folder / "run"], Shelf(folder / "shelf"), lambda: 0.0)
+        recorder.look()
+        recorder.close()
+        Levels(folder / "run").look()
+    return found
