@@ -116,7 +116,9 @@ def main(argv: list[str] | None = None) -> int:
         if any("\ud800" <= one <= "\udfff" for one in argument):  # nothing could be written of it
             sys.stderr.write(f"rmf-bridge: {os.fsencode(argument)!r} is not UTF-8: rename it\n")
             return 2
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal may have no sign for what is to be said
+    if isinstance(
+        sys.stdout, io.TextIOWrapper
+    ):  # a terminal may have no sign for what is to be said
         sys.stdout.reconfigure(errors="backslashreplace")
     typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
     parsed, unknown = parser(arguments).parse_known_args(arguments, typed)

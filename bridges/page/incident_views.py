@@ -102,7 +102,9 @@ def _item(one: incidents.File) -> str:
     at = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(one.wall))
     link = f'<a href="{_address(one.name)}">{escape(one.name)}</a>'
     if not one.name.isprintable():
-        link = f"<span>{escape(printable(one.name))}: a strange name; rename it to see it here</span>"
+        link = (
+            f"<span>{escape(printable(one.name))}: a strange name; rename it to see it here</span>"
+        )
     size = f"{one.size / 1024:.0f} KiB"
     return f'<li class="panel"><span class="when">{at}</span>{link}<span>{size}</span></li>'
 

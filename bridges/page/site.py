@@ -26,8 +26,8 @@ from bridges.serve import diagnostics
 
 KEPT_S: Final = 600.0
 """The past that a device's page shows."""
-MOST_DEVICES: Final = 200
-"""The most devices of each kind; RMF's largest sites have a quarter of it."""
+MOST_DEVICES: Final = 300
+"""The most devices of each kind; a large hospital has 200 doors."""
 MOST_LINES: Final = 100
 """The most story lines of one device. Its view shows forty. With six hundred each a large site takes
 150 MB."""

@@ -123,7 +123,9 @@ class _Allowances:
         else:
             raise Damaged(f"a chunk is compressed by {chunk.compression[:20]!r}, not zstd or lz4")
         if len(unpacked) != size:
-            raise Damaged(f"a chunk of {len(chunk.data)} bytes does not unpack to {size}, as it says")
+            raise Damaged(
+                f"a chunk of {len(chunk.data)} bytes does not unpack to {size}, as it says"
+            )
         self._unpacked -= size
         return unpacked
 

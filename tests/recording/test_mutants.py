@@ -18,9 +18,10 @@ from bridges.recording.trees import UnknownValue, tree
 from bridges.recording.typed import typed, types_of
 from bridges.rmf import definitions as d
 from tests.depth import depth
-from tests.recording.mutants import Mutator, Plain, as_ring, corpus, endings, ended, write_file
+from tests.recording.mutants import Mutator, as_ring, corpus, ended, endings, write_file
 
 LIFT, DOOR = types_of(decide_lift), types_of(decide_door)
+ATTENDED = {"": "core.decision.Attended", "yes": True}
 
 
 @pytest.mark.long(10)
@@ -73,7 +74,7 @@ def test_an_entry_is_nested_as_deep_as_any_core_needs_and_no_deeper() -> None:
         (tree(IoFailed("no answer")), DOOR["memory"]),
         ({"": "core.decision.IoFailed", "reason": 7}, LIFT["event"]),
         ({"": "core.decision.Sampled", "sample": None}, LIFT["event"]),
-        ({"": "core.decision.Sampled", "sample": {"": "core.decision.Attended", "yes": True}}, LIFT["event"]),
+        ({"": "core.decision.Sampled", "sample": ATTENDED}, LIFT["event"]),
         ({"": "door.signals.DoorSample"}, LIFT["event"]),
         ({"": "rmf.definitions.LiftState", "=": 3}, LIFT["event"]),
         (True, int),

@@ -163,3 +163,13 @@ def test_a_file_of_rmfs_is_named_as_such_with_the_option_that_takes_it(
 ) -> None:
     (found,) = problems_of(file, text)
     assert f"this is {says}, and no device YAML: rmf-bridge check DEVICE.yaml --" in found
+
+
+@pytest.mark.parametrize("where", ["value", "key"])
+def test_half_of_a_character_is_refused_where_it_stands(tmp_path: Path, where: str) -> None:
+    file = tmp_path / "a.yaml"
+    half = '"\\ud800"'
+    text = f"kind: {half}\n" if where == "value" else f"kind: lift\n{half}: 1\n"
+    place = "1:7" if where == "value" else "2:1"
+    said = "'\\ud800' is half of a character: write it as '\\U' and 8 digits, or as it is"
+    assert problems_of(file, text) == [f"{place}: {said}"]

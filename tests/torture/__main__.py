@@ -20,6 +20,7 @@ from tests.torture.deaths import kills, shortages, signals
 from tests.torture.forged import forged
 from tests.torture.held import dead_bus_first, looks, planted, readers
 from tests.torture.table import Table
+from tests.torture.tools import pages, recordings
 from tests.torture.wires import wires
 
 
@@ -29,6 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, help="one is drawn and printed if left out")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--times", type=int, default=10, help="of each shortage")
+    parser.add_argument("--recordings", type=int, default=300, help="that decode and are wrong")
     parser.add_argument("--forged-s", type=float, default=20.0, help="on each wire")
     options = parser.parse_args(argv)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the daemons heed a nohup that they inherit
@@ -62,6 +64,8 @@ def _one_after_another(here: Path, seed: int, options: argparse.Namespace, table
     wires(here / "f", random.Random(seed + 4), options.forged_s, options.times, table)
     long_names(here / "g", options.forged_s / 4, table)
     lost_network(table)
+    pages(here / "g", random.Random(seed + 5), table)
+    recordings(here / "h", seed + 6, options.recordings, table)
 
 
 def _tried(part: Callable[[], None], failed: list[str]) -> None:

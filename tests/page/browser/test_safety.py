@@ -117,7 +117,7 @@ def test_the_server_names_no_version_and_believes_no_forwarded_address(address: 
 
 
 def test_a_form_that_never_ends_is_not_read(address: str) -> None:
-    assert ask(address, "/login", FORM, form(password="x" * 100_000))[0] == 403
+    assert ask(address, "/login", FORM, form(password="x" * 100_000))[0] == 413
 
 
 def test_after_five_wrong_passwords_the_right_one_has_to_wait_at_that_address(address: str) -> None:
