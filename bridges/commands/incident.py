@@ -41,8 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when the file is written; 65 if its YAML cannot be made anonymous; 69 without a ring that can be
-    read; 73 if the file cannot be written."""
+    """0 when the file is written; 65 if its YAML cannot be made anonymous; 69 without a ring that can
+    be read; 73 if the file cannot be written."""
     try:
         from bridges.recording import mcap_write
     except ImportError as error:

@@ -10,12 +10,15 @@ from typing import Any, Final
 from nicegui import core
 from nicegui.server import Server
 
+from bridges.core.durations import AGES_AGO
 from bridges.log import pairs
 from bridges.page.silent import Silent
 
 log = logging.getLogger(__name__)
 
 LOOK_S: Final = 1.0
+QUIET_S: Final = 60.0
+"""It is said so often at most."""
 MOST_WAITING: Final = 50
 """The most unread packets of a browser: about five seconds of them. A browser that reads has a few."""
 
@@ -23,9 +26,11 @@ MOST_WAITING: Final = 50
 async def watch() -> None:
     """For ever."""
     silent = Silent()
+    ended: set[object] = set()
+    told_at = AGES_AGO
     while True:
         await asyncio.sleep(LOOK_S)
-        await _end_deaf()
+        told_at = await _end_deaf(ended, told_at)
         unasked = dict(_unasked(Server.instance.server_state.connections))
         for one in silent.too_long(unasked, time.monotonic()):
             unasked[one].transport.close()
@@ -39,10 +44,17 @@ def _unasked(connections: Iterable[Any]) -> Iterator[tuple[Hashable, Any]]:
             yield (one, last), one
 
 
-async def _end_deaf() -> None:
-    for socket in list(core.sio.eio.sockets.values()):
-        waiting = socket.queue.qsize()
-        if waiting > MOST_WAITING:
-            log.warning(pairs("browser_does_not_read", waiting=waiting))
-            with suppress(Exception):  # it may be closing already
-                await socket.close(wait=False)
+async def _end_deaf(ended: set[object], told_at: float) -> float:
+    """`ended`: which were ended before, and may take a while to go. Returns when it was said last."""
+    sockets = core.sio.eio.sockets.copy()
+    ended &= sockets.keys()
+    deaf = [one for one in sockets.keys() - ended if sockets[one].queue.qsize() > MOST_WAITING]
+    for one in deaf:
+        ended.add(one)
+        with suppress(Exception):  # it may be closing already
+            await sockets[one].close(wait=False)
+    now = time.monotonic()
+    if not deaf or now < told_at + QUIET_S:
+        return told_at
+    log.warning(pairs("browser_does_not_read", browsers=len(deaf)))
+    return now

@@ -60,7 +60,7 @@ def strange_frames(address: str, rng: random.Random, number: int) -> int:
         frame = FRAMES[n % len(FRAMES)]
         whose = rng.choice((view, view, "", "&client_id=x", view.replace("id=0", "id=x")))
         with (
-            suppress(WebSocketException, OSError),
+            suppress(WebSocketException, OSError, EOFError),
             connect(where + whose, origin=Origin(address.rstrip("/")), close_timeout=0) as joined,
         ):
             if rng.random() < 0.8:
