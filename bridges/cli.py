@@ -113,7 +113,9 @@ def main(argv: list[str] | None = None) -> int:
         argcomplete.autocomplete(whole_parser())
     arguments, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
     for argument in arguments:
-        if any("\ud800" <= one <= "\udfff" for one in argument):  # nothing could be written of it
+        if any(
+            "\ud800" <= one <= "\udfff" for one in argument
+        ):  # no log, JSON or message can have it
             sys.stderr.write(f"rmf-bridge: {os.fsencode(argument)!r} is not UTF-8: rename it\n")
             return 2
     if isinstance(

@@ -4,7 +4,7 @@ values, with anything in its fields; the types are those that the core itself is
 
 import math
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from functools import cache
 from itertools import zip_longest
 from typing import Any, Literal, Never, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -62,7 +62,7 @@ def _parts(found: Any, args: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
 
 
 @cache
-def _fields(kind: type, args: tuple[Any, ...]) -> Mapping[str, Any]:
+def _fields(kind: Hashable, args: tuple[Any, ...]) -> Mapping[str, Any]:
     """The fields of a struct or a tuple with names, and their types; empty for all else."""
     if not hasattr(kind, "__struct_fields__") and not hasattr(kind, "_fields"):
         return {}

@@ -162,8 +162,6 @@ def _check_text(node: ScalarNode, extra: Extra) -> None:
         if looks(node) == f"the number {text}":
             taken = f"is the number {text}"
         raise Wrong(f'{taken}: if the text is meant, write "{short(text)}" in quotes')
-    if any("\ud800" <= c <= "\udfff" for c in text):
-        raise Wrong("holds half a character (\\ud800 to \\udfff): write the whole character")
 
 
 def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> Wrong:

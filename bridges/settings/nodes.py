@@ -92,9 +92,10 @@ class _Composer(yaml.SafeLoader):
             raise _Refused(mark, "an alias ('*name') inside the value that it repeats")
         self._sizes[id(node)] = size = 1 + sum(self._sizes[id(n)] for n in _children(node))
         self._refuse_more_than_most(mark, size)
-        if isinstance(node, ScalarNode) and (half := HALVES.search(node.value)):
-            escaped = f"'\\u{ord(half[0]):04x}' is half of a character"
-            raise _Refused(mark, f"{escaped}: write it as '\\U' and 8 digits, or as it is")
+        if isinstance(node, ScalarNode) and HALVES.search(node.value):
+            raise _Refused(
+                mark, "holds half a character (\\ud800 to \\udfff): write the whole character"
+            )
         if isinstance(node, ScalarNode) and is_plain(node) and (odd := slips.odd_space(node.value)):
             self._page.note(node, odd)
             node.value = slips.cleaned(node.value)

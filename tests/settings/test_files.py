@@ -171,5 +171,5 @@ def test_half_of_a_character_is_refused_where_it_stands(tmp_path: Path, where: s
     half = '"\\ud800"'
     text = f"kind: {half}\n" if where == "value" else f"kind: lift\n{half}: 1\n"
     place = "1:7" if where == "value" else "2:1"
-    said = "'\\ud800' is half of a character: write it as '\\U' and 8 digits, or as it is"
+    said = "holds half a character (\\ud800 to \\udfff): write the whole character"
     assert problems_of(file, text) == [f"{place}: {said}"]

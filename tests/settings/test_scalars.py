@@ -90,7 +90,6 @@ OTHER_NAMES = {
     '" a"': "is ' a': write text without control characters, or spaces at its ends",
     '"a\\n"': "is 'a\\n': write text without control characters, or spaces at its ends",
     '"a\\0b"': "is 'a\\x00b': write text without control characters, or spaces at its ends",
-    '"\\ud800"': "holds half a character (\\ud800 to \\udfff): write the whole character",
     "[a]": "is a list: write text",
     "{a: b}": "is a mapping: write text",
 }

@@ -59,9 +59,8 @@ def _memory(address: str, domain: int) -> float:
 def recordings(directory: Path, seed: int, times: int, table: Table) -> None:
     """Recordings that decode and are wrong, and a file that unpacks to much."""
     for ending, number in endings(Mutator(seed), times, directory).items():
-        table.count(
-            f"wrong recordings, {ending.partition(':')[0]}", f"exit code{ending[-3:]}", number
-        )
+        command, _, code = ending.partition(": ")
+        table.count(f"wrong recordings, {command}", f"exit code {code}", number)
     tiny = record(0x80, b"") * ((64 << 20) // 9)
     bomb = directory / "bomb.mcap"
     bomb.write_bytes(MAGIC + chunk(b"zstd", zstandard.compress(tiny), len(tiny)))
