@@ -51,7 +51,8 @@ def _fits(found: Any, hint: Any) -> bool:
 
 def _parts(found: Any, args: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
     """All that a value holds, each with its type. `args`: those of its own type."""
-    if fields := _fields(type(found), args):
+    kind: Any = type(found)
+    if fields := _fields(kind, args):
         yield from ((getattr(found, name), hint) for name, hint in fields.items())
     elif isinstance(found, Mapping):
         yield from (pair for both in found.items() for pair in zip(both, args, strict=False))

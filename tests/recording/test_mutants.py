@@ -84,7 +84,7 @@ def test_an_entry_is_nested_as_deep_as_any_core_needs_and_no_deeper() -> None:
         (["a", 1], tuple[str, ...]),
         ({"": "map", "=": [["a", 1]]}, dict[str, str]),
         ({"": "set", "=": [1]}, frozenset[str]),
-        (tree(Settled("x", 0.0, "x", 0.0)), Settled[Door]),
+        (tree(Settled("x", "x", 0.0)), Settled[Door]),
     ],
 )  # fmt: skip
 def test_a_value_of_another_type_than_a_core_takes_is_refused(told: Any, hint: Any) -> None:

@@ -9,6 +9,7 @@ from typing import Final
 import zstandard
 
 from bridges.page import access, incidents
+from bridges.recording.mcap_read import MAGIC
 from hal_fakes.domain import domain_for_a_while
 from hal_fakes.wire import join
 from tests.page.browser.conftest import PASSWORD, USER, on_graph, page
@@ -16,7 +17,7 @@ from tests.page.browser.test_bad_days import page_pid, rss_mb
 from tests.page.browser.test_safety import ask
 from tests.page.strangers import half_requests, long_names, strange_frames
 from tests.recording.mutants import Mutator, endings
-from tests.recording.test_hostile_bags import MAGIC, chunk, record
+from tests.recording.test_hostile_bags import chunk, record
 from tests.torture.table import Table
 from tests.waiting import wait_until
 
