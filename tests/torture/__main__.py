@@ -64,8 +64,8 @@ def _one_after_another(here: Path, seed: int, options: argparse.Namespace, table
     wires(here / "f", random.Random(seed + 4), options.forged_s, options.times, table)
     long_names(here / "g", options.forged_s / 4, table)
     lost_network(table)
-    pages(here / "g", random.Random(seed + 5), table)
-    recordings(here / "h", seed + 6, options.recordings, table)
+    pages(here / "i", random.Random(seed + 5), table)
+    recordings(here / "j", seed + 6, options.recordings, table)
 
 
 def _tried(part: Callable[[], None], failed: list[str]) -> None:
