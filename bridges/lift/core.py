@@ -82,7 +82,7 @@ def decide(
     return Decision(
         memory,
         memory.relays.outputs(),
-        report(memory, view, outputs, _faults(memory, view, now, limits), limits),
+        report(memory, view, outputs, _faults(memory, view, now, limits), now, limits),
         _wake_at(memory, view, outputs, now, limits),
         refused,
         _alarms(alarmed_before, memory, limits),

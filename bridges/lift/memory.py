@@ -1,9 +1,9 @@
 """What the lift's core remembers from scan to scan, and the limits that it is given."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 import msgspec
 from msgspec.structs import replace
@@ -205,16 +205,31 @@ class Relays(msgspec.Struct, frozen=True):
 
     def changes_at(self, wanted: LiftOutputs, now: float, limits: LiftLimits) -> float:
         """When an output that is wanted and still off may come on; always later than `now`."""
+        off = self._still_off(wanted, now, limits)
+        due = [channel.may_switch_on_at(now, ready_at, limits) for _, channel, ready_at in off]
+        return max(min(due, default=NEVER), math.nextafter(now, NEVER))
+
+    def resting(self, wanted: LiftOutputs, now: float, limits: LiftLimits) -> tuple[str, bool]:
+        """The first output that is wanted and must rest before it comes on, and whether
+        `max_cycles_per_min` is why; "" for none."""
+        for name, channel, ready_at in self._still_off(wanted, now, limits):
+            unused = replace(channel, ons=())
+            at = channel.may_switch_on_at(now, ready_at, limits)
+            return name, at > unused.may_switch_on_at(now, ready_at, limits)
+        return "", False
+
+    def _still_off(
+        self, wanted: LiftOutputs, now: float, limits: LiftLimits
+    ) -> Iterator[tuple[str, Channel[Any], float]]:
+        """Each output that is wanted and off, its name, and when the others let it come on."""
         agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, AGES_AGO, limits)
         ready_at = max(agv_at, self._rested_at(limits))
-        due = []
         if wanted.agv_request and not self.agv.on:
-            due.append(agv_at)
+            yield "AGV mode", self.agv, AGES_AGO
         if wanted.call and not self.call.on:
-            due.append(self.call.may_switch_on_at(now, ready_at, limits))
+            yield "the call", self.call, ready_at
         if wanted.hold_door and not self.hold.on:
-            due.append(self.hold.may_switch_on_at(now, ready_at, limits))
-        return max(min(due, default=NEVER), math.nextafter(now, NEVER))
+            yield "the door", self.hold, ready_at
 
     def _rested_at(self, limits: LiftLimits) -> float:
         """When call and door command will both have been off for `dead_time_s`."""

@@ -91,4 +91,5 @@ def summary(report: LiftReport) -> Mapping[str, str]:
         "session": report.session or "-",
         "boarded": "yes" if report.boarded else "no",
         "destination": report.destination or "-",
+        **({"waits": report.waits} if report.waits else {}),
     }

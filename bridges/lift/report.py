@@ -1,9 +1,10 @@
 """What RMF is told about a lift: the content of LiftState."""
 
 import msgspec
+from msgspec.structs import replace
 
 from bridges.core.decision import Fault
-from bridges.lift import forgotten
+from bridges.lift import drive, forgotten
 from bridges.lift.memory import LiftLimits, Memory, Relays, Session
 from bridges.lift.sensing import View
 from bridges.lift.signals import Hazard, LiftOutputs, Motion
@@ -18,7 +19,8 @@ class LiftReport(msgspec.Struct, frozen=True):
     """LiftState without its name, floors and stamp, and what only the status file shows.
 
     `floor`: RMF's name, "" when unknown. `read_at`: monotonic seconds, None before the first reading.
-    `estimated`: no contact proves what `door` shows. `boarded`: a robot may be inside.
+    `estimated`: no contact proves what `door` shows. `boarded`: a robot may be inside. `waits`: what
+    the session's request waits for; "" without one, or once RMF is shown what was asked.
     """
 
     read_at: float | None
@@ -31,6 +33,7 @@ class LiftReport(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...] = ()
     estimated: bool = False
     boarded: bool = False
+    waits: str = ""
 
     @property
     def open_at(self) -> str:
@@ -48,6 +51,7 @@ def report(
     view: View,
     wanted: LiftOutputs,
     faults: tuple[Fault, ...],
+    now: float,
     limits: LiftLimits,
 ) -> LiftReport:
     """The state as it is shown now. `wanted`: the outputs that would be on if no relay had to rest."""
@@ -58,7 +62,7 @@ def report(
     door, estimated = _door(session, view, floor, limits)
     if door is LiftDoor.DOOR_OPEN and not _may_enter(memory, floor, mode, wanted, faults):
         door, estimated = LiftDoor.DOOR_MOVING, False
-    return LiftReport(
+    shown = LiftReport(
         read_at=memory.senses.read_at,
         floor=floor,
         destination=destination,
@@ -66,10 +70,50 @@ def report(
         motion=_motion(view, door),
         mode=mode,
         session=session.id if session else "",
-        faults=faults,
+        faults=(*faults, *_worn(relays, wanted, now, limits)),
         estimated=estimated,
         boarded=bool(session and session.boarded),
     )
+    if session is None or (shown.open_at == destination and session.doubted is None):
+        return shown
+    return replace(shown, waits=_waits(session, relays, view, wanted, faults, now, limits))
+
+
+def _worn(
+    relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits
+) -> tuple[Fault, ...]:
+    """A relay was switched on too often, so that the lift stands. It hides no open door."""
+    output, worn = relays.resting(wanted, now, limits)
+    most = f"its relay came on {limits.t.max_cycles_per_min} times within a minute"
+    return (Fault("RELAY_RESTS", f"{output}: {most}"),) if worn else ()
+
+
+def _waits(
+    session: Session,
+    relays: Relays,
+    view: View,
+    wanted: LiftOutputs,
+    faults: tuple[Fault, ...],
+    now: float,
+    limits: LiftLimits,
+) -> str:
+    """What a request waits for that RMF does not see fulfilled."""
+    if session.doubted:
+        return f"for the robot to ask for {session.doubted.destination} itself: it may have ridden"
+    if not session.agv:
+        return "for END: a lift in HUMAN mode is called by people"
+    if not view.fresh:
+        return f"for its inputs: {view.blind}"
+    if wanted == LiftOutputs() and drive.silent(session, now, limits):
+        return f"for a request of {session.id}"
+    if output := relays.resting(wanted, now, limits)[0]:
+        return f"for {output}: its relay must rest"
+    if wanted.agv_request and session.waiting:
+        at = f" at {session.destination}"
+        return {"agv": "for AGV mode", "floor": f"for the car{at}", "door": f"for the door{at}"}[
+            session.waiting
+        ]
+    return f"until this is over: {', '.join(f.code for f in faults if f.code != forgotten.CODE)}"
 
 
 def _may_enter(

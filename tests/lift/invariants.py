@@ -14,7 +14,9 @@ from bridges.rmf.definitions import LiftDoor
 from tests.lift.walk import Step, World, reading
 
 RIVAL_S = 5.0
+MINUTE_S = 60.0
 OFF = LiftOutputs()
+HINDER_NOBODY = {"FORGOTTEN_BY_SUPERVISOR", "RELAY_RESTS"}
 
 
 def check(step: Step) -> None:
@@ -23,6 +25,7 @@ def check(step: Step) -> None:
     nothing_is_driven_when_forbidden(step)
     sessions_end_by_end_alone(step)
     open_is_the_truth(step)
+    a_request_that_waits_has_a_reason(step)
     assert step.decision.wake_at > step.now
 
 
@@ -115,13 +118,43 @@ def open_is_the_truth(step: Step) -> None:
         asked_here = step.decision.memory.own.get(session.id) == shown.floor
         assert step.decision.outputs.hold_door or not asked_here
     if session and not session.boarded:
-        assert {fault.code for fault in shown.faults} <= {"FORGOTTEN_BY_SUPERVISOR"}
+        assert {fault.code for fault in shown.faults} <= HINDER_NOBODY
         assert shown.mode.name == "MODE_AGV"
         elsewhere = shown.floor != shown.destination
         assert step.decision.outputs.hold_door or elsewhere or not session.agv
         if _sampled(step):
             assert sample.agv is not False
             assert not sample.hazards
+
+
+def a_request_that_waits_has_a_reason(step: Step) -> None:
+    """A request waits while the lift has its session, and does not show the last floor that was asked
+    for with the door OPEN. A wait for a worn relay is a fault as well."""
+    shown, session = step.decision.report, step.decision.memory.session
+    asked = step.event.destination if isinstance(step.event, Requested) else ""
+    waits = session is not None and (
+        shown.open_at != session.destination
+        or (asked not in ("", session.destination) and step.event.session_id == session.id)
+    )
+    assert bool(shown.waits) >= waits, shown
+    assert not shown.waits.endswith(": "), shown
+    assert session is not None or not shown.waits
+    worn = "RELAY_RESTS" in {fault.code for fault in shown.faults}
+    assert worn <= any(_worn(channel, step) for channel in _relays(step))
+    if shown.waits.endswith("must rest") and not worn:
+        t = step.limits.t
+        rested_at = max(channel.off_at for channel in _relays(step)) + max(t.min_off_s, t.dead_time_s)
+        assert step.now < rested_at
+
+
+def _relays(step: Step) -> tuple[Any, ...]:
+    relays = step.decision.memory.relays
+    return relays.agv, relays.call, relays.hold
+
+
+def _worn(channel: Any, step: Step) -> bool:
+    lately = [at for at in channel.ons if step.now - at < MINUTE_S]
+    return channel.on is None and len(lately) >= step.limits.t.max_cycles_per_min
 
 
 def nothing_changes_before_wake_at(world: World, limits: LiftLimits) -> None:

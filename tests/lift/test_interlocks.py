@@ -158,9 +158,29 @@ def test_a_door_that_is_only_open_for_its_own_dwell_time_is_not_offered(inside: 
     assert story.outputs == LiftOutputs(agv_request=True)
     story.building.set(door=Door.OPEN)
     story.run(9.0)
-    assert (story.faults, story.state) == ([], "AGV, moving at L1, A to L1")
+    assert (story.faults, story.state) == (["RELAY_RESTS"], "AGV, moving at L1, A to L1")
     story.until(lambda: story.outputs.hold_door)
-    assert story.state == "AGV, open at L1, A to L1"
+    assert (story.faults, story.state) == ([], "AGV, open at L1, A to L1")
+
+
+def test_a_lift_that_stands_because_a_relay_came_on_too_often_says_so() -> None:
+    story = Story(Building(replace(AT_L1, door=Door.CLOSED)), max_cycles_per_min=3)
+    story.run(1.0)
+    for at, floor in enumerate(["L3", "L4", "L3", "L4"]):
+        story.run(2.0 + at)
+        story.asks("A", floor)
+    said = []
+    while story.now < 64.0:
+        story.run(story.now + 0.5)
+        status = story.node.status()
+        now = (status.get("waits"), *(fault["detail"] for fault in status["faults"]))
+        said += [(round(story.now, 1), *now)] if now not in [what[1:] for what in said[-1:]] else []
+        story.asks("A", "L4")
+    rests = "the call: its relay came on 3 times within a minute"
+    assert said == [
+        (5.5, "for the call: its relay must rest", rests),
+        (62.0, "for the car at L4"),
+    ]
 
 
 def test_a_reset_gives_no_second_pulse_where_nothing_was_wrong() -> None:

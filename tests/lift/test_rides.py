@@ -413,6 +413,7 @@ def test_a_person_reads_the_state_in_a_few_words() -> None:
         "session": "A",
         "boarded": "no",
         "destination": "L2",
+        "waits": "for AGV mode",
         "outputs": "agv_request yes",
         "faults": [],
         "input_age_s": 0.0,

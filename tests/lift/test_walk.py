@@ -28,6 +28,7 @@ ROOTS = {
     "arrived": ARRIVED,
     "boarded": BOARDED,
     "riding": RIDING,
+    "called to and fro, worn": (*CALLED, *("A asks L1", 1.0, "A asks L3", 1.0) * 20),
     "in the grace": (*BOARDED, "A ends", 0.05),
     "burnt out, latched": (*BOARDED, "fire_alarm", 1.0, "fire_alarm", 4.0),
     "failed, latched": (*ARRIVED, *("A asks L3", 25.0) * 7),
@@ -47,6 +48,7 @@ def test_each_stage_of_a_ride_is_what_its_name_says() -> None:
         "arrived": ((False, None), False, None, False),
         "boarded": ((True, None), False, None, False),
         "riding": ((True, None), False, "L1", False),
+        "called to and fro, worn": ((False, None), False, None, False),
         "in the grace": (None, True, None, False),
         "burnt out, latched": ((True, None), False, None, True),
         "failed, latched": ((False, inf), False, None, False),
@@ -74,7 +76,7 @@ def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> 
 def mended_and_idle(world: World) -> World:
     """The building mends itself and stands idle at L1; RMF ends every session; an operator resets."""
     world = replace(world, sample=IDLE, readable=True, writable=True)
-    return WALKER.path(world, 6.0, "A ends", "B ends", "reset", 9.0, seen=check)
+    return WALKER.path(world, 6.0, "A ends", "B ends", "reset", 61.0, seen=check)
 
 
 def serves(world: World) -> bool:
