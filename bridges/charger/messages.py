@@ -102,6 +102,7 @@ def summary(report: ChargerReport) -> Mapping[str, str]:
         "request": report.request_id or "-",
         "robot": f"{report.fleet}/{report.robot}{seen}" if report.robot else "-",
         "error": report.error_message or "-",
+        **({"waits": report.waits} if report.waits else {}),
     }
     optional = {
         "receiver": measured.receiver_id,

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from bridges.charger import pad
 from bridges.charger.memory import ChargerLimits, Memory, rivalled, unreachable
+from bridges.charger.session import cleared_to_start
 from bridges.charger.settings import Robot
 from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerSample, Measured
 from bridges.core.decision import Fault
@@ -80,7 +81,8 @@ class ChargerReport(msgspec.Struct, frozen=True):
     `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:
     blank unless `state` is CHARGER_ERROR. `request_id`: blank while no request holds the station.
     `fleet`, `robot`: the request's robot; without a request, the one on the pad of a station that is
-    not idle. `verified`: the station sees that robot's receiver.
+    not idle. `verified`: the station sees that robot's receiver. `waits`: what the request waits
+    for; "" without one, and while it is charged, over or in ERROR.
     """
 
     read_at: float | None
@@ -92,11 +94,13 @@ class ChargerReport(msgspec.Struct, frozen=True):
     verified: bool = False
     faults: tuple[Fault, ...] = ()
     measured: Measured = Measured()
+    waits: str = ""
 
     def news(self) -> object:
-        """All but the age and the measurements, which change with each reading."""
+        """All but the age, the measurements and what is waited for, which change while RMF is shown
+        the same."""
         measured = Measured(receiver_id=self.measured.receiver_id)
-        return replace(self, read_at=None, measured=measured)
+        return replace(self, read_at=None, measured=measured, waits="")
 
 
 def report(memory: Memory, now: float, limits: ChargerLimits) -> ChargerReport:
@@ -116,7 +120,26 @@ def report(memory: Memory, now: float, limits: ChargerLimits) -> ChargerReport:
         verified=who is not None and on_pad.robot == who,
         faults=(*found, *_irregular(memory, shown, limits)),
         measured=Measured() if lost or memory.sample is None else memory.sample.measured,
+        waits=_waits(memory, shown, limits),
     )
+
+
+def _waits(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> str:
+    """What the request waits for that is not charged yet, or must not be charged now."""
+    holder, sample = memory.holder, memory.sample
+    if not holder or not sample or shown not in (ASSIGNED, CHARGING):
+        return ""
+    who, not_ready = holder.request.who, pad.not_ready(sample)
+    if shown is CHARGING:
+        return f"as {not_ready}" if not_ready and not holder.over else ""
+    if holder.over:
+        return "for the end of its handshake: it was at fault before"
+    if not pad.seen(sample, limits).may_be(who):
+        return f"for {who} on the pad"
+    if not_ready:
+        return f"as {not_ready}"
+    ready = holder.started or cleared_to_start(memory, limits)
+    return f"for the station to charge {who}" if ready else f"for {who} in range"
 
 
 def state(memory: Memory) -> ChargerStateValue:

@@ -76,8 +76,8 @@ def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory,
             return wishes.unwanted(memory, request_id)
         case Dedicated(dedicated):
             return replace(memory, preferred={**memory.preferred, **dict(dedicated)}), ""
-        case MaySpeak(yes=yes, alone=alone):
-            return _may_speak(memory, yes, alone, now), ""
+        case MaySpeak(yes=yes, alone=alone, waits=passive):
+            return _may_speak(replace(memory, passive=passive), yes, alone, now), ""
         case OperatorReset():
             return replace(memory, strikes={}, shunned={}, absent={}, nudges={}), ""
         case _:  # only time has passed

@@ -13,6 +13,7 @@ from bridges.charger_coordinator.schedule import Charging, LocalTime
 from bridges.charger_coordinator.settings import Settings
 from bridges.charger_coordinator.signals import Sighting, Wanted
 from bridges.core.durations import AGES_AGO
+from bridges.core.graph_kind import LISTENS
 from bridges.rmf.definitions import ChargerStateValue, ChargingAssignments
 
 K = TypeVar("K")
@@ -181,7 +182,8 @@ class Nudge(msgspec.Struct, frozen=True):
 class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
-    `may_speak`: it may publish. `alone`: no other node publishes charging assignments.
+    `may_speak`: it may publish. `passive`: what those wait for that wait for us, while it may not.
+    `alone`: no other node publishes charging assignments.
 
     `wishes`: in the order in which they are served. `grants`: by station. `strikes`: robot -> the
     stations where it has failed. `served`: robot -> the task in which it was charged. `rested`: robots
@@ -197,6 +199,7 @@ class Memory(msgspec.Struct, frozen=True):
 
     began_at: float = 0.0
     may_speak: bool = False
+    passive: str = LISTENS
     alone: bool = True
     wishes: tuple[Wish, ...] = ()
     grants: Mapping[str, Grant] = msgspec.field(default_factory=dict)

@@ -44,6 +44,7 @@ def reasons(memory: Memory, now: float, site: Site) -> Iterator[str]:
             taken.add(first)
             texts.append(f"{first} is free in {_lasts(wait_s)}")
         why = ", ".join(texts) or "the charging schedule has no station for it"
+        why = why if memory.may_speak else memory.passive
         yield f"{wish.robot} {WHOSE[wish.by]}: {why}"
 
 

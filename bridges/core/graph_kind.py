@@ -6,7 +6,7 @@ doors) there are, and keeps one core memory for each. `bridges/<kind>/__init__.p
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import Any, Generic, Union
+from typing import Any, Final, Generic, Union
 
 from msgspec import Struct
 
@@ -16,10 +16,13 @@ from bridges.core.table import Table
 from bridges.rmf.definitions import Message, Time
 from bridges.rmf.topics import Topic
 
+LISTENS: Final = "for the end of the quiet start"
+
 
 class MaySpeak(Struct, frozen=True):
     """Whether the core may publish. It may not during the quiet start or while a rival publishes.
 
+    `waits`: what those wait for that wait for us, while it may not.
     `at_once`: during the quiet start what a restart must not interrupt may be sent: no rival is there.
     `alone`: no other node publishes on a topic of `yields`.
     """
@@ -27,6 +30,7 @@ class MaySpeak(Struct, frozen=True):
     yes: bool
     at_once: bool = False
     alone: bool = True
+    waits: str = LISTENS
 
 
 class Woken(Struct, frozen=True):

@@ -37,4 +37,5 @@ def state_message(name: str, settings: object, report: DoorReport, stamp: Time) 
 def summary(report: DoorReport) -> Mapping[str, str]:
     """The report in one line, for the log, the status file and `watch`."""
     words = {"mode": report.mode.name.removeprefix("MODE_"), "hold": "on" if report.hold else "off"}
-    return {**words, "feedback": "estimated"} if report.estimated else words
+    words |= {"feedback": "estimated"} if report.estimated else {}
+    return {**words, "waits": report.waits} if report.waits else words

@@ -21,7 +21,8 @@ from bridges.rmf.definitions import DoorModeValue
 class DoorReport(msgspec.Struct, frozen=True):
     """What RMF and the status file are told. `hold`: we hold the door open, also between pulses.
 
-    `estimated`: no contact proves `mode`.
+    `estimated`: no contact proves `mode`. `waits`: what RMF's OPEN waits for; "" without one, or once
+    the door is OPEN.
     """
 
     mode: DoorModeValue
@@ -29,9 +30,10 @@ class DoorReport(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...] = ()
     hold: bool = False
     estimated: bool = False
+    waits: str = ""
 
     def news(self) -> object:
-        """The report without its age."""
+        """The report without its age, and without what is waited for, which RMF is not shown."""
         return self.mode, self.faults, self.hold, self.estimated
 
 
@@ -44,7 +46,18 @@ def report(memory: Memory, view: View, now: float, limits: DoorLimits) -> DoorRe
         faults=tuple(_faults(memory, view, now, limits)),
         hold=memory.held,
         estimated=bool(view.estimated & _PROOFS.get(mode, frozenset())),
+        waits=_waits(memory, view, mode, now),
     )
+
+
+def _waits(memory: Memory, view: View, mode: DoorModeValue, now: float) -> str:
+    if memory.latched_at is None or mode is DoorModeValue.MODE_OPEN:
+        return ""
+    if rivalled(memory, now):
+        return "until no other node publishes its states"
+    if not view.fresh:
+        return "for a reading"
+    return "for the door to open" if view.seen else "for its contacts to be steady"
 
 
 _PROOFS = {

@@ -86,8 +86,8 @@ def _take(memory: Memory, event: Event, now: float) -> tuple[Memory, str]:
             return _hear(memory, event, now)
         case StateHeard(mode):
             return _see(replace(memory, mode=mode, shown_at=now), now), ""
-        case MaySpeak(yes, at_once):
-            memory = replace(memory, may_speak=yes, at_once=at_once)
+        case MaySpeak(yes, at_once, waits=passive):
+            memory = replace(memory, may_speak=yes, at_once=at_once, passive=passive)
             return replace(memory, sent=None, prompted=False), ""
         case _:  # only time has passed
             return memory, ""

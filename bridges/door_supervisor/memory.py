@@ -7,6 +7,7 @@ from msgspec.structs import replace
 
 from bridges.core.durations import AGES_AGO, NEVER, SILENT_S
 from bridges.core.freshness import Requesters
+from bridges.core.graph_kind import LISTENS
 from bridges.door_supervisor.settings import Settings
 from bridges.rmf.definitions import DoorModeValue
 
@@ -52,6 +53,7 @@ class Holder(msgspec.Struct, frozen=True):
 class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
+    `passive`: what those wait for that wait for us, while we may not publish.
     `holders`: in the order in which they came. `requesters`: what was lately heard of each. `mode`:
     the door's last mode, heard at `shown_at`. `at_once`: what was restored need not wait until we may
     publish. `sent`: the last request to the door's node since we may publish. `prompted`: something
@@ -60,6 +62,7 @@ class Memory(msgspec.Struct, frozen=True):
 
     door: str
     may_speak: bool = False
+    passive: str = LISTENS
     at_once: bool = False
     holders: tuple[Holder, ...] = ()
     requesters: Requesters = {}

@@ -73,4 +73,5 @@ def summary(report: DoorHoldReport, now: float) -> Mapping[str, str]:
     """One door in one line, for a person."""
     mode = "-" if report.mode is None else report.mode.name.removeprefix("MODE_")
     held = ", ".join(f"{who} ({now - since:.0f} s)" for who, since in report.holders)
-    return {"mode": mode, "held_by": held or "-"}
+    said = {"mode": mode, "held_by": held or "-"}
+    return {**said, "waits": report.waits} if report.waits else said

@@ -27,12 +27,14 @@ class DoorHoldReport(msgspec.Struct, frozen=True):
     """One door, for the log and the status file. Times are monotonic seconds.
 
     `holders`: each requester, and since when it holds the door. `mode`: the door's last, of `read_at`.
+    `waits`: what the holders wait for while nothing is sent to the door.
     """
 
     read_at: float | None
     mode: DoorModeValue | None = None
     holders: tuple[tuple[str, float], ...] = ()
     faults: tuple[Fault, ...] = ()
+    waits: str = ""
 
     def news(self) -> object:
         """What is worth a line in the log."""
@@ -46,6 +48,7 @@ def report(memory: Memory, now: float, limits: Limits) -> DoorHoldReport:
         mode=memory.mode,
         holders=tuple((holder.requester, holder.since) for holder in memory.holders),
         faults=tuple(_faults(memory, now, limits)),
+        waits=memory.passive if memory.holders and not memory.may_send else "",
     )
 
 

@@ -79,9 +79,7 @@ def report(
     return replace(shown, waits=_waits(session, relays, view, wanted, faults, now, limits))
 
 
-def _worn(
-    relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits
-) -> tuple[Fault, ...]:
+def _worn(relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
     """A relay was switched on too often, so that the lift stands. It hides no open door."""
     output, worn = relays.resting(wanted, now, limits)
     most = f"its relay came on {limits.t.max_cycles_per_min} times within a minute"

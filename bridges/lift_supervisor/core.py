@@ -99,8 +99,8 @@ def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Mem
             return _ask(memory, event, now)
         case StateHeard():
             return _see(memory, event, now), ""
-        case MaySpeak(yes):
-            return _speak(memory, yes), ""
+        case MaySpeak(yes, waits=passive):
+            return _speak(memory, yes, passive), ""
         case _:  # only time has passed
             return memory, ""
 
@@ -186,9 +186,10 @@ def _see(memory: Memory, shown: StateHeard, now: float) -> Memory:
     )
 
 
-def _speak(memory: Memory, yes: bool) -> Memory:
+def _speak(memory: Memory, yes: bool, passive: str) -> Memory:
     """While we may not publish nobody has a turn. Later the lift's states show who has the lift."""
-    return replace(memory, may_speak=yes, turn=memory.turn if yes else None)
+    turn = memory.turn if yes else None
+    return replace(memory, may_speak=yes, passive=passive, turn=turn)
 
 
 # --- whose turn it is --------------------------------------------------------------------------

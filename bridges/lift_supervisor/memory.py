@@ -6,6 +6,7 @@ import msgspec
 
 from bridges.core.durations import AGES_AGO, NEVER, SILENT_S
 from bridges.core.freshness import FUTURE_S, Requesters, Rules
+from bridges.core.graph_kind import LISTENS
 from bridges.lift_supervisor.settings import Settings
 from bridges.lift_supervisor.signals import StateHeard, Target
 from bridges.rmf.definitions import LiftMode, LiftRequest
@@ -59,6 +60,7 @@ class Turn(msgspec.Struct, frozen=True):
 class Memory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
+    `passive`: what those wait for that wait for us, while we may not publish.
     `claims`: in the order of first requests, with the holder's. `heard_at`: when an adapter was last
     heard. `requesters`: what was heard of each. `shown`: the latest state, which came at `shown_at`;
     `session_since`: since when it shows this session. `flowing_since`: since when states come without
@@ -69,6 +71,7 @@ class Memory(msgspec.Struct, frozen=True):
     lift: str
     started_at: float
     may_speak: bool = False
+    passive: str = LISTENS
     claims: tuple[Claim, ...] = ()
     turn: Turn | None = None
     shown: StateHeard | None = None

@@ -87,4 +87,5 @@ def summary(report: SupervisorReport, now: float) -> Mapping[str, str]:
     word = "ending" if report.ending else "holder"
     held = f"{report.holder} ({now - report.since:.0f} s)" if report.holder else "-"
     waiting = ", ".join(f"{session} ({now - since:.0f} s)" for session, since in report.waiting)
-    return {"session": report.shown or "-", word: held, "waiting": waiting or "-"}
+    said = {"session": report.shown or "-", word: held, "waiting": waiting or "-"}
+    return {**said, "waits": report.waits} if report.waits else said

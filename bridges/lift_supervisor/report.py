@@ -8,6 +8,7 @@ import msgspec
 from bridges.core.decision import Fault
 from bridges.core.durations import SILENT_S
 from bridges.lift_supervisor.memory import Limits, Memory
+from bridges.rmf.definitions import LiftMode
 
 OVERDUE_S: Final = 30.0
 """A lift that has not obeyed for this long is at fault."""
@@ -18,7 +19,7 @@ class SupervisorReport(msgspec.Struct, frozen=True):
 
     `shown`: the session in the lift's state. `holder`: the session whose turn it is, `since` when.
     `ending`: we send its END. `waiting`: the queue, with the time of each first request. `read_at`:
-    when the lift's last state came.
+    when the lift's last state came. `waits`: what those wait for that ask and are not served.
     """
 
     read_at: float | None
@@ -28,6 +29,7 @@ class SupervisorReport(msgspec.Struct, frozen=True):
     ending: bool = False
     waiting: tuple[tuple[str, float], ...] = ()
     faults: tuple[Fault, ...] = ()
+    waits: str = ""
 
     def news(self) -> object:
         """What is worth a line in the log."""
@@ -49,8 +51,28 @@ def report(memory: Memory, faults: Iterable[Fault]) -> SupervisorReport:
         since=turn.since if turn else 0.0,
         ending=bool(turn and turn.ends),
         waiting=waiting,
+        waits=_waits(memory, queued=bool(waiting)),
         faults=tuple(faults),
     )
+
+
+def _waits(memory: Memory, *, queued: bool) -> str:
+    """What the first in the queue waits for; without a queue, the one whose turn it is."""
+    turn, shown = memory.turn, memory.session_shown
+    if not memory.claims:
+        return ""
+    if not memory.may_speak:
+        return memory.passive
+    if turn and turn.ends:
+        return f"for the lift to release {turn.session}"
+    if shown and (turn is None or turn.session != shown):
+        return f"for a request or the end of {shown}, which the lift shows"
+    if memory.shown and memory.nobody_is_sent:
+        mode = LiftMode(memory.shown.mode).name.removeprefix("MODE_")
+        return f"for the end of the lift's {mode} mode"
+    if turn and not shown:
+        return f"for the lift to take {turn.session}"
+    return f"for END of {turn.session}" if turn and queued else ""
 
 
 def alarms(memory: Memory, now: float, limits: Limits) -> Iterator[tuple[float, Fault]]:

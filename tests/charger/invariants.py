@@ -22,6 +22,7 @@ def check(step: Step) -> None:
     protection_lasts(step)
     requests_end_on_good_readings(step)
     commands_are_counted(step)
+    a_request_that_waits_has_a_reason(step)
     assert step.decision.report.read_at == step.ledger.read_at
     assert step.decision.wake_at > step.now
 
@@ -140,6 +141,20 @@ def commands_are_counted(step: Step) -> None:
     assert outputs.range_checks - before.range_checks in (0, 1)
     if _rivalled(step):
         assert outputs.clear_errors == before.clear_errors
+
+
+def a_request_that_waits_has_a_reason(step: Step) -> None:
+    """A request waits while it has the station, and the station neither charges with leave to do so,
+    nor shows that the request is over (RELEASED)."""
+    shown, seen = step.decision.report, step.seen
+    may_not = step.decision.outputs.power is False and seen and seen.activity is Activity.CHARGING
+    waits = step.decision.memory.holder is not None and (
+        shown.state in (State.CHARGER_ASSIGNED, State.CHARGER_ERROR)
+        or (shown.state is State.CHARGER_CHARGING and may_not)
+    )
+    assert not waits or shown.waits or shown.faults, shown
+    assert not shown.waits or step.ledger.granted is not None
+    assert shown.state is not State.CHARGER_ASSIGNED or shown.waits
 
 
 def _sighted(step: Step) -> bool:

@@ -57,7 +57,12 @@ def test_an_ad_hoc_request_of_a_robot_already_in_the_handshake_is_granted() -> N
 def test_every_state_but_idle_names_the_robot_and_its_request() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("idle 1")
     assert story.report == ChargerReport(
-        read_at=1.0, state=State.CHARGER_ASSIGNED, request_id="req-1", fleet="tiny", robot="AMR01"
+        read_at=1.0,
+        state=State.CHARGER_ASSIGNED,
+        request_id="req-1",
+        fleet="tiny",
+        robot="AMR01",
+        waits="for the station to charge tiny/AMR01",
     )
 
 

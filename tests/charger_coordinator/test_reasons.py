@@ -1,5 +1,7 @@
 """What the queue says of each robot that waits: whole texts, on memories made by hand."""
 
+from msgspec.structs import replace
+
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator.memory import (
     ASSIGNED,
@@ -36,6 +38,7 @@ def shows(state: ChargerStateValue, full_in_s: float = 0.0) -> Seen:
 
 
 BUSY = Memory(
+    may_speak=True,
     wishes=tuple(Wish(who, "fleet") for who in (ONE, THREE, TWO)),
     grants={
         "s1": Grant(X, "r1", 0.0, started=True),
@@ -68,6 +71,7 @@ def test_the_station_where_it_stands_comes_first_and_its_own_robot_is_not_in_its
     last_two = {name: BUSY.stations[name] for name in ("s5", "s6")}
     stands_there = Standing(Sighting(ONE, False, "p6", 50.0, ""), 10.0)
     memory = Memory(
+        may_speak=True,
         wishes=BUSY.wishes[:1],
         stations=last_two,
         shunned=BUSY.shunned,
@@ -81,11 +85,19 @@ def test_the_station_where_it_stands_comes_first_and_its_own_robot_is_not_in_its
     ]
 
 
+def test_while_it_may_not_publish_no_station_is_what_they_wait_for() -> None:
+    memory = replace(BUSY, may_speak=False, passive="until rival leaves")
+    assert list(reasons(memory, 12.0, site(6))) == [
+        "tiny/AMR01 by the robot: until rival leaves",
+        "tiny/AMR02 by the robot: until rival leaves",
+    ]
+
+
 def said(now: float, seen: Seen, *robots: Robot) -> str:
     """What AMR01 hears of its only station, at which these robots stand."""
     one = Site({ONE: ("s1",)}, {}, {"s1": {"tiny": "p1"}}, {}, 60.0, 100.0, 90.0, 60.0)
     there = {who: Standing(Sighting(who, False, "p1", 50.0, ""), 10.0) for who in robots}
-    memory = Memory(wishes=BUSY.wishes[:1], stations={"s1": seen}, robots=there)
+    memory = replace(BUSY, wishes=BUSY.wishes[:1], grants={}, stations={"s1": seen}, robots=there)
     (text,) = reasons(memory, now, one)
     return text.removeprefix("tiny/AMR01 by the robot: ")
 
@@ -105,7 +117,7 @@ def test_the_remaining_time_of_a_charge_is_shown_in_seconds_or_minutes() -> None
 
 
 def test_a_robot_without_any_station_waits_for_the_schedule() -> None:
-    memory = Memory(wishes=BUSY.wishes[:1], alone=False)
+    memory = Memory(may_speak=True, wishes=BUSY.wishes[:1], alone=False)
     assert list(reasons(memory, 12.0, site(2))) == [
         "tiny/AMR01 by the robot: the charging schedule has no station for it"
     ]

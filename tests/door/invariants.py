@@ -19,6 +19,7 @@ def check(step: Step) -> None:
     the_relay_follows_the_hold(step)
     open_is_the_truth(step)
     hazards_are_as_read(step)
+    a_request_that_waits_has_a_reason(step)
     assert step.decision.report.read_at == step.ledger.read_at
     assert step.decision.wake_at > step.now
 
@@ -73,6 +74,15 @@ def open_is_the_truth(step: Step) -> None:
     assert not _told_otherwise(step, "opened", step.limits.debounce.get("opened", 0.0))
     if _exact(step):
         assert (sample.opened, sample.closed, sample.lost) == (True, False, "")
+
+
+def a_request_that_waits_has_a_reason(step: Step) -> None:
+    """An OPEN waits while RMF wants the door open, and is not shown that it is. Without the hold there
+    is a fault too, except before the first reading."""
+    shown = step.decision.report
+    assert bool(shown.waits) == (step.ledger.wanted and shown.mode is not DoorModeValue.MODE_OPEN)
+    stands = shown.waits and not shown.hold and step.ledger.read_at is not None
+    assert not stands or _codes(step) & {"COMMUNICATION_LOST", "TWO_NODES_FOR_ONE_DEVICE"}
 
 
 def hazards_are_as_read(step: Step) -> None:

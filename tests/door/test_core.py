@@ -208,6 +208,7 @@ def test_a_door_whose_reading_is_too_old_is_offline_with_the_hold_off_and_rememb
         mode=DoorModeValue.MODE_OFFLINE,
         read_at=1.0,
         faults=(Fault("COMMUNICATION_LOST", "no reply"),),
+        waits="for a reading",
     )
     core.sees(CLOSED, until=6.0)
     assert core.told[2:] == [

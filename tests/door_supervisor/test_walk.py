@@ -60,6 +60,7 @@ class Ledger:
         late = [h.requester for h in self.memory.holders if self.now >= h.since + 30.0]
         codes = [fault.code for fault in decided.report.faults]
         assert ("DOOR_HELD_OPEN" in codes) == bool(late)
+        assert bool(decided.report.waits) == (bool(self.holders) and not self.speaks)
         # A new holder reaches the node soon: a message is due, or the last one was right.
         if self.speaks and self.holders:
             assert self.memory.sent == OPEN or self.wake_at <= self.now + GAP_S

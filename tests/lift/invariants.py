@@ -143,7 +143,9 @@ def a_request_that_waits_has_a_reason(step: Step) -> None:
     assert worn <= any(_worn(channel, step) for channel in _relays(step))
     if shown.waits.endswith("must rest") and not worn:
         t = step.limits.t
-        rested_at = max(channel.off_at for channel in _relays(step)) + max(t.min_off_s, t.dead_time_s)
+        rested_at = max(channel.off_at for channel in _relays(step)) + max(
+            t.min_off_s, t.dead_time_s
+        )
         assert step.now < rested_at
 
 

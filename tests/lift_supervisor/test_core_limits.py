@@ -184,11 +184,12 @@ def test_the_report_says_who_holds_who_waits_and_since_when() -> None:
     desk.asks("b")
     desk.shows("a")
     waiting = (("b", 2.0),)
-    held = SupervisorReport(2.0, "a", "a", 1.0, False, waiting)
+    held = SupervisorReport(2.0, "a", "a", 1.0, False, waiting, waits="for END of a")
     assert desk.report == held
     desk.until(3.0)
     desk.ends("a")
-    assert desk.report == replace(held, since=3.0, ending=True)
+    ending = replace(held, since=3.0, ending=True, waits="for the lift to release a")
+    assert desk.report == ending
     assert desk.report.news() == ("a", "a", True, ("b",))
 
 
