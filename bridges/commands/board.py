@@ -39,7 +39,7 @@ Device = tuple[str, str]
 class Row(Struct, frozen=True):
     """One device, the charger coordinator, or a robot with its assigned place.
 
-    `waiting`: the supervisor's or coordinator's queue. `age`: age of the reading. `mark`: why the row
+    `waiting`: who waits, or what the one that has it waits for. `age`: age of the reading. `mark`: why the row
     may be wrong. `simulated`: no hardware is behind it. `faults`: those that its daemons report.
     """
 
@@ -87,6 +87,10 @@ class Diagnosis(Struct, frozen=True):
     def is_current(self, now: float) -> bool:
         """Whether it was said so lately that it counts."""
         return now - self.at <= SILENT_AFTER_S
+
+    def waiting(self) -> str:
+        """Who waits, and for what: `fleet/b (12 s): for END of fleet/a`."""
+        return ": ".join(filter(None, (self.value("waiting"), self.value("waits"))))
 
     @property
     def of_daemon(self) -> bool:
@@ -200,7 +204,7 @@ class Board:
             words.printable(name),
             words.condition(state),
             held_by or "-",
-            words.printable(", ".join(filter(None, (one.value("waiting") for one in found)))),
+            words.printable(", ".join(filter(None, (one.waiting() for one in found)))),
             _age(words.stamped_at(state), wall),
             _mark(state, now - self._heard_at[key], wall),
             any(one.kind == kind and self._simulated(one, now) for one in found),

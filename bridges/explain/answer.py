@@ -109,6 +109,13 @@ def old_reading(device: Device, clock: Clock) -> str:
     return ""
 
 
+def say_waits(found: Answer, device: Device, clock: Clock) -> None:
+    """What our daemons say that a request waits for."""
+    for kind, text in device.waits(clock.now).items():
+        whose = "daemon" if kind == device.kind else "supervisor"
+        found.say(f"Its {whose} says that the request waits {text}.")
+
+
 def notes(device: Device, clock: Clock) -> tuple[str, ...]:
     """What may mislead the reader."""
     found = []

@@ -189,6 +189,11 @@ class Device:
                 found.setdefault(code, fault)
         return found
 
+    def waits(self, now: Moment) -> dict[str, str]:
+        """What those wait for that ask our daemons for it, by the daemon's kind."""
+        said = ((one.kind, one.values.get("waits")) for one in self.heard_from(now))
+        return {kind: label(text, 200) for kind, text in said if text}
+
     def refusals(self, now: Moment, since: float) -> list[str]:
         """Why requests were refused since then (s), the last reason first."""
         found = [

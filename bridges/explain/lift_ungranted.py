@@ -47,7 +47,12 @@ def _not_passed_on(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -
     passed = claim.passed_on
     if not claim.own or (passed is not None and clock.now.at - passed.at < 5.0):
         return False
-    if lift.supervisor_last is None:
+    if "lift_supervisor" in lift.waits(clock.now):
+        found.say(
+            "Its supervisor does not pass the request on.",
+            Step("the supervisor", "pass it on, once what it says below is so"),
+        )
+    elif lift.supervisor_last is None:
         found.say(
             "Nobody passes the request on: no supervisor was heard on `lift_requests`.",
             Step("a person", "start rmf_lift_supervisor, or a lift supervisor of rmf-bridges"),

@@ -126,6 +126,7 @@ class Site:
         began = self._began or self._now
         device = self._devices.get((kind, name)) or MAKES[kind](name, began)
         answer = self._answer(device, clock)
+        common.say_waits(answer, device, clock)
         story = self._story(device, answer)
         for_s = lasted(self._now.at - began.at)
         return Explanation(

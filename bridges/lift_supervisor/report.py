@@ -10,6 +10,7 @@ from bridges.core.durations import SILENT_S
 from bridges.lift_supervisor.memory import Limits, Memory
 from bridges.rmf.definitions import LiftMode
 
+SILENT: Final = "LIFT_SILENT"
 OVERDUE_S: Final = 30.0
 """A lift that has not obeyed for this long is at fault."""
 
@@ -38,7 +39,7 @@ class SupervisorReport(msgspec.Struct, frozen=True):
 
 def report(memory: Memory, faults: Iterable[Fault]) -> SupervisorReport:
     """The lift as it is now, with these faults."""
-    turn = memory.turn
+    turn, faults = memory.turn, tuple(faults)
     waiting = tuple(
         (claim.session, claim.since)
         for claim in memory.claims
@@ -51,18 +52,20 @@ def report(memory: Memory, faults: Iterable[Fault]) -> SupervisorReport:
         since=turn.since if turn else 0.0,
         ending=bool(turn and turn.ends),
         waiting=waiting,
-        waits=_waits(memory, queued=bool(waiting)),
-        faults=tuple(faults),
+        faults=faults,
+        waits=_waits(memory, faults, queued=bool(waiting)),
     )
 
 
-def _waits(memory: Memory, *, queued: bool) -> str:
+def _waits(memory: Memory, faults: tuple[Fault, ...], *, queued: bool) -> str:
     """What the first in the queue waits for; without a queue, the one whose turn it is."""
     turn, shown = memory.turn, memory.session_shown
     if not memory.claims:
         return ""
     if not memory.may_speak:
         return memory.passive
+    if any(fault.code == SILENT for fault in faults):
+        return "for the lift's states"
     if turn and turn.ends:
         return f"for the lift to release {turn.session}"
     if shown and (turn is None or turn.session != shown):
@@ -80,7 +83,7 @@ def alarms(memory: Memory, now: float, limits: Limits) -> Iterator[tuple[float, 
     turn = memory.turn
     if not memory.flows(now):
         if turn or memory.claims:
-            yield memory.shown_at + SILENT_S, Fault("LIFT_SILENT", "no LiftState comes")
+            yield memory.shown_at + SILENT_S, Fault(SILENT, "no LiftState comes")
         return
     if turn is None:
         return

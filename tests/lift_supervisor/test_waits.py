@@ -65,4 +65,5 @@ def test_in_every_history_whoever_waits_is_told_for_what() -> None:
         "for a request or the end of a, which the lift shows",
         "for a request or the end of b, which the lift shows",
         "for the end of the lift's FIRE mode",
+        "for the lift's states",
     }
