@@ -39,8 +39,8 @@ Device = tuple[str, str]
 class Row(Struct, frozen=True):
     """One device, the charger coordinator, or a robot with its assigned place.
 
-    `waiting`: who waits, or what the one that has it waits for. `age`: age of the reading. `mark`: why the row
-    may be wrong. `simulated`: no hardware is behind it. `faults`: those that its daemons report.
+    `waiting`: who waits, or what the one that has it waits for. `age`: age of the reading.
+    `mark`: why the row may be wrong. `simulated`: no hardware is behind it. `faults`: those that its daemons report.
     """
 
     kind: str
@@ -216,12 +216,12 @@ class Board:
             if diagnosis.kind != COORDINATOR or diagnosis.of_daemon:
                 continue
             daemon = self._daemon(diagnosis, now)
-            passive = daemon is not None and diagnostics.PASSIVE in daemon.status.message
+            passive = daemon.value(diagnostics.PASSIVE) if daemon else ""
             queue = diagnosis.value("queue")
             yield Row(
                 "coordinator",
                 words.printable(diagnosis.status.name.partition(": ")[0]),
-                "passive: another coordinator works" if passive else _coordinates(diagnosis),
+                words.printable(f"passive: {passive}") if passive else _coordinates(diagnosis),
                 waiting=words.printable(queue),
                 simulated=self._simulated(diagnosis, now),
                 faults=_faults([diagnosis]),

@@ -276,7 +276,8 @@ def _state(one: Daemon) -> str:
         case "unknown":
             return "cannot be seen"
         case "serving" if one.status.get("passive"):
-            return "passive: another node does the same"
+            rivals = one.status.get("other_publishers")
+            return "passive" if rivals else "listens before it publishes"
         case other:
             return other
 

@@ -103,7 +103,7 @@ class DdsTransport(Threaded):
     ) -> DdsSubscription:
         """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
         subscription = DdsSubscription(
-            topic, any_type(received), self.dropped, others_only=others_only
+            topic, any_type(received), self.dropped, self._owners, others_only=others_only
         )
         with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
             if self._joined:
@@ -231,6 +231,14 @@ class DdsTransport(Threaded):
         self._failed = True
         self._stop.wait(LOOK_EVERY_S)
         self._join_anew()
+
+    def _owners(self, writers: list[bytes]) -> list[str]:
+        with self._lock:
+            if not self._joined:
+                return []
+            if self._node.reader is None:
+                self._keep(self._node.listen())
+            return self._node.owners(writers)
 
     def _withdraw(self, publisher: DdsPublisher, writer: DataWriter) -> None:
         """Take one writer off the graph; after close that has happened already."""

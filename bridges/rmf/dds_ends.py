@@ -107,17 +107,20 @@ class DdsPublisher:
 
 
 class DdsSubscription:
-    """The subscription of one topic. `dropped`: counts invalid samples, by topic name."""
+    """The subscription of one topic. `dropped`: counts invalid samples, by topic name.
+    `owners(guids)`: the nodes of these writers."""
 
     def __init__(
         self,
         topic: AnyTopic,
         received: Receive,
         dropped: dict[str, int],
+        owners: Callable[[list[bytes]], list[str]],
         *,
         others_only: bool,
     ) -> None:
         self.topic = topic
+        self._owners = owners
         self._others_only = others_only
         self._reader: DataReader = None
         self._received = received
@@ -144,6 +147,16 @@ class DdsSubscription:
             return len(self._reader.get_matched_publications()) if self._reader else 0
         except DDSException:
             return 0
+
+    def senders(self) -> list[str]:
+        """The nodes of these publishers; none at first, until other nodes' announcements have come."""
+        reader = self._reader
+        try:
+            handles = reader.get_matched_publications() if reader else []
+            found = [reader.get_matched_publication_data(handle) for handle in handles]
+        except DDSException:
+            return []
+        return self._owners([writer.key.bytes for writer in found if writer])
 
     def take(self) -> bool:
         """Deliver what has arrived; False if nothing had."""

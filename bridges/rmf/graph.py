@@ -6,6 +6,7 @@ which node owns which of its readers and writers, retained for late joiners. Wit
 Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publish them.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,6 +19,9 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
+from bridges.rmf.peers import MOST
+
+MOST_PARTICIPANTS: Final = 200
 PACKAGE: Final = "rmw_dds_common.msg.dds_."
 TYPE_HASH: Final = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"
 """What Iron, Jazzy and later announce for ParticipantEntitiesInfo."""
@@ -51,6 +55,9 @@ class NodeOnGraph:
     def __init__(self, participant: DomainParticipant, node_name: str) -> None:
         self._node = NodeEntitiesInfo("/", node_name, [], [])
         self._info = ParticipantEntitiesInfo(_gid(participant), [self._node])
+        self._participant = participant
+        self._owners: dict[bytes, str] = {}
+        self.reader: DataReader | None = None
         self.topic = Topic(participant, "ros_discovery_info", ParticipantEntitiesInfo)
         self.writer = DataWriter(participant, self.topic, qos=_qos())
         self.writer.write(self._info)
@@ -70,16 +77,32 @@ class NodeOnGraph:
         self._node.writer_gid_seq.remove(_gid(writer))
         self.writer.write(self._info)
 
+    def listen(self) -> DataReader:
+        """Begin to hear which node owns which writers: each participant retains its last word."""
+        self.reader = DataReader(self._participant, self.topic, qos=_qos(MOST_PARTICIPANTS))
+        return self.reader
+
+    def owners(self, writers: Iterable[bytes]) -> list[str]:
+        """The names of the nodes that own these writers (guids), as far as they were heard."""
+        assert self.reader is not None
+        for info in self.reader.take(MOST_PARTICIPANTS):
+            for node in info.node_entities_info_seq:
+                name = f"{node.node_namespace.rstrip('/')}/{node.node_name}"
+                self._owners |= {bytes(gid.data): name for gid in node.writer_gid_seq}
+        if len(self._owners) > MOST:
+            self._owners.clear()
+        return [self._owners[guid] for guid in writers if guid in self._owners]
+
 
 def _gid(entity: Entity) -> Gid:
     return Gid(list(entity.guid.bytes))
 
 
-def _qos() -> Qos:
+def _qos(depth: int = 1) -> Qos:
     return Qos(
         Policy.Reliability.Reliable(100_000_000),
         Policy.Durability.TransientLocal,
-        Policy.History.KeepLast(1),
+        Policy.History.KeepLast(depth),
         Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
         Policy.Userdata(f"typehash={TYPE_HASH};".encode()),
     )

@@ -151,4 +151,9 @@ class _Subscription:
 
     def matched(self) -> int:
         """How many publishers are heard; 0 after close."""
-        return sum(self.hears(end) for end in self._hears) if self in self._ends else 0
+        return len(self.senders())
+
+    def senders(self) -> list[str]:
+        """The nodes of these publishers."""
+        heard = self._hears if self in self._ends else []
+        return [f"/{end.node.name}" for end in heard if self.hears(end)]

@@ -163,6 +163,7 @@ class Ros2Subscription:
         self._dropped = dropped
         self._using = threading.Lock()
         self._end: RosSubscription | None = None
+        self._node: Node | None = None
 
     def create(self, node: Node) -> None:
         """Make rclpy's subscription."""
@@ -178,12 +179,12 @@ class Ros2Subscription:
             ),
         )
         with self._using:
-            self._end = made
+            self._end, self._node = made, node
 
     def drop(self) -> None:
         """Let go of rclpy's subscription: nobody uses it from then on."""
         with self._using:
-            self._end = None
+            self._end = self._node = None
 
     def would_hear(self, published: AnyTopic) -> bool:
         """Whether DDS would match this end with a publisher of that topic."""
@@ -200,6 +201,18 @@ class Ros2Subscription:
             except RuntimeError:
                 return 0
         return max(0, count - self._ends.unheard_publishers(self))
+
+    def senders(self) -> list[str]:
+        """The nodes of these publishers."""
+        with self._using:
+            node = self._node
+            try:
+                found = node.get_publishers_info_by_topic(self.topic.name) if node else []
+            except RuntimeError:
+                return []
+            ours = (node.get_namespace(), node.get_name()) if node and self.others_only else ()
+        names = [(end.node_namespace, end.node_name) for end in found]
+        return [f"{space.rstrip('/')}/{name}" for space, name in names if (space, name) != ours]
 
     def _take(self, sample: bytes) -> None:
         try:

@@ -49,6 +49,10 @@ class Subscription(Protocol):
     def matched(self) -> int:
         """How many publishers are heard here, in any process; 0 after close."""
 
+    def senders(self) -> list[str]:
+        """The nodes of these publishers, as `/namespace/name`, as far as the wire tells; from any
+        thread. Anybody can make a name up."""
+
 
 class Transport(Protocol):
     """One node on the RMF graph. `speaks`: the transport's name in a YAML. `domain_id`: its ROS domain.

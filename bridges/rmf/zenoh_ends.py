@@ -230,9 +230,14 @@ class ZenohSubscription(ZenohEnd):
 
     def matched(self) -> int:
         """How many publishers are heard; 0 after close."""
+        return len(self.senders())
+
+    def senders(self) -> list[str]:
+        """The nodes of these publishers."""
         place = self.place
         peers = list(place.peers.values()) if place else []
-        return sum(not self.others_only or peer.session != self._own_session for peer in peers)
+        ours = self._own_session if self.others_only else ""
+        return [peer.node for peer in peers if peer.session != ours]
 
     def take(self) -> None:
         """Deliver what has arrived, at most AT_ONCE samples; the rest waits for the next turn."""

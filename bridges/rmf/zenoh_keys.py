@@ -38,12 +38,14 @@ class Peer(Struct, frozen=True):
 
     `type`: the message type, with the hash where the token has one. `transient_local`: a publisher
     retains its messages; a subscription wants retained ones. `announced`: its topic, type and hash.
+    `node`: its node, as `/namespace/name`.
     """
 
     session: str
     type: str
     transient_local: bool
     announced: Announced
+    node: str
 
 
 class Keys(Protocol):
@@ -122,7 +124,8 @@ class RmwZenoh:
         kind = parts[10].replace("::msg::dds_::", "/msg/").removesuffix("_")
         topic = parts[9].strip("%").replace("%", "/")
         announced = Announced(topic, kind, parts[11], parts[5] == "MP")
-        return Peer(parts[2], "/".join(parts[10:12]), qos[1] == "1", announced)
+        node = f"{parts[7].replace('%', '/').rstrip('/')}/{parts[8]}"
+        return Peer(parts[2], "/".join(parts[10:12]), qos[1] == "1", announced, node)
 
 
 class Ros2Dds:
@@ -169,7 +172,8 @@ class Ros2Dds:
         found = HASH.search(parts[6])
         topic, kind = parts[4].replace("§", "/"), parts[5].replace("§", "/")
         announced = Announced(topic, kind, found[1] if found else "", parts[3] == "MP")
-        return Peer(parts[1], parts[5], qos[2] == "1", announced)
+        node = f"a node behind the zenoh bridge {parts[1]}"
+        return Peer(parts[1], parts[5], qos[2] == "1", announced, node)
 
 
 WAYS: Final[dict[str, type[RmwZenoh] | type[Ros2Dds]]] = {

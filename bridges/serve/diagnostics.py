@@ -6,8 +6,8 @@ names the faults. The values are the status file's, with each fault's detail und
 LiftState, DoorState and ChargerState have no fields for this.
 
     OK      the input is read, and there is no fault
-    WARN    the daemon: it is a simulation, or leaves its work to another node
-    ERROR   the device has faults; the daemon: it cannot keep what a restart must not forget
+    WARN    the daemon: it is a simulation, or only listens in its quiet start
+    ERROR   the device or the daemon has faults: it cannot publish, or another node does its work
     STALE   its input has not been read yet
 """
 

@@ -170,10 +170,13 @@ class GraphNode(Generic[S, L, M, E, R]):
             "other_publishers": self.presence.rivals,
             "refused": self.refused,
             **self._answers.status(),
-            "faults": [{"code": f.code, "detail": f.detail} for f in self._keeper.faults],
+            "faults": [{"code": f.code, "detail": f.detail} for f in self._faults()],
             "heard_by": self._heard_by(),
             "hears": {name: end.matched() for name, end in self._hears.items()},
         }
+
+    def _faults(self) -> tuple[Fault, ...]:
+        return *self.presence.faults, *self._keeper.faults
 
     def devices(self) -> Mapping[str, Status]:
         """For the status file, from any thread: each subject by name."""
@@ -226,7 +229,8 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _may_speak(self) -> MaySpeak:
         alone = self.alone is None or self.alone.may_speak
-        return MaySpeak(self.presence.may_speak, self._must_at_once(), alone)
+        presence = self.presence
+        return MaySpeak(presence.may_speak, self._must_at_once(), alone, presence.waits)
 
     def _must_at_once(self) -> bool:
         """Is there something that cannot wait for the end of the quiet start, and no rival?"""

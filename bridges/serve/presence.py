@@ -7,37 +7,58 @@ publishers declared, so that a waiting node is not counted as a rival.
 import logging
 import random
 from collections.abc import Iterable
+from typing import Final
 
+from bridges.core.decision import Fault
 from bridges.core.durations import AGES_AGO, NEVER
+from bridges.core.graph_kind import LISTENS
+from bridges.core.names import LONGEST_NAME
 from bridges.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Subscription, Transport
+from bridges.rmf.words import printable
+from bridges.serve import diagnostics
 
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S = 0.25
 """How often to look for other nodes on the graph."""
+MOST_NAMED: Final = 3
 SPREAD_LEAST_S, SPREAD_MOST_S = 0.5, 3.0
 """Extra listening time after meeting a rival: longer than discovery takes, and random."""
 
 
 class Presence:
-    """Looks for rivals. `kind`: for the log. `rivals`: how many other nodes publish our topics."""
+    """Looks for rivals. `kind`: for the log. `rivals`: how many other nodes publish our topics.
+    `rivals_do`: who they are, and what they publish: `/desk publishes lift_requests`; "" for nobody."""
 
     def __init__(self, kind: str, quiet_s: float) -> None:
         self.may_speak = False
         self.rivals = 0
+        self.rivals_do = ""
         self.look_at = AGES_AGO
         self._kind = kind
         self._quiet_s = quiet_s
         self._spread_s = 0.0
         self._alone_since: float | None = None
-        self._ends: list[Subscription] = []
+        self._ends: dict[str, Subscription] = {}
 
     def listen(self, transport: Transport, sole: Iterable[Topic[Message]]) -> None:
         """Count the publishers of these topics from now on."""
-        self._ends += [transport.subscribe(topic, _ignore, others_only=True) for topic in sole]
+        for topic in sole:
+            self._ends[topic.name] = transport.subscribe(topic, _ignore, others_only=True)
+
+    @property
+    def waits(self) -> str:
+        """What those wait for that wait for us, while we may not speak."""
+        return f"while {self.rivals_do}" if self.rivals else LISTENS
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """PASSIVE, while a rival keeps us silent: it may be one that does nothing."""
+        detail = f"{self.rivals_do}, so this node only listens"
+        return (Fault(diagnostics.PASSIVE, detail),) if self.rivals else ()
 
     def look(self, now: float) -> None:
         """Look, if it is due."""
@@ -50,15 +71,23 @@ class Presence:
         self._set(now >= speak_at)
 
     def _count(self, now: float) -> None:
-        before, self.rivals = self.rivals, sum(end.matched() for end in self._ends)
+        before, did = self.rivals, self.rivals_do
+        self.rivals = sum(end.matched() for end in self._ends.values())
+        self.rivals_do = self._named() if self.rivals else ""
         if self.rivals:
             self._alone_since = None
         elif self._alone_since is None:
             self._alone_since = now
-        if self.rivals and not before:
-            log.warning(pairs("passive", kind=self._kind, reason="another node does the same"))
+        if self.rivals and self.rivals_do != did:
+            log.warning(pairs("passive", kind=self._kind, reason=self.rivals_do))
         elif before and not self.rivals:
             log.info(pairs("other_node_gone", kind=self._kind))
+
+    def _named(self) -> str:
+        heard = {topic: end for topic, end in self._ends.items() if end.matched()}
+        names = sorted({name for end in heard.values() for name in end.senders()})
+        who = " and ".join(printable(name[:LONGEST_NAME]) for name in names[:MOST_NAMED])
+        return f"{who or 'another node'} publishes {' and '.join(heard)}"
 
     def _set(self, yes: bool) -> None:
         """Two nodes that began at once both fall silent; by chance one returns before the other."""

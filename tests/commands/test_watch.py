@@ -297,9 +297,9 @@ def test_the_coordinator_has_a_row_with_its_queue_its_faults_and_whether_it_assi
     }
 
     def told(passive: bool) -> d.DiagnosticArray:
-        return diagnosis(
-            "coordinator", "charger_coordinator", {"passive": passive}, {"": site}, d.Time()
-        )
+        faults = [{"code": "PASSIVE", "detail": "/other publishes charger_requests"}]
+        daemon = {"passive": True, "faults": faults} if passive else {}
+        return diagnosis("coordinator", "charger_coordinator", daemon, {"": site}, d.Time())
 
     row = Row(
         "coordinator",
@@ -309,7 +309,7 @@ def test_the_coordinator_has_a_row_with_its_queue_its_faults_and_whether_it_assi
         faults="STATION_SILENT (b: no ChargerState comes)",
     )
     assert board(told(passive=False)).rows(100.0, WALL) == [row]
-    passive = replace(row, state="passive: another coordinator works")
+    passive = replace(row, state="passive: /other publishes charger_requests")
     assert board(told(passive=True)).rows(100.0, WALL) == [passive]
     site["assigns"] = "no: another node publishes charging_assignments"
     site["schedule"] = "22:00-05:00 tiny to 98 %: under way"

@@ -169,7 +169,7 @@ def test_a_lift_that_stands_because_a_relay_came_on_too_often_says_so() -> None:
     for at, floor in enumerate(["L3", "L4", "L3", "L4"]):
         story.run(2.0 + at)
         story.asks("A", floor)
-    said = []
+    said: list[tuple[object, ...]] = []
     while story.now < 64.0:
         story.run(story.now + 0.5)
         status = story.node.status()

@@ -29,6 +29,9 @@ class Late:
     def matched(self) -> int:
         return self._seen[0]
 
+    def senders(self) -> list[str]:
+        return self._end.senders()
+
 
 class LateTransport(MemoryTransport):
     """A node whose view of the graph lags."""

@@ -135,6 +135,17 @@ def test_others_only_leaves_out_the_nodes_own_messages(join: Join) -> None:
     assert (everything.matched(), others_only.matched()) == (2, 1)
 
 
+def test_a_subscription_knows_the_nodes_that_send_to_it_and_leaves_itself_out(join: Join) -> None:
+    ours, other = join("ours"), join("other")
+    heard = ours.subscribe(HEARD, print, others_only=True)
+    ours.publisher(HEARD)
+    assert heard.senders() == []
+    voice = other.publisher(HEARD)
+    wait_until(lambda: heard.senders() == [f"/{other.name}"], "the sender has a name")
+    voice.close()
+    wait_until(lambda: heard.senders() == [], "it has gone")
+
+
 def test_matches_are_counted_up_and_down(join: Join) -> None:
     publisher = join("speaker").publisher(HEARD)
     assert publisher.matched() == 0

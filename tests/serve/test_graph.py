@@ -91,8 +91,12 @@ def test_while_another_publishes_it_is_passive_and_says_so_once(
     rival.publisher(LIFT_REQUESTS)
     site.until(4.5)
     site.asks()
+    assert site.node.devices()["Lift1"]["waits"] == "while /rival publishes lift_requests"
     site.until(60.0)
-    assert (site.sent, site.node.status()["passive"]) == ([], True)
+    status = site.node.status()
+    detail = "/rival publishes lift_requests, so this node only listens"
+    assert (site.sent, status["passive"]) == ([], True)
+    assert status["faults"] == [{"code": "PASSIVE", "detail": detail}]
     rival.close()
     site.until(60.25)
     site.asks()
@@ -103,7 +107,7 @@ def test_while_another_publishes_it_is_passive_and_says_so_once(
     ours = [r.getMessage() for r in caplog.records if r.name.startswith("bridges.serve.")]
     assert [text for text in ours if not text.startswith("state")] == [
         "active kind=lift_supervisor",
-        'passive kind=lift_supervisor reason="another node does the same"',
+        'passive kind=lift_supervisor reason="/rival publishes lift_requests"',
         "other_node_gone kind=lift_supervisor",
         "active kind=lift_supervisor",
     ]
@@ -281,6 +285,7 @@ def test_the_status_says_who_holds_each_lift_who_waits_and_what_is_wrong() -> No
             "session": "fleet/a",
             "holder": "fleet/a (5 s)",
             "waiting": "fleet/b (5 s)",
+            "waits": "for the lift's states",
             "faults": [{"code": "LIFT_SILENT", "detail": "no LiftState comes"}],
             "input_age_s": 5.0,
         }
@@ -305,10 +310,12 @@ def test_faults_are_logged_when_they_come_and_when_they_go(
     lines = [r.getMessage() for r in caplog.records if "Lift1" in r.getMessage()]
     assert lines == [
         "state subject=Lift1 session=- holder=- waiting=-",
-        'state subject=Lift1 session=- holder="fleet/a (0 s)" waiting=-',
+        'state subject=Lift1 session=- holder="fleet/a (0 s)" waiting=-'
+        ' waits="for the lift to take fleet/a"',
         'state subject=Lift1 session=fleet/a holder="fleet/a (0 s)" waiting=-',
         'fault subject=Lift1 code=LIFT_SILENT detail="no LiftState comes"',
-        'state subject=Lift1 session=fleet/a holder="fleet/a (6 s)" waiting="fleet/b (0 s)"',
+        'state subject=Lift1 session=fleet/a holder="fleet/a (6 s)" waiting="fleet/b (0 s)"'
+        ' waits="for the lift\'s states"',
         'fault_over subject=Lift1 code=LIFT_SILENT detail="no LiftState comes"',
     ]
 

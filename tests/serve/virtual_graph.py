@@ -197,7 +197,12 @@ class _End:
 
     def matched(self) -> int:
         """How many publishers other nodes have on the topic."""
-        return len(self._node.world.publishers[self._topic.name] - {self._node.name})
+        return len(self.senders())
+
+    def senders(self) -> list[str]:
+        """Those nodes."""
+        others = self._node.world.publishers[self._topic.name] - {self._node.name}
+        return sorted(f"/{name}" for name in others)
 
     def close(self) -> None:
         self._node.world.publishers[self._topic.name].discard(self._node.name)
