@@ -3,8 +3,10 @@
 import codecs
 import logging
 import os
+import re
 import sys
-from collections.abc import Iterator, Mapping, Set
+import time
+from collections.abc import Callable, Iterator, Mapping, Set
 from datetime import UTC, datetime
 from enum import Enum
 
@@ -135,10 +137,52 @@ class _OthersOnce(logging.Filter):
         return first
 
 
+class Seldom(logging.Filter):
+    """Holds back a line that keeps coming: OFTEN times it passes, then once in AGAIN_S, with the number
+    of those left out. It keeps coming while never more than PAUSE_S lie between two.
+
+    A device that comes and goes each second would fill the disk. Lines are equal that differ only in
+    seconds. `now`: monotonic s.
+    """
+
+    OFTEN, PAUSE_S, AGAIN_S, MOST = 6, 10.0, 600.0, 1000
+    SECONDS = re.compile(r"\d+(\.\d+)? s\b")
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._now = now
+        self._runs: dict[str, _Run] = {}
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        now, text = self._now(), self.SECONDS.sub("", record.getMessage())
+        run = self._runs.pop(text, None)
+        if run is None or now - run.last_at > self.PAUSE_S:
+            run = _Run()
+        self._runs[text] = run  # the newest last
+        if len(self._runs) > self.MOST:
+            del self._runs[next(iter(self._runs))]
+        run.times, run.last_at = run.times + 1, now
+        if run.times > self.OFTEN and now - run.told_at < self.AGAIN_S:
+            run.left_out += 1
+            return False
+        if run.left_out and isinstance(record.msg, Line):
+            record.msg = pairs(record.msg.event, **record.msg.values, left_out=run.left_out)
+        run.told_at, run.left_out = now, 0
+        return True
+
+
+class _Run(msgspec.Struct):
+    times: int = 0
+    last_at: float = 0.0
+    told_at: float = 0.0
+    left_out: int = 0
+
+
 def start(level: str = "INFO", *, json: bool = False) -> None:
     """Send every log line to stderr, as text or as JSON."""
     to_stderr = logging.StreamHandler(sys.stderr)
     journal = "JOURNAL_STREAM" in os.environ
     to_stderr.setFormatter(_Json(journal) if json else _Formatter(journal))
     to_stderr.addFilter(_OthersOnce())
+    to_stderr.addFilter(Seldom())
     logging.basicConfig(level=level, handlers=[to_stderr], force=True)

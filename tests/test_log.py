@@ -10,7 +10,7 @@ from msgspec import Struct
 from bridges.core.decision import OperatorReset
 from bridges.door.signals import DoorOutputs
 from bridges.lift.signals import LiftOutputs, Side
-from bridges.log import _Formatter, _Json, pairs, plain
+from bridges.log import Seldom, _Formatter, _Json, pairs, plain
 from bridges.rmf.definitions import LiftMode
 
 
@@ -19,6 +19,29 @@ class Asked(Struct, frozen=True):
     agv: bool
     at: float = 0.0
     floors: tuple[str, ...] = ()
+
+
+def test_a_line_that_keeps_coming_is_held_back_and_its_number_is_told() -> None:
+    now = 0.0
+    seldom, passed = Seldom(lambda: now), []
+    for second in range(1300):
+        now = float(second)
+        for text in [pairs("lost", device="ward", for_s=f"{second} s")] + ["other"] * (
+            second == 700
+        ):
+            record = logging.LogRecord("bridges", logging.INFO, "", 0, text, None, None)
+            if seldom.filter(record):
+                passed.append((second, record.getMessage()))
+    said = [(at, f'lost device=ward for_s="{at} s"') for at in range(6)]
+    assert passed == [
+        *said,
+        (605, 'lost device=ward for_s="605 s" left_out=599'),
+        (700, "other"),
+        (1205, 'lost device=ward for_s="1205 s" left_out=599'),
+    ]
+    now = 1311.0
+    record = logging.LogRecord("bridges", logging.INFO, "", 0, said[0][1], None, None)
+    assert seldom.filter(record)
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,8 @@ class Row(Struct, frozen=True):
     """One device, the charger coordinator, or a robot with its assigned place.
 
     `waiting`: who waits, or what the one that has it waits for. `age`: age of the reading.
-    `mark`: why the row may be wrong. `simulated`: no hardware is behind it. `faults`: those that its daemons report.
+    `mark`: why the row may be wrong. `simulated`: no hardware is behind it.
+    `faults`: those that its daemons report.
     """
 
     kind: str

@@ -50,7 +50,7 @@ def _not_passed_on(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -
     if "lift_supervisor" in lift.waits(clock.now):
         found.say(
             "Its supervisor does not pass the request on.",
-            Step("the supervisor", "pass it on, once what it says below is so"),
+            Step("a person", "end what it waits for; `rmf-bridge status` on its machine says how"),
         )
     elif lift.supervisor_last is None:
         found.say(

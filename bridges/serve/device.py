@@ -5,7 +5,7 @@ owns the device's bus calls it; nothing here waits or keeps a thread.
 """
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Generic
 
 from bridges.core.decision import (
@@ -37,11 +37,14 @@ from bridges.serve.subject import Core, Publish, Status, Subject
 from bridges.serve.witness import NOBODY, Nobody
 from drivers import Driver, DriverError
 
+NotSent = Callable[[Topic[Message], Exception], None]
+
 log = logging.getLogger(__name__)
 
 
 class Node(Generic[S, L, M, X, E, O, R]):
-    """Serves one device. `publish(topic, message)` sends to RMF and does not raise."""
+    """Serves one device. `publish(topic, message)` sends to RMF and does not raise.
+    `not_sent(topic, error)`: is told why a state cannot be."""
 
     def __init__(
         self,
@@ -53,6 +56,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         publish: Publish,
         clock: Clock,
         witness: Nobody = NOBODY,
+        not_sent: NotSent = lambda topic, error: None,
     ) -> None:
         self.name = name
         self.wake_at = AGES_AGO
@@ -60,6 +64,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._settings = settings
         self._driver = Contained(name, driver, clock)
         self._publish = publish
+        self._not_sent = not_sent
         self._clock = clock
         self._refusals = Refusals()
         memory = kind.initial(limits, clock.monotonic())
@@ -202,7 +207,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         try:
             at = self._clock.stamp(report.read_at)
         except ClockError as error:
-            log.error(pairs("not_published", topic=self._kind.states.name, reason=error))
+            self._not_sent(self._kind.states, error)
             return False
         state = self._kind.state_message(self.name, self._settings, report, at)
         return self._publish(self._kind.states, state) is not False

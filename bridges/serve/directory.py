@@ -154,6 +154,11 @@ class Once:
         if self._wrong.pop(what, None) is not None:
             log.info(pairs(self._again, **{self._key: what}))
 
+    @property
+    def wrong(self) -> Mapping[str, str]:
+        """What fails now, and why; from any thread."""
+        return self._wrong.copy()
+
 
 class RuntimeDirectory:
     """One process's lock, status and record.

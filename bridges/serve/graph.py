@@ -176,7 +176,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         }
 
     def _faults(self) -> tuple[Fault, ...]:
-        return *self.presence.faults, *self._keeper.faults
+        return *self.presence.faults, *self._outlet.faults, *self._keeper.faults
 
     def devices(self) -> Mapping[str, Status]:
         """For the status file, from any thread: each subject by name."""
@@ -332,7 +332,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         try:
             stamped = self._kind.stamped(message, stamp(self._clock.wall()))
         except ClockError as error:
-            log.error(pairs("not_published", topic=topic.name, reason=error))
+            self._outlet.failed(topic, error)
             return
         self._outlet.publish(topic, stamped)
 

@@ -4,6 +4,7 @@ import logging
 import threading
 from collections.abc import Callable, Iterable
 
+from bridges.core.decision import Fault
 from bridges.rmf.definitions import Message
 from bridges.rmf.instead import INSTEAD, converted
 from bridges.rmf.topics import Topic
@@ -38,18 +39,28 @@ class Outlet:
                 self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> bool:
-        """Publish; False when it was not sent. That is logged once: the next one may get through."""
+        """Publish; False when it was not sent: a fault until the next one gets through."""
         way, wanted = self._way(topic, message)
         if wanted is None:
             return True
         try:
             self._end(way).publish(wanted)
         except TransportError as error:
-            self._once.failed(topic.name, error)
+            self.failed(topic, error)
             return False
         self._once.works(topic.name)
         self._witness.spoken(self._named(way).name, wanted, sent=True)
         return True
+
+    def failed(self, topic: Topic[Message], error: Exception) -> None:
+        """Note that a message was not published; the first one is logged."""
+        self._once.failed(topic.name, error)
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """NOT_PUBLISHED, for each topic whose last message was not; from any thread."""
+        failing = sorted(self._once.wrong.items())
+        return tuple(Fault("NOT_PUBLISHED", f"{topic}: {why}") for topic, why in failing)
 
     def _way(
         self, topic: Topic[Message], message: Message

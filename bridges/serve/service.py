@@ -165,6 +165,7 @@ class Devices:
         return {
             "requests_for_others": self._strangers["requests"],
             "events_dropped": sum(loop.inbox.dropped for loop in self._loops),
+            "faults": [{"code": f.code, "detail": f.detail} for f in self._outlet.faults],
             "heard_by": self._outlet.heard_by(),
             "hears": {name: end.matched() for name, end in self._hears.items()},
         }
@@ -190,8 +191,10 @@ class Devices:
         driver = driver_type.create(name, device, bus)
         if name in self._unsafe:
             driver = SafeFirst(name, driver)
-        publish, clock = self._outlet.publish, self._clock
-        return Node(name, self._kind, device, limits, driver, publish, clock, self._witness)
+        out, clock, witness = self._outlet, self._clock, self._witness
+        return Node(
+            name, self._kind, device, limits, driver, out.publish, clock, witness, out.failed
+        )
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
         """A callback for the transport's thread. States of others' devices are not counted."""

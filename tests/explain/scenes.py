@@ -16,6 +16,7 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.stamps import stamp
 from tests.explain.scene import Guest, Scene
+from tests.site.network import Place
 from tests.site.timeline import EPOCH
 
 Case = tuple[list[Heard], Kind, str]
@@ -138,6 +139,17 @@ def no_supervisor() -> Case:
     scene = Scene("Lift1")
     scene.supervisors["lift_supervisor"].kill()
     scene.run(1.0)
+    scene.heard.clear()
+    scene.robot("fleet/red").asks("Lift1", "L2")
+    scene.run(20.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def supervisor_is_passive() -> Case:
+    """A node that does nothing else has a publisher on `lift_requests`, so our supervisor is silent."""
+    scene = Scene("Lift1")
+    Place(scene.air, "forgotten_pub", lambda: None).publisher(topics.LIFT_REQUESTS)
+    scene.run(5.0)
     scene.heard.clear()
     scene.robot("fleet/red").asks("Lift1", "L2")
     scene.run(20.0)
@@ -293,6 +305,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         unknown_floor,
         foreign_node_refuses,
         no_supervisor,
+        supervisor_is_passive,
         reading_is_old,
         nobody_publishes,
         daemon_is_gone,
