@@ -8,7 +8,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TextIO
 
@@ -39,6 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
     parser.add_argument("--json", action="store_true", help="for programs")
+    parser.add_argument(
+        "--form",
+        type=Path,
+        metavar="OUT",
+        help="also write the form of docs/hardware.md, for a person",
+    )
     parser.add_argument(
         "--scan", action="store_true", help="ask every unit or node of a bus, not only 1 to 16"
     )
@@ -94,6 +100,18 @@ def run(args: argparse.Namespace) -> int:
         return INTERRUPTED
     if args.json:
         print(json.dumps(msgspec.to_builtins(found)))
+    return _form(config, found, args.form) if args.form else exit_code(found)
+
+
+def _form(config: Config, found: Sequence[Finding], out: Path) -> int:
+    from bridges.commands.doctoring.form import form
+    from bridges.commands.doctoring.machine import Machine
+    from bridges.commands.written import not_written
+
+    try:
+        out.write_text(form(config, found, Machine()), encoding="utf-8")
+    except OSError as error:
+        return not_written(out, error.strerror)
     return exit_code(found)
 
 

@@ -328,7 +328,7 @@ def test_a_lost_transport_is_logged_and_does_not_end_the_daemon(
     site.adapter.publish(LiftRequest("Lift1", stamp(WALL + 3.0), "fleet/a", 1, "L3", 2))
     site.transport.close()
     site.node.round()
-    site.until(63.0)
+    site.until(12.0)
     lines = [r.getMessage() for r in caplog.records if "not_published" in r.getMessage()]
     assert [line[:33] for line in lines] == ["not_published topic=lift_requests"]
     assert [fault["code"] for fault in site.node.status()["faults"]] == ["NOT_PUBLISHED"]
