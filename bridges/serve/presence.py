@@ -18,7 +18,6 @@ from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Subscription, Transport
 from bridges.rmf.words import printable
-from bridges.serve import diagnostics
 
 log = logging.getLogger(__name__)
 
@@ -57,8 +56,9 @@ class Presence:
     @property
     def faults(self) -> tuple[Fault, ...]:
         """PASSIVE, while a rival keeps us silent: it may be one that does nothing."""
-        detail = f"{self.rivals_do}, so this node only listens"
-        return (Fault(diagnostics.PASSIVE, detail),) if self.rivals else ()
+        if not self.rivals:
+            return ()
+        return (Fault("PASSIVE", f"{self.rivals_do}, so this node only listens"),)
 
     def look(self, now: float) -> None:
         """Look, if it is due."""
