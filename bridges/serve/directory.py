@@ -131,6 +131,7 @@ class Once:
     """Logs one line when a write fails, and one when it works again; the daemon runs on.
 
     `fails`, `again`: the two events; `key`: of what is written; `level`: of the first.
+    `wrong`: what fails now, and why.
     """
 
     def __init__(
@@ -140,24 +141,19 @@ class Once:
         key: str = "what",
         level: int = logging.WARNING,
     ) -> None:
-        self._wrong: dict[str, str] = {}
+        self.wrong: dict[str, str] = {}
         self._fails, self._again, self._key, self._level = fails, again, key, level
 
     def failed(self, what: str, error: Exception) -> None:
         """Note a failed attempt; the caller will try again."""
-        if what not in self._wrong:
+        if what not in self.wrong:
             log.log(self._level, pairs(self._fails, **{self._key: what}, reason=error))
-        self._wrong[what] = str(error)
+        self.wrong[what] = str(error)
 
     def works(self, what: str) -> None:
         """Note a successful attempt."""
-        if self._wrong.pop(what, None) is not None:
+        if self.wrong.pop(what, None) is not None:
             log.info(pairs(self._again, **{self._key: what}))
-
-    @property
-    def wrong(self) -> Mapping[str, str]:
-        """What fails now, and why; from any thread."""
-        return self._wrong.copy()
 
 
 class RuntimeDirectory:

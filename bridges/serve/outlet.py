@@ -59,7 +59,7 @@ class Outlet:
     @property
     def faults(self) -> tuple[Fault, ...]:
         """NOT_PUBLISHED, for each topic whose last message was not; from any thread."""
-        failing = sorted(self._once.wrong.items())
+        failing = sorted(self._once.wrong.copy().items())
         return tuple(Fault("NOT_PUBLISHED", f"{topic}: {why}") for topic, why in failing)
 
     def _way(
