@@ -130,9 +130,7 @@ def _replace(path: Path, content: bytes) -> None:
 class Once:
     """Logs one line when a write fails, and one when it works again; the daemon runs on.
 
-    `fails`, `again`: the two events; `key`: of what is written; `level`: of the first.
-    `wrong`: what fails now, and why.
-    """
+    `fails`, `again`: the two events; `key`: of what is written; `level`: of the first. `wrong`: by it."""
 
     def __init__(
         self,
