@@ -130,7 +130,7 @@ def _replace(path: Path, content: bytes) -> None:
 class Once:
     """Logs one line when a write fails, and one when it works again; the daemon runs on.
 
-    `fails`, `again`: the two events; `key`: of what is written; `level`: of the first. `wrong`: by it."""
+    `fails`, `again`: the events; `key`: of what is written; `level`: of the first; `wrong`: it, why."""
 
     def __init__(
         self,
