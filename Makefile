@@ -19,6 +19,7 @@ help:
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
+	@echo "             (KILL_EVERY=27: nothing goes wrong but that RMF's lift supervisor dies so often)"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
 	@echo "make test-vm  boot Debian 13 in QEMU, install our package, and kill and hang it there (ARCH=arm64)"
 	@echo "             (one of its machines: ONLY=lift, ONLY=site)"
@@ -118,7 +119,7 @@ flood: .venv/ready
 
 # Without SEED one is drawn, and printed.
 soak: .venv/ready
-	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED)) $(if $(RMF),--rmf $(RMF))
+	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED)) $(if $(RMF),--rmf $(RMF)) $(if $(KILL_EVERY),--kill-every $(KILL_EVERY))
 
 torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))

@@ -10,8 +10,8 @@ from bridges.rmf import definitions as d
 from bridges.rmf import topics
 
 HAZARDS: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
-GRACE_S: Final = 5.0
-"""The longest `release_grace_s`: until then the same session may resume."""
+GRACE_S: Final = 65.0
+"""Until then the same session may resume: its robot may have been left in the car."""
 LATE_S: Final = 5.0
 """An END may have been sent this long before the session was shown."""
 FLOORS: Final = 8
@@ -209,7 +209,7 @@ class LiftScene(Scene[d.LiftState]):
         keep(self.asks, session, ask)
         if session != self.session:
             self.other_asked_at = self.now if direct else self.other_asked_at
-        elif direct:
+        else:
             self.ending = Ending()
         if session == self.session and moved:
             self.reopened.clear()

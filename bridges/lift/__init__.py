@@ -40,6 +40,7 @@ RECORDED: Recorded = {
     "lift.memory.Forgotten": memory.Forgotten,
     "lift.memory.Grace": memory.Grace,
     "lift.memory.Memory": memory.Memory,
+    "lift.memory.OwnWords": memory.OwnWords,
     "lift.memory.Position": memory.Position,
     "lift.memory.Relays": memory.Relays,
     "lift.memory.Senses": memory.Senses,

@@ -4,11 +4,16 @@ Rules, in the order in which they are applied:
 1. While the lift is free, the first request gets a session, unless an obstacle (rule 4) is present.
    Requests of the same session refresh it; those of other sessions are refused. Only its own END ends
    a session: no hazard, fault or timeout does. A session in HUMAN mode has no outputs.
-2. END ends the session at once. AGV mode and the door's hold may stay on for `release_grace_s`. During
-   that time only the same session is granted, even in a fire. The reason: a supervisor that restarts
-   sends END for a robot that is still inside, and that robot must get out.
-   If RMF's supervisor asks for a session other than the one that has the lift, the requests and END
-   of the holder's own robot count as well (`bridges/lift/forgotten.py`).
+2. END ends the session at once, unless it is older than the session. AGV mode and the door's hold may
+   stay on for `release_grace_s`. During that time only the same session is granted, even in a fire.
+   The reason: a supervisor that restarts sends END for a robot that is still inside, and that robot
+   must get out. For the same reason (`bridges/lift/forgotten.py`):
+   - An END on `lift_requests` does not end the session of a robot that may be inside while that robot
+     itself goes on asking. The session ends by the robot's own END, a person's, or its silence.
+   - If RMF's supervisor asks for a session other than the one that has the lift, or has ended it, the
+     requests and END of the holder's own robot count as well.
+   - After an END in mid-ride, as a new fleet adapter sends it, the lift waits longer for that robot:
+     until IN_CAR_S after its last word. Nothing is energised after `release_grace_s`.
 3. A request sets the destination and the mode. While the door is held, another destination may have
    to wait (`bridges/lift/replayed.py`). `bridges/lift/drive.py` says what may be energised.
 4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and its
@@ -30,7 +35,6 @@ Rules, in the order in which they are applied:
 from msgspec.structs import replace
 
 from bridges.core.decision import (
-    RELEASED_LATELY,
     STARTING,
     Decision,
     Fault,
@@ -43,11 +47,18 @@ from bridges.core.decision import (
     WriteFailed,
 )
 from bridges.core.durations import NEVER, RIVAL_QUIET_S
-from bridges.lift import drive, forgotten, replayed
-from bridges.lift.memory import Grace, LiftLimits, Memory, Session
+from bridges.lift import drive, forgotten, sessions
+from bridges.lift.memory import LiftLimits, Memory, Session
 from bridges.lift.report import NOT_FRESH, LiftReport, report
 from bridges.lift.sensing import HAZARDS, View, gap, look, take, trust, unsure
-from bridges.lift.signals import Event, FromAdapter, Hazard, LiftOutputs, LiftSample, Requested
+from bridges.lift.signals import (
+    Event,
+    FromAdapter,
+    Hazard,
+    LiftOutputs,
+    LiftSample,
+    Requested,
+)
 from bridges.rmf.definitions import Bool, EmergencySignal
 from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER
 
@@ -74,7 +85,7 @@ def decide(
 ) -> Decision[Memory, LiftOutputs, LiftReport]:
     """One scan: take in the event, look at the inputs, derive outputs and report afresh."""
     alarmed_before = memory.alarmed
-    memory, refused = _take(memory, event, now, limits)
+    memory, refused = _take(sessions.lapse(memory, now, limits), event, now, limits)
     view = look(memory.senses, now, limits)
     memory = _latch(memory, view, now, limits)
     allowed = not obstacles(memory, view, now, limits)
@@ -92,9 +103,12 @@ def decide(
 def published(memory: Memory, shown: LiftReport) -> Memory:
     """The memory once this report was sent. After OPEN at the destination a robot may be inside."""
     session = memory.session
-    if session is None or shown.open_at != session.destination:
+    if session is None or not shown.open_at:
         return memory
-    return replace(memory, session=replace(session, boarded=True))
+    boarded = session.boarded or shown.open_at == session.destination
+    robot = session.robot
+    robot = replace(robot, opened=robot.opened or shown.open_at == robot.floor)
+    return replace(memory, session=replace(session, boarded=boarded, robot=robot))
 
 
 def obstacles(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
@@ -155,10 +169,10 @@ def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple
         case OperatorReset():
             return _reset(memory, now, limits), ""
         case Requested():
-            return _ask(memory, event, now, limits)
+            return sessions.ask(memory, event, now, lambda: _why_not(memory, now, limits))
         case FromAdapter():
-            return _hear_adapter(memory, event, now, limits), ""
-    return _end(memory, event.session_id, now, limits)
+            return sessions.hear_adapter(memory, event.asked, now, limits), ""
+    return sessions.end(memory, event, now, limits)
 
 
 def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) -> Memory:
@@ -172,82 +186,14 @@ def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) ->
     )
 
 
-def _ask(memory: Memory, request: Requested, now: float, limits: LiftLimits) -> tuple[Memory, str]:
-    held, grace = memory.session, memory.grace
-    if held and held.id != request.session_id:
-        session = forgotten.overruled(held, request.session_id, now)
-        return replace(memory, session=session), f"held by another session: {held.id}"
-    if held:
-        return replace(memory, session=_heed(memory, held, request, now)), ""
-    if grace and now < grace.until:
-        if grace.session.id != request.session_id:
-            return memory, f"{RELEASED_LATELY}: by {grace.session.id}"
-        session = _heed(memory, _anew(grace.session, now), request, now)
-        return replace(memory, session=session, grace=None), ""
+def _why_not(memory: Memory, now: float, limits: LiftLimits) -> str:
+    """Why nobody gets a lift that is free; "" if somebody may."""
     view = look(memory.senses, now, limits)
     why_not = obstacles(memory, view, now, limits)
-    if why_not:
-        starting = view.settling and not memory.io_fault and why_not[0].code == NOT_FRESH
-        return memory, STARTING if starting else why_not[0].code
-    session = Session(request.session_id, request.agv, request.destination, now)
-    return replace(memory, session=session, grace=None), ""
-
-
-def _heed(memory: Memory, session: Session, request: Requested, now: float) -> Session:
-    """The session once `lift_requests` asks for it."""
-    own = memory.own.get(session.id, "")
-    held_open = memory.relays.hold.on is not None
-    doubted = replayed.doubt(session, request, own, held_open, now)
-    heeded = replace(session, asked_at=now) if doubted else _refresh(session, request, now)
-    return replace(heeded, forgotten=None, doubted=doubted)
-
-
-def _hear_adapter(memory: Memory, event: FromAdapter, now: float, limits: LiftLimits) -> Memory:
-    """A robot's own request: it counts for the session that has the lift, if that is forgotten, or if
-    it settles a doubt."""
-    held, asked = memory.session, event.asked
-    memory = replace(memory, own=replayed.noted(memory.own, asked))
-    if held is None or held.id != asked.session_id:
-        return memory
-    session, obeyed = forgotten.heard(held, event)
-    if not (obeyed or replayed.confirmed(session, asked)):
-        return replace(memory, session=session)
-    if isinstance(asked, Requested):
-        return replace(memory, session=_refresh(session, asked, now))
-    return _end(memory, asked.session_id, now, limits)[0]
-
-
-def _refresh(session: Session, request: Requested, now: float) -> Session:
-    """A repeat only shows that RMF is alive. A different destination or mode is a new request."""
-    if (request.agv, request.destination) == (session.agv, session.destination):
-        return replace(session, asked_at=now)
-    fresh = replace(_anew(session, now), agv=request.agv, destination=request.destination)
-    return replace(fresh, forgotten=session.forgotten)
-
-
-def _anew(session: Session, now: float) -> Session:
-    """The session as if it were granted now, but for what is known of its robot."""
-    return Session(
-        session.id,
-        session.agv,
-        session.destination,
-        now,
-        boarded=session.boarded,
-        own_stamp=session.own_stamp,
-    )
-
-
-def _end(memory: Memory, session_id: str, now: float, limits: LiftLimits) -> tuple[Memory, str]:
-    held = memory.session
-    if held is None or not session_id:
-        return memory, ""
-    if held.id != session_id:
-        session = forgotten.remembered(held, session_id)
-        return replace(memory, session=session), f"held by another session: {held.id}"
-    grace = None
-    if memory.relays.agv.on or held.boarded:
-        grace = Grace(held, now + limits.t.release_grace_s)
-    return replace(memory, session=None, grace=grace), ""
+    if not why_not:
+        return ""
+    starting = view.settling and not memory.io_fault and why_not[0].code == NOT_FRESH
+    return STARTING if starting else why_not[0].code
 
 
 def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
@@ -300,6 +246,8 @@ def _faults(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple
         found.append(Fault("OVERLOAD", "waits until the car is lighter"))
     if session:
         found += _faults_of_rmf(session, now, limits)
+    elif memory.grace and memory.grace.in_car:
+        found.append(Fault("ROBOT_LEFT_IN_CAR", f"{memory.grace.session.id} was ended in mid-ride"))
     return (*found, *view.faults)
 
 
@@ -322,9 +270,12 @@ def _wake_at(
         _unwritten_at(memory, limits),
     ]
     if memory.session:
-        due += [*drive.next_at(memory.session, limits), forgotten.named_at(memory.session)]
+        session = memory.session
+        due += [*drive.next_at(session, limits), forgotten.named_at(session)]
+        due.append(forgotten.lapses_at(session))
     if memory.grace:
-        due += [drive.let_go_at(memory.grace, limits), memory.grace.until]
+        grace = memory.grace
+        due += [drive.let_go_at(grace, limits), grace.off_at, grace.until]
     if memory.rival_at is not None:
         due.append(memory.rival_at + RIVAL_QUIET_S)
     return min((at for at in due if at > now), default=NEVER)

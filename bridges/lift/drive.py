@@ -3,8 +3,8 @@
 Rules:
 - Without a session no output is switched on. All outputs are off under an obstacle (`core.py`), for a
   session in HUMAN mode, while RMF is silent and the robot is outside, and while a fault waits for its
-  next try. In the grace after END, AGV mode and the door's hold stay on if they were on; the hold
-  ends `dead_time_s` before AGV mode.
+  next try. For `release_grace_s` after END, AGV mode and the door's hold stay on if they were on; the
+  hold ends `dead_time_s` before AGV mode.
 - The order is: AGV mode, then the call to the destination, then, once the car stands there, the door's
   hold. With `by_call` a call brings AGV mode, so the call comes first, even if the car stands there.
 - A call is given only in AGV mode (except with `by_call`), away from the destination, and without
@@ -107,6 +107,8 @@ def stays_on(
     grace: Grace, relays: Relays, view: View, now: float, limits: LiftLimits
 ) -> LiftOutputs:
     """The outputs in the grace after END."""
+    if now >= grace.off_at:
+        return LiftOutputs()
     standing = agv_ok(view) and at_destination(grace.session, view, limits)
     hold = relays.hold.on if standing and now < let_go_at(grace, limits) else None
     return LiftOutputs(agv_request=bool(relays.agv.on), hold_door=hold)
@@ -114,7 +116,7 @@ def stays_on(
 
 def let_go_at(grace: Grace, limits: LiftLimits) -> float:
     """When the door's hold ends."""
-    return grace.until - limits.t.dead_time_s
+    return min(grace.off_at, grace.until) - limits.t.dead_time_s
 
 
 def next_at(session: Session, limits: LiftLimits) -> tuple[float, ...]:

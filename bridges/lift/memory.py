@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from bridges.core.debounce import Settled
 from bridges.core.decision import Fault
 from bridges.core.durations import AGES_AGO, NEVER
+from bridges.core.freshness import Requester
 from bridges.lift.settings import Durations, LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, Motion, Side, Stop
 
@@ -98,12 +99,27 @@ class Senses(msgspec.Struct, frozen=True):
 
 
 class Forgotten(msgspec.Struct, frozen=True):
-    """RMF's supervisor asks for another session instead (`by`), `since` when. `ended`: the forgotten
-    robot's own END was heard once (`bridges/lift/forgotten.py`)."""
+    """RMF's supervisor asks for another session instead (`by`, "" for none), or has ended this one
+    while its robot goes on asking (`disowned`), `since` when. `ended`: the robot's own END was heard
+    once (`bridges/lift/forgotten.py`)."""
 
     by: str
     since: float
     ended: bool = False
+    disowned: bool = False
+
+
+class OwnWords(msgspec.Struct, frozen=True):
+    """What a robot's own adapter has said. `stamp`: the newest (ns), by its clock. `asked_at`: when it
+    last asked for the lift. `ended_at`: when it first sent END after that. `floor`: where it would go.
+    `opened`: OPEN has been published there since. `told`: it has asked again after that."""
+
+    stamp: int = 0
+    asked_at: float = AGES_AGO
+    ended_at: float = AGES_AGO
+    floor: str = ""
+    opened: bool = False
+    told: bool = False
 
 
 class Doubted(msgspec.Struct, frozen=True):
@@ -120,8 +136,8 @@ class Session(msgspec.Struct, frozen=True):
     `agv_seen`: AGV mode has come on for our request. `arrived`: the car has stood at the destination.
     `call_at`: when the present call began. `waiting`, `since`: what we wait for, and since when.
     `tries`: how often that has failed. `retry_at`: outputs stay off until then (inf: latched).
-    `forgotten`: RMF's supervisor asks for another session. `own_stamp`: the newest stamp (ns) of the
-    robot's own requests, as its adapter sent them. `doubted`: a destination that does not count yet.
+    `forgotten`: RMF's supervisor does not ask for it. `robot`: what its own adapter has said.
+    `doubted`: a destination that does not count yet. `ends`: which stamps its END may have.
     """
 
     id: str
@@ -138,15 +154,19 @@ class Session(msgspec.Struct, frozen=True):
     retry_at: float | None = None
     fault: Fault | None = None
     forgotten: Forgotten | None = None
-    own_stamp: int = 0
+    robot: OwnWords = OwnWords()
     doubted: Doubted | None = None
+    ends: Requester = Requester()
 
 
 class Grace(msgspec.Struct, frozen=True):
-    """After END: this session, and only this one, is granted again until `until`."""
+    """After END: this session, and only this one, is granted again until `until`. Its outputs go off at
+    `off_at`. `in_car`: its robot may still be inside, and may resume by its own requests too."""
 
     session: Session
     until: float
+    off_at: float = NEVER
+    in_car: bool = False
 
 
 class Channel(msgspec.Struct, Generic[T], frozen=True):

@@ -29,11 +29,14 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
 
     An END_SESSION counts whatever its floor and door are: fleet adapters send "" and 0
     (rmf_fleet_adapter RobotContext.cpp). Jazzy's supervisor sends one without a session at each state
-    of a lift that nobody has (lift_supervisor/Node.cpp); it ends nothing.
+    of a lift that nobody has (lift_supervisor/Node.cpp); it ends nothing. One with DOOR_OPEN, which no
+    node of RMF's sends, is a person's (`rmf-bridge send`, rmf-web).
     """
     check_length(session_id=request.session_id)
+    stamp = _stamp(request)
     if request.request_type == LiftRequestType.REQUEST_END_SESSION:
-        return Ended(request.session_id)
+        by_person = request.door_state == LiftRequestDoor.DOOR_OPEN
+        return Ended(request.session_id, stamp, by_person)
     if not request.session_id:
         raise RequestRefused("empty session_id", "a session needs a name")
     agv = request.request_type == LiftRequestType.REQUEST_AGV_MODE
@@ -46,12 +49,20 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
         raise RequestRefused(
             "floor not served", f"{request.destination_floor!r} is not one of {', '.join(floors)}"
         )
-    return Requested(request.session_id, agv, request.destination_floor)
+    return Requested(request.session_id, agv, request.destination_floor, stamp)
 
 
 def accept_adapters(request: LiftRequest, settings: LiftSettings) -> FromAdapter:
     """A fleet adapter's request, before RMF's supervisor has decided on it. Raises RequestRefused."""
-    return FromAdapter(accept(request, settings), in_ns(request.request_time))
+    return FromAdapter(accept(request, settings))
+
+
+def _stamp(request: LiftRequest) -> int:
+    """Its request_time (ns); 0 for one that no clock shows: an END counts all the same."""
+    try:
+        return in_ns(request.request_time)
+    except RequestRefused:
+        return 0
 
 
 def alarm_topics(settings: LiftSettings) -> tuple[Topic[Message], ...]:

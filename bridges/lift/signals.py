@@ -91,24 +91,30 @@ class LiftOutputs(msgspec.Struct, frozen=True):
 
 
 class Requested(msgspec.Struct, frozen=True):
-    """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and a floor that it serves."""
+    """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and a floor that it serves.
+
+    `stamp`: its request_time (ns), by its sender's clock; 0 without one.
+    """
 
     session_id: str
     agv: bool
     destination: str
+    stamp: int = 0
 
 
 class Ended(msgspec.Struct, frozen=True):
-    """A LiftRequest for END_SESSION, whatever its other fields say."""
+    """A LiftRequest for END_SESSION, whatever its floor says. `by_person`: a person has sent it, with
+    `rmf-bridge send` or `release`."""
 
     session_id: str
+    stamp: int = 0
+    by_person: bool = False
 
 
 class FromAdapter(msgspec.Struct, frozen=True):
-    """A robot's own request, as its fleet adapter sends it to RMF's supervisor. `stamp`: ns."""
+    """A robot's own request, as its fleet adapter sends it to RMF's supervisor."""
 
     asked: Requested | Ended
-    stamp: int
 
 
 Asked = Requested | Ended | FromAdapter

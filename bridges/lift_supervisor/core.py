@@ -37,7 +37,7 @@ from bridges.core.graph_kind import MaySpeak
 from bridges.lift_supervisor.memory import Claim, Limits, Memory, Turn
 from bridges.lift_supervisor.report import SupervisorReport, alarms, report
 from bridges.lift_supervisor.signals import Ended, Event, Requested, StateHeard
-from bridges.rmf.definitions import LiftRequest, LiftRequestType
+from bridges.rmf.definitions import LiftRequest, LiftRequestDoor, LiftRequestType
 from bridges.rmf.topics import LIFT_REQUESTS
 
 MAX_CLAIMS: Final = 100
@@ -95,7 +95,7 @@ def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Mem
             if refused:
                 return memory, refused
             if isinstance(event, Ended):
-                return _end(memory, event.session, now), ""
+                return _end(memory, event, now), ""
             return _ask(memory, event, now)
         case StateHeard():
             return _see(memory, event, now), ""
@@ -148,14 +148,14 @@ def _with(memory: Memory, before: Claim | None, claim: Claim) -> Memory:
     return replace(memory, claims=tuple(claim if c is before else c for c in memory.claims))
 
 
-def _end(memory: Memory, session: str, now: float) -> Memory:
+def _end(memory: Memory, ended: Ended, now: float) -> Memory:
     """The session leaves the queue. If it has the lift or its turn, the node is sent END."""
-    memory = _without(memory, session)
-    turn = memory.turn
+    session = ended.session
+    memory, turn = _without(memory, session), memory.turn
     has_it = session in (memory.session_shown, turn.session if turn else "")
     if not has_it or not memory.may_speak or (turn and turn.ends):
         return memory
-    return _begin(memory, Turn(session, now, ends=True))
+    return _begin(memory, Turn(session, now, ends=True, by_person=ended.by_person))
 
 
 def _without(memory: Memory, session: str) -> Memory:
@@ -253,7 +253,8 @@ def wanted(memory: Memory) -> LiftRequest | None:
         return None
     if turn.ends:
         floor = memory.shown.floor if memory.shown else ""
-        return LiftRequest(memory.lift, session_id=turn.session, destination_floor=floor)
+        end = LiftRequest(memory.lift, session_id=turn.session, destination_floor=floor)
+        return replace(end, door_state=LiftRequestDoor.DOOR_OPEN) if turn.by_person else end
     claim = memory.claim(turn.session)
     assert claim is not None
     target = claim.target

@@ -49,12 +49,14 @@ class Claim(msgspec.Struct, frozen=True):
 
 
 class Turn(msgspec.Struct, frozen=True):
-    """The session whose request we pass on. `ends`: we send its END. `seen`: the lift has shown it."""
+    """The session whose request we pass on. `ends`: we send its END, which a person has asked for
+    if `by_person`. `seen`: the lift has shown it."""
 
     session: str
     since: float
     ends: bool = False
     seen: bool = False
+    by_person: bool = False
 
 
 class Memory(msgspec.Struct, frozen=True):

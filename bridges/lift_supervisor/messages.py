@@ -34,7 +34,8 @@ def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Req
     check_length(session_id=request.session_id, destination_floor=request.destination_floor)
     stamp = in_ns(request.request_time) / SECOND_NS
     if request.request_type == LiftRequestType.REQUEST_END_SESSION:
-        return Ended(request.session_id, stamp, wall - stamp)
+        by_person = request.door_state == LiftRequestDoor.DOOR_OPEN
+        return Ended(request.session_id, stamp, wall - stamp, by_person)
     if request.request_type not in set(LiftRequestType):
         raise RequestRefused("unknown request_type", str(request.request_type))
     if request.door_state not in set(LiftRequestDoor):

@@ -24,11 +24,13 @@ class Requested(msgspec.Struct, frozen=True):
 
 
 class Ended(msgspec.Struct, frozen=True):
-    """An END_SESSION of an adapter or an operator, whatever its other fields say."""
+    """An END_SESSION of an adapter or an operator, whatever its floor says. `by_person`: it has
+    DOOR_OPEN, which the lift's node takes for a person's."""
 
     session: str
     stamp: float
     age_s: float
+    by_person: bool = False
 
 
 class StateHeard(msgspec.Struct, frozen=True):

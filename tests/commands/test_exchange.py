@@ -299,9 +299,11 @@ def test_a_daemon_that_falls_silent_is_named_as_the_reason() -> None:
     assert ran.outcome == Failed("Lift1 fell silent 8 s ago: is its daemon still running?")
 
 
-def test_end_takes_the_holder_from_the_first_state_and_sends_what_fleets_send() -> None:
+def test_end_takes_the_holder_from_the_first_state_and_tells_by_door_open_that_a_person_ends_it() -> (
+    None
+):
     ran = tell(LiftEnd("Lift1", "", direct=True), [(0.5, GRANTED), (1.2, GRANTED), (1.8, LIFT)])
-    end = d.LiftRequest("Lift1", d.Time(), ME, 0, "", 0)
+    end = d.LiftRequest("Lift1", d.Time(), ME, 0, "", 2)
     assert ran == Ran(
         [(0.5, end), (1.5, end)], [], Done("Lift1 is no longer held by fleet/robot"), 1.8
     )

@@ -3,6 +3,7 @@
 Judged from the event, the inputs and the outputs; the core's own conclusions are not asked.
 """
 
+import math
 from typing import Any
 
 from bridges.core.decision import IoFailed, Sampled, WriteFailed
@@ -76,18 +77,22 @@ def nothing_is_driven_when_forbidden(step: Step) -> None:
 
 
 def sessions_end_by_end_alone(step: Step) -> None:
-    """Granted by a request while free, ended by the holder's END, and untouched by all else."""
+    """Granted by a request while free, ended by the holder's END or by the silence of a robot whose END
+    has come, and untouched by all else. Who may be in the car gets the lift back, and nobody else."""
     before, after, event = _id(step.before), _id(step.decision.memory), step.event
-    if (isinstance(event, Ended) and event.session_id == before) or (
-        isinstance(event, FromAdapter) and before and _ends_forgotten(step.before, event)
-    ):
+    if before and _fell_silent(step):
+        assert after is None or (after == before and _is_asked_for(event, before))
+    elif before and _is_its_end(step, event):
         assert after is None
-    elif isinstance(event, Requested) and before is None:
+    elif before is None and isinstance(event, Requested):
         assert after in (None, event.session_id)
         assert (after is None) == bool(step.decision.refused)
+        assert after is None or not _is_kept_for_another(step, after)
+    elif before is None and isinstance(event, FromAdapter):
         grace = step.before.grace
-        others = grace is not None and step.now < grace.until and grace.session.id != after
-        assert after is None or not others
+        waits = grace is not None and grace.in_car and step.now < grace.until
+        given_back = waits and isinstance(event.asked, Requested)
+        assert after is None or (given_back and not _is_kept_for_another(step, after))
     else:
         assert after == before
     shown: LiftReport = step.decision.report
@@ -95,12 +100,42 @@ def sessions_end_by_end_alone(step: Step) -> None:
     assert (shown.destination == "") == (after is None)
 
 
-def _ends_forgotten(memory: Memory, event: FromAdapter) -> bool:
-    """The second END of a robot that RMF's supervisor has forgotten."""
-    session = memory.session
+def _is_kept_for_another(step: Step, session: str) -> bool:
+    grace = step.before.grace
+    return grace is not None and step.now < grace.until and grace.session.id != session
+
+
+def _is_asked_for(event: object, session: str) -> bool:
+    asked = event.asked if isinstance(event, FromAdapter) else event
+    return isinstance(asked, Requested) and asked.session_id == session
+
+
+def _fell_silent(step: Step) -> bool:
+    """The supervisor has ended the session, and its robot has not asked for five seconds."""
+    session = step.before.session
     assert session is not None
-    heard_once = session.forgotten is not None and session.forgotten.ended
-    return heard_once and event.asked == Ended(session.id)
+    disowned = session.forgotten is not None and session.forgotten.disowned
+    return disowned and step.now >= session.robot.asked_at + 5.0
+
+
+def _is_its_end(step: Step, event: object) -> bool:
+    """An END of its supervisor while its robot does not go on asking, a person's, or its robot's own
+    where that counts."""
+    session = step.before.session
+    assert session is not None
+    forgotten, robot, ends = session.forgotten, session.robot, session.ends
+    if isinstance(event, FromAdapter):
+        heard_once = forgotten is not None and (forgotten.ended or forgotten.disowned)
+        return heard_once and event.asked == Ended(session.id)
+    if not isinstance(event, Ended) or event.session_id != session.id:
+        return False
+    if 0 < event.stamp < ends.newest * 1e9 and step.now < ends.doubted_since + 1.0:
+        return False
+    if 0 < event.stamp < ends.newest * 1e9 and ends.doubted_since == -math.inf:
+        return False
+    just_asked = robot.ended_at < robot.asked_at and step.now < robot.asked_at + 5.0
+    goes_on = session.boarded and just_asked and step.now >= robot.ended_at + 3.0
+    return event.by_person or not goes_on
 
 
 def open_is_the_truth(step: Step) -> None:

@@ -176,5 +176,5 @@ def test_defect_l_the_log_had_a_line_each_second(caplog: pytest.LogCaptureFixtur
     lines = [r.getMessage() for r in caplog.records]
     assert lines == [
         'refused device=Lift1 kind="held by another session"'
-        ' detail="A; session_id B, agv yes, destination L1"'
+        ' detail="A; session_id B, agv yes, destination L1, stamp 0"'
     ]

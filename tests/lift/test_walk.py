@@ -29,6 +29,8 @@ ROOTS = {
     "boarded": BOARDED,
     "riding": RIDING,
     "called to and fro, worn": (*CALLED, *("A asks L1", 1.0, "A asks L3", 1.0) * 20),
+    "riding, disowned": (*RIDING, "A's adapter asks L3", 0.05, "A ends, stamped", 1.0),
+    "left in the car": (*RIDING, "A's adapter asks L3", 6.0, "A ends", 4.0),
     "in the grace": (*BOARDED, "A ends", 0.05),
     "burnt out, latched": (*BOARDED, "fire_alarm", 1.0, "fire_alarm", 4.0),
     "failed, latched": (*ARRIVED, *("A asks L3", 25.0) * 7),
@@ -49,6 +51,8 @@ def test_each_stage_of_a_ride_is_what_its_name_says() -> None:
         "boarded": ((True, None), False, None, False),
         "riding": ((True, None), False, "L1", False),
         "called to and fro, worn": ((False, None), False, None, False),
+        "riding, disowned": ((True, None), False, "L1", False),
+        "left in the car": (None, True, None, False),
         "in the grace": (None, True, None, False),
         "burnt out, latched": ((True, None), False, None, True),
         "failed, latched": ((False, inf), False, None, False),
@@ -76,7 +80,9 @@ def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> 
 def mended_and_idle(world: World) -> World:
     """The building mends itself and stands idle at L1; RMF ends every session; an operator resets."""
     world = replace(world, sample=IDLE, readable=True, writable=True)
-    return WALKER.path(world, 6.0, "A ends", "B ends", "reset", 61.0, seen=check)
+    world = WALKER.path(world, 6.0, "A ends", "B ends", "reset", 9.0, seen=check)
+    assert world.memory.session is None
+    return WALKER.path(world, 64.0, seen=check)
 
 
 def serves(world: World) -> bool:

@@ -13,8 +13,10 @@ from msgspec.structs import replace
 
 from bridges.core.debounce import Settled
 from bridges.core.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.core.durations import AGES_AGO
+from bridges.core.freshness import Requester
 from bridges.lift.core import decide, initial, published
-from bridges.lift.memory import Channel, Forgotten, LiftLimits, Memory
+from bridges.lift.memory import Channel, Forgotten, LiftLimits, Memory, OwnWords
 from bridges.lift.settings import Durations, LiftSettings
 from bridges.lift.signals import (
     Door,
@@ -107,15 +109,18 @@ def reading(world: World) -> Event:
 
 MOVES: dict[str, Move] = {
     **{
-        f"{who} asks {floor}": _event(Requested(who, True, floor))
+        f"{who} asks {floor}": _event(Requested(who, True, floor, stamp=2 * 10**9))
         for who in ("A", "B")
         for floor in ("L1", "L3")
     },
+    "A ends, stamped": _event(Ended("A", stamp=3 * 10**9)),
+    "A ends, long ago": _event(Ended("A", stamp=10**9)),
+    "a person ends A": _event(Ended("A", by_person=True)),
     "A asks human": _event(Requested("A", False, "L1")),
     "A ends": _event(Ended("A")),
     "B ends": _event(Ended("B")),
-    "A's adapter asks L3": _event(FromAdapter(Requested("A", True, "L3"), stamp=1)),
-    "A's adapter ends": _event(FromAdapter(Ended("A"), stamp=0)),
+    "A's adapter asks L3": _event(FromAdapter(Requested("A", True, "L3", 1))),
+    "A's adapter ends": _event(FromAdapter(Ended("A"))),
     "agv on": _inputs(agv=True),
     "agv off": _inputs(agv=False),
     **{f"at {level}": _inputs(level=level, code_fault="") for level in ("L1", "L2", "L3", None)},
@@ -225,7 +230,12 @@ def shifted(memory: Memory, by: float) -> Memory:
         ),
         session=session and _session(session, by),
         grace=grace
-        and replace(grace, session=_session(grace.session, by), until=_at(grace.until, by)),
+        and replace(
+            grace,
+            session=_session(grace.session, by),
+            off_at=max(_at(grace.off_at, by), -0.5),
+            until=_at(grace.until, by),
+        ),
         relays=replace(
             memory.relays,
             agv=_channel(memory.relays.agv, by),
@@ -262,12 +272,32 @@ def _session(session: Any, by: float) -> Any:
         since=_at(session.since, by, "since") if session.waiting else 0.0,
         retry_at=_at(session.retry_at, by),
         forgotten=session.forgotten and _forgotten(session.forgotten, by),
-        own_stamp=0,
+        robot=_robot(session.robot, by),
+        ends=_ends(session.ends, by),
     )
 
 
 def _forgotten(forgotten: Forgotten, by: float) -> Forgotten:
     return replace(forgotten, since=max(_at(forgotten.since, by), -4.0))
+
+
+def _robot(robot: OwnWords, by: float) -> OwnWords:
+    """Whether it was ever heard makes a difference."""
+    heard = robot.asked_at > AGES_AGO
+    asked_at = max(_at(robot.asked_at, by), -7.0) if heard else AGES_AGO
+    ended_at = round(robot.ended_at + by, 6)
+    return replace(robot, stamp=0, asked_at=asked_at, ended_at=_recent(ended_at, 8.0))
+
+
+def _ends(ends: Requester, by: float) -> Requester:
+    since, at = round(ends.doubted_since + by, 6), round(ends.doubted_at + by, 6)
+    return replace(
+        ends, doubted_since=_recent(since, 5.0), doubted_at=_recent(at, 4.0), heard_at=0.0
+    )
+
+
+def _recent(at: float, age_s: float) -> float:
+    return at if at > -age_s else AGES_AGO
 
 
 def _channel(channel: Channel[Any], by: float) -> Any:

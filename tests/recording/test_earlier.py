@@ -25,7 +25,7 @@ from drivers.profiles import texts
 from tests.recording.earlier import DAYS
 from tests.recording.recordable import recordable, specimens
 
-ENDED: set[str] = set()
+ENDED = {"lift.memory.Session.own_stamp", "lift.signals.FromAdapter.stamp"}
 """Fields (`lift.memory.Session.level`) that a core no longer has: what they held is left out."""
 
 

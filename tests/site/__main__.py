@@ -20,12 +20,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, help="of the day; one is drawn and printed if left out")
     parser.add_argument("--hours", type=float, default=24.0, help="simulated, 0.5 at the least")
     parser.add_argument("--rmf", choices=SUPERVISORS, help="whose supervisors; else by the seed")
+    parser.add_argument(
+        "--kill-every",
+        type=float,
+        metavar="S",
+        help="RMF's lift supervisor dies so often, nothing else",
+    )
     parser.add_argument("--log", type=int, default=60, help="so many last lines of a failed day")
     options = parser.parse_args(argv)
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     if options.hours < 0.3:
         parser.error("less than 0.3 hours is no day")
-    began, site = time.perf_counter(), Site(seed, options.rmf)
+    if options.kill_every and options.rmf not in SUPERVISORS[1:]:
+        parser.error("--kill-every needs --rmf kilted or jazzy")
+    began, site = time.perf_counter(), Site(seed, options.rmf, options.kill_every)
     _print(f"seed {seed}, {options.hours:g} hours, supervisors: {site.rmf}")
     try:
         site.run(options.hours, told=lambda look: _print(str(look)))
@@ -47,7 +55,8 @@ def _failed(site: Site, why: str, options: argparse.Namespace) -> int:
         _print(f"{at:12.3f}  {line}")
     _print(f"wrong now: {', '.join(site.ills.all()) or 'nothing'}")
     _print(f"BROKEN {why}")
-    _print(f"again: make soak SEED={site.seed} HOURS={options.hours:g} RMF={site.rmf}")
+    kills = f" KILL_EVERY={options.kill_every:g}" if options.kill_every else ""
+    _print(f"again: make soak SEED={site.seed} HOURS={options.hours:g} RMF={site.rmf}{kills}")
     return 1
 
 

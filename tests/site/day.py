@@ -27,7 +27,7 @@ from tests.site.growth import Look, look
 from tests.site.laws import BOUND_S, Laws
 from tests.site.network import CLEAR, Air, Place
 from tests.site.robots import Places, Resident
-from tests.site.timeline import Timeline
+from tests.site.timeline import NEVER, Timeline
 from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable, pressable
 
 ROBOTS = ("red", "green", "blue", "white", "black")
@@ -50,10 +50,13 @@ class Site:
     """One seed's day. `run` raises `laws.Broken` when a law is broken.
 
     `rmf`: one of SUPERVISORS; the seed decides when it is not given. The fleet adapters of a day with
-    ours are of either release.
+    ours are of either release. `kill_every_s`: nothing goes wrong but that RMF's lift supervisor dies
+    so often (s), and is up again within seconds.
     """
 
-    def __init__(self, seed: int, rmf: str | None = None) -> None:
+    def __init__(
+        self, seed: int, rmf: str | None = None, kill_every_s: float | None = None
+    ) -> None:
         self.seed = seed
         self.rmf = rmf or SUPERVISORS[seed % len(SUPERVISORS)]
         self.jazzy = self.rmf == "jazzy" or (self.rmf == "ours" and seed % 2 == 1)
@@ -77,6 +80,8 @@ class Site:
         self.trouble = Trouble(
             timeline, self.ills, Random(self.random.random()), self._draw, self.laws.note
         )
+        self.kill_every_s = kill_every_s
+        self.kills = {"supervisor kills": 0, "of them with a robot in a car": 0}
         self.looks: list[Look] = []
         self._people = Random(self.random.random())
         self._people_at: dict[str, float] = {}
@@ -98,7 +103,11 @@ class Site:
         end = hours * HOUR_S
         the_random.seed(self.seed)  # supervisors that meet a rival draw how long they hold back
         self._open()
-        self.trouble.begin(until=end - WIND_DOWN_S)
+        if self.kill_every_s is None:
+            self.trouble.begin(until=end - WIND_DOWN_S)
+        else:
+            self.trouble.over_at = end - WIND_DOWN_S
+            self.timeline.at(60.0, self._kill)
         self.timeline.at(end - WIND_DOWN_S, self._wind_down)
         self.timeline.at(end - SWEEP_S, self._sweep)
         with _silent():
@@ -117,7 +126,8 @@ class Site:
             for what, count in robot.done.items():
                 done[what] = done.get(what, 0) + count
         done["scans"] = sum(daemon.scans for daemon in self.daemons.values())
-        return {**done, "checks": self.laws.checks, **self.air.counts}
+        kills = self.kills if self.kill_every_s else {}
+        return {**done, **kills, "checks": self.laws.checks, **self.air.counts}
 
     # ---- its hours
 
@@ -318,6 +328,19 @@ class Site:
             self._trust(devices, why)
 
         return Ill("supervisor", supervisor.name, "daemon", begin, end, least_s=0.2, most_s=20.0)
+
+    def _kill(self) -> None:
+        """RMF's lift supervisor dies, and a new one starts, while everybody goes on."""
+        if self.timeline.now > self.trouble.over_at:
+            return
+        supervisor = next(s for s in self.supervisors if s.name == RIVAL)
+        riders = [robot.name for robot in self.robots if robot.in_car]
+        self.laws.note(f"--- the lift supervisor is killed; in cars: {riders}")
+        self.kills["supervisor kills"] += 1
+        self.kills["of them with a robot in a car"] += bool(riders)
+        supervisor.kill()
+        self.timeline.after(self.random.uniform(0.2, 5.0), supervisor.start)
+        self.timeline.after(self.kill_every_s or NEVER, self._kill)
 
     def _distrust(self, devices: Sequence[str], why: str) -> None:
         """What is said for a robot now is not its own wish."""

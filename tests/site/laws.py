@@ -214,6 +214,8 @@ class Laws:
             truth.offered = truth.offered and (resumed or not state.session_id)
             truth.last = before or truth.last
             truth.session, truth.since = state.session_id, now
+            others = sorted(set(truth.inside) - {state.session_id}) if state.session_id else []
+            self.require(not others, f"{name} is given to {state.session_id}, {others} in the car")
         if state.door_state != d.LiftDoor.DOOR_OPEN:
             return
         self._open_is_true(name, state)

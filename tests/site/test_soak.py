@@ -41,6 +41,17 @@ def test_without_our_remedy_a_robot_that_rmfs_supervisor_forgets_stops_a_lift_fo
         site.run(0.5)
 
 
+@pytest.mark.long(5)
+@pytest.mark.parametrize("rmf", depth(["jazzy"], ["jazzy", "kilted"]))
+def test_no_occupied_car_is_given_to_another_robot_while_rmfs_supervisor_dies_each_27_s(
+    rmf: str,
+) -> None:
+    """`make soak RMF=jazzy KILL_EVERY=27 HOURS=1.65 SEED=3` has two hundred kills."""
+    site = Site(3, rmf, kill_every_s=27.0)
+    site.run(depth(12, 60) / 60)
+    assert site.kills["of them with a robot in a car"] > depth(4, 60)
+
+
 @pytest.mark.long(2)
 def test_the_same_seed_is_the_same_day() -> None:
     days = [Site(5), Site(5)]

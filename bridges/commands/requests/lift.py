@@ -115,7 +115,8 @@ class LiftEnd(_Lift):
         return self.session or next(first, "")
 
     def message(self, seen: Seen) -> d.LiftRequest | None:
-        """END_SESSION as fleets send it: no floor, door 0."""
+        """END_SESSION without a floor, as fleets send it; DOOR_OPEN tells our lifts that a person ends
+        it, who counts for more than a robot that goes on asking."""
         session = self._ending(seen)
         if not session:
             return None
@@ -123,6 +124,7 @@ class LiftEnd(_Lift):
             lift_name=self.name,
             session_id=session,
             request_type=d.LiftRequestType.REQUEST_END_SESSION,
+            door_state=d.LiftRequestDoor.DOOR_OPEN,
         )
 
     def outcome(self, seen: Seen) -> Done | None:
