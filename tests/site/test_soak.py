@@ -34,7 +34,7 @@ def test_without_our_remedy_a_robot_that_rmfs_supervisor_forgets_stops_a_lift_fo
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The day finds the deadlock that `bridges/lift/forgotten.py` ends."""
-    monkeypatch.setattr(forgotten, "heard", lambda session, event: (session, False))
+    monkeypatch.setattr(forgotten, "heard", lambda session, asked, now: (session, False))
     site = Site(23, "kilted")  # a day on which it comes early
     site.trouble._draw = site._restart_rmfs
     with pytest.raises(Broken, match=r"waits for Lift\d"):
