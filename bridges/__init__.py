@@ -1,3 +1,6 @@
 """rmf-bridges: daemons that connect Open-RMF to the lifts, doors and chargers of a building."""
 
 __version__ = "0.1.0"
+BUILD = ""
+"""The commit, written by setup.py into what is installed; "" where it is not known."""
+VERSION = f"{__version__}+{BUILD}" if BUILD else __version__

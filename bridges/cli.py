@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
-from bridges import __version__
+from bridges import VERSION
 
 EX_PIPE = 141
 """The reader of our output has gone: what a shell shows for a program that SIGPIPE ended."""
@@ -166,7 +166,7 @@ def whole_parser() -> argparse.ArgumentParser:
 
 def _parser(names: Iterable[str], whole: bool) -> argparse.ArgumentParser:
     top = _Parser(prog="rmf-bridge", description="Connect Open-RMF to lifts, doors and chargers.")
-    top.add_argument("--version", action="version", version=f"rmf-bridge {__version__}")
+    top.add_argument("--version", action="version", version=f"rmf-bridge {VERSION}")
     subparsers = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in names:
         text, example = COMMANDS[name]

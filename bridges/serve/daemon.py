@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from bridges import __version__
+from bridges import VERSION
 from bridges.log import pairs
 from bridges.recording.entries import Head
 from bridges.recording.ring import Ring
@@ -103,7 +103,7 @@ class Daemon:
         head = Head(
             run=secrets.token_hex(8),
             pid=os.getpid(),
-            version=__version__,
+            version=VERSION,
             kind=self._config.kind,
             file=record.file,
             yaml=record.yaml,
@@ -195,7 +195,7 @@ class Daemon:
             self._once.works(what)
 
     def _about(self) -> dict[str, Any]:
-        about = {"version": __version__, "node": self._transport.name, "pid": os.getpid()}
+        about = {"version": VERSION, "node": self._transport.name, "pid": os.getpid()}
         return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
 
     def _apart(self) -> list[dict[str, str]]:

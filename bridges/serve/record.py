@@ -15,7 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from bridges import __version__
+from bridges import BUILD, VERSION
 from bridges.rmf.settings import Rmf
 from bridges.serve import files
 from bridges.serve.places import Places, named, opened
@@ -63,7 +63,7 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """
         texts.give(self.texts)
         with suppress(msgspec.MsgspecError, ImportError, AttributeError):
-            if self.claim is not None and self.claim.version == __version__:
+            if BUILD and self.claim is not None and self.claim.version == VERSION:
                 return _claimed(self, self.claim)
         from bridges.settings.load import understood
 
@@ -79,7 +79,7 @@ def of(config: Config) -> Record:
 def _claim(config: Config) -> Claim:
     buses = {name: (config.bus_types[name], _json(bus)) for name, bus in config.buses.items()}
     devices = {name: _json(device) for name, device in config.devices.items()}
-    return Claim(__version__, config.kind, config.driver, buses, devices)
+    return Claim(VERSION, config.kind, config.driver, buses, devices)
 
 
 def _json(settings: msgspec.Struct) -> bytes:

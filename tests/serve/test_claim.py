@@ -12,14 +12,19 @@ from bridges.serve import record
 from bridges.serve.record import Claim, Record
 from bridges.settings.config import Config
 from bridges.settings.examples import device_yamls
-from bridges.settings.load import load
+from bridges.settings.load import SettingsError, load
 from drivers.profiles import texts
 
 DEVICES = [file for file in device_yamls() if "\nbuses:" in file.read_text()]
 
 
+BUILD = "r1.gabcdef0"
+
+
 @pytest.fixture(autouse=True)
-def _forgotten() -> Iterator[None]:
+def _built(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """As in a package: this checkout's build is not known."""
+    monkeypatch.setattr(record, "BUILD", BUILD)
     texts.give({})
     yield
     texts.give({})
@@ -73,10 +78,21 @@ def test_settings_of_another_version_or_that_do_not_decode_are_made_from_the_yam
         assert claimed(found) == claimed(config)
 
 
+def test_settings_of_an_unknown_build_are_made_from_the_yaml(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _, written, _ = of_file(DEVICES[0])
+    spoiled = msgspec.structs.replace(written, yaml=b"kind: [")
+    assert spoiled.config().devices
+    monkeypatch.setattr(record, "BUILD", "")
+    with pytest.raises(SettingsError):
+        spoiled.config()
+
+
 def test_nothing_that_takes_long_to_import_is_imported_to_switch_off() -> None:
     _, written, _ = of_file(next(file for file in DEVICES if file.stem == "lift_dry_contact"))
     code = (
-        "import sys, msgspec; import bridges.commands.dead; from bridges.serve.record import Record;"
+        f"import sys, msgspec, bridges; bridges.BUILD = {BUILD!r}; import bridges.commands.dead; from bridges.serve.record import Record;"
         "config = msgspec.json.decode(sys.stdin.buffer.read(), type=Record).config();"
         "[config.driver_type(name) for name in config.devices];"
         "slow = {'yaml', 'bridges.settings.load', 'gpiozero', 'dataclasses', 'difflib'};"

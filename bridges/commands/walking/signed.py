@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from bridges import __version__
+from bridges import VERSION
 from bridges.commands.walking.bench import Input
 from bridges.commands.walking.core import Memory, Step
 from bridges.serve.files import replace
@@ -31,7 +31,7 @@ def record(
     return {
         "file": str(file),
         "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
-        "version": __version__,
+        "version": VERSION,
         "device": device,
         "simulated": simulated,
         "by": by,

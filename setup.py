@@ -1,0 +1,59 @@
+"""What pyproject.toml cannot say: the version names the commit that is built.
+
+`0.1.0+r900.gabcdef0` is the 900th commit; `.m` and the time of the last change follow for a checkout with changes.
+Where there is no git, the build is unknown: the version is 0.1.0, and the built `bridges` has an empty BUILD.
+"""
+
+import re
+import subprocess
+import time
+from pathlib import Path
+
+from setuptools import setup
+from setuptools.command.build_py import build_py
+
+HERE = Path(__file__).resolve().parent
+FACE = "bridges/__init__.py"
+
+
+def build() -> str:
+    """The commit's number and short hash; "" if this folder is no checkout of its own."""
+    if not (HERE / ".git").exists():
+        return ""
+    try:
+        number, short = _git("rev-list", "--count", "HEAD"), _git("rev-parse", "--short", "HEAD")
+        changed = _git("diff", "--name-only", "HEAD").splitlines()
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return f"r{number}.g{short}" + (_last_change(changed) if changed else "")
+
+
+def _last_change(files: list[str]) -> str:
+    """When one of these, or its folder for one that is gone, was changed last."""
+    there = [path if path.exists() else HERE for path in map(HERE.joinpath, files)]
+    at = time.gmtime(max(path.stat().st_mtime for path in there))
+    return time.strftime(".m%Y%m%d%H%M%S", at)
+
+
+def _git(*words: str) -> str:
+    done = subprocess.run(["git", "-C", HERE, *words], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+BUILD = build()
+PLAIN = re.search(r'__version__ = "(.*)"', (HERE / FACE).read_text())[1]  # type: ignore[index]
+
+
+class BuildPy(build_py):
+    """Writes the build into the copy of `bridges` that is installed."""
+
+    def run(self) -> None:
+        super().run()
+        built = Path(self.build_lib) / FACE
+        if built.exists():  # none for an editable installation, whose sources change
+            text = (HERE / FACE).read_text()
+            built.unlink()  # it may be a hard link to ours
+            built.write_text(text.replace('BUILD = ""', f'BUILD = "{BUILD}"'))
+
+
+setup(version=PLAIN + (BUILD and f"+{BUILD}"), cmdclass={"build_py": BuildPy})
