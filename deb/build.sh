@@ -1,6 +1,7 @@
 #!/bin/sh
 # Builds the two Debian packages of one architecture and one Python: deb/build.sh ARCH PYTHON (`make deb`).
-# rmf-bridges has the daemons and the recorder; rmf-bridges-page adds what the web page needs.
+# rmf-bridges has the daemons and the recorder, as one archive that its postinst unpacks; rmf-bridges-page adds what the
+# web page needs.
 # As an ordinary user, on any machine: wheels are fetched for the target. lgpio has none for Python 3.13: lgpio.sh
 # builds it.
 set -eu
@@ -11,52 +12,56 @@ case $python in
 esac
 here=$(cd "$(dirname "$0")/.." && pwd)
 bin=$here/.venv/bin
-version=$("$bin/python" -c 'import bridges; print(bridges.__version__)')+$release
 maintainer="${DEBFULLNAME:-rmf-bridges maintainers} <${DEBEMAIL:-rmf-bridges@localhost}>"
 work=$here/build/deb/$release-$arch
-root=$work/root page=$work/page wheels=$here/build/deb/wheels
+root=$work/root page=$work/page tree=$work/tree wheels=$here/build/deb/wheels
 lib=usr/lib/rmf-bridges
-site=$lib/lib/python$python/site-packages
+site=$tree/lib/python$python/site-packages
+beside=usr/lib/rmf-bridges-page # the page's libraries
 next=3.$((${python#3.} + 1))
 SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$here" log -1 --format=%ct 2>/dev/null || date +%s)}
 export SOURCE_DATE_EPOCH
 
 rm -rf "$work" "$here"/build/lib "$here"/build/bdist.* # else a wheel keeps modules that are gone
 umask 022
-mkdir -p "$root/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$page/$lib/lib/python$python" "$work/wheel" "$wheels"
+mkdir -p "$root/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$root/usr/bin" "$tree/bin" "$page/usr/lib" "$work/wheel" "$wheels"
 
 # The libraries. The page's are those that the daemons have not. Left out is what only Cyclone's own commands import,
 # and what colorzero was built with: half of the byte code that an installation would have to make.
 [ "$python" != 3.13 ] || "$here/deb/lgpio.sh" "$arch" "$wheels"
 "$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work/wheel" "$here"
+version=$(basename "$work"/wheel/*.whl | cut -d- -f2)+$release # it has the commit: setup.py
 fill() {
   into=$1; shift
   "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
     --find-links "$wheels" --without cyclonedds:rich-click --without colorzero:setuptools --target "$into" "$@"
 }
-fill "$root/$site" --extra=gpio --extra=recording
-cp -R "$root/$site" "$page/$site"
-fill "$page/$site" --extra=gpio --extra=recording --extra=page
-(cd "$root/$site" && find . ! -type d -print0) | (cd "$page/$site" && xargs -0 rm -f)
-for each in "$root/$site" "$page/$site"; do
+fill "$site" --extra=gpio --extra=recording
+cp -R "$site" "$page/$beside"
+fill "$page/$beside" --extra=gpio --extra=recording --extra=page
+(cd "$site" && find . ! -type d -print0) | (cd "$page/$beside" && xargs -0 rm -f)
+for each in "$site" "$page/$beside"; do
   rm -rf "$each/bin" "$each/cyclonedds/tools" "$each/cyclonedds/.libs/idlc" # programs of the libraries
   find "$each" -type f -exec chmod 644 {} +
   find "$each" -type d -empty -delete
 done
 
-# A virtual environment that sees the system's packages (rclpy), on the system's own Python.
-ln -s "../../../bin/python$python" "$root/$lib/bin/python3"
-printf 'home = /usr/bin\ninclude-system-site-packages = true\nversion = %s\n' "$python" > "$root/$lib/pyvenv.cfg"
-cat > "$root/$lib/bin/rmf-bridge" <<'SCRIPT'
-#!/usr/lib/rmf-bridges/bin/python3
+# A virtual environment that sees the system's packages (rclpy), on the system's own Python. Its program gets its first
+# line where it is unpacked (postinst), so that a daemon imports from its own tree whatever `current` says later.
+echo "/$beside" > "$site/rmf-bridges-page.pth"
+ln -s "/usr/bin/python$python" "$tree/bin/python3"
+printf 'home = /usr/bin\ninclude-system-site-packages = true\nversion = %s\n' "$python" > "$tree/pyvenv.cfg"
+cat > "$tree/bin/rmf-bridge" <<'SCRIPT'
+#!/usr/bin/python3
 import sys
 
 from bridges.cli import main
 
 sys.exit(main())
 SCRIPT
-chmod 755 "$root/$lib/bin/rmf-bridge"
-mkdir -p "$root/usr/bin"
+chmod 755 "$tree/bin/rmf-bridge"
+tar -C "$tree" --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$SOURCE_DATE_EPOCH" -cJf "$root/$lib/tree.tar.xz" .
+ln -s ../current/bin/rmf-bridge "$root/$lib/bin/rmf-bridge"
 ln -s ../lib/rmf-bridges/bin/rmf-bridge "$root/usr/bin/rmf-bridge"
 
 put() { install -D -m 644 "$here/$2" "$1/$3"; }
@@ -80,7 +85,8 @@ gzip -9nc "$here/build/rmf-bridge.1" > "$root/usr/share/man/man1/rmf-bridge.1.gz
 "$bin/rmf-bridge" completion zsh > "$root/usr/share/zsh/vendor-completions/_rmf-bridge"
 "$bin/rmf-bridge" completion fish > "$root/usr/share/fish/vendor_completions.d/rmf-bridge.fish"
 
-# package NAME ROOT DEPENDS SUMMARY: its control files, changelog, copyright and lintian's overrides; description on stdin.
+# package NAME ROOT DEPENDS SUMMARY [TREE]: its control files, changelog, copyright and lintian's overrides; description
+# on stdin. TREE is what its postinst unpacks.
 package() {
   doc=$2/usr/share/doc/$1
   mkdir -p "$doc"
@@ -89,7 +95,7 @@ package() {
   cp "$here/deb/copyright" "$doc/copyright"
   put "$2" "deb/lintian/$1" "usr/share/lintian/overrides/$1"
   for script in "$here/deb/scripts/$1".*; do
-    sed "s/@PYTHON@/$python/g" "$script" > "$2/DEBIAN/${script##*.}"
+    sed "s/@PYTHON@/$python/g; s/@VERSION@/$version/g" "$script" > "$2/DEBIAN/${script##*.}"
     chmod 755 "$2/DEBIAN/${script##*.}"
   done
   cat > "$2/DEBIAN/control" <<CONTROL
@@ -97,7 +103,7 @@ Package: $1
 Version: $version
 Architecture: $arch
 Maintainer: $maintainer
-Installed-Size: $(du -sk --apparent-size "$2" | cut -f1)
+Installed-Size: $(du -ck --apparent-size "$2" ${5:-} | tail -1 | cut -f1)
 Depends: $3
 Section: net
 Priority: optional
@@ -111,7 +117,7 @@ CONTROL
 }
 libc='libc6 (>= 2.34)' # of the wheels' tags (wheels.py, lgpio.sh)
 package rmf-bridges "$root" "python3 (>= $python~), python3 (<< $next~), $libc, systemd (>= 252)" \
-  "connect Open-RMF to lifts, doors and chargers" <<'DESCRIPTION'
+  "connect Open-RMF to lifts, doors and chargers" "$tree" <<'DESCRIPTION'
  Small daemons, one for each controller, that stand between Open-RMF and a
  building: dry contacts, Modbus, HTTP and CAN. Each is configured by one YAML
  and run by systemd.

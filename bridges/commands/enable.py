@@ -37,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-start", action="store_true", help="write and enable it, and start nothing now"
     )
+    parser.add_argument("--drop-in", action="store_true", help="print its drop-in, and no more")
     add_root(parser)
 
 
@@ -53,6 +54,9 @@ def run(args: argparse.Namespace) -> int:
         return _wrong(problems)
     for problem in config.warnings:
         print(problem, file=sys.stderr)
+    if args.drop_in:
+        print(drop_in.text(config, groups(args.root)), end="")
+        return 0
     planned = steps(config, args.root, groups(args.root))
     last = "start" if args.no_start else None
     return carry_out((s for s in planned if not (isinstance(s, Run) and s.words[1] == last)), args)
