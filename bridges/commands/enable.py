@@ -52,11 +52,11 @@ def run(args: argparse.Namespace) -> int:
         return _wrong(error.problems)
     if problems := list(_taken(config, args.root)):
         return _wrong(problems)
-    for problem in config.warnings:
-        print(problem, file=sys.stderr)
     if args.drop_in:
         print(drop_in.text(config, groups(args.root)), end="")
         return 0
+    for problem in config.warnings:
+        print(problem, file=sys.stderr)
     planned = steps(config, args.root, groups(args.root))
     last = "start" if args.no_start else None
     return carry_out((s for s in planned if not (isinstance(s, Run) and s.words[1] == last)), args)

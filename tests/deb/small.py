@@ -8,12 +8,13 @@ import os
 import shutil
 import signal
 import subprocess
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+from functools import partial
 from pathlib import Path
 
 SCRIPTS = Path(__file__).parents[2] / "deb/scripts"
 LIB = Path("usr/lib/rmf-bridges")
-COUNTED = ("mv", "ln", "rm", "sync", "mkdir", "systemctl", "sort", "nice", "cp")
+COUNTED = ("cp", "ln", "mv", "nice", "rm", "sync", "systemctl")
 FORCE = ("script-chrootless", "not-root", "bad-path", "confold")
 PROGRAM = """#!/usr/bin/python3
 # A program that tells its version, and in which tree it is.
@@ -28,7 +29,7 @@ if command == "check":
 if command == "enable":
     print(f"drop-in of {{version}}")
 if command == "outputs-off":
-    print(version, *sorted(p.name for p in tree.rglob("module*")))
+    print(version, *sorted(p.name for p in (tree / "lib").iterdir()))
 """
 FAKE = """#!/bin/sh
 n=$(($(cat {here}/count 2>/dev/null || echo 0) + 1)); echo $n > {here}/count
@@ -37,15 +38,16 @@ n=$(($(cat {here}/count 2>/dev/null || echo 0) + 1)); echo $n > {here}/count
 """
 SYSTEMCTL = """
 echo "$*" >> {here}/calls
+cd {here}/units; words= states=
+for w; do case $w in --state=*) states=${{w#*=}} ;; -*) ;; *) words="$words $w" ;; esac; done
+set -- $words
 command=$1; shift
-[ "$1" != --quiet ] || {{ command="quiet $command"; shift; }}
 case $command in
-  list-units) cd {here}/units; for u in *; do
-    read -r s < "$u"; [ "$s" = inactive ] || echo "$u loaded $s sub of it"; done ;;
-  stop) for u; do [ ! -e "{here}/units/$u" ] || echo inactive > "{here}/units/$u"; done ;;
-  start) for u; do [ -e "{here}/absent/$u" ] && echo failed > "{here}/units/$u" || echo active > "{here}/units/$u"; done ;;
-  *is-enabled) [ ! -e "{here}/disabled/$1" ] ;;
-  *is-active) [ "$(cat "{here}/units/$1")" = active ] ;;
+  list-units) for u; do read -r s < "$u" && case ,$states, in *,$s,*) echo "$u loaded $s sub of it" ;; esac; done ;;
+  stop) for u; do [ "$(cat "$u")" = failed ] || echo inactive > "$u"; done ;;
+  start) for u; do if [ -e "../absent/$u" ]; then echo failed; else echo active; fi > "$u"; done ;;
+  is-enabled) [ ! -e "../disabled/$1" ] ;;
+  is-active) [ "$(cat "$1")" = active ] ;;
 esac
 """
 
@@ -83,12 +85,21 @@ def package(folder: Path, version: str, modules: Collection[str], *, old: bool =
     return made
 
 
+def _replace(file: Path, text: str) -> None:
+    file.write_text(text)
+
+
 class System:
     """A root directory with services, on a systemd that keeps files."""
 
     def __init__(self, folder: Path) -> None:
         self.root, self.fakes = folder / "root", folder / "fakes"
-        for name in ("var/lib/dpkg/info", "var/lib/dpkg/updates", "run/systemd/system", "etc/rmf-bridges"):
+        for name in (
+            "var/lib/dpkg/info",
+            "var/lib/dpkg/updates",
+            "run/systemd/system",
+            "etc/rmf-bridges",
+        ):
             (self.root / name).mkdir(parents=True)
         (self.root / "var/lib/dpkg/status").touch()
         for name in ("bin", "units", "absent", "disabled"):
@@ -133,9 +144,22 @@ class System:
         path = f"{self.fakes}/bin:/usr/sbin:/usr/bin:/sbin:/bin"
         command = ["dpkg", f"--root={self.root}", "--log=/dev/null", *force, *map(str, words)]
         env = {"PATH": path, "HOME": "/", "LC_ALL": "C"}
-        done = subprocess.run(command, env=env, capture_output=True, text=True, start_new_session=True)
+        done = subprocess.run(
+            command, env=env, capture_output=True, text=True, start_new_session=True
+        )
         assert done.returncode in (0, 1, 2) or (cut and done.returncode == -signal.SIGKILL), done
         return done
+
+    def fails(self, name: str) -> Callable[[], None]:
+        """Let a command fail, as on a full disk; returns what mends it."""
+        file = self.fakes / "bin" / name
+        real = file.read_text()
+        file.write_text("#!/bin/sh\nexit 1\n")
+        return partial(_replace, file, real)
+
+    def called(self) -> list[str]:
+        """What systemctl was told."""
+        return (self.fakes / "calls").read_text().splitlines()
 
     def counted(self) -> int:
         """How many commands the last dpkg has counted."""
@@ -143,7 +167,9 @@ class System:
 
     def off(self) -> str:
         """What `outputs-off` says now: its version, and the modules of its tree."""
-        done = subprocess.run([self.root / LIB / "bin/rmf-bridge", "outputs-off"], capture_output=True)
+        done = subprocess.run(
+            [self.root / LIB / "bin/rmf-bridge", "outputs-off"], capture_output=True
+        )
         return (done.stdout + done.stderr).decode().strip()
 
     def status(self) -> str:

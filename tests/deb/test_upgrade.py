@@ -10,7 +10,11 @@ from tests.deb.small import System, package
 pytestmark = pytest.mark.skipif(shutil.which("dpkg") is None, reason="dpkg is Debian's")
 
 OLD, ONE, TWO = "0.1.0+deb13", "0.1.0+r1.ga", "0.1.0+r2.gb"
-MODULES = {OLD: ("module_a", "module_old"), ONE: ("module_a", "module_b"), TWO: ("module_b", "module_c")}
+MODULES = {
+    OLD: ("module_a", "module_old"),
+    ONE: ("module_a", "module_b"),
+    TWO: ("module_b", "module_c"),
+}
 SERVED = {"door": "active", "failed": "active", "stopped": "inactive"}
 
 
@@ -40,7 +44,8 @@ def is_complete(made: System, version: str) -> bool:
     assert made.states() == SERVED
     assert [f.read_text() for f in drop_ins] == [f"drop-in of {version}\n"] * len(drop_ins)
     assert not [f for f in drop_ins if f.is_symlink() or len(list(f.parent.iterdir())) != 1]
-    assert made.trees() == [f"{version}-1"]
+    (tree,) = made.trees()
+    assert tree.rpartition("-")[0] == version
     return True
 
 
@@ -66,10 +71,91 @@ def test_whenever_the_power_is_cut_one_version_is_whole_and_dpkg_completes_the_o
         made.dpkg("-i", debs[after], cut=cut)
         now = made.off()
         assert now in (whole(before), whole(after)), cut
-        if now == whole(after) or made.drop_in("door").is_symlink():
-            assert made.drop_in("door").read_text() == f"drop-in of {now.split()[0]}\n" or before == OLD
+        fits = "nothing" if now == whole(before) else after
+        assert made.drop_in("door").read_text() == f"drop-in of {fits}\n", cut
         if made.status()[1] == "H":  # dpkg had not unpacked it: it wants the file again
             made.dpkg("-i", debs[after])
         else:
             made.dpkg("--configure", "-a")
         assert is_complete(made, after), cut
+
+
+def test_a_file_that_the_new_version_refuses_leaves_everything_as_it_was(
+    tmp_path: Path, debs: dict[str, Path]
+) -> None:
+    made = system(tmp_path, debs[ONE])
+    yaml = made.root / "etc/rmf-bridges/door.yaml"
+    yaml.write_text(f"# refused by {TWO}\n")
+    states = made.states()
+    told = made.dpkg("-i", debs[TWO])
+    assert (told.returncode, f"{yaml}:1:1: refused\n" in told.stderr) == (1, True)
+    assert (made.status(), made.off(), made.states()) == (f"iF {TWO}", whole(ONE), states)
+    assert (made.trees(), made.drop_in("door").read_text()) == (
+        [f"{ONE}-1"],
+        "drop-in of nothing\n",
+    )
+    assert "stop" not in made.called()
+    yaml.write_text("mended\n")
+    made.dpkg("--configure", "-a")
+    assert is_complete(made, TWO)
+
+
+def test_a_service_that_does_not_start_and_an_output_that_is_not_off_are_named_and_all_others_serve(
+    tmp_path: Path, debs: dict[str, Path]
+) -> None:
+    made = system(tmp_path, debs[ONE])
+    record = made.root / "var/lib/rmf-bridge/door/claimed-1.json"
+    record.parent.mkdir()
+    record.touch()
+    (made.fakes / "absent/rmf-bridge@failed.service").touch()
+    told = made.dpkg("-i", debs[TWO])
+    assert told.returncode == 0
+    assert (
+        f"door: not verified off: cut its relays' supply before anybody works on it ({record})"
+        in told.stderr
+    )
+    assert "rmf-bridge@failed.service does not serve" in told.stderr
+    assert made.states() == {**SERVED, "failed": "failed"}
+    assert (made.off(), len(made.trees())) == (whole(TWO), 2)  # the old one, until all have served
+
+
+@pytest.mark.parametrize("step", ["nice", "sync", "ln", "mv"])
+def test_a_full_disk_at_any_step_leaves_every_service_running(
+    tmp_path: Path, debs: dict[str, Path], step: str
+) -> None:
+    made = system(tmp_path, debs[ONE])
+    real = made.fails(step)
+    told = made.dpkg("-i", debs[TWO])
+    assert (told.returncode, made.status()) == (1, f"iF {TWO}")
+    assert (made.off(), made.states()["door"]) == (whole(ONE), "active")
+    assert made.trees() == [f"{ONE}-1"]
+    real()
+    made.dpkg("--configure", "-a")
+    assert is_complete(made, TWO)
+
+
+def test_what_somebody_has_disabled_stays_so_and_a_first_installation_enables(
+    tmp_path: Path, debs: dict[str, Path]
+) -> None:
+    made = system(tmp_path, debs[ONE])
+    assert [line for line in made.called() if "enable " in line] == [
+        f"--root={made.root} enable --quiet rmf-bridges.target rmf-bridge-recorder.service"
+    ]
+    (made.fakes / "disabled/rmf-bridge@failed.service").touch()
+    made.dpkg("-i", debs[TWO])
+    assert made.states() == {**SERVED, "failed": "failed"}
+    assert len([line for line in made.called() if " enable " in line]) == 1
+
+
+def test_after_a_removal_an_installation_starts_what_ran_and_a_purge_leaves_nothing(
+    tmp_path: Path, debs: dict[str, Path]
+) -> None:
+    made = system(tmp_path, debs[ONE])
+    made.dpkg("-r", "rmf-bridges")
+    assert set(made.states().values()) == {"inactive", "failed"}
+    assert not (made.root / "usr/lib/rmf-bridges").exists()
+    made.dpkg("-i", debs[TWO])
+    assert made.states() == SERVED
+    made.dpkg("-P", "rmf-bridges")
+    left = [p for p in made.root.rglob("*") if "rmf" in p.name]
+    assert left == []
