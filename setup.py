@@ -1,7 +1,8 @@
 """What pyproject.toml cannot say: the version names the commit that is built.
 
-`0.1.0+r900.gabcdef0` is the 900th commit; `.m` and the time of the last change follow for a checkout with changes.
-Where there is no git, the build is unknown: the version is 0.1.0, and the built `bridges` has an empty BUILD.
+`0.1.0+r900.gabcdef0` is the 900th commit; `.m` and the time of the last change follow for a checkout
+with changes. Where there is no git, the build is unknown: the version is 0.1.0, and the built `bridges`
+has an empty BUILD.
 """
 
 import re

@@ -69,7 +69,11 @@ unit() {
   mkdir -p "$1/usr/lib/systemd/system"
   sed 's#/opt/rmf-bridges/.venv/bin/#/usr/lib/rmf-bridges/bin/#' "$here/systemd/$2" > "$1/usr/lib/systemd/system/$2"
 }
-for each in rmf-bridges.target rmf-bridge@.service rmf-bridge-recorder.service; do unit "$root" "$each"; done
+for each in rmf-bridges.target rmf-bridge@.service rmf-bridge-recorder.service rmf-bridge-outputs-off.service; do
+  unit "$root" "$each"
+done
+mkdir "$root/usr/lib/systemd/system/multi-user.target.wants" # whatever is enabled: off is safe
+ln -s ../rmf-bridge-outputs-off.service "$root/usr/lib/systemd/system/multi-user.target.wants/"
 unit "$page" rmf-bridge-page.service
 put "$root" systemd/rmf-bridges.sysusers usr/lib/sysusers.d/rmf-bridges.conf
 put "$page" systemd/rmf-bridges-page.sysusers usr/lib/sysusers.d/rmf-bridges-page.conf

@@ -14,7 +14,12 @@ from bridges.serve import last_mark
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `outputs-off`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
+    parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="the device YAML")
+    parser.add_argument(
+        "--all-records",
+        action="store_true",
+        help="of every service that a power cut or a death has left a record of; 6 s at most",
+    )
     parser.add_argument("--runtime-dir", metavar="DIR", help="the dead daemon's runtime directory")
     parser.add_argument("--record", action="append", default=[], help=argparse.SUPPRESS)
 
@@ -24,6 +29,12 @@ def run(args: argparse.Namespace) -> int:
     if last_mark.says_off(os.environ):
         print('nothing_to_switch_off reason="the daemon verified it"', file=sys.stderr)
         return 0
+    if args.all_records:
+        from bridges.commands.all_records import switch_off_all
+
+        return switch_off_all()
+    if args.file is None:
+        args.usage("name a device YAML, or --all-records")
     from bridges.commands.dead import switch_off
 
     return switch_off(args)

@@ -1,7 +1,7 @@
-"""A small package with our own maintainer scripts, and a root directory into which the real dpkg installs it.
+"""A small package with our own maintainer scripts, and a root into which the real dpkg installs it.
 
-What the scripts call is real but for systemd: `systemctl` keeps a file for each unit. Each command that changes something
-counts, and at a chosen one everything is killed, dpkg included, as by a power cut.
+What the scripts call is real but for systemd: `systemctl` keeps a file for each unit. Each command that
+changes something counts, and at a chosen one everything is killed, dpkg included, as by a power cut.
 """
 
 import os
@@ -43,7 +43,8 @@ for w; do case $w in --state=*) states=${{w#*=}} ;; -*) ;; *) words="$words $w" 
 set -- $words
 command=$1; shift
 case $command in
-  list-units) for u; do read -r s < "$u" && case ,$states, in *,$s,*) echo "$u loaded $s sub of it" ;; esac; done ;;
+  list-units) for u; do read -r s < "$u" || continue
+    case ,$states, in *,$s,*) echo "$u loaded $s sub of it" ;; esac; done ;;
   stop) for u; do [ "$(cat "$u")" = failed ] || echo inactive > "$u"; done ;;
   start) for u; do if [ -e "../absent/$u" ]; then echo failed; else echo active; fi > "$u"; done ;;
   is-enabled) [ ! -e "../disabled/$1" ] ;;

@@ -1,4 +1,4 @@
-"""Installing, upgrading, going back and removing, by the real dpkg: whatever ends it, one version is whole, and serves."""
+"""Install, upgrade, go back and remove, by the real dpkg: whatever ends it, one version is whole, and serves."""
 
 import shutil
 from pathlib import Path
@@ -29,7 +29,7 @@ def whole(version: str) -> str:
 
 
 def system(folder: Path, deb: Path) -> System:
-    """A machine with this package and services: one serves, one has failed, somebody has stopped one."""
+    """A machine with this package: one service serves, one has failed, somebody has stopped one."""
     made = System(folder)
     assert made.dpkg("-i", deb).returncode == 0
     for name, state in (("door", "active"), ("failed", "failed"), ("stopped", "inactive")):

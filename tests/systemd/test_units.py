@@ -18,6 +18,8 @@ FILES = ROOT / "systemd"
 UNIT = FILES / "rmf-bridge@.service"
 RECORDER = FILES / "rmf-bridge-recorder.service"
 PAGE = FILES / "rmf-bridge-page.service"
+EARLY = FILES / "rmf-bridge-outputs-off.service"
+OTHERS = (RECORDER, PAGE, EARLY)
 CONFIG = device_yamls()
 VERIFY = ("systemd-analyze", "verify", "--man=no")
 MOST = 2.0
@@ -65,8 +67,8 @@ def test_no_shipped_file_needs_a_service_that_is_more_exposed_than_this(
 
 
 @needs_systemd
-@pytest.mark.parametrize(("service", "most"), [(RECORDER, 1.0), (PAGE, 1.5)])
-def test_the_recorder_and_the_page_are_less_exposed_than_any_daemon(
+@pytest.mark.parametrize(("service", "most"), [(RECORDER, 1.0), (PAGE, 1.5), (EARLY, MOST)])
+def test_the_other_units_are_no_more_exposed_than_a_daemon(
     tmp_path: Path, service: Path, most: float
 ) -> None:
     units = tmp_path / "etc/systemd/system"
@@ -80,9 +82,9 @@ def test_systemd_finds_nothing_wrong_with_the_units(tmp_path: Path) -> None:
     name = system(tmp_path, ROOT / "config/door_rs485.yaml")
     units = tmp_path / "etc/systemd/system"
     program = "/opt/rmf-bridges/.venv/bin/rmf-bridge"
-    others = [units / "rmf-bridges.target", units / RECORDER.name, units / PAGE.name]
-    shutil.copy(RECORDER, units)
-    shutil.copy(PAGE, units)
+    others = [units / "rmf-bridges.target", *(units / each.name for each in OTHERS)]
+    for each in OTHERS:
+        shutil.copy(each, units)
     for unit in (units / "rmf-bridge@.service", *others):
         unit.write_text(unit.read_text().replace(program, "/bin/true").replace("man:", "file:/"))
     (units / "rmf-bridge@.service").rename(units / name)

@@ -1,0 +1,77 @@
+"""`outputs-off --all-records`: at boot, off is what the services' records name, before any daemon starts.
+
+The power was cut while they served. One process loads the program, and forks for each service: a wire that hangs
+delays no other, and each record has its own profiles. This machine's pins come first: they need no module that
+answers. All of it is bounded in time, as every daemon waits for it: what is left, a daemon makes safe when it starts.
+"""
+
+import argparse
+import logging
+import os
+import re
+import signal
+import time
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+from bridges import log
+from bridges.commands import dead
+from bridges.log import pairs
+from bridges.serve.places import SERVICE_STATE
+from bridges.serve.record import PATTERN, read
+
+OWN_S, OTHERS_S = 4.0, 2.0
+"""For this machine's own pins, and then for all else: as long as the start of a daemon may take."""
+AGAIN_S = 0.2
+"""udev may not yet have given the chip to its group."""
+LOOK_EVERY_S = 0.01
+OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
+"""In a YAML; it decides only who comes first."""
+
+
+def switch_off_all(state: Path = SERVICE_STATE) -> int:
+    """0 when every output that a record names is verified off, 1 when not."""
+    log.start()
+    own, others = list[Path](), list[Path]()
+    for path in sorted(state.glob(f"*/{PATTERN}")):
+        if record := read(path):
+            file = Path(record.file)
+            (own if OWN_PINS.search(record.yaml) else others).append(file)
+    left = _off(own, OWN_S) | _off(set(others) - set(own), OTHERS_S)
+    for file in sorted(left):
+        logging.warning(pairs("left_to_its_daemon", file=file))
+    return 1 if left else 0
+
+
+def _off(files: Collection[Path], within_s: float) -> set[Path]:
+    """Switch these services' outputs off, side by side; returns those that are not verified off in time."""
+    give_up_at = time.monotonic() + within_s
+    running = {_forked(lambda file=file: _until_off(file)): file for file in dict.fromkeys(files)}  # type: ignore[misc]
+    left = set(running.values())
+    while running and time.monotonic() < give_up_at:
+        pid, ended = os.waitpid(-1, os.WNOHANG)
+        if pid == 0:
+            time.sleep(LOOK_EVERY_S)
+        elif (file := running.pop(pid)) and ended == 0:
+            left.discard(file)
+    for pid in running:
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+    return left
+
+
+def _forked(work: Callable[[], object]) -> int:
+    """Do this in a child, whose exit code is 0 when it is done; returns its process id."""
+    if pid := os.fork():
+        return pid
+    try:
+        work()
+    finally:
+        os._exit(1)
+
+
+def _until_off(file: Path) -> None:
+    """Try until it is off; ends the process."""
+    while dead.switch_off(argparse.Namespace(file=file, runtime_dir=None, record=[])):
+        time.sleep(AGAIN_S)
+    os._exit(0)
