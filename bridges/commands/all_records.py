@@ -1,8 +1,9 @@
-"""`outputs-off --all-records`: at boot, off is what the services' records name, before any daemon starts.
+"""`outputs-off --all-records`: what the services' records name is off before a daemon starts.
 
-The power was cut while they served. One process loads the program, and forks for each service: a wire that hangs
-delays no other, and each record has its own profiles. This machine's pins come first: they need no module that
-answers. All of it is bounded in time, as every daemon waits for it: what is left, a daemon makes safe when it starts.
+The power was cut while they served. One process loads the program, and forks for each service: a wire
+that hangs delays no other, and each record has its own profiles. This machine's pins come first: they
+need no module that answers. All of it is bounded in time, as every daemon waits for it: what is left,
+a daemon makes safe when it starts.
 """
 
 import argparse
@@ -12,6 +13,7 @@ import re
 import signal
 import time
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from pathlib import Path
 
 from bridges import log
@@ -19,6 +21,8 @@ from bridges.commands import dead
 from bridges.log import pairs
 from bridges.serve.places import SERVICE_STATE
 from bridges.serve.record import PATTERN, read
+from bridges.settings.problems import SettingsError
+from drivers.profiles import texts
 
 OWN_S, OTHERS_S = 4.0, 2.0
 """For this machine's own pins, and then for all else: as long as the start of a daemon may take."""
@@ -29,22 +33,27 @@ OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
 """In a YAML; it decides only who comes first."""
 
 
-def switch_off_all(state: Path = SERVICE_STATE) -> int:
+def switch_off_all(
+    state: Path = SERVICE_STATE, own_s: float = OWN_S, others_s: float = OTHERS_S
+) -> int:
     """0 when every output that a record names is verified off, 1 when not."""
     log.start()
     own, others = list[Path](), list[Path]()
     for path in sorted(state.glob(f"*/{PATTERN}")):
         if record := read(path):
             file = Path(record.file)
+            with suppress(SettingsError):  # it is said where the record is used
+                record.config()  # what that imports, each child has
             (own if OWN_PINS.search(record.yaml) else others).append(file)
-    left = _off(own, OWN_S) | _off(set(others) - set(own), OTHERS_S)
+    texts.give({})
+    left = _off(own, own_s) | _off(set(others) - set(own), others_s)
     for file in sorted(left):
         logging.warning(pairs("left_to_its_daemon", file=file))
     return 1 if left else 0
 
 
 def _off(files: Collection[Path], within_s: float) -> set[Path]:
-    """Switch these services' outputs off, side by side; returns those that are not verified off in time."""
+    """Switch these services' outputs off, side by side; returns those not verified off in time."""
     give_up_at = time.monotonic() + within_s
     running = {_forked(lambda file=file: _until_off(file)): file for file in dict.fromkeys(files)}  # type: ignore[misc]
     left = set(running.values())

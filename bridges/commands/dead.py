@@ -105,7 +105,8 @@ def _off_by_record(
     try:
         config = record.config()
     except SettingsError as error:
-        _say(error)
+        _say(error)  # another version's YAML: that of now is all that there is to go by
+        _off_by_yaml(Path(record.file), answered)
         return False
     unsafe = _unsafe(config, record.safe, answered, within_s)
     try:

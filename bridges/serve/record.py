@@ -1,7 +1,8 @@
 """The record of what a daemon claims, written before it claims: all that is needed to switch it off.
 
 It holds the YAML and the settings as they were validated, so that `outputs-off` need not load and
-check the YAML again. If the settings do not decode, for example those of another version, it does.
+check the YAML again. If the settings do not decode, for example those of another version, it does. What
+another version has added is passed over.
 
 A record is a file named by its content, in the daemon's state directory, or in its runtime directory
 if that cannot be written. So a daemon that restarts on the same YAML finds its record, and one on
@@ -9,6 +10,7 @@ another YAML overwrites none. Tokens are not in it: they are read from their fil
 """
 
 import hashlib
+import logging
 from collections.abc import Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +18,7 @@ from pathlib import Path
 import msgspec
 
 from bridges import BUILD, VERSION
+from bridges.log import pairs
 from bridges.rmf.settings import Rmf
 from bridges.serve import files
 from bridges.serve.places import Places, named, opened
@@ -23,12 +26,14 @@ from bridges.settings import names
 from bridges.settings.config import Config
 from drivers.profiles import texts
 
+log = logging.getLogger(__name__)
+
 PATTERN = "claimed-*.json"
 SIZE_MAX = 64 << 20
 """Larger than any YAML with its profiles and DBC files."""
 
 
-class Claim(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Claim(msgspec.Struct, frozen=True):
     """Validated settings, each as JSON. `version`: of the program that wrote them."""
 
     version: str
@@ -38,16 +43,21 @@ class Claim(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     devices: dict[str, bytes]
 
 
-class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Claimed(msgspec.Struct, frozen=True):
     """`file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files, by name.
 
-    `safe`: the devices whose outputs have since been verified off. `claim`: the YAML as settings.
+    `safe`: the devices whose outputs have since been verified off. Every version can read this much.
     """
 
     file: str
     yaml: bytes
     texts: dict[str, bytes]
     safe: tuple[str, ...] = ()
+
+
+class Record(Claimed, frozen=True):
+    """`claim`: the YAML as settings."""
+
     claim: Claim | None = None
 
     @property
@@ -124,9 +134,13 @@ class Records:
         self._file = named(file)
 
     def unreleased(self) -> list[Record]:
-        """The records not yet released; unreadable ones and those of other files are left out."""
-        found = (record for path in paths(self._places) if (record := read(path)))
-        by_name = {record.name: record for record in found if record.file == self._file}
+        """The records not yet released; unreadable ones are named, and left out like other files'."""
+        by_name = dict[str, Record]()
+        for path in paths(self._places):
+            if (record := read(path)) is None:
+                log.warning(pairs("record_not_read", path=path))
+            elif record.file == self._file:
+                by_name[record.name] = record
         return list(by_name.values())
 
     def write(self, record: Record) -> Path:
@@ -152,9 +166,13 @@ class Records:
         self.write(msgspec.structs.replace(record, safe=safe))
 
     def release(self, record: Record) -> None:
-        """Remove a record whose outputs are all off. Raises OSError."""
-        for folder in self._places.folders:
-            (folder / record.name).unlink(missing_ok=True)
+        """Remove a record whose outputs are all off. Raises OSError.
+
+        That of another version has the name which that version gave it.
+        """
+        for path in list(paths(self._places)):
+            if path.name == record.name or ((found := read(path)) and found.name == record.name):
+                path.unlink(missing_ok=True)
 
 
 def paths(places: Places) -> Iterator[Path]:
@@ -167,6 +185,14 @@ def paths(places: Places) -> Iterator[Path]:
 def read(path: Path) -> Record | None:
     """The record in a file; None if it is invalid, unreadable or a symbolic link."""
     try:
-        return msgspec.json.decode(files.read(path, SIZE_MAX), type=Record)
+        return _decoded(files.read(path, SIZE_MAX))
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return None
+
+
+def _decoded(content: bytes) -> Record:
+    """Raises MsgspecError or UnicodeDecodeError."""
+    try:
+        return msgspec.json.decode(content, type=Record)
+    except msgspec.ValidationError:  # another version's claim: the YAML beside it is enough
+        return Record(**msgspec.structs.asdict(msgspec.json.decode(content, type=Claimed)))

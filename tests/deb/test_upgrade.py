@@ -1,4 +1,4 @@
-"""Install, upgrade, go back and remove, by the real dpkg: whatever ends it, one version is whole, and serves."""
+"""Upgrades by the real dpkg: whatever ends one, one version is whole, and serves."""
 
 import shutil
 from pathlib import Path

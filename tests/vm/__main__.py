@@ -2,12 +2,12 @@
 
 import argparse
 import os
-import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -15,9 +15,14 @@ from typing import Any
 
 from tests.vm.image import Unusable, image, needed
 from tests.vm.machine import ARCHS, Machine, accelerated
-from tests.vm.order import ALSO, CUT, NOT_ON, PARTS, REBOOT, WHOLE
+from tests.vm.order import ALSO, CUT, CUT_OFF, NOT_ON, PARTS, REBOOT, WHOLE
 from tests.vm.suite import suite
 
+RESTARTS: dict[str, Callable[[Machine], None]] = {
+    CUT: Machine.cut_power,
+    REBOOT: lambda machine: machine.restarts("boots.reboot"),
+    CUT_OFF: lambda machine: machine.restarts(CUT_OFF),
+}
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / "build/vm"
 NEXT = "next"
@@ -85,11 +90,30 @@ def _as_next(package: Path, folder: Path) -> None:
     needed({"dpkg-deb": "dpkg"})
     tree = folder / "tree"
     subprocess.run(["dpkg-deb", "--raw-extract", str(package), str(tree)], check=True)
-    control = tree / "DEBIAN/control"
-    control.write_text(re.sub(r"^Version: .*", r"\g<0>.1", control.read_text(), flags=re.M))
+    version = package.name.split("_")[1]
+    for file in (tree / "DEBIAN").iterdir():
+        file.write_text(file.read_text().replace(version, f"{version}.1"))
+    _with_a_new_module(tree / "usr/lib/rmf-bridges/tree.tar.xz", folder / "unpacked")
     words = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", str(tree), str(folder)]
     subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
     shutil.rmtree(tree)
+
+
+def _with_a_new_module(archive: Path, folder: Path) -> None:
+    """The same tree, in which `outputs-off` needs a module that the version before has not."""
+    with tarfile.open(archive) as packed:
+        packed.extractall(folder, filter="tar")
+    (package,) = folder.glob("lib/python*/site-packages/bridges")
+    (package / "added.py").touch()
+    command = package / "commands/outputs_off.py"
+    command.write_text(
+        command.read_text().replace("import os\n", "import os\nimport bridges.added\n")
+    )
+    subprocess.run(
+        ["tar", "-C", folder, "--owner=0", "--group=0", "-cf", archive, "-I", "xz -0", "."],
+        check=True,
+    )
+    shutil.rmtree(folder)
 
 
 def _run(machine: Machine, steps: Iterable[str], log: Path) -> int:
@@ -98,8 +122,8 @@ def _run(machine: Machine, steps: Iterable[str], log: Path) -> int:
     with log.open("w") as out:
         for step in steps:
             began = time.monotonic()
-            if step in (CUT, REBOOT):
-                (machine.cut_power if step == CUT else machine.reboot)()
+            if step in RESTARTS:
+                RESTARTS[step](machine)
                 line = f"      {time.monotonic() - began:6.1f} s  ({step}; the host's time)"
             else:
                 result = machine.check(step)

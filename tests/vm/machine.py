@@ -131,9 +131,9 @@ class Machine:
         self._port.sendall(name.encode() + b"\n")
         return self._heard()
 
-    def reboot(self) -> None:
-        """Let the machine restart itself, in good order."""
-        self._port.sendall(b"boots.reboot\n")
+    def restarts(self, check: str) -> None:
+        """Run a check that ends with a restart of the machine."""
+        self._port.sendall(check.encode() + b"\n")
         self.booted()
 
     def cut_power(self) -> None:

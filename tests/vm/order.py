@@ -4,6 +4,8 @@ from typing import Final
 
 CUT: Final = "power cut"
 REBOOT: Final = "reboot"
+CUT_OFF: Final = "upgrades.cut"
+"""A check that cuts the power itself, in the machine, at a random moment."""
 LIFT: Final = ("install.package", "install.lift")
 PARTS: Final = {
     "lift": (
@@ -50,9 +52,24 @@ PARTS: Final = {
         "install.page",
         "install.security",
     ),
+    "upgrade": (
+        *LIFT,
+        "wires.door_service",
+        "wires.charger_service",
+        "install.supervisors",
+        "upgrades.site",
+        CUT,
+        "upgrades.booted",
+        "upgrades.full_var",
+        "upgrades.refused",
+        "upgrades.absent",
+        "upgrades.back",
+        *(CUT_OFF, "upgrades.completed") * 3,
+        "upgrades.purged",
+    ),
 }
 """Each is one machine from its first boot on: a check may need those before it."""
-WHOLE: Final = ("lift", "site")
+WHOLE: Final = ("lift", "site", "upgrade")
 """The parts that have every check: they run side by side."""
 ALSO: Final = {("arm64", "lift"): ("inside.demo", "inside.transport")}
 """What CI's own machine, an amd64, does not show."""

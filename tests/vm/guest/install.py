@@ -31,25 +31,25 @@ EXPOSED = 2.0
 
 def package() -> str:
     """`apt install ./rmf-bridges_….deb` on a fresh Debian."""
-    deb = _deb("rmf-bridges")
-    install(deb)
+    found = deb("rmf-bridges")
+    install(found)
     chip = (header.CONFIGFS / "bank0/chip_name").read_text().strip()
     group = grp.getgrgid(Path(f"/dev/{chip}").stat().st_gid).gr_name
     if group != "gpio":
         raise Wrong(f"/dev/{chip} belongs to the group {group}")
-    return f"{deb.name}: {sh('rmf-bridge', '--version').strip()}; /dev/{chip} is the group gpio's"
+    return f"{found.name}: {sh('rmf-bridge', '--version').strip()}; /dev/{chip} is the group gpio's"
 
 
-def install(deb: Path) -> None:
+def install(file: Path) -> None:
     """As people do it, but that nothing is asked."""
     apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
-    sh(*apt, "--no-install-recommends", str(deb))
+    sh(*apt, "--no-install-recommends", str(file))
 
 
-def _deb(name: str) -> Path:
+def deb(name: str) -> Path:
     """The package of this name, which the host shares."""
-    (deb,) = mounted("packages", "/srv").glob(f"{name}_*.deb")
-    return deb
+    (found,) = mounted("packages", "/srv").glob(f"{name}_*.deb")
+    return found
 
 
 def lift() -> str:
@@ -88,7 +88,7 @@ def wrong_yaml() -> str:
 
 def page() -> str:
     """The web page, a package of its own: started by systemd it answers, below its memory limit."""
-    install(_deb("rmf-bridges-page"))
+    install(deb("rmf-bridges-page"))
     began = time.monotonic()
     sh("systemctl", "start", PAGE)
     until(_answers, "the page answers")
@@ -134,7 +134,7 @@ def upgrade() -> str:
     service = unit("lift")
     relays, old = energise(), pid(service)
     when = header.now()
-    install(_deb("next/rmf-bridges"))
+    install(deb("next/rmf-bridges"))
     back(service, old)
     version = sh("dpkg-query", "-W", "-f", "${Version}", "rmf-bridges")
     off = header.off_at(relays, when)

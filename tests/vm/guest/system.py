@@ -10,7 +10,7 @@ from threading import Timer
 from typing import Final, TypeVar
 
 CONFIG: Final = Path("/mnt/tests/vm/guest/config")
-PYTHON: Final = "/usr/lib/rmf-bridges/bin/python3"
+PYTHON: Final = "/usr/lib/rmf-bridges/current/bin/python3"
 LATE_S: Final = 60.0
 """For what has no time of its own."""
 KEPT: Final = Path("/var/lib/checks-kept")

@@ -1,0 +1,229 @@
+"""Another version comes: refused, with an adapter away, on a full disk, cut off at any moment."""
+
+import os
+import random
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tests.vm.guest import header
+from tests.vm.guest.install import deb
+from tests.vm.guest.rides import LIFT, end, energise, send
+from tests.vm.guest.system import (
+    Wrong,
+    enable,
+    far_side,
+    is_active,
+    pid,
+    sh,
+    since_boot_s,
+    unit,
+    until,
+)
+from tests.vm.guest.wires import tell
+
+SERVICES = ("lift", "door", "charger", "lift_supervisor", "door_supervisor", "low")
+OFF_S, READY_S = 12.0, 20.0
+"""What docs/reliability.md promises after a power cut, from the kernel's start."""
+YAML = Path("/etc/rmf-bridges/lift.yaml")
+CURRENT = Path("/usr/lib/rmf-bridges/current")
+UPGRADE_S = 45.0
+"""A cut comes within this time: an upgrade takes less."""
+FORCE = ("dpkg", "--force-confold", "--install")
+
+
+def site() -> str:
+    """Lift, two doors, charger and both supervisors serve; relays of the lift and a door are on."""
+    enable("low")
+    wait = [since_boot_s(unit(name), "ActiveEnterTimestampMonotonic") for name in SERVICES]
+    send("door", "ward_door", "open", "--direct")
+    energise()
+    Path("/var/lib/checks-version").write_text(version())
+    sh("sync")
+    return f"{len(wait)} services, status says {_status()}"
+
+
+def booted() -> str:
+    """The whole site is up again after a power cut: off within 12 s, all ready within 20 s."""
+    until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
+    first, on = _first_writes()
+    ready = {n: since_boot_s(unit(n), "ActiveEnterTimestampMonotonic") for n in SERVICES}
+    _wires_back()
+    sh("systemd-analyze", "critical-chain", unit("lift"), "--no-pager")
+    sh("systemd-analyze", "blame", "--no-pager")
+    sh("journalctl", "-b", "-u", "rmf-bridge-outputs-off.service", "-o", "short-monotonic")
+    text = ", ".join(f"{name} {s:.1f}" for name, s in ready.items())
+    if on or first > OFF_S or max(ready.values()) > READY_S:
+        raise Wrong(f"on {on}, all off {first:.1f} s after the kernel's start, ready: {text}")
+    return f"all written off {first:.1f} s after the kernel's start, ready: {text}"
+
+
+def _first_writes() -> tuple[float, list[header.Write]]:
+    """When the last output of the lift was first written, and the writes that switched one on."""
+    writes = [each for each in header.writes() if each.line in LIFT]
+    if {each.line for each in writes} != LIFT.keys():
+        raise Wrong(f"written: {writes}")
+    first = {line: min(w.at for w in writes if w.line == line) for line in LIFT}
+    return max(first.values()), [each for each in writes if each.level == LIFT[each.line]]
+
+
+def _wires_back() -> None:
+    """What was at the wires is there again: a boot ends it, as it runs in this machine."""
+    if not Path("/sys/class/net/vcan0").exists():
+        sh("ip", "link", "add", "vcan0", "type", "vcan")
+        sh("ip", "link", "set", "vcan0", "up")
+    for name in ("lift", "door", "charger"):
+        if not Path(f"/run/far-{name}").exists():
+            far_side(name)
+
+
+def version() -> str:
+    """Of the package, as dpkg has it."""
+    return sh("dpkg-query", "-W", "-f", "${Version}", "rmf-bridges")
+
+
+def _status() -> str:
+    """What `rmf-bridge status` ends with: 0 well, 1 faults, 2 somebody died."""
+    import subprocess
+
+    done = subprocess.run(["rmf-bridge", "status"], capture_output=True, text=True)
+    print(done.stdout, done.stderr)
+    if done.returncode not in (0, 1, 2) or "Traceback" in done.stderr:
+        raise Wrong(f"status: {done.returncode}: {done.stderr[-300:]}")
+    return str(done.returncode)
+
+
+def refused() -> str:
+    """A YAML that the next version refuses: file and line are named, nothing else happens."""
+    old, tree, text = pid(unit("lift")), CURRENT.readlink(), YAML.read_text()
+    YAML.write_text(text + "flors: [L1]\n")
+    try:
+        told = sh(*FORCE, str(deb("next/rmf-bridges")), fails=True)
+    finally:
+        YAML.write_text(text)
+    state = sh("dpkg-query", "-W", "-f", "${db:Status-Status}", "rmf-bridges")
+    if f"{YAML}:" not in told or (state, CURRENT.readlink(), pid(unit("lift"))) != (
+        "half-configured",
+        tree,
+        old,
+    ):
+        raise Wrong(f"{state}, {CURRENT.readlink()}, {told[-300:]}")
+    return f"dpkg has it half-configured, the services are as they were, status {_status()}"
+
+
+def absent() -> str:
+    """That YAML is mended, an adapter is away: `dpkg --configure -a` starts every service."""
+    tell("door", "fail ward_door server off")
+    began = time.monotonic()
+    told = sh("dpkg", "--configure", "-a")
+    took = time.monotonic() - began
+    states = {name: is_active(unit(name)) for name in SERVICES}
+    tell("door", "fail ward_door server ok")
+    send("door", "ward_door", "open", "--direct")
+    trees = os.listdir("/usr/lib/rmf-bridges/trees")
+    if not all(states.values()) or not version().endswith(".1") or len(trees) != 1:
+        raise Wrong(f"{version()}: {states}, {trees}, {told[-300:]}")
+    said = next((line for line in told.splitlines() if "not verified off" in line), "said nothing")
+    return f"{took:.1f} s, {version()}: all serve, the door again when its adapter is back; {said}"
+
+
+def back() -> str:
+    """The version before is installed again, two relays on: off, and every service is back."""
+    relays, when = energise(), header.now()
+    sh(*FORCE, str(deb("rmf-bridges")))
+    off = header.off_at(relays, when)
+    if off.keys() != relays.keys() or not all(map(is_active, map(unit, SERVICES))):
+        raise Wrong(f"{version()}: off {off}")
+    return f"{version()}: off after {max(off.values()) - when:.1f} s, all serve, status {_status()}"
+
+
+@contextmanager
+def _full() -> Iterator[None]:
+    """The disk is full, also for root."""
+    filler = Path("/var/filler")
+    room = os.statvfs("/var")
+    with filler.open("wb") as out:
+        os.posix_fallocate(out.fileno(), 0, room.f_bfree * room.f_frsize - (1 << 20))
+        block = bytes(4096)
+        try:
+            while True:
+                out.seek(0, os.SEEK_END)
+                out.write(block)
+                out.flush()
+        except OSError:
+            pass
+    try:
+        yield
+    finally:
+        filler.unlink()
+
+
+def full_var() -> str:
+    """/var is full, with all of the disk: `enable`, a ride and an upgrade leave all serving."""
+    with _full():
+        sh("rmf-bridge", "enable", str(YAML), fails=True)
+        until(lambda: is_active(unit("lift")), "the lift's service is back")
+        energise()
+        _status()
+        end()
+        old = pid(unit("lift"))
+        told = sh(*FORCE, str(deb("next/rmf-bridges")), fails=True)
+        if pid(unit("lift")) != old or not all(map(is_active, map(unit, SERVICES))):
+            raise Wrong(f"the services have not stayed: {told[-300:]}")
+    was = version()
+    sh(*FORCE, str(deb("rmf-bridges")))
+    return f"enable and upgrade fail ({was}), a ride succeeds; with room again dpkg succeeds"
+
+
+def cut() -> str:
+    """(the power is cut at a random moment of an upgrade or of the way back)"""
+    names = ("next/rmf-bridges", "rmf-bridges")
+    target = deb(names[version().endswith(".1")])
+    Path("/var/lib/checks-target").write_text(str(target))
+    if is_active(unit("lift")):
+        energise()
+    sh("sync")
+    moment = random.SystemRandom().uniform(0, UPGRADE_S)
+    Path("/var/lib/checks-moment").write_text(f"{moment:.1f}")
+    os.sync()
+    words = f"sleep {moment}; echo b > /proc/sysrq-trigger"
+    sh("systemd-run", "sh", "-c", words)
+    sh("systemd-run", *FORCE, str(target))
+    return "soon"
+
+
+def completed() -> str:
+    """After that cut: off at boot, all serve one version; dpkg completes the other, and all serve."""
+    moment = Path("/var/lib/checks-moment").read_text()
+    until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
+    first, on = _first_writes()
+    if on:
+        raise Wrong(f"cut after {moment} s: on at boot {on}")
+    sh("rmf-bridge", "outputs-off", "--help")
+    state = sh("dpkg-query", "-W", "-f", "${db:Status-Status} ${Version}", "rmf-bridges")
+    tree = CURRENT.readlink().name
+    status = _status()
+    target = Path("/var/lib/checks-target").read_text()
+    if state.startswith("half-installed"):
+        sh(*FORCE, target)
+    else:
+        sh("dpkg", "--configure", "-a")
+        if version() not in target:
+            sh(*FORCE, target)
+    _wires_back()
+    until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is back")
+    done = sh("dpkg-query", "-W", "-f", "${db:Status-Status} ${Version}", "rmf-bridges")
+    if done.split()[0] != "installed" or done.split()[1] not in target:
+        raise Wrong(f"cut after {moment} s: {state}, then {done}")
+    return f"cut after {moment} s: {state}, by {tree}, off {first:.1f} s, status {status}; completed"
+
+
+def purged() -> str:
+    """`apt purge`: nothing of it is left but the user and the groups."""
+    sh("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "purge", "--yes", "rmf-bridges")
+    left = sh("find", "/etc", "/usr", "/var", "/run", "-xdev", "-name", "*rmf-bridge*").split()
+    left = [name for name in left if not name.startswith("/var/cache")]
+    if left:
+        raise Wrong(f"left: {left}")
+    return "nothing"
