@@ -2,7 +2,8 @@
 
 It validates the file, beside the files of this machine's other services; stops an instance that runs,
 so that its outputs are switched off while it may still reach the old relay; copies the file to
-/etc/rmf-bridges; writes the instance's drop-in (`bridges/serve/drop_in.py`); and starts it.
+/etc/rmf-bridges; writes the instance's drop-in (`bridges/serve/drop_in.py`); and starts it. If a step
+fails, what ran is started again as it is then.
 """
 
 import argparse
@@ -59,7 +60,8 @@ def run(args: argparse.Namespace) -> int:
         print(problem, file=sys.stderr)
     planned = steps(config, args.root, groups(args.root))
     last = "start" if args.no_start else None
-    return carry_out((s for s in planned if not (isinstance(s, Run) and s.words[1] == last)), args)
+    taken = (s for s in planned if not (isinstance(s, Run) and s.words[1] == last))
+    return carry_out(taken, args, keeps=unit(config.path.stem))
 
 
 def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step]:

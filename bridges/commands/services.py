@@ -6,7 +6,7 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -86,8 +86,11 @@ def switch_off(name: str) -> SwitchOff:
     return SwitchOff((sys.executable, *words), SERVICE_STATE / name)
 
 
-def carry_out(steps: Iterable[Step], args: argparse.Namespace) -> int:
-    """Take the steps in turn, up to the first that fails; or print them. Returns the exit code."""
+def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") -> int:
+    """Take the steps in turn, up to the first that fails; or print them. Returns the exit code.
+
+    `keeps`: a unit that is started again after a step that has failed, if it ran before.
+    """
     live = args.root == Path("/")
     if live and not args.dry_run and os.geteuid() != 0:
         print("only root may do that: use sudo, or --dry-run to see it", file=sys.stderr)
@@ -95,6 +98,7 @@ def carry_out(steps: Iterable[Step], args: argparse.Namespace) -> int:
     if not args.root.is_dir():
         print(f"{args.root} is not a folder: is the card mounted?", file=sys.stderr)
         return os.EX_NOINPUT
+    ran = keeps and live and not args.dry_run and _did(("systemctl", "--quiet", "is-active", keeps))
     for step in steps:
         if not live and (
             isinstance(step, SwitchOff) or (isinstance(step, Run) and step.running_only)
@@ -104,8 +108,14 @@ def carry_out(steps: Iterable[Step], args: argparse.Namespace) -> int:
             _show(step)
         elif code := _take(step, args.root):
             print("the steps after that were not taken", file=sys.stderr)
+            if ran:
+                _did(("systemctl", "start", keeps))
             return code
     return 0
+
+
+def _did(words: Sequence[str]) -> bool:
+    return subprocess.run(words).returncode == 0
 
 
 def _show(step: Step) -> None:
@@ -125,6 +135,14 @@ def _show(step: Step) -> None:
 
 def _take(step: Step, root: Path) -> int:
     """Returns 0 if it succeeded."""
+    try:
+        return _taken(step, root)
+    except OSError as error:  # a full disk
+        print(error, file=sys.stderr)
+        return os.EX_IOERR
+
+
+def _taken(step: Step, root: Path) -> int:
     match step:
         case Run(words):
             where = [] if root == Path("/") else [f"--root={root}"]

@@ -193,3 +193,19 @@ def test_a_relay_that_is_not_verified_off_keeps_its_drop_in(
     assert "what ward had claimed is not verified off" in told
     assert f"rm {left}" in told
     assert kept.exists()
+
+
+def test_a_step_that_fails_after_the_stop_ends_with_the_service_started_again(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    calls: list[list[str]],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    (tmp_path / "file").touch()
+    live = _told(LIFT, Path("/"))
+    live.dry_run = False
+    full = Write(tmp_path / "file" / "drop_in", b"")  # no folder: as a full disk, an OSError
+    assert carry_out([full, Remove(tmp_path / "never")], live, keeps=UNIT) == os.EX_IOERR
+    assert calls == [["systemctl", "--quiet", "is-active", UNIT], ["systemctl", "start", UNIT]]
+    assert "the steps after that were not taken" in capsys.readouterr().err

@@ -216,7 +216,9 @@ def completed() -> str:
     done = sh("dpkg-query", "-W", "-f", "${db:Status-Status} ${Version}", "rmf-bridges")
     if done.split()[0] != "installed" or done.split()[1] not in target:
         raise Wrong(f"cut after {moment} s: {state}, then {done}")
-    return f"cut after {moment} s: {state}, by {tree}, off {first:.1f} s, status {status}; completed"
+    return (
+        f"cut after {moment} s: {state}, by {tree}, off {first:.1f} s, status {status}; completed"
+    )
 
 
 def purged() -> str:
