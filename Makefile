@@ -22,7 +22,7 @@ help:
 	@echo "             (KILL_EVERY=27: nothing goes wrong but that RMF's lift supervisor dies so often)"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
 	@echo "make test-vm  boot Debian 13 in QEMU, install our package, and kill and hang it there (ARCH=arm64)"
-	@echo "             (one of its machines: ONLY=lift, ONLY=site)"
+	@echo "             (one of its machines: ONLY=lift, site or upgrade)"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make man     the manual page, build/rmf-bridge.1"
 	@echo "make deb     Debian packages in dist/, for Debian 12 and 13 and Ubuntu 24.04, amd64 and arm64"

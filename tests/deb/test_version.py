@@ -1,0 +1,57 @@
+"""setup.py names the commit in the version, so that a mended package is a newer one."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bridges import __version__
+
+ROOT = Path(__file__).parents[2]
+
+
+def git(folder: Path, *words: str) -> str:
+    names = ("-c", "user.name=n", "-c", "user.email=n@n")
+    command = ["git", "-C", str(folder), *names, *words]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def version(folder: Path) -> str:
+    words = [sys.executable, "setup.py", "--version"]
+    done = subprocess.run(words, cwd=folder, check=True, capture_output=True, text=True)
+    return done.stdout.splitlines()[-1]
+
+
+@pytest.fixture
+def sources(tmp_path: Path) -> Path:
+    for name in ("setup.py", "bridges/__init__.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    return tmp_path
+
+
+def test_each_commit_and_each_change_beside_it_is_a_newer_version(sources: Path) -> None:
+    git(sources, "init", "-q")
+    seen = []
+    for number in (1, 2):
+        git(sources, "add", "setup.py", "bridges")
+        git(sources, "commit", "-q", "--allow-empty", "-m", "a step")
+        seen.append(version(sources))
+        assert seen[-1] == f"{__version__}+r{number}.g{git(sources, 'rev-parse', '--short', 'HEAD')}"
+    with (sources / "bridges/__init__.py").open("a") as changed:
+        changed.write("# changed\n")
+    seen.append(version(sources))
+    assert seen[-1].startswith(f"{seen[1]}.m20")
+    packages = [f"{__version__}+deb13", *(f"{each}+deb13" for each in seen)]
+    for older, newer in zip(packages, packages[1:], strict=False):
+        subprocess.run(["dpkg", "--compare-versions", older, "lt", newer], check=True)
+
+
+def test_without_a_checkout_of_its_own_the_build_is_unknown(sources: Path) -> None:
+    git(sources, "init", "-q")
+    inner = sources / "archive"
+    shutil.copytree(sources / "bridges", inner / "bridges")
+    shutil.copy(sources / "setup.py", inner)
+    assert version(inner) == __version__
