@@ -38,7 +38,7 @@ def module(tmp_path: Path, domain: int) -> Iterator[Module]:
     made = Module(tmp_path, domain)
     with socket.create_connection(("127.0.0.1", port(made.file))) as wire:
         wire.sendall(COIL_ON)
-        wait_until(lambda: made.relay() == [True], "the relay is on")
+        wait_until(lambda: made.relay()[-1:] == [True], "the relay is on")
     yield made
     made.close()
 
@@ -70,7 +70,7 @@ def test_a_relay_goes_off_though_another_services_module_never_answers(
         dead.write_text(module.yaml.replace(str(port(module.file)), silent_port))
         answers, never = died(tmp_path, module.file), died(tmp_path, dead)
         done = booted(tmp_path)
-    wait_until(lambda: module.relay() == [True, False], "the relay is off")
+    wait_until(lambda: module.relay()[-1:] == [False], "the relay is off")
     assert (done.returncode, answers.exists(), never.exists()) == (1, False, True)
     assert f"left_to_its_daemon file={dead}" in done.stderr
 
@@ -81,7 +81,7 @@ def test_a_record_of_a_later_version_that_is_not_understood_is_named_and_off_is_
 ) -> None:
     path = died(tmp_path, module.file, later=b"\nlater: 1\n")
     done = booted(tmp_path)
-    wait_until(lambda: module.relay() == [True, False], "the relay is off")
+    wait_until(lambda: module.relay()[-1:] == [False], "the relay is off")
     assert (done.returncode, path.exists()) == (1, True)
     assert f"{module.file}:" in done.stderr
     assert "unknown key 'later'" in done.stderr
