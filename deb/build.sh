@@ -18,7 +18,6 @@ root=$work/root page=$work/page tree=$work/tree wheels=$here/build/deb/wheels
 lib=usr/lib/rmf-bridges
 site=$tree/lib/python$python/site-packages
 beside=usr/lib/rmf-bridges-page # the page's libraries
-next=3.$((${python#3.} + 1))
 SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$here" log -1 --format=%ct 2>/dev/null || date +%s)}
 export SOURCE_DATE_EPOCH
 
@@ -119,8 +118,9 @@ CONTROL
   dpkg-deb --root-owner-group -Zxz --build "$2" "$here/dist/$1_${version}_$arch.deb"
   ! command -v lintian > /dev/null || lintian --allow-root --fail-on error "$here/dist/$1_${version}_$arch.deb"
 }
+# Of that Python and not of `python3`, which is another one in the next release: its upgrade keeps ours, and serving.
 libc='libc6 (>= 2.34)' # of the wheels' tags (wheels.py, lgpio.sh)
-package rmf-bridges "$root" "python3 (>= $python~), python3 (<< $next~), $libc, systemd (>= 252)" \
+package rmf-bridges "$root" "python$python, $libc, systemd (>= 252)" \
   "connect Open-RMF to lifts, doors and chargers" "$tree" <<'DESCRIPTION'
  Small daemons, one for each controller, that stand between Open-RMF and a
  building: dry contacts, Modbus, HTTP and CAN. Each is configured by one YAML
