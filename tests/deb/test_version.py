@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -39,13 +40,15 @@ def test_each_commit_and_each_change_beside_it_is_a_newer_version(sources: Path)
         git(sources, "add", "setup.py", "bridges")
         git(sources, "commit", "-q", "--allow-empty", "-m", "a step")
         seen.append(version(sources))
-        assert seen[-1] == f"{__version__}+r{number}.g{git(sources, 'rev-parse', '--short', 'HEAD')}"
+        assert (
+            seen[-1] == f"{__version__}+r{number}.g{git(sources, 'rev-parse', '--short', 'HEAD')}"
+        )
     with (sources / "bridges/__init__.py").open("a") as changed:
         changed.write("# changed\n")
     seen.append(version(sources))
     assert seen[-1].startswith(f"{seen[1]}.m20")
     packages = [f"{__version__}+deb13", *(f"{each}+deb13" for each in seen)]
-    for older, newer in zip(packages, packages[1:], strict=False):
+    for older, newer in pairwise(packages):
         subprocess.run(["dpkg", "--compare-versions", older, "lt", newer], check=True)
 
 
