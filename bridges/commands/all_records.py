@@ -12,7 +12,7 @@ import os
 import re
 import signal
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 
@@ -26,8 +26,6 @@ from drivers.profiles import texts
 
 OWN_S, OTHERS_S = 4.0, 2.0
 """For this machine's own pins, and then for all else: as long as the start of a daemon may take."""
-AGAIN_S = 0.2
-"""udev may not yet have given the chip to its group."""
 LOOK_EVERY_S = 0.01
 OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
 """In a YAML; it decides only who comes first."""
@@ -55,7 +53,7 @@ def switch_off_all(
 def _off(files: Collection[Path], within_s: float) -> set[Path]:
     """Switch these services' outputs off, side by side; returns those not verified off in time."""
     give_up_at = time.monotonic() + within_s
-    running = {_forked(lambda file=file: _until_off(file)): file for file in dict.fromkeys(files)}  # type: ignore[misc]
+    running = {_forked(file): file for file in dict.fromkeys(files)}
     left = set(running.values())
     while running and time.monotonic() < give_up_at:
         pid, ended = os.waitpid(-1, os.WNOHANG)
@@ -69,18 +67,12 @@ def _off(files: Collection[Path], within_s: float) -> set[Path]:
     return left
 
 
-def _forked(work: Callable[[], object]) -> int:
-    """Do this in a child, whose exit code is 0 when it is done; returns its process id."""
+def _forked(file: Path) -> int:
+    """Switch a service's outputs off in a child, whose exit code is 0 when they are; its process id."""
     if pid := os.fork():
         return pid
+    code = 1
     try:
-        work()
+        code = dead.switch_off(argparse.Namespace(file=file, runtime_dir=None, record=[]))
     finally:
-        os._exit(1)
-
-
-def _until_off(file: Path) -> None:
-    """Try until it is off; ends the process."""
-    while dead.switch_off(argparse.Namespace(file=file, runtime_dir=None, record=[])):
-        time.sleep(AGAIN_S)
-    os._exit(0)
+        os._exit(code)

@@ -40,7 +40,9 @@ def module(tmp_path: Path, domain: int) -> Iterator[Module]:
     with socket.create_connection(("127.0.0.1", port(made.file))) as wire:
 
         def is_on() -> bool:  # again and again: who follows the relay may have missed the first
-            wire.sendall(COIL_OFF + COIL_ON)
+            for frame in (COIL_OFF, COIL_ON):
+                wire.sendall(frame)
+                assert wire.recv(64)
             return made.relay()[-1:] == [True]
 
         wait_until(is_on, "the relay is on")

@@ -4,7 +4,7 @@ import os
 import random
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tests.vm.guest import header
@@ -142,18 +142,12 @@ def back() -> str:
 def _full() -> Iterator[None]:
     """The disk is full, also for root."""
     filler = Path("/var/filler")
-    room = os.statvfs("/var")
-    with filler.open("wb") as out:
-        os.posix_fallocate(out.fileno(), 0, room.f_bfree * room.f_frsize - (1 << 20))
-        block = bytes(4096)
-        try:
-            while True:
-                out.seek(0, os.SEEK_END)
-                out.write(block)
-                out.flush()
-        except OSError:
-            pass
     try:
+        with filler.open("wb") as out:
+            for size in (1 << 26, 1 << 20, 1 << 12):
+                with suppress(OSError):
+                    while True:
+                        os.posix_fallocate(out.fileno(), os.fstat(out.fileno()).st_size, size)
         yield
     finally:
         filler.unlink()
