@@ -14,6 +14,7 @@ from websockets.sync.client import connect
 
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
+from bridges.rmf.cdr import LONGEST_FLAT
 from bridges.rmf.transport import Transport
 from tests.page.browser.test_safety import ask
 
@@ -72,11 +73,14 @@ def strange_frames(address: str, rng: random.Random, number: int) -> int:
     return sent
 
 
-def long_names(transport: Transport, times: int = 1) -> Iterator[None]:
-    """Publish 23 lifts with names of almost a megabyte, so many times; yields after each."""
+def long_names(
+    transport: Transport, times: int = 1, length: int = LONGEST_FLAT - 1000
+) -> Iterator[None]:
+    """Publish 23 lifts with names of this many characters, by default the longest that a transport
+    takes, so many times; yields after each."""
     publisher = transport.publisher(topics.LIFT_STATES)
     for n in range(times):
         for lift in range(23):
-            name = f"{lift:02}" + "x" * (MB - 1000)
+            name = f"{lift:02}" + "x" * length
             publisher.publish(d.LiftState(lift_name=name, session_id=f"robot_{n}"))
         yield

@@ -50,7 +50,7 @@ def pages(directory: Path, rng: random.Random, table: Table) -> None:
 def _memory(address: str, domain: int) -> float:
     pid, forger = page_pid(address), join("forger", domain)
     most = 0.0
-    for _ in long_names(forger, 20):
+    for _ in long_names(forger, 20, 999_000):
         threading.Event().wait(0.5)
         most = max(most, rss_mb(pid))
     forger.close()

@@ -76,7 +76,7 @@ def test_when_the_network_fails_everything_is_marked_old_and_recovers_without_a_
     router.die()
     until(lambda: "OLD: silent" in card(tab, "Lift1"), "the lift to turn old")
     until(lambda: "OLD: silent" in card(tab, "Lift2"), "the other to turn old")
-    until(lambda: "nothing was heard for" in tab.locator("#status").inner_text(), "it to be said")
+    until(lambda: "no router answers" in tab.locator("#status").inner_text(), "it to be said")
     assert "now" not in card(tab, "Lift1").split()
     router.start()
     graph.lift("Lift1", "L3", 2, "fleet/robot")
